@@ -1,0 +1,3 @@
+"""gestured: a real-time tactile gesture recognition daemon."""
+
+__version__ = "0.1.0"

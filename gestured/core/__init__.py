@@ -1,0 +1,1 @@
+"""The pure core: numpy and the standard library's data modules, no clock, no socket, no file."""

@@ -1,0 +1,28 @@
+"""What gestured raises on purpose. Anything else that escapes is a bug and crashes loudly."""
+
+
+class GesturedError(Exception):
+    """Base of the errors that a command line prints as one sentence."""
+
+
+class ProtocolError(GesturedError):
+    """A peer sent nonsense: count `reason`, drop the packet, go on.
+
+    `reason` is a short, fixed word (a metric label), the text says more.
+    """
+
+    def __init__(self, reason: str, text: str = "") -> None:
+        super().__init__(text or reason)
+        self.reason = reason
+
+
+class ModelError(GesturedError):
+    """A model file that cannot be used; names the file and what is wrong."""
+
+
+class RecordingError(GesturedError):
+    """A recording that cannot be read or written; names the file, the field and what was expected."""
+
+
+class SettingsError(GesturedError):
+    """A setting that is not valid; names the key, the value and what was expected."""

@@ -1,0 +1,84 @@
+"""What comes out: small frozen facts in a plain union. Times are seconds on the stream's clock.
+
+An `id` numbers a sensor's segments: each `Onset` is followed by exactly one `Gesture`, `Unknown` or
+`Cancelled`, and by one `Release`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Onset:
+    """A contact began."""
+
+    sensor: str
+    id: int
+    onset: float  # s
+
+
+@dataclass(frozen=True, slots=True)
+class Gesture:
+    """A segment was recognised."""
+
+    sensor: str
+    id: int
+    gesture: str
+    confidence: float  # 0..1, calibrated
+    sequence: int  # counts a sensor's gestures from 1 without gaps
+    onset: float  # s, first touched frame
+    offset: float  # s, last touched frame
+    decided: float  # s, the frame (or flush) that decided it
+    frames: int  # touched frames, first to last
+    lost: int
+    model: str
+    degraded: bool
+    scores: Mapping[str, float]  # one per gesture
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """A segment that is none of the gestures, or not surely enough."""
+
+    sensor: str
+    id: int
+    confidence: float  # of the best gesture
+    onset: float
+    offset: float
+    decided: float
+    frames: int
+    lost: int
+    model: str
+    degraded: bool
+    scores: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Cancelled:
+    """A contact that is not answered: held too long, cut off by silence, a restart of the sensor ..."""
+
+    sensor: str
+    id: int
+    reason: str  # "held", "silence", "restart", "glitch", "refractory", "model"
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """The sensor was let go; the end of an `Onset`, whatever became of it."""
+
+    sensor: str
+    id: int
+    offset: float  # s
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """A sign of life, once a second."""
+
+    state: str  # "ok", "degraded", "no_data"
+    sensors: Mapping[str, str]  # state of each
+    model: str
+    time: float  # s since the Unix epoch
+
+
+Event = Onset | Gesture | Unknown | Cancelled | Release | Status
