@@ -1,0 +1,274 @@
+"""From raw counts to counts above the baseline: mounting, baseline, noise, bad taxels.
+
+Nothing here smooths over time: at 15 Hz a tap is one to three frames. The baseline is what a second
+without movement shows (`Settling`), followed slowly while the sensor is idle. Both steps are exact for
+any time between frames: `-expm1(-dt / tau)`, never `dt / tau`.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SETTLE_S = 0.93  # a stable second at 15 Hz: half-way between its last two frames, so jitter cannot miss it
+SETTLE_FRAMES = 64  # frames kept of that second; faster sensors are thinned out
+PATIENCE_S = 5.0  # a sensor that never settles (hum, a hand that never rests) is used all the same after this
+BASELINE_TAU_S = 2.0
+NOISE_TAU_S = 30.0
+REVIEW_S = 0.5  # noise moves slowly: it is looked at twice a second
+RESTLESS = 5.0  # a taxel that moves more than this many times the sensor's noise was touched, or is bad
+NOISY = 8.0  # a taxel with more than this many times the sensor's noise is bad
+STRIKES = 2  # gestures in which a taxel stood still while its neighbours were pressed
+
+
+@dataclass(frozen=True, slots=True)
+class Mounting:
+    """How a sensor is mounted: first mirrored left to right, then turned clockwise. Applied to frames and touches."""
+
+    rotate: int = 0  # degrees clockwise: 0, 90, 180, 270
+    mirror: bool = False
+
+    def __post_init__(self) -> None:
+        if self.rotate not in (0, 90, 180, 270):
+            raise ValueError(f"rotate: expected 0, 90, 180 or 270, found {self.rotate!r}")
+
+    def shape(self, rows: int, columns: int) -> tuple[int, int]:
+        """The grid (R, C) after mounting."""
+        return (columns, rows) if self.rotate in (90, 270) else (rows, columns)
+
+    def frame(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
+        """(R, C) as sent -> (R', C') as a person in front of the sensor sees it."""
+        if self.mirror:
+            values = values[:, ::-1]
+        return np.rot90(values, -(self.rotate // 90)) if self.rotate else values
+
+    def point(self, x: float, y: float, rows: int, columns: int) -> tuple[float, float]:
+        """The same for a touch: x to the right, y upward, in taxel pitches of a sensor of R x C taxels as sent."""
+        if self.mirror:
+            x = columns - 1 - x
+        if self.rotate == 90:
+            return y, columns - 1 - x
+        if self.rotate == 180:
+            return columns - 1 - x, rows - 1 - y
+        if self.rotate == 270:
+            return rows - 1 - y, x
+        return x, y
+
+
+class Settling:
+    """Collects frames until one second of them shows no movement, and says what the idle sensor looks like."""
+
+    def __init__(self) -> None:
+        self._frames: deque[tuple[float, Array]] = deque()
+        self._since: float | None = None
+
+    @property
+    def started(self) -> bool:
+        """Whether anything is collected."""
+        return self._since is not None
+
+    def clear(self) -> None:
+        """Forget what was collected: the sensor was touched."""
+        self._frames.clear()
+        self._since = None
+
+    def push(self, t: float, raw: Array, *, patience: bool) -> tuple[Array, Array, NDArray[np.bool_], bool] | None:
+        """Take one frame of (N,) counts; returns (baseline, noise, constant, stable) or nothing yet.
+
+        `patience` allows an answer that is not stable after `PATIENCE_S`.
+        """
+        frames = self._frames
+        if self._since is None:
+            self._since = t
+        if not frames or t - frames[-1][0] >= SETTLE_S / SETTLE_FRAMES:
+            frames.append((t, raw))
+        if t - frames[0][0] < SETTLE_S or len(frames) < 4:
+            return None
+        stack = np.array([f for _, f in frames])  # (n, N)
+        baseline, noise, constant, restless = _idle(stack)
+        stable = restless <= min(3, raw.size // 20)
+        if not stable and not (patience and t - self._since >= PATIENCE_S):
+            while t - frames[0][0] >= SETTLE_S / 2:  # the newer half may be the first half of a stable second
+                frames.popleft()
+            return None
+        self.clear()
+        return baseline, noise, constant, stable
+
+
+def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int]:
+    """(n, N) counts -> baseline (N,), noise (N,), taxels that never changed (N,), how many taxels moved."""
+    n = len(stack)
+    baseline = np.median(stack, axis=0)
+    # Successive differences see noise and not slow movement; mean absolute values, since one outlier must not rule.
+    jumps = np.abs(np.diff(stack, axis=0))
+    pooled = float(np.median(jumps.mean(axis=0))) / 1.128
+    step = quantum(stack, jumps)
+    floor = max(pooled, step / 2 if pooled > 0 else step)
+    spread = np.abs(stack - baseline).mean(axis=0) * 1.2533
+    shift = np.abs(np.median(stack[: n // 2], axis=0) - np.median(stack[n // 2 :], axis=0))
+    moved = int(np.count_nonzero((spread > RESTLESS * floor) | (shift > RESTLESS * floor)))
+    # A second of frames knows a taxel's own noise badly: lean on all taxels together.
+    noise = np.maximum(np.sqrt((n * spread**2 + 16 * floor**2) / (n + 16)), floor / 2)
+    constant = ~jumps.any(axis=0)
+    if pooled < step or np.count_nonzero(constant) > stack.shape[1] // 4:
+        constant[:] = False  # a clipped or coarse sensor stands still when idle: that proves nothing
+    return baseline, noise, constant, moved
+
+
+def quantum(stack: Array, jumps: Array) -> float:
+    """One quantisation step of the sensor in counts: 1 for integers, else the smallest change seen, never 0."""
+    if np.array_equal(stack, np.rint(stack)) and np.abs(stack).max() < 2**52:
+        return 1.0
+    seen = jumps[jumps > 0]
+    top = float(np.abs(stack).max())
+    return max(float(seen.min()) if seen.size else 0.0, top * 1e-6, 1e-35)
+
+
+class Conditioner:
+    """Baseline, noise and bad taxels of one sensor. Taxels are flat here: (N,) with N = R * C after mounting."""
+
+    def __init__(self, rows: int, columns: int) -> None:
+        self.rows = rows
+        self.columns = columns
+        self.ready = False
+        self._settling = Settling()
+        self._provisional = False  # the baseline is doubtful: take the next stable second instead
+        self._baseline: Array = np.zeros(rows * columns)
+        self._sigma: Array = np.ones(rows * columns)
+        self._weight: Array = np.ones(rows * columns)  # 1 / noise, 0 for bad taxels
+        self._stuck = np.zeros(rows * columns, dtype=bool)
+        self._strikes = np.zeros(rows * columns, dtype=np.int64)
+        self.bad = np.zeros(rows * columns, dtype=bool)
+        self.noise = 1.0  # counts, the median taxel's standard deviation
+        self._tracked: float | None = None
+        self._reviewed = 0.0
+
+    def reset(self) -> None:
+        """Forget the baseline: the next stable second is a new one."""
+        self.ready = False
+        self._provisional = False
+        self._settling.clear()
+        self._tracked = None
+
+    def doubt(self) -> None:
+        """After a silence: go on with the baseline, but replace it by the next stable second."""
+        self._provisional = True
+        self._tracked = None
+
+    def deviation(self, raw: Array) -> tuple[Array, float, float]:
+        """(N,) raw counts -> (N,) counts above the baseline; the largest (activity) and the lowest in units of noise."""
+        d = raw - self._baseline
+        scaled = d * self._weight
+        return d, float(scaled.max()), float(scaled.min())
+
+    def place(self, d: Array) -> tuple[float, float]:
+        """Centroid (row, column) of what clearly rises above the baseline, bad taxels left out."""
+        pressed = np.where(self._weight > 0, d, 0.0)
+        top = float(pressed.max())
+        pressed = np.maximum(pressed / top - 0.3, 0.0) if top > 0 else np.ones_like(pressed)
+        grid = pressed.reshape(self.rows, self.columns)
+        total = float(grid.sum())
+        return (
+            float(grid.sum(axis=1) @ np.arange(self.rows)) / total,
+            float(grid.sum(axis=0) @ np.arange(self.columns)) / total,
+        )
+
+    def settle(self, t: float, raw: Array) -> bool:
+        """Offer a frame that may be idle; true when the baseline was learned from the second that ends here."""
+        learned = self._settling.push(t, raw, patience=not self.ready)
+        if learned is None:
+            return False
+        self._baseline, self._sigma, self._stuck, stable = learned
+        self._provisional = not stable
+        self.ready = True
+        self._tracked = self._reviewed = t
+        self._review()
+        return True
+
+    def shifted(self, d: Array, on: float) -> bool:
+        """Many taxels far below the baseline: no touch does that, so the sensor restarted or a hand left it."""
+        scaled = d * self._weight
+        below = scaled < -max(on, 0.3 * float(scaled.max()))
+        return int(np.count_nonzero(below)) * 20 >= 3 * d.size
+
+    def idle(self, t: float, raw: Array, d: Array, *, sunken: bool) -> None:
+        """Follow the idle sensor: baseline with `BASELINE_TAU_S`, noise with `NOISE_TAU_S`.
+
+        `sunken`: some taxel lies clearly below its baseline, as after a hand that rested there when it was learned.
+        """
+        if self._provisional or sunken:
+            self.settle(t, raw)
+        elif self._settling.started:
+            self._settling.clear()
+        if self._tracked is not None:
+            self._baseline = self._baseline + d * -math.expm1((self._tracked - t) / BASELINE_TAU_S)
+            if t - self._reviewed >= REVIEW_S:
+                seen = np.minimum(np.abs(d), 4 * self._sigma) * 1.2533
+                self._sigma = self._sigma + (seen - self._sigma) * -math.expm1((self._reviewed - t) / NOISE_TAU_S)
+                self._reviewed = t
+                self._review()
+        self._tracked = t
+
+    def busy(self) -> None:
+        """The sensor is touched: nothing is learned, and the time that passes is not tracked afterwards."""
+        self._tracked = None
+        if self._settling.started:
+            self._settling.clear()
+
+    def inspect(self, frames: Array) -> None:
+        """Look at a finished contact (T, N), not yet bridged: a taxel that stood still under pressure is stuck."""
+        if len(frames) < 2:
+            return
+        peaks = frames.max(axis=0)
+        around = _neighbour_mean(peaks.reshape(self.rows, self.columns), np.ones((self.rows, self.columns), dtype=bool))
+        still = np.ptp(frames, axis=0) == 0
+        pressed = around.ravel() > max(0.4 * float(peaks.max()), 8 * self.noise)
+        self._strikes[pressed & still] += 1
+        self._strikes[~still] = 0
+        stuck = (self._stuck & still) | (self._strikes >= STRIKES)
+        if (stuck != self._stuck).any():
+            self._stuck = stuck
+            self._review()
+
+    def bridge(self, frames: Array) -> Array:
+        """(T, N) -> (T, R, C) with the bad taxels replaced by what their good neighbours show."""
+        grid = frames.reshape(-1, self.rows, self.columns)
+        good = ~self.bad.reshape(self.rows, self.columns)
+        if good.all() or not good.any():
+            return grid
+        grid = np.where(good, grid, 0.0)
+        while not good.all():
+            around = _neighbour_mean(grid, good)
+            fill = ~good & (_neighbour_mean(good.astype(float), np.ones_like(good)) > 0)
+            grid = np.where(fill, around, grid)
+            good = good | fill
+        return grid
+
+    def _review(self) -> None:
+        """Weights, the sensor's noise and its bad taxels from what is known of each taxel."""
+        self.noise = float(np.median(self._sigma))
+        self.bad = self._stuck | (self._sigma > NOISY * self.noise)
+        if self.bad.all():
+            self.bad = np.zeros_like(self.bad)
+        self._weight = np.where(self.bad, 0.0, 1.0 / np.maximum(self._sigma, 0.2 * self.noise))
+
+
+def _neighbour_mean(grid: NDArray[np.floating], good: NDArray[np.bool_]) -> Array:
+    """(..., R, C) -> mean over the good ones of the eight neighbours, nearer ones counting double; 0 without any."""
+    pad = [(0, 0)] * (grid.ndim - 2) + [(1, 1), (1, 1)]
+    values = np.pad(np.where(good, grid, 0.0), pad)
+    weight = np.pad(good.astype(float), 1)
+    rows, columns = good.shape
+    total = np.zeros(grid.shape)
+    count = np.zeros(good.shape)
+    for i in range(3):
+        for j in range(3):
+            if (i, j) != (1, 1):
+                share = 2.0 if 1 in (i, j) else 1.0
+                total += share * values[..., i : i + rows, j : j + columns]
+                count += share * weight[i : i + rows, j : j + columns]
+    return total / np.maximum(count, 1e-9)

@@ -1,0 +1,279 @@
+"""The one path from frames to events: conditioning, segmentation, classification, decision."""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.conditioning import Conditioner, Mounting
+from gestured.core.errors import ModelError
+from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
+from gestured.core.frames import Frame, Segment, Touch
+from gestured.core.segmentation import TOUCHED, Action, Phase, Segmenter, Timing
+
+LEAD_S = 0.15  # quiet frames kept before an onset: at 15 Hz two of them
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """What a classifier says of a segment."""
+
+    values: NDArray[np.float32]  # (G,) probabilities given that it is one of the gestures, in the classifier's order
+    unknown: float  # probability that it is none of them
+    model: str
+    degraded: bool = False  # a fallback answered
+
+
+class Classifier(Protocol):
+    """Anything that scores segments: a model, or a ladder of them."""
+
+    gestures: tuple[str, ...]
+
+    def classify(self, segment: Segment) -> Scores:
+        """Score one segment; raises ModelError where it cannot."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """A segment that is complete and waits for its name."""
+
+    id: int
+    segment: Segment
+    decided: float  # s, the frame that completed it
+
+
+Contact = Onset | Cut | Cancelled | Release
+Kept = tuple[float, NDArray[np.float64], tuple[Touch, ...], int]  # t, (N,) counts above the baseline, touches, lost
+
+
+class FrontEnd:
+    """Frames of one sensor in, segments out. `rows` x `columns` is the grid as sent, before mounting."""
+
+    def __init__(
+        self,
+        sensor: str,
+        rows: int,
+        columns: int,
+        *,
+        mounting: Mounting | None = None,
+        wait_for_double_tap: bool = True,
+        timing: Timing | None = None,
+    ) -> None:
+        self.sensor = sensor
+        self.sent = (rows, columns)
+        self.mounting = mounting or Mounting()
+        self.rows, self.columns = self.mounting.shape(rows, columns)
+        self.timing = timing or Timing()
+        self.conditioner = Conditioner(self.rows, self.columns)
+        travel = self.timing.tap_travel * min(self.rows, self.columns)
+        self.segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
+        self._mounted = self.mounting != Mounting()
+        self._kept: deque[Kept] = deque()
+        self._id = 0
+        self._last: float | None = None
+        self._interval = 0.0
+
+    @property
+    def ready(self) -> bool:
+        """Whether the idle sensor is known, so that a touch can be told from it."""
+        return self.conditioner.ready
+
+    @property
+    def touched(self) -> bool:
+        """Whether a contact is going on, given up or not."""
+        return self.segmenter.phase is not Phase.IDLE
+
+    @property
+    def noise(self) -> float:
+        """Counts, one standard deviation of the median taxel."""
+        return self.conditioner.noise
+
+    @property
+    def bad_taxels(self) -> int:
+        """How many taxels are bridged from their neighbours."""
+        return int(np.count_nonzero(self.conditioner.bad))
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames a second as they come, 0 before it is known."""
+        return 1.0 / self._interval if self._interval > 0 else 0.0
+
+    def push(self, frame: Frame) -> list[Contact]:
+        """Take one frame; its time must lie after the last one's (ValueError), its grid must be the sensor's."""
+        t = frame.t
+        out: list[Contact] = []
+        if self._last is not None:
+            step = t - self._last
+            if not step > 0:
+                raise ValueError(f"frame times must increase: {t} s after {self._last} s")
+            if step > self.timing.stale_s:
+                out = self.flush(t)
+            else:
+                self._interval += (step - self._interval) * (0.05 if self._interval else 1.0)
+        self._last = t
+        values = self.mounting.frame(frame.values) if self._mounted else frame.values
+        raw = values.astype(np.float64).reshape(-1)
+        conditioner, segmenter = self.conditioner, self.segmenter
+        if not conditioner.ready:
+            conditioner.settle(t, raw)
+            return out
+        d, activity, lowest = conditioner.deviation(raw)
+        sunken = lowest < -segmenter.on
+        if sunken and conditioner.shifted(d, segmenter.on):
+            out += self.reset("restart")
+            conditioner.settle(t, raw)
+            return out
+        if segmenter.phase is not Phase.IDLE:
+            for action in segmenter.flush(t):
+                out += self._act(action, t)
+        kept = self._kept
+        kept.append((t, d, frame.touches, frame.lost))
+        place = conditioner.place(d) if activity >= segmenter.off else None
+        for action in segmenter.push(t, activity, place):
+            out += self._act(action, t)
+        if segmenter.phase in TOUCHED:
+            conditioner.busy()
+            return out
+        while kept[0][0] < t - LEAD_S:
+            kept.popleft()
+        if segmenter.phase is Phase.IDLE:
+            conditioner.idle(t, raw, d, sunken=sunken)
+        else:
+            conditioner.settle(t, raw)  # what stays on the sensor becomes part of its baseline
+        return out
+
+    def flush(self, t: float) -> list[Contact]:
+        """The stream paused or ended at `t` s: close what is open."""
+        out: list[Contact] = []
+        if self.touched:
+            for action in self.segmenter.flush(t):
+                out += self._act(action, t)
+        if self.touched:
+            out += self._act(Action.CLOSE, t) if self.segmenter.let_go() else self._cancel("silence")
+        self.segmenter.reset()
+        self._kept.clear()
+        self.conditioner.doubt()
+        return out
+
+    def reset(self, reason: str = "restart") -> list[Contact]:
+        """Start clean and learn the idle sensor anew; an open contact is cancelled."""
+        out = self._cancel(reason) if self.touched else []
+        self.segmenter.reset()
+        self.conditioner.reset()
+        self._kept.clear()
+        return out
+
+    def _act(self, action: Action, t: float) -> list[Contact]:
+        offset = self.segmenter.last_touched
+        if action is Action.OPEN:
+            self._id += 1
+            return [Onset(self.sensor, self._id, t)]
+        if action is Action.HELD:
+            return [Cancelled(self.sensor, self._id, "held")]
+        release = Release(self.sensor, self._id, offset)
+        if action is Action.LEFT:
+            return [release]
+        if self.segmenter.contact_s() < self.timing.glitch_s:
+            return [Cancelled(self.sensor, self._id, "glitch"), release]
+        return [Cut(self._id, self._segment(), t), release]
+
+    def _cancel(self, reason: str) -> list[Contact]:
+        release = Release(self.sensor, self._id, self.segmenter.last_touched)
+        if self.segmenter.phase is Phase.SPENT:  # has been cancelled already
+            return [release]
+        return [Cancelled(self.sensor, self._id, reason), release]
+
+    def _segment(self) -> Segment:
+        times = np.array([k[0] for k in self._kept])
+        stack = np.array([k[1] for k in self._kept])
+        first = int(np.searchsorted(times, self.segmenter.onset))
+        last = int(np.searchsorted(times, self.segmenter.last_touched))
+        self.conditioner.inspect(stack[first : last + 1])
+        limit = float(np.finfo(np.float32).max)
+        frames = np.clip(self.conditioner.bridge(stack), -limit, limit).astype(np.float32)
+        touches: tuple[tuple[Touch, ...], ...] = ()
+        if any(k[2] for k in self._kept):
+            touches = tuple(tuple(self._mount(touch) for touch in k[2]) for k in self._kept)
+        lost = sum(k[3] for k in list(self._kept)[first + 1 : last + 1])
+        return Segment(frames, times, first, last, self.conditioner.noise, lost, touches)
+
+    def _mount(self, touch: Touch) -> Touch:
+        return Touch(touch.id, *self.mounting.point(touch.x, touch.y, *self.sent))
+
+
+class Recognizer:
+    """Frames of one sensor in, events out. `classifier` may be replaced between two frames.
+
+    `gestures` restricts the answer to a subset; what falls to the others is not given to those that are left.
+    `thresholds` are the confidences below which a gesture is unknown; `refractory` seconds in which the same
+    gesture is not published again.
+    """
+
+    def __init__(
+        self,
+        front_end: FrontEnd,
+        classifier: Classifier,
+        *,
+        gestures: Sequence[str] | None = None,
+        thresholds: Mapping[str, float] | None = None,
+        default_threshold: float = 0.5,
+        refractory: Mapping[str, float] | None = None,
+        sequence: int = 0,
+    ) -> None:
+        self.front_end = front_end
+        self.classifier = classifier
+        self.sequence = sequence
+        self._gestures = tuple(gestures) if gestures is not None else classifier.gestures
+        self._thresholds = dict(thresholds or {})
+        self._default_threshold = default_threshold
+        self._refractory = dict(refractory or {})
+        self._last_offset: dict[str, float] = {}
+
+    def push(self, frame: Frame) -> list[Event]:
+        """Take one frame, give what it decides; see `FrontEnd.push`."""
+        found = self.front_end.push(frame)
+        return self._name(found) if found else []
+
+    def flush(self, t: float) -> list[Event]:
+        """The stream paused or ended at `t` s: decide what can be decided, cancel the rest."""
+        return self._name(self.front_end.flush(t))
+
+    def reset(self) -> list[Event]:
+        """The sensor restarted: cancel what is open, learn the idle sensor anew."""
+        return self._name(self.front_end.reset())
+
+    def _name(self, found: list[Contact]) -> list[Event]:
+        return [self._decide(x) if isinstance(x, Cut) else x for x in found]
+
+    def _decide(self, cut: Cut) -> Gesture | Unknown | Cancelled:
+        sensor, segment = self.front_end.sensor, cut.segment
+        try:
+            answer = self.classifier.classify(segment)
+        except ModelError:
+            return Cancelled(sensor, cut.id, "model")
+        scores = {
+            gesture: float(value)
+            for gesture, value in zip(self.classifier.gestures, answer.values, strict=True)
+            if gesture in self._gestures
+        }
+        best = max(scores, key=scores.__getitem__)
+        confidence = scores[best] * (1.0 - answer.unknown)
+        frames = segment.last - segment.first + 1
+        if not confidence >= self._thresholds.get(best, self._default_threshold):
+            return Unknown(
+                sensor, cut.id, confidence, segment.onset, segment.offset, cut.decided,
+                frames, segment.lost, answer.model, answer.degraded, scores,
+            )  # fmt: skip
+        since = segment.onset - self._last_offset.get(best, -np.inf)
+        if since < self._refractory.get(best, 0.0):
+            return Cancelled(sensor, cut.id, "refractory")
+        self._last_offset[best] = segment.offset
+        self.sequence += 1
+        return Gesture(
+            sensor, cut.id, best, confidence, self.sequence, segment.onset, segment.offset, cut.decided,
+            frames, segment.lost, answer.model, answer.degraded, scores,
+        )  # fmt: skip

@@ -1,0 +1,210 @@
+"""The pressure-activity state machine: which frames belong to one gesture.
+
+Activity is the largest taxel in units of its own noise. The cases, and what becomes of them:
+
+    tap          ##..............   one segment, decided after `tap_gap_s` of quiet: a second tap may come
+    double tap   ##...##..          one segment of two contacts, decided `release_s` after the second
+    swipe        ########..         one segment, decided `release_s` after the finger left
+    flicker      ###.####..         one contact: a single quiet frame is shorter than `release_s`
+    hold         ############...    after `limit_s` cancelled ("held"); nothing more until it is let go
+    object       ###############    the same; the baseline learns it, then the sensor is idle again
+    silence      ####     ...       cancelled ("silence") after `stale_s` without a frame
+    glitch       |                  shorter than any finger at a fast sensor: cancelled ("glitch")
+
+Not handled: two people on one sensor, and a tap that begins while another finger still rests (one contact).
+"""
+
+import math
+from dataclasses import dataclass
+from enum import Enum, auto
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Durations in seconds. At 15 Hz they lie half-way between frames, so that jitter cannot flip a decision."""
+
+    release_s: float = 0.10  # quiet this long: the finger is off
+    tap_gap_s: float = 0.50  # a second tap may begin until then (gaps up to 0.4 s, seen through 15 Hz)
+    tap_s: float = 0.57  # a tap is at most this long
+    tap_travel: float = 0.15  # and stays within this share of the grid's shorter side
+    limit_s: float = 5.03  # a contact that is no gesture any more
+    stale_s: float = 1.0  # silence that ends everything
+    glitch_s: float = 0.02  # a contact surely shorter than this is no finger
+
+
+OFF_SHARE = 0.12  # of the contact's peak: below it the finger is off (textile recovers slowly)
+ON_SHARE = 0.20  # of the last contact's peak: what a new contact must exceed while the textile recovers
+RECOVERY_S = 1.0
+
+
+class Phase(Enum):
+    """What is true of the sensor."""
+
+    IDLE = auto()
+    CONTACT = auto()
+    RELEASING = auto()
+    GAP = auto()
+    SPENT = auto()
+
+
+class Signal(Enum):
+    """What a frame, or the time that passed, says."""
+
+    QUIET = auto()
+    WEAK = auto()
+    STRONG = auto()
+    RELEASED = auto()  # quiet for release_s
+    TAPPED = auto()  # the same, and the segment is one tap so far
+    GAP_OVER = auto()  # quiet for tap_gap_s
+    LIMIT = auto()
+
+
+class Action(Enum):
+    """What the owner of the frames has to do."""
+
+    OPEN = auto()
+    CLOSE = auto()
+    HELD = auto()  # give the segment up
+    LEFT = auto()  # a given-up contact was let go
+
+
+P, S, A = Phase, Signal, Action
+TRANSITIONS: dict[tuple[Phase, Signal], tuple[Phase, Action | None]] = {
+    (P.IDLE, S.QUIET): (P.IDLE, None),
+    (P.IDLE, S.WEAK): (P.IDLE, None),
+    (P.IDLE, S.STRONG): (P.CONTACT, A.OPEN),
+    (P.CONTACT, S.QUIET): (P.RELEASING, None),
+    (P.CONTACT, S.WEAK): (P.CONTACT, None),
+    (P.CONTACT, S.STRONG): (P.CONTACT, None),
+    (P.CONTACT, S.LIMIT): (P.SPENT, A.HELD),
+    (P.RELEASING, S.QUIET): (P.RELEASING, None),
+    (P.RELEASING, S.WEAK): (P.RELEASING, None),
+    (P.RELEASING, S.STRONG): (P.CONTACT, None),
+    (P.RELEASING, S.RELEASED): (P.IDLE, A.CLOSE),
+    (P.RELEASING, S.TAPPED): (P.GAP, None),
+    (P.RELEASING, S.LIMIT): (P.SPENT, A.HELD),
+    (P.GAP, S.QUIET): (P.GAP, None),
+    (P.GAP, S.WEAK): (P.GAP, None),
+    (P.GAP, S.STRONG): (P.CONTACT, None),
+    (P.GAP, S.GAP_OVER): (P.IDLE, A.CLOSE),
+    (P.GAP, S.LIMIT): (P.SPENT, A.HELD),
+    (P.SPENT, S.QUIET): (P.SPENT, None),
+    (P.SPENT, S.WEAK): (P.SPENT, None),
+    (P.SPENT, S.STRONG): (P.SPENT, None),
+    (P.SPENT, S.RELEASED): (P.IDLE, A.LEFT),
+}
+TOUCHED = frozenset({P.CONTACT, P.RELEASING, P.GAP})
+
+
+class Segmenter:
+    """Turns activity over time into actions. Knows times and levels, no frames.
+
+    `on` and `off` are in units of noise; a quiet taxel exceeds 1 + sqrt(2 ln N) rarely and 4 + sqrt(2 ln N)
+    never (extreme values of N normal deviates).
+    """
+
+    def __init__(self, taxels: int, travel: float, *, wait_for_double_tap: bool = True, timing: Timing | None = None):
+        self.timing = timing or Timing()
+        self.on = 4.0 + math.sqrt(2 * math.log(taxels))
+        self.off = 1.0 + math.sqrt(2 * math.log(taxels))
+        self._travel = travel  # taxel pitches that a tap may move
+        self._wait = wait_for_double_tap
+        self.reset()
+
+    def reset(self) -> None:
+        """Start clean, in IDLE."""
+        self.phase = Phase.IDLE
+        self.onset = self.last_touched = 0.0  # s, of the segment
+        self._began = 0.0  # s, of the contact
+        self._contacts = 0
+        self._peak = 0.0
+        self._quiet_since: float | None = None
+        self._box: tuple[float, float, float, float] | None = None  # where the contact's centroid went
+        self._widest = 0.0
+
+    def push(self, t: float, activity: float, place: tuple[float, float] | None) -> list[Action]:
+        """One frame at `t` s, after `flush(t)`; `place` is the centroid (row, column) where activity is at least `off`."""
+        actions: list[Action] = []
+        level = self._level(t, activity)
+        before = self.phase
+        self._step(level, actions)
+        if self.phase is Phase.SPENT:
+            if level is Signal.QUIET:
+                self._quiet_since = self._since(t)
+            else:
+                self._quiet_since, self.last_touched = None, t
+        elif self.phase is Phase.CONTACT:
+            if before is not Phase.CONTACT and before is not Phase.RELEASING:
+                self._began = t
+                self._box = None
+                self._contacts = 1 if before is Phase.IDLE else self._contacts + 1
+            if before is Phase.IDLE:
+                self.onset, self._peak, self._widest = t, 0.0, 0.0
+            self._peak = max(self._peak, activity)
+            self.last_touched = t
+            self._quiet_since = None
+            if place is not None and level is Signal.STRONG:
+                self._follow(place)
+        elif self.phase is not Phase.IDLE:
+            self._quiet_since = self._since(t)
+        return actions
+
+    def flush(self, t: float) -> list[Action]:
+        """What the time alone decides until `t` s. Comes before `push`, so that a late frame cannot join what is over."""
+        actions: list[Action] = []
+        timing = self.timing
+        if self.phase in TOUCHED and t - self.onset >= timing.limit_s:
+            self._step(Signal.LIMIT, actions)
+        if self._quiet_since is not None:
+            quiet = t - self._quiet_since
+            if self.phase in (Phase.RELEASING, Phase.SPENT) and quiet >= timing.release_s:
+                self._step(Signal.TAPPED if self._is_tap() else Signal.RELEASED, actions)
+            if self.phase is Phase.GAP and quiet >= timing.tap_gap_s:
+                self._step(Signal.GAP_OVER, actions)
+        return actions
+
+    def let_go(self) -> bool:
+        """Whether a finger was already off when the stream ended: what is open may then be decided."""
+        return self.phase in (Phase.RELEASING, Phase.GAP)
+
+    def contact_s(self) -> float:
+        """Longest that the contact can have lasted: to its first quiet frame."""
+        return (self.last_touched if self._quiet_since is None else self._quiet_since) - self.onset
+
+    def _step(self, signal: Signal, actions: list[Action]) -> None:
+        self.phase, action = TRANSITIONS[self.phase, signal]
+        if action is not None:
+            actions.append(action)
+
+    def _since(self, t: float) -> float:
+        return t if self._quiet_since is None else self._quiet_since
+
+    def _level(self, t: float, activity: float) -> Signal:
+        on, off = self.on, self.off
+        if self.phase is Phase.IDLE:
+            if activity < on:  # the common case first
+                return Signal.QUIET if activity < off else Signal.WEAK
+            recovering = ON_SHARE * self._peak * math.exp(min(0.0, (self.last_touched - t) / RECOVERY_S))
+            return Signal.STRONG if activity >= recovering else Signal.WEAK
+        if self.phase is Phase.SPENT:
+            return Signal.QUIET if activity < off else Signal.STRONG
+        if activity < max(off, OFF_SHARE * self._peak):
+            return Signal.QUIET
+        return Signal.STRONG if activity >= max(on, ON_SHARE * self._peak) else Signal.WEAK
+
+    def _follow(self, place: tuple[float, float]) -> None:
+        row, column = place
+        top, left, bottom, right = self._box or (row, column, row, column)
+        top, left, bottom, right = min(top, row), min(left, column), max(bottom, row), max(right, column)
+        self._box = (top, left, bottom, right)
+        self._widest = max(self._widest, math.hypot(bottom - top, right - left))
+
+    def _is_tap(self) -> bool:
+        short = self.last_touched - self._began <= self.timing.tap_s
+        return (
+            self._wait
+            and self.phase is Phase.RELEASING
+            and self._contacts == 1
+            and short
+            and self._widest <= self._travel
+        )

@@ -1,0 +1,159 @@
+"""From a segment to a net's input: the model's grid, rate and scale. Part of the model, stored in its metadata."""
+
+import json
+from dataclasses import asdict, dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.frames import Segment
+
+SAME_RATE = 0.12  # a rate this near to the model's is taken as it is: interpolating jittered times blurs taps
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """How a segment is prepared for a model."""
+
+    rows: int
+    columns: int
+    rate_hz: float
+    smooth_frames: int  # running average over so many frames (paper, section on preprocessing); 1 = none
+    lead_s: float  # quiet context before the first touched frame
+    tail_s: float  # and after the last one
+    floor: float  # the peak is taken to be at least so many times the sensor's noise
+
+    def to_json(self) -> str:
+        """The settings as JSON, for a model's metadata."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> "Window":
+        """Read what `to_json` wrote; raises ValueError naming the key."""
+        try:
+            found = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise ValueError(f"window: expected a JSON object, {error}") from None
+        names = {f.name: f.type for f in fields(cls)}
+        if not isinstance(found, dict) or set(found) != set(names):
+            raise ValueError(f"window: expected exactly the keys {', '.join(names)}")
+        for name, kind in names.items():
+            value = found[name]
+            whole = kind is int
+            low = 2 if name in ("rows", "columns") else 1 if whole else 0
+            if isinstance(value, bool) or not isinstance(value, int if whole else int | float):
+                raise ValueError(f"window: {name}: expected a{' whole' if whole else ''} number, found {value!r}")
+            if not low <= value <= 1000 or (name == "rate_hz" and value <= 0):
+                raise ValueError(f"window: {name}: expected a number from {low} to 1000, found {value!r}")
+        return cls(**found)
+
+    def apply(self, segment: Segment) -> NDArray[np.float32]:
+        """(T, R, C) segment -> (T', rows, columns) float32, 0..1 of the segment's own peak."""
+        frames, times = self._span(segment)
+        frames = self._regrid(frames, segment)
+        frames = self._retime(frames, times)
+        if self.smooth_frames > 1:
+            frames = _running_mean(frames, self.smooth_frames)
+        frames = np.maximum(frames, 0.0)
+        peak = max(float(frames.max()), self.floor * segment.noise, 1e-37)
+        return (frames / peak).astype(np.float32)
+
+    def _span(self, segment: Segment) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The frames from `lead_s` before the first touched one to `tail_s` after the last."""
+        times = segment.times
+        slack = 0.25 / self.rate_hz  # jitter must not decide whether a frame is in
+        start = int(np.searchsorted(times, segment.onset - self.lead_s - slack))
+        end = int(np.searchsorted(times, segment.offset + self.tail_s + slack))
+        return segment.frames[start:end].astype(np.float64), times[start:end]
+
+    def _regrid(self, frames: NDArray[np.float64], segment: Segment) -> NDArray[np.float64]:
+        """Area average (or bilinear, where the sensor is coarser) of a square around the touched place.
+
+        A long sensor is not squeezed: directions and circles keep their shape. The square is as wide as the
+        sensor's shorter side, or as long as the movement where that is longer.
+        """
+        _, rows, columns = frames.shape
+        if (rows, columns) == (self.rows, self.columns):
+            return frames
+        side = float(min(rows, columns))
+        top, left = (rows - side) / 2, (columns - side) / 2
+        if rows != columns:
+            axis = 1 if rows > columns else 2  # the longer one
+            touched = segment.frames[segment.first : segment.last + 1]
+            profile = touched.max(axis=(0, 3 - axis))
+            used = np.flatnonzero(profile >= 0.3 * profile.max())
+            length = frames.shape[axis]
+            low, high = float(used[0]), float(used[-1] + 1)
+            side = min(max(side, high - low + 2), float(length))
+            start = min(max((low + high - side) / 2, 0.0), length - side)
+            top, left = (start, (columns - side) / 2) if axis == 1 else ((rows - side) / 2, start)
+        vertical = _resize(rows, top, side, self.rows)
+        horizontal = _resize(columns, left, side, self.columns)
+        return np.asarray(vertical @ frames @ horizontal.T)
+
+    def _retime(self, frames: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """To `rate_hz` by time stamps: averaged where the sensor is faster, interpolated where it is slower."""
+        if len(times) < 2:
+            return frames
+        step = 1.0 / self.rate_hz
+        steps = np.diff(times)
+        usual = float(np.median(steps))
+        flat = frames.reshape(len(frames), -1)
+        if abs(usual - step) <= SAME_RATE * step:
+            missing = np.maximum(np.rint(steps / step).astype(int), 1)
+            at = np.concatenate([[0], np.cumsum(missing)])
+            if at[-1] + 1 == len(flat):
+                return frames
+            grid = np.arange(at[-1] + 1)
+            out = _interpolate(grid.astype(float), at.astype(float), flat)
+        else:
+            grid = np.arange(max(int(np.rint((times[-1] - times[0]) * self.rate_hz)), 0) + 1) * step + times[0]
+            if usual > step:
+                out = _interpolate(grid, times, flat)
+            else:
+                out = _box_mean(grid, step, times, flat)
+        return out.reshape(len(out), *frames.shape[1:])
+
+
+def _resize(size: int, start: float, side: float, cells: int) -> NDArray[np.float64]:
+    """(cells, size) weights that bring `side` taxels from `start` on to `cells`; what lies outside counts as 0."""
+    width = side / cells
+    taxel = np.arange(size)
+    if width >= 1.0:
+        low = start + width * np.arange(cells)[:, None]
+        overlap = np.minimum(low + width, taxel + 1.0) - np.maximum(low, taxel)
+        return np.maximum(overlap, 0.0) / width
+    centre = start + width * (np.arange(cells)[:, None] + 0.5) - 0.5
+    centre = np.clip(centre, max(start, 0.0), min(start + side, size) - 1.0)
+    return np.maximum(1.0 - np.abs(centre - taxel), 0.0)
+
+
+def _interpolate(
+    grid: NDArray[np.float64], times: NDArray[np.float64], flat: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Linear in time, (T, N) -> (len(grid), N); constant beyond the ends."""
+    right = np.clip(np.searchsorted(times, grid), 1, len(times) - 1)
+    share = np.clip((grid - times[right - 1]) / (times[right] - times[right - 1]), 0.0, 1.0)[:, None]
+    return np.asarray(flat[right - 1] * (1 - share) + flat[right] * share)
+
+
+def _box_mean(
+    grid: NDArray[np.float64], step: float, times: NDArray[np.float64], flat: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Mean of the piecewise linear signal over `step` seconds around each time of `grid`."""
+    edges = np.clip(np.stack([grid - step / 2, grid + step / 2]), times[0], times[-1])
+    areas = np.diff(times)[:, None] * (flat[1:] + flat[:-1]) / 2
+    total = np.concatenate([np.zeros((1, flat.shape[1])), np.cumsum(areas, axis=0)])  # integral up to each time
+    sums = []
+    for edge in edges:
+        left = np.clip(np.searchsorted(times, edge, side="right") - 1, 0, len(times) - 2)
+        here = _interpolate(edge, times, flat)
+        sums.append(total[left] + (edge - times[left])[:, None] * (flat[left] + here) / 2)
+    return np.asarray((sums[1] - sums[0]) / np.maximum(edges[1] - edges[0], 1e-12)[:, None])
+
+
+def _running_mean(frames: NDArray[np.float64], length: int) -> NDArray[np.float64]:
+    """Mean over `length` frames centred on each; fewer at the ends. Windows are short: no running sums."""
+    before, after = length // 2, (length - 1) // 2
+    n = len(frames)
+    return np.stack([frames[max(0, k - before) : min(n, k + after + 1)].mean(axis=0) for k in range(n)])
