@@ -1,0 +1,83 @@
+# gestured: `make help` says what there is.
+#
+# Two environments: .venv holds the runtime alone (what a vehicle gets), .venv-dev what tests and training need.
+# A stamp in each says that it is complete, so that the second run asks pip for nothing and works offline.
+
+.PHONY: help demo test lint lab clean
+.NOTPARALLEL:
+.DEFAULT_GOAL := help
+MAKEFLAGS += --no-builtin-rules
+unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV
+export PIP_DISABLE_PIP_VERSION_CHECK = 1
+export PIP_NO_INPUT = 1
+
+SECONDS = 60
+MODEL = cnn_lstm
+PYTHON =
+ARGS =
+# The same version everywhere; the extra index has the build without CUDA, which is a tenth of the size.
+TORCH = torch==2.13.0
+TORCH_INDEX = https://download.pytorch.org/whl/cpu
+
+help:  ## this list
+	@echo "usage: make TARGET [NAME=VALUE ...]"
+	@sed -n 's/^\([a-z]*\):.*## /  \1\t/p' Makefile | expand -t 10
+
+demo: .venv/.runtime  ## recognise simulated gestures with the real daemon: SECONDS=20 MODEL=lstm PACE=fast ARGS="--seed 7"
+	@.venv/bin/gesturectl demo --seconds "$(SECONDS)" --model "$(MODEL)" $(if $(PACE),--pace "$(PACE)") $(ARGS)
+
+test: .venv-dev/.dev  ## run the tests: ARGS="tests/core -k tap"
+	@$(MAKE) --no-print-directory .venv-dev/.lab || echo "note: without the lab's packages its tests are skipped" >&2
+	@.venv-dev/bin/python -m pytest $(ARGS)
+
+lint: .venv-dev/.dev  ## ruff and mypy
+	@.venv-dev/bin/ruff check .
+	@.venv-dev/bin/mypy
+
+lab: .venv-dev/.dev .venv-dev/.lab  ## what training needs (torch), and how to train
+	@.venv-dev/bin/gestured-lab --help
+
+clean:  ## remove the environments and what tools left behind
+	rm -rf .venv .venv-dev build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# $(call venv,DIR): make the environment, or say in one sentence what is missing.
+define venv
+@py=; for p in $(or $(PYTHON),python3 python3.13 python3.12 python3.11); do \
+	"$$p" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && py=$$p && break; \
+done; \
+[ -n "$$py" ] || { echo "gestured needs Python 3.11, 3.12 or 3.13, and \
+$(if $(PYTHON),$(PYTHON) is none,there is none here: sudo apt install python3 python3-venv)" >&2; exit 1; }; \
+"$$py" -c 'import venv, ensurepip' 2>/dev/null || { echo "$$py has no venv module: sudo apt install" \
+	"$$("$$py" -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')" >&2; exit 1; }; \
+[ -x $(1)/bin/pip ] && $(1)/bin/python -c '' 2>/dev/null || "$$py" -m venv --clear $(1) || { \
+	echo "no virtual environment could be made in $(CURDIR)/$(1); python's own words are above" >&2; exit 1; }; \
+echo '*' >$(1)/.gitignore
+endef
+
+# $(call install,DIR,WHAT,PIP'S ARGUMENTS): silent when it works, one sentence when it does not.
+define install
+@echo "installing $(2) into $(1) (the first time only)"
+@$(1)/bin/pip install $(3) >$(1)/pip.log 2>&1 </dev/null || { \
+	if grep -qiE 'name resolution|NewConnectionError|Connection refused|unreachable|ProxyError|timed out' $(1)/pip.log; \
+	then echo "no package index can be reached: connect this machine, or set PIP_INDEX_URL to an index that it reaches" >&2; \
+	else echo "pip could not install $(2): $$(grep -i error $(1)/pip.log | tail -n 1) (all of it: $(1)/pip.log)" >&2; fi; \
+	exit 1; }
+endef
+
+.venv/.runtime: pyproject.toml
+	$(call venv,.venv)
+	$(call install,.venv,the runtime,-e .)
+	@touch $@
+
+.venv-dev/.dev: pyproject.toml
+	$(call venv,.venv-dev)
+	$(call install,.venv-dev,the test tools,-e '.[dev]')
+	@touch $@
+
+.venv-dev/.lab: .venv-dev/.dev
+	$(call install,.venv-dev,$(TORCH),--no-deps --retries 0 --extra-index-url $(TORCH_INDEX) $(TORCH))
+	$(call install,.venv-dev,the lab,-e '.[dev$(,)lab]')
+	@touch $@
+
+, := ,

@@ -1,0 +1,1 @@
+"""gesturectl: the operator's client of a running daemon, and the demo."""

@@ -1,0 +1,1 @@
+"""The models that ship with gestured: .onnx files, their cards and manifest.json."""
