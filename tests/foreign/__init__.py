@@ -1,0 +1,84 @@
+"""A second generator of tactile recordings, conceived apart from `gestured.simulator`, to judge models with.
+
+No model is ever trained or tuned on it: once that happens it says nothing any more. It is not reality either;
+it only errs in other ways than the simulator does.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from tests.foreign.hands import GESTURES, LEVELS, NON_GESTURES, draw_person, perform
+from tests.foreign.sensors import draw_sensor, record
+
+__all__ = ["GESTURES", "GRIDS", "LEVELS", "NON_GESTURES", "other_grids", "session", "take"]
+
+KINDS = GESTURES + NON_GESTURES
+GRIDS: tuple[tuple[int, int, float], ...] = (
+    (16, 16, 50.0),
+    (12, 20, 30.0),
+    (6, 6, 20.0),
+)  # rows, columns, Hz
+
+
+def _label(kind: str) -> str:
+    return kind if kind in GESTURES else "none"
+
+
+def _take(kind: str, seed: int, level: str, rows: int, columns: int, rate_hz: float) -> dict[str, Any]:
+    rng = np.random.default_rng([seed, KINDS.index(kind), LEVELS.index(level), rows, columns])
+    person, sensor = draw_person(rng, level), draw_sensor(rng, level, rows, columns, rate_hz)
+    performed = perform(kind, rng, person)
+    onset = 1.4 + float(rng.uniform(0.0, 0.4))
+    release = onset + performed.duration
+    frames, times, strongest = record(sensor, rng, [(onset, performed)], release + 1.4)
+    return {
+        "frames": frames,
+        "times": times,
+        "label": _label(kind),
+        "kind": kind,
+        "onset": onset,
+        "release": release,
+        "strongest": strongest,
+    }
+
+
+def take(kind: str, seed: int, level: str = "nominal") -> dict[str, Any]:
+    """One gesture or non-gesture on a 9 x 9 sheet at about 15 Hz.
+
+    Returns `frames` (N, 9, 9) raw counts, `times` (N,) s, `label` (`none` for non-gestures), `kind`,
+    `onset` and `release` (s, true first and last contact), and `strongest` (the true signal over the noise:
+    below about 4 nobody can see it). Idle for at least 1.3 s before and 1.3 s after.
+    """
+    return _take(kind, seed, level, 9, 9, 15.0)
+
+
+def other_grids(kind: str, seed: int) -> list[dict[str, Any]]:
+    """The same as a nominal `take` on each sheet of `GRIDS`; with `rate_hz`."""
+    return [{**_take(kind, seed, "nominal", *grid), "rate_hz": grid[2]} for grid in GRIDS]
+
+
+def session(
+    seed: int, level: str = "nominal", seconds: float = 60.0, non_gesture_share: float = 0.25
+) -> dict[str, Any]:
+    """One person at one sheet for a while, pauses of 0.7 to 3 s between what is done.
+
+    Returns `frames`, `times` and `events`: a list of dictionaries with `label`, `kind`, `onset`, `release`
+    (s).
+    """
+    rng = np.random.default_rng([seed, 1000, LEVELS.index(level)])
+    person, sensor = draw_person(rng, level), draw_sensor(rng, level)
+    performances, events, t = [], [], 1.6
+    while True:
+        kinds = NON_GESTURES if rng.random() < non_gesture_share else GESTURES
+        performed = perform(str(rng.choice(kinds)), rng, person)
+        if t + performed.duration + 1.4 > seconds:
+            break
+        performances.append((t, performed))
+        release = t + performed.duration
+        events.append(
+            {"label": _label(performed.kind), "kind": performed.kind, "onset": t, "release": release}
+        )
+        t = release + float(rng.uniform(0.7, 3.0))
+    frames, times, _ = record(sensor, rng, performances, seconds)
+    return {"frames": frames, "times": times, "events": events}

@@ -1,0 +1,329 @@
+"""Judge a model, or the front end alone, on the independent generator.
+
+    python -m tests.foreign.judge --model cnn_lstm --n 40 --level nominal hard
+    python -m tests.foreign.judge --front-end --n 40
+    python -m tests.foreign.judge --model cnn_lstm --grids --sessions 5 --json
+
+A take's outcome is one of: `missed` (no segment), `cancelled:REASON`, `split` (more than one segment or
+event), or its one segment's label. Takes whose true signal never rose above four times the noise are
+counted as `unseen` and left out.
+"""
+
+import argparse
+import json
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+from gestured.core.events import Cancelled, Gesture, Onset, Unknown
+from gestured.core.frames import Frame, Segment
+from gestured.core.recognizer import Cut, FrontEnd, Recognizer
+from tests.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
+
+SEEN = 4.0  # times the noise
+Take = dict[str, Any]
+
+
+@dataclass
+class Outcome:
+    """What became of one take."""
+
+    kind: str
+    level: str
+    seed: int
+    answer: str  # label | "unknown" | "missed" | "split" | "cancelled:REASON"
+    before: str = ""  # best label before rejection, where there is one segment
+    extra: int = 0  # segments that lie wholly outside the gesture
+    late: float = 0.0  # s, decision after the true release
+    start: float = 0.0  # s, segment's onset after the true one
+    end: float = 0.0  # s, segment's offset after the true release
+    segments: list[tuple[float, float]] = field(default_factory=list)  # (s, s) relative to the true onset
+    ready: bool = True
+    confidence: float = 0.0
+
+
+def _frames(recording: Take) -> Iterator[Frame]:
+    for t, values in zip(recording["times"], recording["frames"], strict=True):
+        yield Frame(float(t), values)
+
+
+def _decided(events: list[Any]) -> tuple[list[Any], list[Any]]:
+    """What was answered (Cut, Gesture or Unknown), and what was cancelled."""
+    return [e for e in events if isinstance(e, Cut | Gesture | Unknown)], [
+        e for e in events if isinstance(e, Cancelled)
+    ]
+
+
+def _span(event: Any) -> tuple[float, float]:
+    thing: Segment | Any = event.segment if isinstance(event, Cut) else event
+    return thing.onset, thing.offset
+
+
+def judge(recording: Take, seed: int, level: str, classifier: Any | None) -> Outcome:
+    """Run one take through a fresh front end (and recognizer, where a classifier is given)."""
+    rows, columns = recording["frames"].shape[1:]
+    front = FrontEnd("foreign", rows, columns)
+    machine: Any = front if classifier is None else Recognizer(front, classifier)
+    onset, release = recording["onset"], recording["release"]
+    events: list[Any] = []
+    ready = False
+    for frame in _frames(recording):
+        if frame.t < onset:
+            ready = front.ready
+        events += machine.push(frame)
+    events += machine.flush(float(recording["times"][-1]) + 5.0)
+    decided, cancelled = _decided(events)
+    slack = 2.0 / max(float(len(recording["times"]) / recording["times"][-1]), 1.0)
+    inside = [e for e in decided if _span(e)[0] <= release + slack + 0.2 and _span(e)[1] >= onset - slack]
+    result = Outcome(recording["kind"], level, seed, "missed", ready=ready, extra=len(decided) - len(inside))
+    result.segments = [(round(_span(e)[0] - onset, 2), round(_span(e)[1] - onset, 2)) for e in inside]
+    if len(inside) + len(cancelled) > 1:
+        result.answer = "split"
+        named = [e for e in inside if isinstance(e, Gesture)]
+        if named and recording["label"] == "none":
+            result.answer = named[0].gesture  # a non-gesture in pieces, one of which was taken for a gesture
+        elif not named and recording["label"] == "none":
+            result.answer = "unknown"
+    elif inside:
+        event = inside[0]
+        first, last = _span(event)
+        result.late, result.start, result.end = event.decided - release, first - onset, last - release
+        if isinstance(event, Cut):
+            result.answer = "segment"
+        else:
+            result.before = max(event.scores, key=lambda name: event.scores[name])
+            result.answer = event.gesture if isinstance(event, Gesture) else "unknown"
+            result.confidence = event.confidence
+    elif cancelled:
+        result.answer = f"cancelled:{cancelled[0].reason}"
+    elif any(isinstance(e, Onset) for e in events):
+        result.answer = "cancelled:?"
+    return result
+
+
+def _open(source: str | None) -> Any | None:
+    if source is None:
+        return None
+    from gestured.models import open_model
+
+    return open_model(source)
+
+
+def _batch(task: tuple[str | None, str, str, int, bool, int]) -> tuple[list[Outcome], int]:
+    source, kind, level, count, grids, first = task
+    classifier = _open(source)
+    outcomes: list[Outcome] = []
+    unseen = 0
+    for seed in range(first, first + count):
+        if grids:
+            outcomes += [
+                judge(r, seed, "{}x{}".format(*r["frames"].shape[1:]), classifier)
+                for r in other_grids(kind, seed)
+            ]
+            continue
+        recording = take(kind, seed, level)
+        if kind != "burst" and recording["strongest"] < SEEN:
+            unseen += 1
+            continue
+        outcomes.append(judge(recording, seed, level, classifier))
+    return outcomes, unseen
+
+
+def _percent(part: float, whole: float) -> str:
+    return f"{100 * part / whole:5.1f}" if whole else "    -"
+
+
+def summary(outcomes: list[Outcome], unseen: dict[str, int]) -> dict[str, Any]:
+    """Everything that the tables show, as plain data; shares are 0..1."""
+    result: dict[str, Any] = {}
+    for level in dict.fromkeys(o.level for o in outcomes):
+        own = [o for o in outcomes if o.level == level]
+        gestures, others = [o for o in own if o.kind in GESTURES], [o for o in own if o.kind not in GESTURES]
+        n = max(len(gestures), 1)
+        kinds: dict[str, Any] = {}
+        for kind in dict.fromkeys(o.kind for o in own):
+            mine = [o for o in own if o.kind == kind]
+            answers = Counter(o.answer for o in mine)
+            kinds[kind] = {
+                "n": len(mine),
+                "before": sum(o.before == kind for o in mine) / len(mine),
+                "answers": dict(answers.most_common()),
+                "extra": sum(o.extra for o in mine),
+                "late_s": sorted(o.late for o in mine)[len(mine) // 2],
+            }
+        result[level] = {
+            "gestures": len(gestures),
+            "unseen": unseen.get(level, 0),
+            "not_ready": sum(not o.ready for o in own),
+            "one_segment": sum(bool(o.before) or o.answer == "segment" for o in gestures) / n,
+            "before_rejection": sum(o.before == o.kind for o in gestures) / n,
+            "right": sum(o.answer == o.kind for o in gestures) / n,
+            "wrong": sum(o.answer in GESTURES and o.answer != o.kind for o in gestures) / n,
+            "unknown": sum(o.answer == "unknown" for o in gestures) / n,
+            "missed": sum(o.answer == "missed" for o in gestures) / n,
+            "cancelled": sum(o.answer.startswith("cancelled") for o in gestures) / n,
+            "split": sum(o.answer == "split" for o in gestures) / n,
+            "non_gestures": len(others),
+            "rejected": sum(o.answer not in GESTURES for o in others) / max(len(others), 1),
+            "confusions": Counter(
+                f"{o.kind} -> {o.before}" for o in gestures if o.before and o.before != o.kind
+            ).most_common(10),
+            "taken_for": Counter(
+                f"{o.kind} -> {o.answer}" for o in others if o.answer in GESTURES
+            ).most_common(12),
+            "kinds": kinds,
+        }
+    return result
+
+
+def _show(result: dict[str, Any], front_end: bool) -> None:
+    for level, row in result.items():
+        print(f"\n== {level}: {row['gestures']} gestures, {row['non_gestures']} non-gestures", end="")
+        print(f" ({row['unseen']} unseen left out, {row['not_ready']} not ready at onset)")
+        names = ["one_segment", "split", "missed", "cancelled"]
+        if not front_end:
+            names = [
+                "before_rejection",
+                "right",
+                "wrong",
+                "unknown",
+                "missed",
+                "cancelled",
+                "split",
+                "rejected",
+            ]
+        print("   " + "  ".join(f"{name} {100 * row[name]:.1f} %" for name in names))
+        for kind, k in row["kinds"].items():
+            answers = ", ".join(f"{a} {c}" for a, c in k["answers"].items() if a != kind)
+            rejected = sum(c for a, c in k["answers"].items() if a not in GESTURES)
+            if front_end:
+                share = "one " + _percent(k["answers"].get("segment", 0), k["n"])
+            elif kind in GESTURES:
+                share = (
+                    f"before {100 * k['before']:5.1f}  right {_percent(k['answers'].get(kind, 0), k['n'])}"
+                )
+            else:
+                share = f"rejected {_percent(rejected, k['n'])}"
+            print(
+                f"   {kind:25s} n {k['n']:3d}  {share}  late {k['late_s']:+.2f} s  extra {k['extra']}",
+                f" {answers}",
+            )
+        if not front_end:
+            for title in ("confusions", "taken_for"):
+                print(f"   {title}: " + "; ".join(f"{a} {c}" for a, c in row[title]))
+
+
+def sessions(source: str, level: str, count: int, first: int, seconds: float = 120.0) -> dict[str, Any]:
+    """Continuous sessions: gestures right and wrong, and events that answer to no gesture."""
+    classifier = _open(source)
+    right = wrong = lost = false = total = 0
+    errors: Counter[str] = Counter()
+    for seed in range(first, first + count):
+        recording = session(seed, level, seconds)
+        front = FrontEnd("foreign", 9, 9)
+        machine = Recognizer(front, classifier)
+        events: list[Any] = []
+        for frame in _frames(recording):
+            events += machine.push(frame)
+        events += machine.flush(seconds + 5.0)
+        found = [e for e in events if isinstance(e, Gesture)]
+        used: set[int] = set()
+        for truth in recording["events"]:
+            hits = [
+                i
+                for i, e in enumerate(found)
+                if i not in used and e.onset <= truth["release"] + 0.35 and e.offset >= truth["onset"] - 0.15
+            ]
+            if truth["label"] == "none":
+                used.update(hits)
+                false += len(hits)
+                errors.update(f"{truth['kind']} -> {found[i].gesture}" for i in hits)
+                continue
+            total += 1
+            used.update(hits)
+            same = [i for i in hits if found[i].gesture == truth["label"]]
+            if same:
+                right += 1
+                false += len(hits) - 1
+            elif hits:
+                wrong += 1
+                false += len(hits) - 1
+                errors[f"{truth['kind']} -> {found[hits[0]].gesture}"] += 1
+            else:
+                lost += 1
+                errors[f"{truth['kind']} lost"] += 1
+        false += len(found) - len(used)
+        errors["event from nothing"] += len(found) - len(used)
+    minutes = count * seconds / 60.0
+    return {
+        "level": level,
+        "gestures": total,
+        "right": right / max(total, 1),
+        "wrong": wrong / max(total, 1),
+        "lost": lost / max(total, 1),
+        "false_a_minute": false / minutes,
+        "errors": [(a, c) for a, c in errors.most_common(12) if c],
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--model", help="a shipped model's name or a path")
+    what.add_argument("--front-end", action="store_true", help="segmentation alone; needs no model")
+    parser.add_argument("--n", type=int, default=40, help="takes of each kind and level (%(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="first seed (%(default)s)")
+    parser.add_argument("--level", nargs="+", choices=LEVELS, default=list(LEVELS))
+    parser.add_argument("--kinds", nargs="+", default=[*GESTURES, *NON_GESTURES])
+    parser.add_argument("--grids", action="store_true", help=f"other grids instead of levels: {GRIDS}")
+    parser.add_argument(
+        "--sessions", type=int, default=0, help="also this many sessions of two minutes a level"
+    )
+    parser.add_argument(
+        "--list", action="store_true", help="print each gesture that went wrong, with its seed"
+    )
+    parser.add_argument("--jobs", type=int, default=1, help="processes (%(default)s)")
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
+    levels = ["grids"] if args.grids else args.level
+    tasks = [(args.model, k, lv, args.n, args.grids, args.first) for lv in levels for k in args.kinds]
+    outcomes: list[Outcome] = []
+    unseen: dict[str, int] = defaultdict(int)
+    with ProcessPoolExecutor(args.jobs) as pool:
+        for task, (some, dark) in zip(tasks, pool.map(_batch, tasks), strict=True):
+            outcomes += some
+            unseen[task[2]] += dark
+    result = summary(outcomes, unseen)
+    long = (
+        [sessions(args.model, lv, args.sessions, args.first) for lv in args.level]
+        if args.model and args.sessions
+        else []
+    )
+    if args.json:
+        print(json.dumps({"takes": result, "sessions": long}, indent=1))
+        return
+    _show(result, args.front_end)
+    for row in long:
+        print(f"\n== sessions, {row['level']}: {row['gestures']} gestures", end="")
+        print(
+            f"  right {100 * row['right']:.1f} %  wrong {100 * row['wrong']:.1f} %",
+            f" lost {100 * row['lost']:.1f} %",
+            end="",
+        )
+        print(f"  false events a minute {row['false_a_minute']:.2f}")
+        print("   " + "; ".join(f"{a} {c}" for a, c in row["errors"]))
+    if args.list:
+        for o in outcomes:
+            if o.kind in GESTURES and o.answer not in (o.kind, "segment"):
+                print(
+                    f"{o.level:8s} {o.kind:25s} seed {o.seed:3d}  {o.answer:15s} before {o.before:15s}",
+                    o.segments,
+                )
+
+
+if __name__ == "__main__":
+    main()
