@@ -1,0 +1,168 @@
+"""Takes and sessions: one gesture, many gestures, the cohort of 3060, the endless wide stream.
+
+Every take draws from a stream of its own (PCG64 on a SeedSequence of its coordinates), so any part can be made alone and in parallel.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .gestures import TEN
+from .others import OTHERS
+from .people import INCLINATIONS, SPEEDS, Artefact, Contact, Participant, Performance, generator
+from .sensor import Sensor, Take
+from .strokes import Scene
+
+GESTURES: tuple[str, ...] = tuple(TEN)
+NON_GESTURES: tuple[str, ...] = tuple(OTHERS)
+NONE = "none"
+
+
+def perform(
+    kind: str,
+    participant: Participant,
+    rng: np.random.Generator,
+    speed: str = "normal",
+    inclination: int = 1,
+    extent: tuple[float, float] = (72.0, 72.0),
+) -> Performance:
+    """One performance of a gesture or non-gesture on a pad of `extent` millimetres (width, height).
+
+    Raises ValueError for an unknown kind, speed or inclination.
+    """
+    if kind not in TEN and kind not in OTHERS:
+        raise ValueError(f"kind: {kind!r} is none of {', '.join(GESTURES + NON_GESTURES)}")
+    if speed not in SPEEDS:
+        raise ValueError(f"speed: {speed!r} is none of {', '.join(SPEEDS)}")
+    if inclination not in INCLINATIONS:
+        raise ValueError(f"inclination: {inclination!r} is none of 0, 1, 2")
+    turn, grow, press = participant.pose(inclination)
+    scene = Scene(
+        rng,
+        participant,
+        extent[0],
+        extent[1],
+        speed,
+        participant.rate(rng, speed),
+        turn + participant.bias,
+        grow,
+        press,
+    )
+    made = TEN[kind](scene) if kind in TEN else OTHERS[kind](scene)
+    contacts = tuple(m for m in made if isinstance(m, Contact))
+    artefacts = tuple(m for m in made if isinstance(m, Artefact))
+    stops = [float(c.t[-1]) for c in contacts] + [a.stop for a in artefacts]
+    label = kind if kind in TEN else NONE
+    return Performance(kind, label, contacts, max(stops), speed, inclination, participant.seed, artefacts)
+
+
+def gesture_take(
+    kind: str,
+    participant: Participant,
+    sensor: Sensor,
+    rng: np.random.Generator,
+    speed: str = "normal",
+    inclination: int = 1,
+    lead_s: float = 1.3,
+    tail_s: float = 0.8,
+) -> Take:
+    """One performance with an idle pad before (lead_s, plus up to one frame) and after it."""
+    performance = perform(kind, participant, rng, speed, inclination, sensor.extent)
+    start = lead_s + float(rng.random()) / sensor.rate_hz
+    return sensor.record([(start, performance)], start + performance.duration_s + tail_s, rng)
+
+
+def session(
+    participant: Participant,
+    sensor: Sensor,
+    rng: np.random.Generator,
+    seconds: float = 60.0,
+    non_gesture_share: float = 0.25,
+    idle_s: tuple[float, float] = (0.9, 3.0),
+    kinds: Sequence[str] | None = None,
+    lead_s: float = 2.0,
+) -> Take:
+    """A continuous recording of that many seconds: performances in random order with idle gaps between them.
+
+    With `kinds` exactly those are performed, in that order, as far as the time reaches.
+    """
+    todo = list(kinds) if kinds is not None else None
+    performances: list[tuple[float, Performance]] = []
+    inclination = int(rng.integers(3))
+    now = lead_s
+    while todo is None or len(performances) < len(todo):
+        if todo is not None:
+            kind = todo[len(performances)]
+        else:
+            pool = NON_GESTURES if rng.random() < non_gesture_share else GESTURES
+            kind = pool[int(rng.integers(len(pool)))]
+        speed = ("slow", "normal", "fast")[int(rng.integers(3))]
+        performance = perform(kind, participant, rng, speed, inclination, sensor.extent)
+        if now + performance.duration_s + 1.0 > seconds:
+            break
+        performances.append((now, performance))
+        now += performance.duration_s + float(rng.uniform(*idle_s))
+    return sensor.record(performances, seconds, rng)
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One cell of the cohort's factorial plan."""
+
+    index: int
+    participant: int
+    gesture: str
+    speed: str
+    inclination: int
+
+
+def cohort_plan(participants: int = 34) -> Iterator[Trial]:
+    """The cohort's trials in order: participant, gesture, speed, inclination (34 x 10 x 3 x 3 = 3060)."""
+    index = 0
+    for person in range(participants):
+        for gesture in GESTURES:
+            for speed in SPEEDS:
+                for inclination in INCLINATIONS:
+                    yield Trial(index, person, gesture, speed, inclination)
+                    index += 1
+
+
+def cohort_take(trial: Trial, seed: int = 0) -> Take:
+    """One trial of the cohort on the nominal sensor on that participant's day. Depends on nothing but its arguments."""
+    rng = generator(seed, 0xC0, trial.index)
+    person = Participant(_person(seed, trial.participant))
+    sensor = Sensor.nominal(day=_person(seed, trial.participant))
+    return gesture_take(trial.gesture, person, sensor, rng, trial.speed, trial.inclination)
+
+
+def cohort(seed: int = 0, participants: int = 34) -> Iterator[Take]:
+    """All takes of the cohort in the plan's order."""
+    for trial in cohort_plan(participants):
+        yield cohort_take(trial, seed)
+
+
+def wide(
+    seed: int,
+    index: int,
+    non_gesture_share: float = 0.35,
+    hardness: float | None = None,
+    kinds: Sequence[str] | None = None,
+) -> Take:
+    """The index-th take of an endless stream: a random participant on a random sensor.
+
+    `hardness` is drawn from 0..1 for each take unless it is given; `kinds` restricts what is performed.
+    """
+    rng = generator(seed, 0x71DE, index)
+    hard = float(rng.random()) if hardness is None else hardness
+    person = Participant(int(rng.integers(1 << 40)) + 1_000_000)
+    sensor = Sensor.wide(rng, hard)
+    pool = kinds if kinds is not None else NON_GESTURES if rng.random() < non_gesture_share else GESTURES
+    kind = pool[int(rng.integers(len(pool)))]
+    speed = ("slow", "normal", "fast")[int(rng.integers(3))]
+    return gesture_take(kind, person, sensor, rng, speed, int(rng.integers(3)))
+
+
+def _person(seed: int, number: int) -> int:
+    """The integer behind participant `number` of cohort `seed`."""
+    return seed * 1000 + number

@@ -1,0 +1,141 @@
+"""How fingers move: speed profiles and paths, sampled on a fine time grid.
+
+Sources: minimum jerk (Flash & Hogan 1985), lognormal speed of rapid strokes (Plamondon 1995, sigma-lognormal), overlapping submovements
+that add up (Flash & Henis 1991), the two-thirds power law on curved paths (Lacquaniti, Terzuolo & Viviani 1983). An ellipse that is run
+through with a constant rate of its parameter obeys the two-thirds law exactly, so the circles below need no other device.
+
+Lengths are millimetres, x to the right, y upward, times seconds, angles radians (counter-clockwise positive).
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+STEP_S = 0.004  # fine time grid: 250 Hz, ten steps within the fastest rise of a tap
+
+
+def grid(duration_s: float) -> Array:
+    """Times 0 .. duration (n,), about STEP_S apart; both ends are included and n >= 5."""
+    return np.linspace(0.0, duration_s, max(5, math.ceil(duration_s / STEP_S) + 1))
+
+
+def minimum_jerk(tau: Array) -> Array:
+    """Progress 0..1 of a smooth reach at relative times tau (clipped to 0..1)."""
+    u = np.clip(tau, 0.0, 1.0)
+    return u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
+
+
+def normal_cdf(z: Array) -> Array:
+    """The normal distribution function (tanh form, error below 3e-4: a hundredth of a millimetre here)."""
+    return 0.5 * (1.0 + np.tanh(0.7978845608 * (z + 0.044715 * z * z * z)))
+
+
+def lognormal(tau: Array, sigma: float, mirrored: bool = False) -> Array:
+    """Progress 0..1 with a lognormal speed: an early peak and a long tail; mirrored, a late peak.
+
+    `sigma` 0.2 is almost symmetric, 0.7 very skewed. The 99.5 % point lies at tau = 1; the ends are exact.
+    """
+    u = np.clip(tau, 0.0, 1.0)
+    if mirrored:
+        return 1.0 - lognormal(1.0 - u, sigma)
+    z = np.log(np.maximum(u, 1e-9)) / sigma + 2.576
+    return np.where(u <= 0.0, 0.0, np.minimum(normal_cdf(z) / 0.995, 1.0))
+
+
+def progress(tau: Array, rng: np.random.Generator, moving_ends: float = 0.0) -> Array:
+    """Progress 0..1 of one stroke with a random human speed profile.
+
+    `moving_ends` (0..1) is how much of the speed is left at landing and leaving: the finger touches only the middle
+    part of a longer movement.
+    """
+    first = 0.32 * moving_ends * rng.uniform(0.2, 1.0)
+    last = 1.0 - 0.32 * moving_ends * rng.uniform(0.2, 1.0)
+    style, sigma = rng.random(), rng.uniform(0.25, 0.65)
+    u = first + (last - first) * np.clip(tau, 0.0, 1.0)
+    ends = np.array([first, last])
+
+    def profile(v: Array) -> Array:
+        if style < 0.45:
+            return minimum_jerk(v)
+        return lognormal(v, sigma, mirrored=style > 0.85)
+
+    a, b = profile(ends)
+    return (profile(u) - a) / (b - a)
+
+
+def wander(t: Array, rng: np.random.Generator, low_hz: float, high_hz: float, waves: int = 4) -> Array:
+    """Smooth random motion (n,) of unit standard deviation: a few sines between two frequencies."""
+    f = rng.uniform(low_hz, high_hz, waves)
+    phase = rng.uniform(0.0, 2.0 * math.pi, waves)
+    amplitude = rng.uniform(0.3, 1.0, waves)
+    amplitude *= math.sqrt(2.0 / float(np.sum(amplitude**2)))
+    return np.sin(2.0 * math.pi * np.multiply.outer(t, f) + phase) @ amplitude
+
+
+def arc(s: Array, length: float, heading: float, bend: float) -> tuple[Array, Array]:
+    """x, y (n,) of a stroke from the origin at progress s along a circular arc.
+
+    The chord points to `heading`; the direction turns by `bend` radians in all (0 is a straight line).
+    """
+    if abs(bend) < 1e-3:
+        return s * length * math.cos(heading), s * length * math.sin(heading)
+    radius = length / bend
+    start = heading - 0.5 * bend
+    angle = start + s * bend
+    return radius * (np.sin(angle) - math.sin(start)), -radius * (np.cos(angle) - math.cos(start))
+
+
+def ellipse(phase: Array, radius: Array, flatness: float, tilt: float) -> tuple[Array, Array]:
+    """x, y (n,) around the origin: half axes radius * flatness and radius / flatness, turned by tilt."""
+    u, v = radius * math.sqrt(flatness) * np.cos(phase), radius / math.sqrt(flatness) * np.sin(phase)
+    return u * math.cos(tilt) - v * math.sin(tilt), u * math.sin(tilt) + v * math.cos(tilt)
+
+
+def turning(tau: Array, rng: np.random.Generator) -> Array:
+    """Progress 0..1 around a closed curve: even in the middle, easing in and out by a random amount."""
+    ease = rng.uniform(0.0, 0.25)
+    even, smooth = np.clip(tau, 0.0, 1.0), minimum_jerk(tau)
+    share = rng.uniform(0.1, 0.7)
+    bumps = (
+        ease
+        * 0.12
+        * np.sin(2.0 * math.pi * (even * rng.uniform(1.0, 3.0) + rng.random()))
+        * even
+        * (1.0 - even)
+    )
+    return (1.0 - share) * even + share * smooth + bumps
+
+
+def submovements(
+    t: Array, points: Sequence[tuple[float, float]], starts: Sequence[float], durations: Sequence[float]
+) -> tuple[Array, Array]:
+    """x, y (n,) through via points: the minimum-jerk moves from point to point add up.
+
+    Moves that overlap in time round the corner between them, as hands do.
+    """
+    x = np.full_like(t, points[0][0])
+    y = np.full_like(t, points[0][1])
+    for (x0, y0), (x1, y1), start, duration in zip(points[:-1], points[1:], starts, durations, strict=True):
+        s = minimum_jerk((t - start) / duration)
+        x += (x1 - x0) * s
+        y += (y1 - y0) * s
+    return x, y
+
+
+def polyline(
+    points: Sequence[tuple[float, float]], leg_s: Sequence[float], overlap: float = 0.25, pause_s: float = 0.0
+) -> tuple[Array, Array, Array]:
+    """t, x, y (n,) of a stroke through via points.
+
+    `leg_s` gives each leg's duration; neighbours overlap by a share of the shorter one, or wait `pause_s`.
+    """
+    starts = [0.0]
+    for before, after in zip(leg_s[:-1], leg_s[1:], strict=True):
+        gap = pause_s if pause_s > 0.0 else -overlap * min(before, after)
+        starts.append(starts[-1] + before + gap)
+    t = grid(starts[-1] + leg_s[-1])
+    x, y = submovements(t, points, starts, leg_s)
+    return t, x, y

@@ -1,0 +1,210 @@
+"""Who performs: participants with their habits, and what a finger leaves on the pad.
+
+A contact's size grows with its force (Hertz: the radius of a sphere pressed on a plane goes with F^(1/3); fingertips measure between
+F^0.1 and F^0.35). Tremor is the physiological 8 to 12 Hz of some hundredths to tenths of a millimetre. Arm poses turn and bend strokes
+about the wrist or the elbow. The distributions are invented within plausible bounds.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .kinematics import Array, wander
+
+SPEEDS = {"slow": 0.55, "normal": 1.0, "fast": 1.8}
+INCLINATIONS = (0, 1, 2)
+
+
+def generator(*key: int) -> np.random.Generator:
+    """A random stream of its own for an integer key: the same on every run and machine."""
+    return np.random.Generator(
+        np.random.PCG64(np.random.SeedSequence([int(k) & 0xFFFFFFFFFFFFFFFF for k in key]))
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """One finger (or palm, or thing) on the pad; arrays are (n,) on a fine grid of increasing times.
+
+    Before the first and after the last time there is no contact. Positions are millimetres from the pad's bottom-left
+    corner, x to the right, y upward. `force` is relative: 1 is a normal firm finger.
+    """
+
+    t: Array
+    x: Array
+    y: Array
+    force: Array
+    length: float  # millimetres, one standard deviation of the footprint along `angle` at force 1
+    width: float  # the same, across
+    angle: float = 0.0
+    growth: float = 0.2  # size ~ force ** growth
+    flatness: float = 1.0  # exponent of the super-Gaussian footprint: 1 Gaussian, 2 flat-topped
+    finger: bool = True  # a sensor with finger tracking would report it
+
+
+@dataclass(frozen=True, slots=True)
+class Artefact:
+    """Counts without a touch: `form` is "all", "row", "column", "block", "taxels" or "taxel"."""
+
+    start: float
+    stop: float
+    form: str
+    height: float  # relative to a normal finger's counts; may be negative
+    flicker: float = 1.0  # 0 steady, 1 a fresh random height each frame
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Performance:
+    """What one person did once, in continuous time from 0 to `duration_s`."""
+
+    kind: str
+    label: str
+    contacts: tuple[Contact, ...]
+    duration_s: float
+    speed: str
+    inclination: int
+    participant: int
+    artefacts: tuple[Artefact, ...] = ()
+
+
+@dataclass(frozen=True)
+class Participant:
+    """A person's hand and habits, all drawn from one integer `seed`."""
+
+    seed: int
+    finger_mm: float = field(init=False)  # footprint of the index finger, one standard deviation
+    oblong: float = field(init=False)  # length over width of the footprint
+    finger_angle: float = field(init=False)  # how the finger points on the pad, radians
+    growth: float = field(init=False)
+    force: float = field(init=False)
+    force_spread: float = field(init=False)
+    pace: float = field(init=False)  # factor on all speeds
+    pace_spread: float = field(init=False)
+    reach: float = field(init=False)  # preferred gesture size, 0 small .. 1 the whole pad
+    place: tuple[float, float] = field(init=False)  # preferred place, -1..1 from the pad's centre
+    place_spread: float = field(init=False)
+    bias: float = field(init=False)  # radians: how this person's "up" is turned
+    aim: float = field(init=False)  # radians, spread of directions
+    bend: float = field(init=False)  # 1/mm, signed: strokes are arcs about wrist or elbow
+    tremor_mm: float = field(init=False)
+    wobble_mm: float = field(init=False)
+    tap_s: float = field(init=False)
+    gap_s: float = field(init=False)  # between the taps of a double tap
+    rest_end: float = field(init=False)  # 0..1, how often and how long a stroke ends at rest
+    rest_start: float = field(init=False)
+    glide: float = field(init=False)  # 0..1, lands and leaves while moving
+    spacing_mm: float = field(init=False)  # between two fingers
+    clumsy: float = field(init=False)  # 0..1, heel of the hand or second finger rests on the pad
+    right_handed: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        rng = generator(self.seed, 0x9E0)
+        draw = dict(
+            finger_mm=float(np.clip(3.7 * rng.lognormal(0.0, 0.24), 2.2, 7.0)),
+            oblong=float(rng.uniform(1.0, 1.7)),
+            growth=float(rng.uniform(0.08, 0.35)),
+            force=float(np.clip(rng.lognormal(0.0, 0.35), 0.35, 2.5)),
+            force_spread=float(rng.uniform(0.08, 0.35)),
+            pace=float(np.clip(rng.lognormal(0.0, 0.22), 0.55, 1.8)),
+            pace_spread=float(rng.uniform(0.06, 0.25)),
+            reach=float(rng.beta(1.6, 1.4)),
+            place=(float(rng.normal(0.0, 0.25)), float(rng.normal(0.0, 0.25))),
+            place_spread=float(rng.uniform(0.1, 0.6)),
+            bias=float(np.clip(rng.normal(0.0, math.radians(5.0)), -0.2, 0.2)),
+            aim=math.radians(float(rng.uniform(2.0, 7.0))),
+            tremor_mm=float(rng.uniform(0.02, 0.25)),
+            wobble_mm=float(rng.uniform(0.1, 1.1)),
+            tap_s=float(np.clip(0.15 * rng.lognormal(0.0, 0.35), 0.06, 0.3)),
+            gap_s=float(np.clip(0.17 * rng.lognormal(0.0, 0.3), 0.09, 0.32)),
+            rest_end=float(rng.beta(1.3, 1.2)),
+            rest_start=float(rng.beta(1.1, 2.0)),
+            glide=float(rng.beta(1.1, 1.2)),
+            spacing_mm=float(np.clip(21.0 * rng.lognormal(0.0, 0.25), 12.0, 40.0)),
+            clumsy=float(rng.beta(0.6, 3.0)),
+            right_handed=bool(rng.random() < 0.85),
+        )
+        side = 1.0 if draw["right_handed"] else -1.0
+        # The finger comes from the hand's side; strokes bend about the wrist (short radius) or the elbow (long one).
+        draw["finger_angle"] = math.pi / 2.0 + side * float(rng.normal(0.35, 0.45))
+        wrist = rng.random() < 0.5
+        radius = rng.uniform(60.0, 150.0) if wrist else rng.uniform(250.0, 350.0)
+        draw["bend"] = side * float(rng.choice([1.0, 1.0, -0.6])) / float(radius)
+        for name, value in draw.items():
+            object.__setattr__(self, name, value)
+
+    def pose(self, inclination: int) -> tuple[float, float, float]:
+        """This person's arm pose at one of three inclinations: (turn in radians, extent factor, force factor)."""
+        rng = generator(self.seed, 0x905E, inclination)
+        step = inclination - 1
+        turn = float(rng.normal(0.0, math.radians(3.0))) + step * math.radians(2.0) * (
+            1 if self.right_handed else -1
+        )
+        return (
+            turn,
+            float(rng.uniform(0.85, 1.1)) - 0.04 * step,
+            float(rng.lognormal(0.0, 0.12)) * (1.0 - 0.1 * step),
+        )
+
+    def rate(self, rng: np.random.Generator, speed: str) -> float:
+        """Factor on this movement's speed: habit, today's intention, chance."""
+        return SPEEDS[speed] * self.pace * float(np.clip(rng.lognormal(0.0, self.pace_spread), 0.5, 2.0))
+
+
+def press(
+    rng: np.random.Generator, person: Participant, t: Array, level: float, fade_in_s: float, fade_out_s: float
+) -> Array:
+    """Force over a contact (n,): rise, a plateau that is never even, fall. Zero at both ends.
+
+    Forms seen on real pads: an overshoot at landing and lighter sliding after it, a slow rise to the end, a dome, a dip.
+    """
+    total = float(t[-1])
+    up = min(fade_in_s, 0.45 * total)
+    down = min(fade_out_s, 0.5 * total)
+    rise = 0.5 - 0.5 * np.cos(math.pi * np.clip(t / up, 0.0, 1.0))
+    fall = 0.5 - 0.5 * np.cos(math.pi * np.clip((total - t) / down, 0.0, 1.0))
+    u = t / total
+    form = rng.random()
+    if form < 0.3:
+        shape = 1.0 + rng.uniform(0.1, 0.9) * np.exp(-t / rng.uniform(0.04, 0.2))
+    elif form < 0.5:
+        shape = 1.0 + rng.uniform(-0.45, 0.7) * (u - 0.5)
+    elif form < 0.65:
+        shape = 1.0 + rng.uniform(-0.4, 0.5) * np.sin(math.pi * u)
+    else:
+        shape = np.ones_like(t)
+    uneven = rng.uniform(0.0, 0.16) * wander(t, rng, 0.3, 4.0) + 0.015 * wander(t, rng, 7.0, 12.0, 2)
+    return level * np.maximum(rise * fall * shape * np.clip(1.0 + uneven, 0.3, 2.0), 0.0)
+
+
+def fingertip(
+    rng: np.random.Generator,
+    person: Participant,
+    t: Array,
+    x: Array,
+    y: Array,
+    *,
+    force: float = 1.0,
+    fade_in_s: float | None = None,
+    fade_out_s: float | None = None,
+    size: float = 1.0,
+    start: float = 0.0,
+) -> Contact:
+    """A finger of this person on the path x, y (n,) at times t (n,) from 0, with a hand's unsteadiness."""
+    level = force * person.force * float(np.clip(rng.lognormal(0.0, person.force_spread), 0.35, 2.5))
+    fade_in = rng.uniform(0.02, 0.08) if fade_in_s is None else fade_in_s
+    fade_out = rng.uniform(0.02, 0.09) if fade_out_s is None else fade_out_s
+    shake = person.tremor_mm * float(rng.uniform(0.5, 1.5))
+    width = person.finger_mm * size * float(rng.uniform(0.88, 1.14))
+    oblong = float(np.clip(person.oblong * rng.uniform(0.85, 1.2), 1.0, 2.2))
+    return Contact(
+        t=t + start,
+        x=x + shake * wander(t, rng, 8.0, 12.0, 3),
+        y=y + shake * wander(t, rng, 8.0, 12.0, 3),
+        force=press(rng, person, t, level, fade_in, fade_out),
+        length=width * math.sqrt(oblong),
+        width=width / math.sqrt(oblong),
+        angle=person.finger_angle + float(rng.normal(0.0, 0.25)),
+        growth=person.growth,
+        flatness=float(rng.uniform(0.85, 1.9)),
+    )
