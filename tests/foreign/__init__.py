@@ -31,7 +31,7 @@ def _take(kind: str, seed: int, level: str, rows: int, columns: int, rate_hz: fl
     performed = perform(kind, rng, person)
     onset = 1.4 + float(rng.uniform(0.0, 0.4))
     release = onset + performed.duration
-    frames, times, strongest = record(sensor, rng, [(onset, performed)], release + 1.4)
+    frames, times, seen = record(sensor, rng, [(onset, performed)], release + 1.4)
     return {
         "frames": frames,
         "times": times,
@@ -39,7 +39,7 @@ def _take(kind: str, seed: int, level: str, rows: int, columns: int, rate_hz: fl
         "kind": kind,
         "onset": onset,
         "release": release,
-        "strongest": strongest,
+        "seen": seen,
     }
 
 
@@ -47,8 +47,8 @@ def take(kind: str, seed: int, level: str = "nominal") -> dict[str, Any]:
     """One gesture or non-gesture on a 9 x 9 sheet at about 15 Hz.
 
     Returns `frames` (N, 9, 9) raw counts, `times` (N,) s, `label` (`none` for non-gestures), `kind`,
-    `onset` and `release` (s, true first and last contact), and `strongest` (the true signal over the noise:
-    below about 4 nobody can see it). Idle for at least 1.3 s before and 1.3 s after.
+    `onset` and `release` (s, true first and last contact), and `seen` (N,): the true signal over all noise in
+    each frame; below about 4 nobody can see a touch. Idle for at least 1.3 s before and after.
     """
     return _take(kind, seed, level, 9, 9, 15.0)
 

@@ -42,6 +42,10 @@ class Outcome:
     segments: list[tuple[float, float]] = field(default_factory=list)  # (s, s) relative to the true onset
     ready: bool = True
     confidence: float = 0.0
+    strongest: float = 0.0  # true signal over noise, at best
+    frames: int = 0  # in which the touch is to be seen
+    lasted: float = 0.0  # s, true
+    pieces: int = 0  # stretches of frames above a fifth of the segment's peak
 
 
 def _frames(recording: Take) -> Iterator[Frame]:
@@ -61,6 +65,13 @@ def _span(event: Any) -> tuple[float, float]:
     return thing.onset, thing.offset
 
 
+def _pieces(segment: Segment) -> int:
+    """How many separate stretches of frames reach a fifth of the segment's strongest taxel."""
+    strength = segment.frames.max(axis=(1, 2))
+    strong = strength >= 0.2 * strength.max()
+    return int(strong[0]) + int((strong[1:] & ~strong[:-1]).sum())
+
+
 def judge(recording: Take, seed: int, level: str, classifier: Any | None) -> Outcome:
     """Run one take through a fresh front end (and recognizer, where a classifier is given)."""
     rows, columns = recording["frames"].shape[1:]
@@ -78,20 +89,22 @@ def judge(recording: Take, seed: int, level: str, classifier: Any | None) -> Out
     slack = 2.0 / max(float(len(recording["times"]) / recording["times"][-1]), 1.0)
     inside = [e for e in decided if _span(e)[0] <= release + slack + 0.2 and _span(e)[1] >= onset - slack]
     result = Outcome(recording["kind"], level, seed, "missed", ready=ready, extra=len(decided) - len(inside))
+    result.strongest, result.frames = float(recording["seen"].max()), int((recording["seen"] > SEEN).sum())
+    result.lasted = release - onset
     result.segments = [(round(_span(e)[0] - onset, 2), round(_span(e)[1] - onset, 2)) for e in inside]
     if len(inside) + len(cancelled) > 1:
         result.answer = "split"
         named = [e for e in inside if isinstance(e, Gesture)]
         if named and recording["label"] == "none":
             result.answer = named[0].gesture  # a non-gesture in pieces, one of which was taken for a gesture
-        elif not named and recording["label"] == "none":
+        elif classifier is not None and recording["label"] == "none":
             result.answer = "unknown"
     elif inside:
         event = inside[0]
         first, last = _span(event)
         result.late, result.start, result.end = event.decided - release, first - onset, last - release
         if isinstance(event, Cut):
-            result.answer = "segment"
+            result.answer, result.pieces = "segment", _pieces(event.segment)
         else:
             result.before = max(event.scores, key=lambda name: event.scores[name])
             result.answer = event.gesture if isinstance(event, Gesture) else "unknown"
@@ -124,7 +137,7 @@ def _batch(task: tuple[str | None, str, str, int, bool, int]) -> tuple[list[Outc
             ]
             continue
         recording = take(kind, seed, level)
-        if kind != "burst" and recording["strongest"] < SEEN:
+        if kind != "burst" and recording["seen"].max() < SEEN:
             unseen += 1
             continue
         outcomes.append(judge(recording, seed, level, classifier))
@@ -151,6 +164,8 @@ def summary(outcomes: list[Outcome], unseen: dict[str, int]) -> dict[str, Any]:
                 "before": sum(o.before == kind for o in mine) / len(mine),
                 "answers": dict(answers.most_common()),
                 "extra": sum(o.extra for o in mine),
+                "partial": sum(bool(o.segments) and (o.start > 0.2 or o.end < -0.2) for o in mine),
+                "pieces": dict(Counter(o.pieces for o in mine if o.answer == "segment").most_common()),
                 "late_s": sorted(o.late for o in mine)[len(mine) // 2],
             }
         result[level] = {
@@ -199,7 +214,11 @@ def _show(result: dict[str, Any], front_end: bool) -> None:
             answers = ", ".join(f"{a} {c}" for a, c in k["answers"].items() if a != kind)
             rejected = sum(c for a, c in k["answers"].items() if a not in GESTURES)
             if front_end:
-                share = "one " + _percent(k["answers"].get("segment", 0), k["n"])
+                share = (
+                    "one " + _percent(k["answers"].get("segment", 0), k["n"]) + f"  partial {k['partial']}"
+                )
+                if kind == "double_tap":
+                    answers += f"; contacts in it {k['pieces']}"
             elif kind in GESTURES:
                 share = (
                     f"before {100 * k['before']:5.1f}  right {_percent(k['answers'].get(kind, 0), k['n'])}"
@@ -322,6 +341,7 @@ def main() -> None:
                 print(
                     f"{o.level:8s} {o.kind:25s} seed {o.seed:3d}  {o.answer:15s} before {o.before:15s}",
                     o.segments,
+                    f"lasted {o.lasted:.2f} s, seen {o.strongest:.1f}, frames {o.frames}",
                 )
 
 

@@ -69,7 +69,9 @@ def draw_sensor(rng: Rng, level: str, rows: int = 9, columns: int = 9, rate_hz: 
     spare = np.array([columns, rows]) - 9.0 * pitch
     shift = spare * rng.uniform(0.0, 1.0, 2) + (pitch - 1) / 2
     usual = _answer(np.array(0.45 / (0.45 + softness)))  # what a usual press in the middle of a taxel gives
-    amplitude = snr * noise
+    pink = noise * float(rng.uniform(0.2, 0.6) if hard else rng.uniform(0.0, 0.2))
+    hum = noise * float(rng.uniform(0.2, 0.9) if hard else rng.uniform(0.0, 0.2))
+    amplitude = snr * float(np.sqrt(noise**2 + pink**2 + hum**2 / 2))
     return Sensor(
         rows=rows,
         columns=columns,
@@ -82,9 +84,9 @@ def draw_sensor(rng: Rng, level: str, rows: int = 9, columns: int = 9, rate_hz: 
         stuck=stuck,
         counts=amplitude / float(usual),
         noise=noise,
-        pink=noise * float(rng.uniform(0.2, 0.6) if hard else rng.uniform(0.0, 0.2)),
+        pink=pink,
         drift=amplitude * float(rng.uniform(-0.02, 0.02) if hard else rng.uniform(-0.001, 0.001)),
-        hum=noise * float(rng.uniform(0.2, 0.9) if hard else rng.uniform(0.0, 0.2)),
+        hum=hum,
         hum_hz=float(rng.choice([50.0, 60.0]) + rng.normal(0.0, 0.05)),
         softness=softness,
         slow=float(rng.uniform(0.1, 0.35) if hard else rng.uniform(0.0, 0.12)),
@@ -176,11 +178,11 @@ def _disturb(
 
 def record(
     sensor: Sensor, rng: Rng, performances: Sequence[tuple[float, Performance]], length: float
-) -> tuple[NDArray[np.uint16] | NDArray[np.float32], Array, float]:
+) -> tuple[NDArray[np.uint16] | NDArray[np.float32], Array, Array]:
     """Record `length` seconds in which the performances begin at the given times.
 
-    Returns frames (N, R, C), times (N,) in seconds, and the strongest true signal in units of the white
-    noise.
+    Returns frames (N, R, C), times (N,) in seconds, and what is to be seen in each frame (N,): the
+    strongest true signal of a living taxel in units of all its noise together.
     """
     times = _times(sensor, rng, length)
     load = np.zeros((len(times), sensor.rows, sensor.columns))
@@ -205,7 +207,8 @@ def record(
         lines = signal.sum(axis=1, keepdims=True) + signal.sum(axis=2, keepdims=True)
         signal = signal + sensor.leak * near + sensor.stripe * lines
     counts = signal * sensor.gain * sensor.counts
-    strongest = float(counts.max()) / sensor.noise
+    noise = np.sqrt(sensor.noise**2 + sensor.pink**2 + sensor.hum**2 / 2)
+    seen = (counts * ~(sensor.dead | sensor.stuck)).max(axis=(1, 2)) / noise
     for start, performed in performances:
         if performed.burst:
             _disturb(sensor, rng, counts, performed, start, times)
@@ -223,5 +226,5 @@ def record(
         counts[:, sensor.stuck] = sensor.offset[sensor.stuck] + sensor.top / 3
     whole = np.clip(np.rint(counts), 0.0, min(sensor.top, 65535.0))
     if sensor.scale is None:
-        return whole.astype(np.uint16), times, strongest
-    return (whole * sensor.scale).astype(np.float32), times, strongest
+        return whole.astype(np.uint16), times, seen
+    return (whole * sensor.scale).astype(np.float32), times, seen
