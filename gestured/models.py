@@ -1,0 +1,445 @@
+"""Open, verify and self-test an .onnx file -> Classifier; and the ladder of fallbacks.
+
+A file is read once, checked against the manifest (where it is a shipped one), inspected without onnxruntime,
+opened from those bytes, held against its own metadata and made to reproduce its self-test. Whatever is wrong
+is one `ModelError`: the file, what is wrong, what was expected.
+"""
+
+import hashlib
+import json
+import math
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import gestured
+from gestured.core.errors import ModelError
+from gestured.core.features import feature_names, touch_pattern
+from gestured.core.frames import Segment
+from gestured.core.recognizer import Classifier, Scores
+from gestured.model_file import Metadata, inspect, read_bytes
+
+LADDER = ("cnn_lstm", "lstm", "touch_pattern_rf")  # the shipped models, best first
+TOLERANCE = 1e-3  # of the self-test: other processors round differently, another model is further off
+OPENING_BYTES = 2 << 30  # address space that opening and self-testing a model may take
+
+
+class Model:
+    """A model that has passed every check; implements `Classifier`."""
+
+    def __init__(self, data: bytes, name: str) -> None:
+        """Opens `data`; `name` stands for it in events. ValueError says what is wrong."""
+        self.name = name
+        self.size = len(data)
+        self.sha256 = hashlib.sha256(data).hexdigest()
+        self.metadata = Metadata.parse(inspect(data))
+        self.gestures = self.metadata.gestures
+        self.rows = self.metadata.rows
+        self.columns = self.metadata.columns
+        self.quantiles = self.metadata.quantiles
+        if self.metadata.features is not None:
+            expected = feature_names(self.rows, self.columns)
+            if self.metadata.features != expected:
+                raise ValueError(
+                    f"metadata 'features': expected the {len(expected)} touch-pattern features of a "
+                    f"{self.rows} x {self.columns} grid in their order"
+                )
+        with _bounded_memory():
+            self._session = _open_session(data)
+            self._input = self._check_shapes()
+            self.self_test_error = self._self_test()
+
+    def classify(self, segment: Segment) -> Scores:
+        """Scores of one segment. What is empty or not finite is unknown, whatever a net would say of it.
+
+        Raises ModelError where the model fails or does not give probabilities.
+        """
+        with np.errstate(all="ignore"):  # counts near the limits of float32 overflow; checked below
+            window = self.metadata.window.apply(segment)
+            usable = len(window) > 0 and bool(np.isfinite(window).all())
+            if usable and self._input == "features":
+                window = touch_pattern(window, self.metadata.rate_hz)
+                usable = bool(np.isfinite(window).all())
+        if not usable:
+            count = len(self.gestures)
+            return Scores(np.full(count, 1.0 / count, np.float32), 1.0, self.name)
+        try:
+            scores, unknown = self._run(window[np.newaxis])
+        except ValueError as error:
+            raise ModelError(f"{self.name}: {error}") from None
+        return Scores(scores[0], float(unknown[0]), self.name)
+
+    def _run(self, batch: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(B, ...) inputs -> scores (B, G), unknown (B,); ValueError where they are no probabilities."""
+        try:
+            scores, unknown = self._session.run(("scores", "unknown"), {self._input: batch})
+        except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
+            raise ValueError(f"onnxruntime cannot run it: {_brief(error)}") from None
+        expected = (len(batch), len(self.gestures))
+        if scores.shape != expected or unknown.shape != expected[:1]:
+            found = f"{scores.shape} and {unknown.shape}"
+            raise ValueError(f"outputs have the shapes {found}, expected {expected} and {expected[:1]}")
+        both = np.concatenate([scores, unknown[:, np.newaxis]], axis=1)
+        sums = scores.sum(axis=1)
+        # Written so that NaN fails every comparison.
+        if not (both.min() >= -1e-4 and both.max() <= 1.0 + 1e-4 and np.abs(sums - 1.0).max() <= 1e-3):
+            raise ValueError("outputs are not probabilities: expected 0 to 1, scores that add up to 1")
+        return np.clip(scores, 0.0, 1.0), np.clip(unknown, 0.0, 1.0)
+
+    def _check_shapes(self) -> str:
+        """The input's name, once names, types and shapes agree with the metadata."""
+        inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
+        names = [i.name for i in inputs]
+        takes = "frames" if self.metadata.features is None else "features"
+        if names != [takes]:
+            raise ValueError(f"has inputs {names}, expected ['{takes}'] as its metadata say")
+        if sorted(o.name for o in outputs) != ["scores", "unknown"]:
+            raise ValueError(f"has outputs {[o.name for o in outputs]}, expected 'scores' and 'unknown'")
+        count = len(self.gestures)
+        own: tuple[int, ...] = (self.rows, self.columns)
+        if self.metadata.features is not None:
+            own = (len(self.metadata.features),)
+        free = 1 if takes == "features" else 2  # the dimensions that must be open: B, or B and T
+        shapes = {takes: (None,) * free + own, "scores": (None, count), "unknown": (None,)}
+        for value in (*inputs, *outputs):
+            expected = shapes[value.name]
+            if value.type != "tensor(float)":
+                raise ValueError(f"{value.name!r} is {value.type}, expected tensor(float)")
+            # What the file leaves open is a name or None; outputs are held to their size when it runs.
+            loose = value.name != takes
+            found = [d if isinstance(d, int) else None for d in value.shape]
+            if len(found) != len(expected) or not all(
+                f == e or (loose and (f is None or e is None)) for f, e in zip(found, expected, strict=True)
+            ):
+                raise ValueError(f"{value.name!r} has the shape {_shape(found)}, expected {_shape(expected)}")
+        return takes
+
+    def _self_test(self) -> float:
+        """The largest difference from the stored outputs; ValueError where it is above `TOLERANCE`."""
+        test = self.metadata.self_test
+        expected = (len(test.values), len(self.gestures))
+        rank = 4 if self._input == "frames" else 2
+        if test.values.ndim != rank or test.scores.shape != expected:
+            raise ValueError(f"self-test: expected scores {expected} of a {rank}-dimensional input")
+        try:
+            scores, unknown = self._run(test.values)
+        except ValueError as error:
+            raise ValueError(f"self-test: {error}") from None
+        difference = float(max(np.abs(scores - test.scores).max(), np.abs(unknown - test.unknown).max()))
+        if not difference <= TOLERANCE:
+            raise ValueError(
+                f"self-test: {difference:.3g} from the stored outputs, expected {TOLERANCE} at most"
+            )
+        return difference
+
+
+def _open_session(data: bytes) -> Any:
+    # Its Linux builds send telemetry otherwise, and only the environment before the import stops all of it.
+    os.environ["ORT_DISABLE_TELEMETRY"] = "1"
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.inter_op_num_threads = 1
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idling burns cores otherwise
+    options.log_severity_level = 4  # what is wrong comes as an exception; stderr belongs to the daemon's log
+    try:
+        return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
+        raise ValueError(f"onnxruntime cannot open it: {_brief(error)}") from None
+
+
+@contextmanager
+def _bounded_memory() -> Iterator[None]:
+    """Bounds this process's address space: some 20 bytes of ONNX can ask for a tensor of any size.
+
+    Only where the system can say how much is in use (Linux); elsewhere nothing is bounded.
+    """
+    try:
+        import resource
+
+        used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    except (ImportError, OSError, ValueError, IndexError):
+        yield
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    limits = [limit for limit in (soft, hard) if limit != resource.RLIM_INFINITY]
+    resource.setrlimit(resource.RLIMIT_AS, (min([used + OPENING_BYTES, *limits]), hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def _brief(error: BaseException) -> str:
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) <= 200 else text[:197] + "..."
+
+
+def _shape(dimensions: Sequence[int | None]) -> str:
+    return "(" + ", ".join("any" if d is None else str(d) for d in dimensions) + ")"
+
+
+def shipped() -> dict[str, Path]:
+    """The models that come with the package, best first: name -> where its file belongs."""
+    return {name: _shipped_directory() / f"{name}.onnx" for name in LADDER}
+
+
+def _shipped_directory() -> Path:
+    try:
+        import gestured_models  # type: ignore[import-not-found, unused-ignore]
+
+        return Path(next(iter(gestured_models.__path__)))
+    except ImportError:  # run from a checkout, not installed
+        return Path(gestured.__file__).resolve().parent.parent / "models"
+
+
+def _locate(source: str | Path) -> tuple[Path, str | None]:
+    """(path, the shipped model's name where it is one)."""
+    path = Path(source)
+    known = shipped()
+    if isinstance(source, str) and os.sep not in source and not os.path.lexists(source):
+        name = source.removesuffix(".onnx")
+        if name not in known:
+            raise ModelError(f"{source}: no such file, and no shipped model ({', '.join(known)})")
+        return known[name], name
+    try:
+        if path.resolve() == known[path.stem].resolve():
+            return path, path.stem
+    except (
+        KeyError,
+        OSError,
+        ValueError,
+        RuntimeError,
+    ):  # not one of them, or no path at all: reading says it
+        pass
+    return path, None
+
+
+def _read(source: str | Path) -> tuple[Path, bytes]:
+    """The file's bytes; a shipped file's are those that its manifest knows."""
+    path, name = _locate(source)
+    try:
+        data = read_bytes(path)
+        if name is not None:
+            expected = _manifest_sha256(path)
+            if hashlib.sha256(data).hexdigest() != expected:
+                raise ValueError(f"is not the shipped file: expected the sha256 {expected} of manifest.json")
+    except ValueError as error:
+        raise ModelError(f"{path}: {error}") from None
+    return path, data
+
+
+def _manifest_sha256(path: Path) -> str:
+    try:
+        manifest = json.loads((path.parent / "manifest.json").read_text())
+        return str(manifest["models"][path.name]["sha256"])
+    except (OSError, ValueError, KeyError, TypeError):
+        raise ValueError("is a shipped model, expected its sha256 in the manifest.json beside it") from None
+
+
+def open_model(source: str | Path) -> Model:
+    """Open and verify a model: a path, or the bare name of a shipped one. Raises ModelError."""
+    path, data = _read(source)
+    try:
+        return Model(data, path.stem)
+    except ValueError as error:
+        raise ModelError(f"{path}: {error}") from None
+
+
+def check(source: str | Path) -> dict[str, Any]:
+    """What `gesturectl check` reports of a good model, as JSON values; raises ModelError for any other."""
+    path, name = _locate(source)
+    model = open_model(source)
+    known = model.metadata
+    return {
+        "file": str(path),
+        "name": model.name,
+        "kind": known.kind,
+        "version": known.version,
+        "shipped": name is not None,
+        "size": model.size,
+        "sha256": model.sha256,
+        "input": "frames" if known.features is None else "features",
+        "gestures": list(model.gestures),
+        "window": asdict(known.window),
+        "calibration": dict(known.calibration),
+        "training_data": known.training_data,
+        "self_test": {"largest_difference": model.self_test_error, "tolerance": TOLERANCE},
+    }
+
+
+class _Rung:
+    """One model of a ladder: opened when it is first needed."""
+
+    def __init__(self, source: str | Path | Classifier) -> None:
+        self.source = source
+        self.model: Classifier | None = None if isinstance(source, str | Path) else source
+        self.name = str(getattr(source, "name", None) or Path(str(source)).stem)
+        self.slow = 0  # runs in a row
+        self.aside_until = -math.inf
+
+    def open(self) -> Classifier:
+        if self.model is None:
+            assert isinstance(self.source, str | Path)
+            self.model = open_model(self.source)
+        return self.model
+
+    def gestures(self) -> tuple[str, ...]:
+        """Of a file without opening it: its metadata alone."""
+        if self.model is None:
+            assert isinstance(self.source, str | Path)
+            path, data = _read(self.source)
+            try:
+                return Metadata.parse(inspect(data)).gestures
+            except ValueError as error:
+                raise ModelError(f"{path}: {error}") from None
+        return tuple(self.model.gestures)
+
+
+class Ladder:
+    """Models, best first, as one `Classifier`: a rung that fails hands the same segment to the next.
+
+    A rung that cannot be opened, raises or gives scores that are not finite is put aside for `retry_after`
+    seconds of `clock`, as is one that took more than `slow_s` seconds `slow_runs` times in a row; then it is
+    tried again. Rungs that are aside still come last, before giving up. What another rung than the
+    first says is `degraded`.
+    """
+
+    def __init__(
+        self,
+        rungs: Sequence[str | Path | Classifier],
+        *,
+        slow_s: float = 0.05,
+        slow_runs: int = 3,
+        retry_after: float = 30.0,
+        clock: Callable[[], float] = time.perf_counter,
+        report: Callable[[str], None] | None = None,
+    ) -> None:
+        """Opens the first rung that can be; ModelError where none can, or one knows other gestures.
+
+        `report` is told in one sentence what happened to a rung.
+        """
+        if not rungs:
+            raise ModelError("a ladder needs at least one model")
+        self._rungs = [_Rung(source) for source in rungs]
+        self.slow_s, self.slow_runs, self.retry_after = slow_s, slow_runs, retry_after
+        self._clock = clock
+        self._report = report or (lambda sentence: None)
+        self.failures = 0  # of rungs: to open, to run
+        self.last_run_s = 0.0  # of the rung that answered
+        self._active, opened = self._first_open()
+        self.gestures: tuple[str, ...] = tuple(opened.gestures)
+        self.rows = int(getattr(opened, "rows", 0))
+        self.columns = int(getattr(opened, "columns", 0))
+        for rung in self._rungs:
+            self._check_gestures(rung)
+
+    @property
+    def name(self) -> str:
+        """The best rung's name, whether or not it can be used."""
+        return self._rungs[0].name
+
+    @property
+    def active(self) -> str:
+        """The name of the rung that answered last, or that would answer first."""
+        return self._active.name
+
+    @property
+    def degraded(self) -> bool:
+        """Whether `active` is a fallback."""
+        return self._active is not self._rungs[0]
+
+    @property
+    def model(self) -> Classifier:
+        """The active rung's model."""
+        return self._active.open()
+
+    def classify(self, segment: Segment) -> Scores:
+        """Scores of the best rung that can give them; raises ModelError where none can."""
+        now = self._clock()
+        ready = [rung for rung in self._rungs if now >= rung.aside_until]
+        aside = [rung for rung in self._rungs if now < rung.aside_until]
+        for rung in ready + aside:
+            try:
+                model = rung.open()
+                if tuple(model.gestures) != self.gestures:
+                    raise ModelError(f"{rung.name}: knows other gestures than {self.name}")
+                start = self._clock()
+                scores = model.classify(segment)
+                took = self._clock() - start
+                if not (np.isfinite(scores.values).all() and math.isfinite(scores.unknown)):
+                    raise ModelError(f"{rung.name}: gave scores that are not finite")
+            except Exception as error:  # whatever a rung dies of, the next one answers
+                self._put_aside(rung, str(error) or type(error).__name__)
+                continue
+            self._timed(rung, took)
+            if rung is not self._active:
+                self._report(f"{rung.name} answers now")
+                self._active = rung
+            self.last_run_s = took
+            return replace(scores, degraded=scores.degraded or self.degraded)
+        raise ModelError(f"no model could classify: {', '.join(rung.name for rung in self._rungs)}")
+
+    def _first_open(self) -> tuple[_Rung, Classifier]:
+        reasons = []
+        for rung in self._rungs:
+            try:
+                return rung, rung.open()
+            except ModelError as error:
+                reasons.append(str(error))
+                self._put_aside(rung, str(error))
+        raise ModelError("; ".join(reasons))
+
+    def _check_gestures(self, rung: _Rung) -> None:
+        """A fallback that cannot be read now may come back; one that knows other gestures is a mistake."""
+        try:
+            gestures = rung.gestures()
+        except ModelError as error:
+            if rung.aside_until == -math.inf:
+                self._report(f"{rung.name} could not be used: {error}")
+            return
+        if gestures != self.gestures:
+            raise ModelError(
+                f"{rung.name}: cannot stand in for {self._active.name}, expected the same gestures in the "
+                f"same order ({', '.join(self.gestures)}), found {', '.join(gestures)}"
+            )
+
+    def _put_aside(self, rung: _Rung, reason: str) -> None:
+        self.failures += 1
+        rung.slow = 0
+        rung.aside_until = self._clock() + self.retry_after
+        self._report(f"{rung.name} is put aside for {self.retry_after:g} s: {reason}")
+
+    def _timed(self, rung: _Rung, took: float) -> None:
+        rung.slow = rung.slow + 1 if took > self.slow_s else 0
+        if rung.slow >= self.slow_runs:
+            rung.slow = 0
+            rung.aside_until = self._clock() + self.retry_after
+            self._report(
+                f"{rung.name} is put aside for {self.retry_after:g} s: "
+                f"{self.slow_runs} runs in a row took more than {self.slow_s:g} s"
+            )
+
+
+def ladder_for(source: str | Path, fallbacks: Sequence[str | Path] | None = None, **settings: Any) -> Ladder:
+    """The contract's rule: named fallbacks, else the shipped rungs below a shipped model, else none.
+
+    `settings` go to `Ladder`. Raises ModelError.
+    """
+    if fallbacks is None:
+        try:
+            name = _locate(source)[1]
+        except ModelError:
+            name = None  # Ladder says it
+        fallbacks = LADDER[LADDER.index(name) + 1 :] if name is not None else ()
+        # By path: a file of that name in the working directory is not the shipped one.
+        fallbacks = [shipped()[rung] for rung in fallbacks]
+    return Ladder([source, *fallbacks], **settings)
