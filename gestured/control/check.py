@@ -1,0 +1,49 @@
+"""`gesturectl check`: whether a model file can be used."""
+
+import argparse
+import json
+import sys
+
+from gestured.core.errors import ModelError
+from gestured.models import check
+
+UNUSABLE = 3
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the subcommand to gesturectl's command line."""
+    parser = commands.add_parser(
+        "check",
+        help="verify a model file",
+        description="Open a model as the daemon would: its metadata, shapes and self-test. "
+        "Exit status 3 if it cannot be used.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="examples:\n  gesturectl check cnn_lstm\n  gesturectl check --json my_model.onnx",
+    )
+    parser.add_argument("model", metavar="MODEL", help="a path, or the name of a shipped model")
+    parser.add_argument("--json", action="store_true", help="print what is known about it as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what is known of the model; 3 and the reason where it cannot be used."""
+    try:
+        report = check(args.model)
+    except ModelError as error:
+        print(f"gesturectl: {error}", file=sys.stderr)
+        return UNUSABLE
+    if args.json:
+        print(json.dumps(report))
+        return 0
+    for key, value in report.items():
+        print(f"{key:<14} {_words(value)}")
+    print("usable")
+    return 0
+
+
+def _words(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_words(inner)}" for key, inner in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_words, value))
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,43 @@
+"""The command line of gesturectl: one file per subcommand."""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+
+import gestured
+from gestured.control import check, demo, listen, simulate
+from gestured.core.errors import GesturedError
+
+SUBCOMMANDS = (listen, simulate, check, demo)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The whole command line; each subcommand adds itself and sets `run`."""
+    top = argparse.ArgumentParser(
+        prog="gesturectl",
+        description="The operator's client of gestured.",
+        epilog="example: gesturectl listen --socket /run/gestured/events.sock",
+    )
+    top.add_argument("--version", action="version", version=f"gesturectl {gestured.__version__}")
+    commands = top.add_subparsers(metavar="COMMAND", required=True)
+    for module in SUBCOMMANDS:
+        module.add(commands)
+    return top
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one subcommand; returns the exit status (0 as asked, 1 failed, 2 usage, 3 unusable model)."""
+    args = parser().parse_args(argv)
+    try:
+        status: int = args.run(args)
+        sys.stdout.flush()
+        return status
+    except GesturedError as error:
+        print(f"gesturectl: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 0
+    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0

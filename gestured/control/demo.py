@@ -1,0 +1,142 @@
+"""`gesturectl demo`: the real daemon, a simulated sensor over real UDP, and how well they get on."""
+
+import argparse
+import json
+import math
+import os
+import queue
+import sys
+import threading
+import time
+from typing import Any
+
+from gestured.control.engine import Engine
+from gestured.control.picture import trace
+from gestured.control.play import add_arguments, frames, play_from
+from gestured.control.score import Outcome, Performed, Tally
+from gestured.control.sensor import Form, Sensor
+from gestured.control.show import as_dict, block, summary
+from gestured.control.stream import Stream
+from gestured.core.errors import GesturedError
+from gestured.simulator import Take
+
+SENSOR = "demo"
+SLACK_S = 0.3  # idle frames shown before what was performed, and waited for at the end
+TAIL_S = 0.1
+POLL_S = 0.05
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the subcommand to gesturectl's command line."""
+
+    parser = commands.add_parser(
+        "demo",
+        help="see it recognise simulated gestures",
+        description="Start a daemon with a shipped model and a simulated sensor that sends to it over UDP, "
+        "and show what was performed beside what was recognised.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="examples:\n  gesturectl demo --seconds 20 --speed fast\n  gesturectl demo --json --kinds double_tap",
+    )
+    parser.add_argument(
+        "--model", default="cnn_lstm", help="a path, or a shipped one's name (default: cnn_lstm)"
+    )
+    parser.add_argument("--seconds", type=float, default=60.0, metavar="S", help="how long (default: 60)")
+    add_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print outcomes and summary as JSON lines")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Show outcomes as they come, then the summary; Ctrl-C goes straight to the summary."""
+
+    if not 5.0 <= args.seconds <= 600.0:
+        raise GesturedError(f"--seconds {args.seconds:g}: expected 5 to 600")
+    play = play_from(args)
+    ((_, take),) = play.takes(args.seconds)
+    show = Show(take, args.json)
+    with Engine(args.model, play.rows, play.columns) as engine:
+        stream = Stream(engine.socket, {"types": ["gesture", "unknown"]})
+        sensor = Sensor(engine.listen, Form(SENSOR))
+        host, port = engine.listen
+        show.say(
+            f"The daemon listens on {host}:{port} with the model {engine.ready['model']}.\n"
+            f"A simulated sensor of {play.rows} x {play.columns} taxels sends OSC to it at {play.rate_hz:g} Hz.\n"
+            "For two seconds nobody touches it. Ctrl-C ends.\n"
+        )
+        try:
+            show.follow(sensor, stream)
+        except KeyboardInterrupt:
+            show.say("")
+        finally:
+            sensor.close()
+            stream.close()
+    show.conclude()
+    return 0
+
+
+class Show:
+    """The running comparison of one take with the events that come of it."""
+
+    def __init__(self, take: Take, as_json: bool) -> None:
+
+        self.take = take
+        self.as_json = as_json
+        plain = "NO_COLOR" in os.environ or os.environ.get("TERM") == "dumb"
+        self.colour = sys.stdout.isatty() and not plain
+        self.tally = Tally()
+
+    def say(self, text: str) -> None:
+        """Words for a person."""
+        if not self.as_json:
+            print(text, flush=True)
+
+    def follow(self, sensor: Sensor, stream: Stream) -> None:
+        """Send the take and show what comes of it, until its end."""
+
+        heard: queue.SimpleQueue[tuple[float, dict[str, Any]] | None] = queue.SimpleQueue()
+
+        def listen() -> None:
+            for event in stream:
+                heard.put((time.time(), event))
+            heard.put(None)
+
+        threading.Thread(target=listen, daemon=True).start()
+        threading.Thread(target=sensor.send, args=(frames(0.0, self.take),), daemon=True).start()
+        ahead = list(self.take.events)
+        end = sensor.moment(float(self.take.times[-1]) + SLACK_S)
+        while (now := time.time()) < end:
+            while ahead and sensor.moment(ahead[0].onset_s) <= now:
+                event = ahead.pop(0)
+                onset, offset = sensor.moment(event.onset_s), sensor.moment(event.offset_s)
+                self.tally.begin(Performed(event.label, event.kind, onset, offset))
+            for outcome in self.tally.settle(now):
+                self._show(outcome, sensor)
+            try:
+                item = heard.get(timeout=POLL_S)
+            except queue.Empty:
+                continue
+            if item is None:
+                raise GesturedError("the daemon closed the connection")
+            arrived, message = item
+            if message["type"] in ("gesture", "unknown") and (decided := self.tally.hear(message, arrived)):
+                self._show(decided, sensor)
+        for outcome in self.tally.settle(math.inf):
+            self._show(outcome, sensor)
+
+    def conclude(self) -> None:
+        """The summary of what was shown."""
+
+        figures = self.tally.summary()
+        words = json.dumps({"type": "summary"} | figures) if self.as_json else summary(figures, self.colour)
+        print(words, flush=True)
+
+    def _show(self, outcome: Outcome, sensor: Sensor) -> None:
+
+        if self.as_json:
+            print(json.dumps(as_dict(outcome)), flush=True)
+            return
+        of = outcome.performed
+        onset, offset = (of.onset, of.offset) if of else (outcome.event["onset"], outcome.event["offset"])  # type: ignore[index]
+        times = self.take.times + sensor.epoch
+        shown = (times >= onset - SLACK_S) & (times <= offset + TAIL_S)
+        print(block(outcome, trace(self.take.frames[shown]), self.colour), flush=True)

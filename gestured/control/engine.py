@@ -1,0 +1,80 @@
+"""A real daemon of one's own for the demo: a process, free ports, a socket in a temporary folder."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from gestured.core.errors import GesturedError
+
+STOP_S = 5.0
+
+
+class Engine:
+    """`gestured` as a child process; a context manager. Raises GesturedError where it does not start."""
+
+    def __init__(self, model: str, rows: int, columns: int) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="gestured-demo-")
+        folder = Path(self._folder.name)
+        self._log = folder / "log"
+        command = [sys.executable, "-m", "gestured.daemon", "--model", model, "--listen", "127.0.0.1:0"]
+        command += ["--socket", str(folder / "events.sock"), "--grid", f"{rows}x{columns}"]
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("GESTURED_")}
+        with self._log.open("wb") as log:
+            # A session of its own: Ctrl-C is for us, and we end it in our own time.
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                env=environment,
+                start_new_session=True,
+            )
+        try:
+            self.ready = self._wait()
+        except BaseException:
+            self.close()
+            raise
+
+    def _wait(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            status = self._process.wait(STOP_S)
+            said = self._log.read_text("utf-8", "replace").strip().splitlines()
+            reason = said[-1] if said else "it said nothing"
+            raise GesturedError(f"the daemon did not start (exit status {status}): {reason}")
+        ready: dict[str, Any] = json.loads(line)
+        return ready
+
+    @property
+    def listen(self) -> tuple[str, int]:
+        """Where it takes frames."""
+        host, port = self.ready["listen"].rsplit(":", 1)
+        return host.strip("[]"), int(port)
+
+    @property
+    def socket(self) -> Path:
+        """Where it gives events."""
+        return Path(self.ready["socket"])
+
+    def close(self) -> None:
+        """End it as an operator would."""
+        self._process.terminate()
+        try:
+            self._process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        if self._process.stdout:
+            self._process.stdout.close()
+        self._folder.cleanup()
+
+    def __enter__(self) -> "Engine":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,113 @@
+"""`gesturectl listen`: events as they come."""
+
+import argparse
+import os
+import sys
+import time
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from gestured.control.address import default_socket
+from gestured.control.stream import Refused, Stream, Unreachable
+
+TYPES = ("gesture", "unknown", "cancelled", "onset", "release", "status")
+RETRY_S = 0.5
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the subcommand to gesturectl's command line."""
+    parser = commands.add_parser(
+        "listen",
+        help="print events as they come",
+        description="Connect to the daemon's event socket and print events as they come.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="examples:\n  gesturectl listen --types gesture,unknown\n"
+        "  gesturectl listen --json --gesture swipe_left --count 1",
+    )
+    parser.add_argument(
+        "--socket", type=Path, help="the daemon's event socket (default: the daemon's own default)"
+    )
+    parser.add_argument(
+        "--types", type=_types, help=f"comma-separated, of {', '.join(TYPES)} (default: gesture)"
+    )
+    parser.add_argument("--sensor", action="append", metavar="NAME", help="only this sensor; may be repeated")
+    parser.add_argument(
+        "--gesture", action="append", metavar="NAME", help="only this gesture; may be repeated"
+    )
+    parser.add_argument("--count", type=int, metavar="N", help="end after N events")
+    parser.add_argument(
+        "--reconnect", action="store_true", help="wait for a daemon that is not there (any more)"
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the daemon's own lines, the hello among them"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print until the count is reached, the daemon ends, or Ctrl-C."""
+    path = args.socket or default_socket(os.environ)
+    wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture}
+    subscribe = {key: value for key, value in wanted.items() if value} or None
+    left = args.count
+    while True:
+        try:
+            stream = Stream(path, subscribe)
+        except Unreachable:
+            if not args.reconnect:
+                raise
+            time.sleep(RETRY_S)
+            continue
+        _greet(stream, args.json)
+        for line, event in stream.raw():
+            if event.get("type") == "error":
+                raise Refused(f"the daemon refused the request: {event.get('reason')}")
+            print(line if args.json else readable(event), flush=True)
+            if left is not None and event.get("type") != "lost":
+                left -= 1
+                if left <= 0:
+                    return 0
+        if not args.reconnect:
+            raise Unreachable(f"the daemon on {path} closed the connection")
+
+
+def readable(event: dict[str, Any]) -> str:
+    """One event as one line for a person."""
+    kind = event.get("type")
+    moment = next((event[key] for key in ("decided", "onset", "offset", "time") if key in event), time.time())
+    clock = datetime.fromtimestamp(moment).strftime("%H:%M:%S.%f")[:-3]
+    head = f"{clock}  {event.get('sensor', '-'):<12} "
+    if kind in ("gesture", "unknown"):
+        number = f"#{event['sequence']}" if kind == "gesture" else ""
+        waited = 1000 * (event["decided"] - event["offset"])
+        tail = f"  by {event['model']}, degraded" if event["degraded"] else ""
+        name = f"{event.get('gesture', 'unknown'):<24} {event['confidence']:4.2f}"
+        return f"{head}{name}  {number:<6} {waited:4.0f} ms{tail}"
+    if kind == "status":
+        sensors = ", ".join(f"{name} {state}" for name, state in sorted(event["sensors"].items()))
+        return f"{head}status: {event['state']} ({sensors or 'no sensor'})"
+    if kind == "cancelled":
+        return f"{head}cancelled: {event['reason']}"
+    if kind == "lost":
+        return f"{head}{event['count']} events lost: this reader was too slow"
+    return f"{head}{kind}"
+
+
+def _greet(stream: Stream, as_json: bool) -> None:
+    hello = stream.hello
+    if as_json:
+        print(stream.hello_line, flush=True)
+        return
+    names = ", ".join(hello["sensors"]) or "none yet"
+    print(f"gestured {hello['version']}, model {hello['model']}, sensors: {names}", file=sys.stderr)
+
+
+def _types(text: str) -> list[str]:
+    types = [word.strip() for word in text.split(",") if word.strip()]
+    unknown = [word for word in types if word not in TYPES]
+    if unknown or not types:
+        raise argparse.ArgumentTypeError(
+            f"{', '.join(unknown) or text!r}: expected some of {', '.join(TYPES)}"
+        )
+    return types

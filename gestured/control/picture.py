@@ -1,0 +1,46 @@
+"""A small picture of the pressure of one gesture, for a terminal."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+SIZE = 9  # columns, and rows: two of them share a line of text
+SHADES = " ░▒▓█"
+DARKEST, STEPS = 232, 23  # the grey ramp of 256-colour terminals
+
+
+def trace(frames: NDArray[np.generic]) -> NDArray[np.float32]:
+    """Where the finger went, brighter the later: (T, R, C) counts -> (9, 9) from 0 to 1.
+
+    The first frame counts as idle: what it holds is subtracted.
+    """
+    values = np.asarray(frames, np.float32)
+    rise = np.maximum(values - values[0], 0.0)
+    peak = float(rise.max())
+    if peak <= 0.0:
+        return np.zeros((SIZE, SIZE), np.float32)
+    age = np.linspace(0.3, 1.0, len(rise), dtype=np.float32)[:, None, None]
+    path = (age * rise / peak).max(axis=0)
+    rows = np.linspace(0, path.shape[0] - 1, SIZE).round().astype(int)
+    columns = np.linspace(0, path.shape[1] - 1, SIZE).round().astype(int)
+    return np.asarray(path[np.ix_(rows, columns)], np.float32)
+
+
+def draw(picture: NDArray[np.float32], colour: bool) -> list[str]:
+    """Five lines of nine characters: half blocks in grey, or shades where there is no colour."""
+    padded = np.vstack([picture, np.zeros((len(picture) % 2, picture.shape[1]), np.float32)])
+    pairs = zip(padded[0::2], padded[1::2], strict=True)
+    return [
+        _coloured(upper, lower) if colour else _shaded(np.maximum(upper, lower)) for upper, lower in pairs
+    ]
+
+
+def _coloured(upper: NDArray[np.float32], lower: NDArray[np.float32]) -> str:
+    cells = (
+        f"\x1b[38;5;{DARKEST + round(STEPS * float(u))}m\x1b[48;5;{DARKEST + round(STEPS * float(v))}m▀"
+        for u, v in zip(upper, lower, strict=True)
+    )
+    return "".join(cells) + "\x1b[0m"
+
+
+def _shaded(row: NDArray[np.float32]) -> str:
+    return "".join(SHADES[round((len(SHADES) - 1) * float(value))] for value in row)

@@ -1,0 +1,152 @@
+"""What the simulated sensor plays: a person who performs gesture after gesture, and the frames of it."""
+
+import argparse
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gestured.core.frames import Frame, Touch
+from gestured.simulator import (
+    GESTURES,
+    NON_GESTURES,
+    SPEEDS,
+    Participant,
+    Performance,
+    Sensor,
+    Take,
+    generator,
+    perform,
+)
+
+PART_S = 600.0  # what is simulated at a time; between two parts the sensor is off
+OFF_S = 3.0
+LEAD_S = 2.0  # untouched at first: the daemon learns the baseline
+TAIL_S = 1.0
+IDLE_S = (1.0, 2.0)  # between performances
+
+
+@dataclass(frozen=True)
+class Play:
+    """Who performs what, on which sensor. The same play gives the same frames."""
+
+    seed: int = 0
+    participant: int = 0
+    rate_hz: float = 15.0
+    rows: int = 9
+    columns: int = 9
+    kinds: tuple[str, ...] = ()  # in this order, again and again; none: at random
+    non_gestures: float = 0.2  # share of what is performed at random
+    speed: str | None = None  # None: mixed
+
+    def takes(self, seconds: float | None) -> Iterator[tuple[float, Take]]:
+        """(start, take) one after the other, `seconds` in all or without end; times in seconds from 0."""
+        start, part = 0.0, 0
+        while seconds is None or start < seconds:
+            length = PART_S if seconds is None else min(PART_S, seconds - start)
+            yield start, self._take(part, length)
+            start, part = start + length + OFF_S, part + 1
+
+    def _take(self, part: int, seconds: float) -> Take:
+        rng = generator(self.seed, 0xC7, self.participant, part)
+        nominal = Sensor.nominal(day=self.participant)
+        pitch = min(nominal.extent) / min(self.rows, self.columns)
+        sensor = replace(nominal, rows=self.rows, columns=self.columns, pitch_mm=pitch, rate_hz=self.rate_hz)
+        person = Participant(self.participant)
+        inclination = int(rng.integers(3))
+        performances: list[tuple[float, Performance]] = []
+        now = LEAD_S
+        while True:
+            kind = self._kind(len(performances), rng)
+            speed = self.speed or tuple(SPEEDS)[int(rng.integers(len(SPEEDS)))]
+            performance = perform(kind, person, rng, speed, inclination, sensor.extent)
+            if now + performance.duration_s + TAIL_S > seconds:
+                return sensor.record(performances, seconds, rng)
+            performances.append((now, performance))
+            now += performance.duration_s + float(rng.uniform(*IDLE_S))
+
+    def _kind(self, number: int, rng: np.random.Generator) -> str:
+        if self.kinds:
+            return self.kinds[number % len(self.kinds)]
+        pool = NON_GESTURES if rng.random() < self.non_gestures else GESTURES
+        return pool[int(rng.integers(len(pool)))]
+
+
+def frames(start: float, take: Take) -> Iterator[tuple[int, Frame]]:
+    """(the sensor's counter, frame) of a take that begins at `start` seconds."""
+    for n in range(len(take.frames)):
+        touches = tuple(
+            Touch(int(id_), float(x), float(y))
+            for id_, (x, y) in zip(take.touch_ids[n], take.touches[n], strict=True)
+            if id_ >= 0
+        )
+        yield int(take.counter[n]), Frame(start + float(take.times[n]), take.frames[n], touches)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The flags of a play."""
+    parser.add_argument("--participant", type=int, default=0, metavar="N", help="who performs (default: 0)")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="another order of things (default: 0)"
+    )
+    parser.add_argument(
+        "--kinds", type=_kinds, default=(), metavar="A,B", help="perform these in turn (default: at random)"
+    )
+    parser.add_argument(
+        "--non-gestures",
+        type=_share,
+        default=0.2,
+        metavar="SHARE",
+        help="share of what is no gesture (default: 0.2)",
+    )
+    parser.add_argument("--speed", choices=tuple(SPEEDS), help="how fast the person moves (default: mixed)")
+    parser.add_argument(
+        "--rate", type=_rate, default=15.0, metavar="HZ", help="frames a second (default: 15)"
+    )
+    parser.add_argument(
+        "--grid", type=_grid, default=(9, 9), metavar="RxC", help="rows and columns (default: 9x9)"
+    )
+
+
+def play_from(args: argparse.Namespace) -> Play:
+    """The play that the flags ask for."""
+    rows, columns = args.grid
+    return Play(
+        args.seed, args.participant, args.rate, rows, columns, args.kinds, args.non_gestures, args.speed
+    )
+
+
+def _kinds(text: str) -> tuple[str, ...]:
+    kinds = tuple(word.strip() for word in text.split(",") if word.strip())
+    unknown = [kind for kind in kinds if kind not in GESTURES + NON_GESTURES]
+    if unknown or not kinds:
+        raise argparse.ArgumentTypeError(
+            f"{', '.join(unknown) or repr(text)}: expected some of {', '.join(GESTURES + NON_GESTURES)}"
+        )
+    return kinds
+
+
+def _share(text: str) -> float:
+    return _between(text, 0.0, 1.0)
+
+
+def _rate(text: str) -> float:
+    return _between(text, 5.0, 1000.0)
+
+
+def _between(text: str, low: float, high: float) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not low <= value <= high:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a number from {low:g} to {high:g}")
+    return value
+
+
+def _grid(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d{1,2})x(\d{1,2})", text)
+    if match is None or not all(2 <= int(number) <= 64 for number in match.groups()):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected ROWSxCOLUMNS, each from 2 to 64, such as 9x9")
+    return int(match[1]), int(match[2])

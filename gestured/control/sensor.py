@@ -1,0 +1,89 @@
+"""A simulated sensor's firmware: frames and finger positions as OSC packets, sent at their times over UDP."""
+
+import socket
+import threading
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.frames import Frame, Touch
+from gestured.core.osc import encode_bundle, encode_message
+
+BLOBS: dict[str, np.dtype[Any]] = {
+    "float32": np.dtype(">f4"),
+    "uint16": np.dtype(">u2"),
+    "uint8": np.dtype(">u1"),
+}
+
+
+@dataclass(frozen=True)
+class Form:
+    """How a frame is written. `values` is "floats", "ints" or one of BLOBS; `plain` has no bundle."""
+
+    sensor: str
+    values: str = "floats"
+    plain: bool = False
+
+    def packet(self, frame: Frame, counter: int, moment: float) -> bytes:
+        """One packet: pressure with the counter and the touches, in a bundle of the epoch time `moment`."""
+        pressure = self._pressure(frame.values, None if self.plain else counter)
+        if self.plain:
+            return pressure
+        return encode_bundle([pressure, self._trajectory(frame.touches)], moment)
+
+    def _pressure(self, values: NDArray[np.generic], counter: int | None) -> bytes:
+        address = f"/{self.sensor}/pressure"
+        flat = np.ravel(values)
+        types, args = ("", []) if counter is None else ("i", [counter])
+        if self.values == "floats":
+            return encode_message(address, types + "f" * flat.size, [*args, flat.astype(np.float32)])
+        if self.values == "ints":
+            return encode_message(address, types + "i" * flat.size, [*args, np.rint(flat).astype(np.int32)])
+        dtype = BLOBS[self.values]
+        if dtype.kind == "u":
+            flat = np.clip(np.rint(flat), 0, np.iinfo(dtype).max)
+        return encode_message(address, types + "b", [*args, flat.astype(dtype).tobytes()])
+
+    def _trajectory(self, touches: Sequence[Touch]) -> bytes:
+        args = [value for touch in touches[:3] for value in (touch.id, touch.x, touch.y)]
+        return encode_message(f"/{self.sensor}/trajectory", "iff" * (len(args) // 3), args)
+
+
+class Sensor:
+    """Sends frames at the pace of their times. A frame's time in seconds counts from the first frame."""
+
+    def __init__(self, to: tuple[str, int], form: Form) -> None:
+        family, kind, _, _, address = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
+        self.socket = socket.socket(family, kind)
+        self.socket.connect(address)
+        self.form = form
+        self.sent = 0
+        self.unheard = 0  # packets that a closed port answered
+        self.start = time.monotonic()
+        self.epoch = time.time()
+        self.stop = threading.Event()
+
+    def send(self, frames: Iterable[tuple[int, Frame]]) -> None:
+        """Send (counter, frame) until they end or `stop` is set. A late frame goes out at once."""
+        for counter, frame in frames:
+            wait = self.start + frame.t - time.monotonic()
+            if self.stop.wait(max(wait, 0.0)):
+                return
+            try:
+                self.socket.send(self.form.packet(frame, counter, self.moment(frame.t)))
+            except ConnectionRefusedError:  # said about an earlier packet: nobody listens on that port
+                self.unheard += 1
+            self.sent += 1
+
+    def moment(self, t: float) -> float:
+        """A frame's time as epoch seconds."""
+        return self.epoch + t
+
+    def close(self) -> None:
+        """Stop sending, and close the socket."""
+        self.stop.set()
+        self.socket.close()

@@ -1,0 +1,77 @@
+"""How the demo looks: a block for each gesture, and the summary."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.control.picture import draw
+from gestured.control.score import NONE, Outcome, Performed
+
+COLOURS = {"right": 32, "rejected": 32, "wrong": 31, "false": 31, "missed": 33}
+BOLD, DIM = 1, 2
+
+
+def paint(text: str, code: int, colour: bool) -> str:
+    """The text in an ANSI style, or as it is."""
+    return f"\x1b[{code}m{text}\x1b[0m" if colour else text
+
+
+def name(performed: Performed | None) -> str:
+    """What a person would call what was performed."""
+    if performed is None:
+        return "nothing"
+    return f"no gesture ({performed.kind.replace('_', ' ')})" if performed.label == NONE else performed.label
+
+
+def block(outcome: Outcome, picture: NDArray[np.float32], colour: bool) -> str:
+    """Picture and words of one outcome, six lines with the empty one after it."""
+    event, performed = outcome.event, outcome.performed
+    if event:
+        answer = f"{event['gesture']}  {event['confidence']:.2f}"
+    else:
+        answer = "unknown" if performed and performed.unknown else "-"
+    when = f"{1000 * outcome.latency_s:.0f} ms after its end" if outcome.latency_s is not None else ""
+    verdict = paint(outcome.verdict.upper(), COLOURS[outcome.verdict], colour)
+    words = [
+        "",
+        f"performed   {name(performed)}",
+        f"recognised  {paint(answer, BOLD, colour)}",
+        f"            {verdict}  {paint(when, DIM, colour)}".rstrip(),
+        "",
+    ]
+    lines = [f"  {row}   {text}".rstrip() for row, text in zip(draw(picture, colour), words, strict=True)]
+    return "\n".join([*lines, ""])
+
+
+def as_dict(outcome: Outcome) -> dict[str, Any]:
+    """One outcome as plain JSON values."""
+    performed, event = outcome.performed, outcome.event
+    return {
+        "type": "outcome",
+        "verdict": outcome.verdict,
+        "performed": performed.label if performed else None,
+        "kind": performed.kind if performed else None,
+        "recognised": event["gesture"] if event else "unknown" if performed and performed.unknown else None,
+        "confidence": event["confidence"] if event else None,
+        "latency_ms": None if outcome.latency_s is None else round(1000 * outcome.latency_s, 1),
+    }
+
+
+def summary(figures: Mapping[str, Any], colour: bool) -> str:
+    """The tally in words."""
+    gestures = figures["right"] + figures["wrong"] + figures["missed"]
+    others = figures["rejected"] + figures["false"]
+    lines = [
+        paint("Summary", BOLD, colour),
+        f"  gestures       {gestures:3d}:  "
+        f"{figures['right']} right, {figures['wrong']} wrong, {figures['missed']} missed",
+        f"  anything else  {others:3d}:  {figures['rejected']} rejected, {figures['false']} false events",
+    ]
+    if figures["latency_ms_median"] is not None:
+        lines.append(
+            f"  latency (end of the gesture to the event):  median {figures['latency_ms_median']} ms, "
+            f"95th percentile {figures['latency_ms_p95']} ms"
+        )
+    return "\n".join(lines)

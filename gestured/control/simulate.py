@@ -1,0 +1,107 @@
+"""`gesturectl simulate`: a simulated sensor, and a person who touches it."""
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+from gestured.control.address import host_port
+from gestured.control.play import add_arguments, frames, play_from
+from gestured.control.sensor import BLOBS, Form, Sensor
+from gestured.core.errors import GesturedError
+from gestured.core.frames import Frame
+from gestured.simulator import Event
+
+DESCRIPTION = """Send the pressure frames of a simulated person on a simulated textile sensor, as OSC over UDP,
+in real time. Says what is performed as it ends, to be compared with what the daemon recognises."""
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the subcommand to gesturectl's command line."""
+    parser = commands.add_parser(
+        "simulate",
+        help="be a sensor that somebody touches",
+        description=DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="examples:\n  gesturectl simulate --to 127.0.0.1:9000 --sensor armrest\n"
+        "  gesturectl simulate --kinds swipe_left,double_tap --seconds 30 --blob",
+    )
+    parser.add_argument("--to", type=host_port, default=("127.0.0.1", 9000), metavar="HOST:PORT",
+                        help="where the daemon listens (default: 127.0.0.1:9000)")  # fmt: skip
+    parser.add_argument(
+        "--sensor", type=_sensor, default="simulated", metavar="NAME", help="its name (default: simulated)"
+    )
+    parser.add_argument("--seconds", type=float, metavar="S", help="end after so long (default: go on)")
+    add_arguments(parser)
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument("--ints", action="store_true", help="send integers instead of floats")
+    form.add_argument(
+        "--blob", nargs="?", const="uint16", choices=tuple(BLOBS), help="send a blob (default: uint16)"
+    )
+    parser.add_argument(
+        "--plain", action="store_true", help="the matrix alone: no bundle, no counter, no finger positions"
+    )
+    parser.add_argument("--json", action="store_true", help="print what is performed as JSON lines")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Send until the time is over, or Ctrl-C."""
+    play = play_from(args)
+    form = Form(args.sensor, "ints" if args.ints else args.blob or "floats", args.plain)
+    try:
+        sensor = Sensor(args.to, form)
+    except OSError as error:
+        raise GesturedError(f"cannot send to {args.to[0]}:{args.to[1]}: {error.strerror or error}") from None
+    host, port = args.to
+    what = f"{play.rows} x {play.columns} taxels at {play.rate_hz:g} Hz"
+    print(f"sending {what} to {host}:{port} as {args.sensor}; Ctrl-C ends", file=sys.stderr)
+    try:
+        for start, take in play.takes(args.seconds):
+            sensor.send(_telling(frames(start, take), start, take.events, sensor, args.json))
+    finally:
+        sensor.close()
+        if sensor.unheard:
+            lost = f"{sensor.unheard} of {sensor.sent} packets"
+            print(f"nobody listened on {host}:{port} for {lost}", file=sys.stderr)
+    return 0
+
+
+def _telling(
+    frames: Iterator[tuple[int, Frame]],
+    start: float,
+    events: tuple[Event, ...],
+    sensor: Sensor,
+    as_json: bool,
+) -> Iterator[tuple[int, Frame]]:
+    """The frames, and what was performed printed as each ends."""
+    left = list(events)
+    for counter, frame in frames:
+        while left and start + left[0].offset_s < frame.t:
+            event = left.pop(0)
+            _tell(event, sensor.moment(start), sensor.form.sensor, as_json)
+        yield counter, frame
+
+
+def _tell(event: Event, start: float, sensor: str, as_json: bool) -> None:
+    performed: dict[str, Any] = {
+        "type": "performed",
+        "sensor": sensor,
+        "gesture": event.label,
+        "kind": event.kind,
+        "onset": start + event.onset_s,
+        "offset": start + event.offset_s,
+        "speed": event.speed,
+        "participant": event.participant,
+    }
+    name = event.label if event.label == event.kind else f"no gesture ({event.kind.replace('_', ' ')})"
+    words = f"performed {name}, {event.speed}, {event.offset_s - event.onset_s:.2f} s"
+    print(json.dumps(performed) if as_json else words, flush=True)
+
+
+def _sensor(text: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", text):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected 1 to 64 of A-Z a-z 0-9 _ -")
+    return text
