@@ -71,13 +71,16 @@ class Model:
             count = len(self.gestures)
             return Scores(np.full(count, 1.0 / count, np.float32), 1.0, self.name)
         try:
-            scores, unknown = self._run(window[np.newaxis])
+            scores, unknown = self.run(window[np.newaxis])
         except ValueError as error:
             raise ModelError(f"{self.name}: {error}") from None
         return Scores(scores[0], float(unknown[0]), self.name)
 
-    def _run(self, batch: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """(B, ...) inputs -> scores (B, G), unknown (B,); ValueError where they are no probabilities."""
+    def run(self, batch: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(B, T, R, C) windows or (B, F) features -> scores (B, G), unknown (B,).
+
+        ValueError where the model fails or what it gives are no probabilities.
+        """
         try:
             scores, unknown = self._session.run(("scores", "unknown"), {self._input: batch})
         except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
@@ -129,7 +132,7 @@ class Model:
         if test.values.ndim != rank or test.scores.shape != expected:
             raise ValueError(f"self-test: expected scores {expected} of a {rank}-dimensional input")
         try:
-            scores, unknown = self._run(test.values)
+            scores, unknown = self.run(test.values)
         except ValueError as error:
             raise ValueError(f"self-test: {error}") from None
         difference = float(max(np.abs(scores - test.scores).max(), np.abs(unknown - test.unknown).max()))
