@@ -1,0 +1,303 @@
+"""Bytes <-> OSC 1.0 (opensoundcontrol.org/spec-1_0): bounded, non-recursive, one error type.
+
+Whatever the bytes are, `decode` gives messages or raises `ProtocolError`, in time linear in their number.
+A sensor sends the same layout over and over: a packet that is laid out as one before is not parsed again, its
+values are read from where they must be. Type tags known: `i f d h t s b`.
+
+Reasons: `not_osc` (no message, no bundle), `address` (not ASCII, too long), `types` (type tags missing or not
+known, a string that is not UTF-8), `truncated` (fewer bytes than the type tags need), `trailing` (more),
+`bundle` (sizes that do not fit, nested too deep), `oversized` (packet, type tags or number of messages).
+"""
+
+from collections.abc import Callable, Sequence
+from struct import Struct
+from struct import error as StructError
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.errors import ProtocolError
+
+MAX_PACKET = 65_536  # bytes; no UDP datagram is longer
+MAX_ADDRESS = 255  # bytes
+MAX_TAGS = 4_352  # type tags of one message; a 64 x 64 frame has 4,097
+MAX_MESSAGES = 2_048  # in one packet
+MAX_DEPTH = 8  # bundles within bundles
+RUN = 4  # so many `i` or `f` in a row come as one array
+
+Argument = int | float | str | bytes | NDArray[np.generic]
+
+_BUNDLE = b"#bundle\0"
+_TIMETAG = Struct(">Q").unpack_from
+_NTP_EPOCH = 2_208_988_800 << 32  # 1970 counted from 1900, in 32.32 fixed point
+_SCALARS = {"i": "i", "f": "f", "d": "d", "h": "q", "t": "Q"}
+_ARRAYS = {"i": np.dtype(">i4"), "f": np.dtype(">f4")}
+_RUNS = tuple(tag * RUN for tag in _ARRAYS)
+_MAX_LAYOUTS = 256
+
+
+class Message(NamedTuple):
+    """One OSC message.
+
+    `args` holds int, float, str and bytes; but four or more `i` or `f` in a row are ONE big-endian, read-only
+    array, so `,iffff` has two arguments. `timetag` is that of the innermost bundle in seconds since the Unix
+    epoch, None without one or for "immediately". Messages with the same `bundle` stand in the same bundle.
+    """
+
+    address: str
+    types: str  # without the comma
+    args: tuple[Argument, ...]
+    timetag: float | None = None
+    bundle: int = -1  # the bundle's number in the packet; -1 is none
+
+
+class _Place(NamedTuple):
+    """Where a packet of a known layout has one message: scalars, then a run; both may be missing."""
+
+    start: int
+    head: bytes  # address and type tags, padded; in a bundle the size before them
+    address: str
+    types: str
+    unpack: Callable[[bytes, int], tuple[Any, ...]] | None
+    scalars: int
+    dtype: "np.dtype[Any] | None"
+    values: int
+    run: int
+
+
+_new = tuple.__new__  # Message(...) takes twice the time
+# By bytes of the first head: a packet's length, and its messages. Bounded: hostile senders invent layouts.
+_layouts: dict[bytes, tuple[int, list[_Place]]] = {}
+
+
+def decode(data: bytes, errors: list[ProtocolError] | None = None) -> list[Message]:
+    """All messages of a packet, bundles flattened, in order.
+
+    Raises ProtocolError at the first fault; where `errors` is given, puts faults there instead and keeps
+    every message that is sound.
+    """
+    if type(data) is not bytes:
+        data = bytes(data)  # arrays are views of it: it must not change under their reader
+    bundled = data[:8] == _BUNDLE
+    key = data[16:48] if bundled else data[:32]
+    layout = _layouts.get(key)
+    if layout is not None and layout[0] == len(data):
+        messages = _read_places(data, layout[1], bundled)
+        if messages is not None:
+            return messages
+    messages = []
+    places: list[_Place] = []
+    try:
+        if len(data) > MAX_PACKET:
+            raise ProtocolError("oversized", f"{len(data)} bytes, at most {MAX_PACKET}")
+        if bundled:
+            _bundle(data, messages, places, errors)
+        else:
+            messages.append(_message(data, 0, 0, len(data), None, -1, places))
+    except ProtocolError as error:
+        if errors is None:
+            raise
+        errors.append(error)
+    if 0 < len(places) == len(messages) and not errors:  # nothing else is in it: no blob, no inner bundle
+        if len(_layouts) >= _MAX_LAYOUTS:
+            _layouts.clear()
+        _layouts[key] = (len(data), places)
+    return messages
+
+
+def _read_places(data: bytes, places: list[_Place], bundled: bool) -> list[Message] | None:
+    timetag, bundle = (_timetag(data, 8, len(data)), 0) if bundled else (None, -1)
+    messages: list[Message] = []
+    for start, head, address, types, unpack, scalars, dtype, count, run in places:
+        if not data.startswith(head, start):
+            return None
+        if unpack is None:
+            args: tuple[Argument, ...] = (np.frombuffer(data, dtype, count, run),) if count else ()
+        else:
+            args = unpack(data, scalars)
+            if count:
+                args += (np.frombuffer(data, dtype, count, run),)
+        messages.append(_new(Message, (address, types, args, timetag, bundle)))
+    return messages
+
+
+def _bundle(
+    data: bytes, messages: list[Message], places: list[_Place], errors: list[ProtocolError] | None
+) -> None:
+    end = len(data)
+    timetag = _timetag(data, 8, end)
+    number = bundles = seen = 0
+    outer: list[tuple[int, float | None, int]] = []  # end, time tag and number of the bundles around this one
+    at = 16
+    while True:
+        if at == end:  # an inner bundle ends where its sibling begins
+            if not outer:
+                return
+            end, timetag, number = outer.pop()
+            continue
+        size = int.from_bytes(data[at : at + 4], "big", signed=True)
+        at += 4
+        if size <= 0 or size % 4 or at + size > end:
+            raise ProtocolError("bundle", f"an element of {size} bytes where {end - at} are left")
+        if data.startswith(_BUNDLE, at):
+            if len(outer) == MAX_DEPTH - 1:
+                raise ProtocolError("bundle", f"nested deeper than {MAX_DEPTH}")
+            outer.append((end, timetag, number))
+            bundles += 1
+            end, timetag, number = at + size, _timetag(data, at + 8, at + size), bundles
+            places.clear()
+            at += 16
+            continue
+        seen += 1
+        if seen > MAX_MESSAGES:
+            raise ProtocolError("oversized", f"more than {MAX_MESSAGES} messages")
+        try:
+            messages.append(_message(data, at - 4, at, at + size, timetag, number, places))
+        except ProtocolError as error:
+            if errors is None:
+                raise
+            errors.append(error)
+        at += size
+
+
+def _timetag(data: bytes, at: int, end: int) -> float | None:
+    if end - at < 8:
+        raise ProtocolError("bundle", "a bundle without its time tag")
+    raw = _TIMETAG(data, at)[0]
+    return None if raw == 1 else (raw - _NTP_EPOCH) / 2**32  # 1 says "immediately"
+
+
+def _message(
+    data: bytes, begin: int, start: int, end: int, timetag: float | None, bundle: int, places: list[_Place]
+) -> Message:
+    """The message at `start`; its size, where it has one, is at `begin`. Raises ProtocolError.
+
+    Where it has only scalars and a run after them, its place is added to `places`.
+    """
+    address, types, at = _head(data, start, end)
+    head = data[begin:at]
+    args: tuple[Argument, ...] = ()
+    kinds = ""
+    scalars, run, dtype, count = at, at, None, 0
+    i = 0
+    while i < len(types):
+        tag = types[i]
+        stop = i + 1
+        if tag in _ARRAYS:
+            while stop < len(types) and types[stop] == tag:
+                stop += 1
+        if stop - i >= RUN:
+            kinds += "r"
+            dtype, count, run = _ARRAYS[tag], stop - i, at
+            at = _after(at, 4 * count, end)
+            args += (np.frombuffer(data, dtype, count, run),)
+        elif tag in _SCALARS:
+            while stop < len(types) and types[stop] in _SCALARS and types[stop : stop + RUN] not in _RUNS:
+                stop += 1
+            kinds += "s"
+            layout = Struct(">" + "".join(_SCALARS[t] for t in types[i:stop]))
+            scalars, at = at, _after(at, layout.size, end)
+            args += layout.unpack_from(data, scalars)
+        else:
+            kinds += "?"
+            value, at = _sized(data, tag, at, end)
+            args += (value,)
+        i = stop
+    if at != end:
+        raise ProtocolError("trailing", f"{end - at} bytes more than the type tags say")
+    if kinds in ("", "s", "r", "sr"):
+        unpack = layout.unpack_from if "s" in kinds else None
+        places.append(_Place(begin, head, address, types, unpack, scalars, dtype, count, run))
+    return Message(address, types, args, timetag, bundle)
+
+
+def _head(data: bytes, start: int, end: int) -> tuple[str, str, int]:
+    """Address, type tags, and where the arguments begin. Raises ProtocolError."""
+    if not data.startswith(b"/", start):
+        raise ProtocolError("not_osc", "neither an OSC message nor a bundle")
+    comma = data.find(b",", start, end)  # no address holds one: it begins the type tags
+    name_end = data.find(b"\0", start, comma) if comma >= 0 else -1
+    if name_end < 0 or name_end + 4 - (name_end - start) % 4 != comma:
+        raise ProtocolError("types", "no type tags after the address")
+    address = data[start:name_end]
+    if len(address) > MAX_ADDRESS or not address.isascii():
+        raise ProtocolError("address", f"not ASCII, or longer than {MAX_ADDRESS} bytes")
+    stop = data.find(b"\0", comma, end)
+    at = stop + 4 - (stop - start) % 4
+    if stop < 0 or at > end:
+        raise ProtocolError("truncated", "type tags without an end")
+    if stop - comma > MAX_TAGS:
+        raise ProtocolError("oversized", f"{stop - comma - 1} type tags, fewer than {MAX_TAGS} expected")
+    return address.decode("ascii"), data[comma + 1 : stop].decode("latin-1"), at
+
+
+def _after(at: int, size: int, end: int) -> int:
+    if size > end - at:
+        raise ProtocolError("truncated", "fewer arguments than type tags")
+    return at + size
+
+
+def _sized(data: bytes, tag: str, at: int, end: int) -> tuple[Argument, int]:
+    """A blob or a string, and where the next argument begins. Raises ProtocolError."""
+    if tag == "b":
+        at = _after(at, 4, end)
+        size = int.from_bytes(data[at - 4 : at], "big", signed=True)
+        if size < 0:
+            raise ProtocolError("truncated", f"a blob of {size} bytes")
+        return data[at : at + size], _after(at, size + -size % 4, end)
+    if tag != "s":
+        raise ProtocolError("types", f"type tag {tag!r} is none of i f d h t s b")
+    stop = data.find(b"\0", at, end)
+    if stop < 0:
+        raise ProtocolError("truncated", "a string without an end")
+    try:
+        return data[at:stop].decode(), _after(stop, 4 - (stop - at) % 4, end)
+    except UnicodeDecodeError:
+        raise ProtocolError("types", "a string that is not UTF-8") from None
+
+
+def encode_message(address: str, types: str, args: Sequence[Argument] = ()) -> bytes:
+    """One message. As in `Message`, a one-dimensional array stands for as many equal type tags as it is long.
+
+    Raises ValueError where types and arguments do not agree.
+    """
+    parts = [_padded(address.encode("ascii")), _padded(b"," + types.encode("ascii"))]
+    at = 0
+    for arg in args:
+        tag = types[at : at + 1]
+        count = 1
+        if isinstance(arg, np.ndarray):
+            count = arg.size
+            if tag not in _ARRAYS or types[at : at + count] != tag * count:
+                raise ValueError(f"an array of {count} values where the type tags are {types[at:]!r}")
+            parts.append(arg.astype(_ARRAYS[tag]).tobytes())
+        elif tag == "b":
+            blob = cast(bytes, arg)
+            parts.append(len(blob).to_bytes(4, "big") + blob + bytes(-len(blob) % 4))
+        elif tag == "s":
+            parts.append(_padded(cast(str, arg).encode()))
+        elif tag in _SCALARS:
+            try:
+                parts.append(Struct(">" + _SCALARS[tag]).pack(arg))
+            except (StructError, OverflowError) as error:
+                raise ValueError(f"argument {arg!r} for type tag {tag!r}: {error}") from None
+        else:
+            raise ValueError(f"argument {arg!r} has the type tag {tag!r}, expected one of i f d h t s b")
+        at += count
+    if at != len(types):
+        raise ValueError(f"{len(types)} type tags for {at} arguments")
+    return b"".join(parts)
+
+
+def encode_bundle(elements: Sequence[bytes], timetag: float | None = None) -> bytes:
+    """A bundle of encoded messages or bundles; `timetag` in seconds since 1970, None is "immediately"."""
+    raw = 1 if timetag is None else round(timetag * 2**32) + _NTP_EPOCH
+    sized = (part for element in elements for part in (len(element).to_bytes(4, "big"), element))
+    return b"".join((_BUNDLE, raw.to_bytes(8, "big"), *sized))
+
+
+def _padded(text: bytes) -> bytes:
+    if b"\0" in text:
+        raise ValueError(f"OSC strings hold no zero byte: {text!r}")
+    return text + bytes(4 - len(text) % 4)
