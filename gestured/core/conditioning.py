@@ -18,6 +18,7 @@ SETTLE_S = 0.93  # a stable second at 15 Hz: half-way between its last two frame
 SETTLE_FRAMES = 64  # frames kept of that second; faster sensors are thinned out
 PATIENCE_S = 5.0  # a sensor that never settles (hum, a hand that never rests) is used all the same after this
 BASELINE_TAU_S = 2.0
+RECOVERY_TAU_S = 0.4  # just after a contact: textile comes back slowly, and what is left of it is no touch
 NOISE_TAU_S = 30.0
 REVIEW_S = 0.5  # noise moves slowly: it is looked at twice a second
 RESTLESS = 5.0  # a taxel that moves more than this many times the sensor's noise was touched, or is bad
@@ -59,6 +60,9 @@ class Mounting:
         return x, y
 
 
+Learned = tuple[Array, Array, NDArray[np.bool_], bool, float]  # baseline, noise, constant taxels, stable?, activity
+
+
 class Settling:
     """Collects frames until one second of them shows no movement, and says what the idle sensor looks like."""
 
@@ -76,8 +80,8 @@ class Settling:
         self._frames.clear()
         self._since = None
 
-    def push(self, t: float, raw: Array, *, patience: bool) -> tuple[Array, Array, NDArray[np.bool_], bool] | None:
-        """Take one frame of (N,) counts; returns (baseline, noise, constant, stable) or nothing yet.
+    def push(self, t: float, raw: Array, *, patience: bool) -> Learned | None:
+        """Take one frame of (N,) counts; returns what was learned or nothing yet.
 
         `patience` allows an answer that is not stable after `PATIENCE_S`.
         """
@@ -90,13 +94,14 @@ class Settling:
             return None
         stack = np.array([f for _, f in frames])  # (n, N)
         baseline, noise, constant, restless = _idle(stack)
+        activity = float(np.median(((stack - baseline) / noise).max(axis=1)))
         stable = restless <= min(3, raw.size // 20)
         if not stable and not (patience and t - self._since >= PATIENCE_S):
             while t - frames[0][0] >= SETTLE_S / 2:  # the newer half may be the first half of a stable second
                 frames.popleft()
             return None
         self.clear()
-        return baseline, noise, constant, stable
+        return baseline, noise, constant, stable, activity
 
 
 def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int]:
@@ -105,7 +110,10 @@ def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int]:
     baseline = np.median(stack, axis=0)
     # Successive differences see noise and not slow movement; mean absolute values, since one outlier must not rule.
     jumps = np.abs(np.diff(stack, axis=0))
-    pooled = float(np.median(jumps.mean(axis=0))) / 1.128
+    rough = jumps.mean(axis=0) / 1.128
+    # Where idle taxels are clipped at zero, most of them seem quieter than they are: the upper quartile knows better.
+    clipped = np.count_nonzero((stack == stack.min()).sum(axis=0) >= 2) * 4 >= rough.size
+    pooled = float(np.quantile(rough[rough > 0], 0.75 if clipped else 0.5)) if rough.any() else 0.0
     step = quantum(stack, jumps)
     floor = max(pooled, step / 2 if pooled > 0 else step)
     spread = np.abs(stack - baseline).mean(axis=0) * 1.2533
@@ -114,7 +122,7 @@ def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int]:
     # A second of frames knows a taxel's own noise badly: lean on all taxels together.
     noise = np.maximum(np.sqrt((n * spread**2 + 16 * floor**2) / (n + 16)), floor / 2)
     constant = ~jumps.any(axis=0)
-    if pooled < step or np.count_nonzero(constant) > stack.shape[1] // 4:
+    if clipped or pooled < step or np.count_nonzero(constant) > stack.shape[1] // 4:
         constant[:] = False  # a clipped or coarse sensor stands still when idle: that proves nothing
     return baseline, noise, constant, moved
 
@@ -146,6 +154,9 @@ class Conditioner:
         self.noise = 1.0  # counts, the median taxel's standard deviation
         self._tracked: float | None = None
         self._reviewed = 0.0
+        self._typical = 0.8 * math.sqrt(2 * math.log(rows * columns))  # median of the largest of N normal deviates
+        self._usual = self._typical  # idle activity, as it is
+        self._scale = 1.0  # by which single taxels' noise understates the idle activity
 
     def reset(self) -> None:
         """Forget the baseline: the next stable second is a new one."""
@@ -182,21 +193,25 @@ class Conditioner:
         learned = self._settling.push(t, raw, patience=not self.ready)
         if learned is None:
             return False
-        self._baseline, self._sigma, self._stuck, stable = learned
+        self._baseline, self._sigma, self._stuck, stable, activity = learned
         self._provisional = not stable
         self.ready = True
         self._tracked = self._reviewed = t
+        self._scale, self._usual = 1.0, activity
         self._review()
         return True
 
-    def shifted(self, d: Array, on: float) -> bool:
-        """Many taxels far below the baseline: no touch does that, so the sensor restarted or a hand left it."""
+    def shifted(self, d: Array, level: float) -> bool:
+        """Many taxels lower than `level` times their noise below the baseline, and than what is pressed is above it.
+
+        No touch does that: the sensor restarted, or a hand that lay there when the baseline was learned has left.
+        """
         scaled = d * self._weight
-        below = scaled < -max(on, 0.3 * float(scaled.max()))
+        below = scaled < -max(level, 0.3 * float(scaled.max()))
         return int(np.count_nonzero(below)) * 20 >= 3 * d.size
 
-    def idle(self, t: float, raw: Array, d: Array, *, sunken: bool) -> None:
-        """Follow the idle sensor: baseline with `BASELINE_TAU_S`, noise with `NOISE_TAU_S`.
+    def idle(self, t: float, raw: Array, d: Array, activity: float, *, sunken: bool, recovering: bool) -> None:
+        """Follow the idle sensor: baseline with `BASELINE_TAU_S` (`RECOVERY_TAU_S`), noise with `NOISE_TAU_S`.
 
         `sunken`: some taxel lies clearly below its baseline, as after a hand that rested there when it was learned.
         """
@@ -205,7 +220,11 @@ class Conditioner:
         elif self._settling.started:
             self._settling.clear()
         if self._tracked is not None:
-            self._baseline = self._baseline + d * -math.expm1((self._tracked - t) / BASELINE_TAU_S)
+            tau = RECOVERY_TAU_S if recovering else BASELINE_TAU_S
+            self._usual += (min(activity, 2 * self._typical) * self._scale - self._usual) * -math.expm1(
+                (self._tracked - t) / NOISE_TAU_S
+            )
+            self._baseline = self._baseline + d * -math.expm1((self._tracked - t) / tau)
             if t - self._reviewed >= REVIEW_S:
                 seen = np.minimum(np.abs(d), 4 * self._sigma) * 1.2533
                 self._sigma = self._sigma + (seen - self._sigma) * -math.expm1((self._reviewed - t) / NOISE_TAU_S)
@@ -254,7 +273,9 @@ class Conditioner:
         self.bad = self._stuck | (self._sigma > NOISY * self.noise)
         if self.bad.all():
             self.bad = np.zeros_like(self.bad)
-        self._weight = np.where(self.bad, 0.0, 1.0 / np.maximum(self._sigma, 0.2 * self.noise))
+        # Clipping, hum and bursts make idle maxima larger than normal deviates': activity is told in what is usual here.
+        self._scale = min(max(self._usual / self._typical, 1.0), 5.0)
+        self._weight = np.where(self.bad, 0.0, 1.0 / (self._scale * np.maximum(self._sigma, 0.2 * self.noise)))
 
 
 def _neighbour_mean(grid: NDArray[np.floating], good: NDArray[np.bool_]) -> Array:

@@ -76,6 +76,7 @@ class FrontEnd:
         self._id = 0
         self._last: float | None = None
         self._interval = 0.0
+        self._shifted: float | None = None  # s, since when the frames lie far below the baseline
 
     @property
     def ready(self) -> bool:
@@ -123,10 +124,14 @@ class FrontEnd:
             return out
         d, activity, lowest = conditioner.deviation(raw)
         sunken = lowest < -segmenter.on
-        if sunken and conditioner.shifted(d, segmenter.on):
-            out += self.reset("restart")
-            conditioner.settle(t, raw)
+        if sunken and conditioner.shifted(d, max(segmenter.on, segmenter.after_effect(t))):
+            # Interference passes and its frames are lost; a sensor that restarted, or a hand that left, stays so.
+            self._shifted = t if self._shifted is None else self._shifted
+            if t - self._shifted >= self.timing.shift_s:
+                out += self.reset("restart")
+                conditioner.settle(t, raw)
             return out
+        self._shifted = None
         if segmenter.phase is not Phase.IDLE:
             for action in segmenter.flush(t):
                 out += self._act(action, t)
@@ -141,7 +146,7 @@ class FrontEnd:
         while kept[0][0] < t - LEAD_S:
             kept.popleft()
         if segmenter.phase is Phase.IDLE:
-            conditioner.idle(t, raw, d, sunken=sunken)
+            conditioner.idle(t, raw, d, activity, sunken=sunken, recovering=segmenter.recovering(t))
         else:
             conditioner.settle(t, raw)  # what stays on the sensor becomes part of its baseline
         return out
@@ -165,6 +170,7 @@ class FrontEnd:
         self.segmenter.reset()
         self.conditioner.reset()
         self._kept.clear()
+        self._shifted = None
         return out
 
     def _act(self, action: Action, t: float) -> list[Contact]:

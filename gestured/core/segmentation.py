@@ -29,6 +29,7 @@ class Timing:
     tap_travel: float = 0.15  # and stays within this share of the grid's shorter side
     limit_s: float = 5.03  # a contact that is no gesture any more
     stale_s: float = 1.0  # silence that ends everything
+    shift_s: float = 0.25  # frames far below the baseline for so long: the sensor restarted
     glitch_s: float = 0.02  # a contact surely shorter than this is no finger
 
 
@@ -99,13 +100,13 @@ TOUCHED = frozenset({P.CONTACT, P.RELEASING, P.GAP})
 class Segmenter:
     """Turns activity over time into actions. Knows times and levels, no frames.
 
-    `on` and `off` are in units of noise; a quiet taxel exceeds 1 + sqrt(2 ln N) rarely and 4 + sqrt(2 ln N)
-    never (extreme values of N normal deviates).
+    `on` and `off` are in units of noise; a quiet taxel exceeds 1 + sqrt(2 ln N) rarely and 3 + sqrt(2 ln N)
+    almost never (extreme values of N normal deviates).
     """
 
     def __init__(self, taxels: int, travel: float, *, wait_for_double_tap: bool = True, timing: Timing | None = None):
         self.timing = timing or Timing()
-        self.on = 4.0 + math.sqrt(2 * math.log(taxels))
+        self.on = 3.0 + math.sqrt(2 * math.log(taxels))
         self.off = 1.0 + math.sqrt(2 * math.log(taxels))
         self._travel = travel  # taxel pitches that a tap may move
         self._wait = wait_for_double_tap
@@ -118,6 +119,7 @@ class Segmenter:
         self._began = 0.0  # s, of the contact
         self._contacts = 0
         self._peak = 0.0
+        self._closed = -math.inf  # s, when the last contact was over
         self._quiet_since: float | None = None
         self._box: tuple[float, float, float, float] | None = None  # where the contact's centroid went
         self._widest = 0.0
@@ -127,7 +129,7 @@ class Segmenter:
         actions: list[Action] = []
         level = self._level(t, activity)
         before = self.phase
-        self._step(level, actions)
+        self._step(t, level, actions)
         if self.phase is Phase.SPENT:
             if level is Signal.QUIET:
                 self._quiet_since = self._since(t)
@@ -140,6 +142,10 @@ class Segmenter:
                 self._contacts = 1 if before is Phase.IDLE else self._contacts + 1
             if before is Phase.IDLE:
                 self.onset, self._peak, self._widest = t, 0.0, 0.0
+            elif self._contacts == 1 and self._peak < OFF_SHARE * activity:
+                # What came before was too faint to belong to this contact: a hover, or noise.
+                self.onset = self._began = t
+                self._box, self._widest = None, 0.0
             self._peak = max(self._peak, activity)
             self.last_touched = t
             self._quiet_since = None
@@ -154,14 +160,23 @@ class Segmenter:
         actions: list[Action] = []
         timing = self.timing
         if self.phase in TOUCHED and t - self.onset >= timing.limit_s:
-            self._step(Signal.LIMIT, actions)
+            self._step(t, Signal.LIMIT, actions)
         if self._quiet_since is not None:
             quiet = t - self._quiet_since
             if self.phase in (Phase.RELEASING, Phase.SPENT) and quiet >= timing.release_s:
-                self._step(Signal.TAPPED if self._is_tap() else Signal.RELEASED, actions)
+                self._step(t, Signal.TAPPED if self._is_tap() else Signal.RELEASED, actions)
             if self.phase is Phase.GAP and quiet >= timing.tap_gap_s:
-                self._step(Signal.GAP_OVER, actions)
+                self._step(t, Signal.GAP_OVER, actions)
         return actions
+
+    def recovering(self, t: float) -> bool:
+        """Whether a contact has just ended, so that what is left on the sensor is its after-effect."""
+        return t - self._closed < RECOVERY_S
+
+    def after_effect(self, t: float) -> float:
+        """Activity that a contact may leave behind, now: textile comes back slowly, or swings below its baseline."""
+        past = 0.0 if self.phase is not Phase.IDLE else self._closed - t
+        return ON_SHARE * self._peak * math.exp(past / RECOVERY_S)
 
     def let_go(self) -> bool:
         """Whether a finger was already off when the stream ended: what is open may then be decided."""
@@ -171,8 +186,10 @@ class Segmenter:
         """Longest that the contact can have lasted: to its first quiet frame."""
         return (self.last_touched if self._quiet_since is None else self._quiet_since) - self.onset
 
-    def _step(self, signal: Signal, actions: list[Action]) -> None:
+    def _step(self, t: float, signal: Signal, actions: list[Action]) -> None:
         self.phase, action = TRANSITIONS[self.phase, signal]
+        if action in (Action.CLOSE, Action.LEFT):
+            self._closed = t
         if action is not None:
             actions.append(action)
 
@@ -184,8 +201,7 @@ class Segmenter:
         if self.phase is Phase.IDLE:
             if activity < on:  # the common case first
                 return Signal.QUIET if activity < off else Signal.WEAK
-            recovering = ON_SHARE * self._peak * math.exp(min(0.0, (self.last_touched - t) / RECOVERY_S))
-            return Signal.STRONG if activity >= recovering else Signal.WEAK
+            return Signal.STRONG if activity >= self.after_effect(t) else Signal.WEAK
         if self.phase is Phase.SPENT:
             return Signal.QUIET if activity < off else Signal.STRONG
         if activity < max(off, OFF_SHARE * self._peak):

@@ -1,0 +1,233 @@
+"""Windows to learn from: recordings and simulated takes, cut by the very front end that the daemon runs.
+
+Nothing here re-does the core's work: a take is pushed frame by frame through `FrontEnd`, and what it cuts is
+matched with what was performed. Simulated sets are cached, keyed by everything that makes them.
+"""
+
+import hashlib
+import multiprocessing
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import gestured.core
+import gestured.simulator
+from gestured.core.features import touch_pattern
+from gestured.core.frames import Frame, Segment
+from gestured.core.recognizer import Cut, FrontEnd
+from gestured.core.window import Window
+from gestured.lab.progress import progress
+from gestured.recording import Recordings
+from gestured.simulator import Take, cohort_take, wide
+
+WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
+NONE = "none"
+COVERED = 0.6  # of a performed gesture must lie in a segment for it to carry its label
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """G windows of varying length with what is known of them."""
+
+    frames: NDArray[np.float16]  # (N, R, C), one after the other
+    offsets: NDArray[np.int64]  # (G + 1,)
+    labels: NDArray[np.str_]  # (G,) gesture or "none"
+    kinds: NDArray[np.str_]  # (G,) the finer name
+    people: NDArray[np.int64]  # (G,) participant or subject
+    strength: NDArray[np.float64]  # (G,) peak in units of the sensor's noise
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def window(self, index: int) -> NDArray[np.float32]:
+        """(T, R, C) window of one sample."""
+        return self.frames[self.offsets[index] : self.offsets[index + 1]].astype(np.float32)
+
+    def lengths(self) -> NDArray[np.int64]:
+        """(G,) frames of each."""
+        return np.diff(self.offsets)
+
+    def features(self) -> NDArray[np.float32]:
+        """(G, F) touch-pattern features."""
+        return np.stack([touch_pattern(self.window(i), WINDOW.rate_hz) for i in range(len(self))])
+
+    def take(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> "Samples":
+        """The chosen samples, in that order."""
+        index = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
+        parts = [self.frames[self.offsets[i] : self.offsets[i + 1]] for i in index]
+        return Samples(
+            np.concatenate(parts) if parts else self.frames[:0],
+            np.concatenate([[0], np.cumsum([len(p) for p in parts], dtype=np.int64)]).astype(np.int64),
+            self.labels[index], self.kinds[index], self.people[index], self.strength[index],
+        )  # fmt: skip
+
+    def digest(self) -> str:
+        """SHA-256 over everything."""
+        total = hashlib.sha256()
+        for array in (
+            self.frames,
+            self.offsets,
+            self.labels.astype("U40"),
+            self.kinds.astype("U40"),
+            self.people,
+        ):
+            total.update(np.ascontiguousarray(array).tobytes())
+        return total.hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class Performed:
+    """What was performed from `onset` to `offset` seconds."""
+
+    label: str
+    kind: str
+    person: int
+    onset: float
+    offset: float
+
+
+Sample = tuple[NDArray[np.float16], str, str, int, float]
+
+
+def collect(samples: Iterable[Sample]) -> Samples:
+    """Put single samples together."""
+    found = list(samples)
+    frames = [s[0] for s in found]
+    return Samples(
+        np.concatenate(frames) if frames else np.zeros((0, WINDOW.rows, WINDOW.columns), np.float16),
+        np.concatenate([[0], np.cumsum([len(f) for f in frames])]).astype(np.int64),
+        np.array([s[1] for s in found], dtype="U40"),
+        np.array([s[2] for s in found], dtype="U40"),
+        np.array([s[3] for s in found], dtype=np.int64),
+        np.array([s[4] for s in found], dtype=np.float64),
+    )
+
+
+def join(parts: Sequence[Samples]) -> Samples:
+    """Several sets as one."""
+    starts = np.cumsum([0] + [int(p.offsets[-1]) for p in parts])
+    offsets = [p.offsets[:-1] + start for p, start in zip(parts, starts, strict=False)]
+    return Samples(
+        np.concatenate([p.frames for p in parts]),
+        np.concatenate([*offsets, starts[-1:]]).astype(np.int64),
+        np.concatenate([p.labels for p in parts]),
+        np.concatenate([p.kinds for p in parts]),
+        np.concatenate([p.people for p in parts]),
+        np.concatenate([p.strength for p in parts]),
+    )
+
+
+def cuts(frames: NDArray[np.generic], times: NDArray[np.float64]) -> list[Segment]:
+    """(N, R, C) raw frames of one recording and their times (N,) -> what the front end cuts out of them."""
+    front = FrontEnd("lab", *frames.shape[1:])
+    found = [x for values, t in zip(frames, times, strict=True) for x in front.push(Frame(float(t), values))]
+    found += front.flush(float(times[-1]) + front.timing.stale_s)
+    return [x.segment for x in found if isinstance(x, Cut)]
+
+
+def matched(segments: Iterable[Segment], performed: Sequence[Performed]) -> Iterator[Sample]:
+    """Windows of the segments that hold a performed gesture, or nothing but a non-gesture."""
+    for segment in segments:
+        best, share = None, 0.0
+        for event in performed:
+            common = min(segment.offset, event.offset) - max(segment.onset, event.onset)
+            length = max(event.offset - event.onset, 0.05)
+            covered = (common + 0.07) / (length + 0.07)
+            if common > -0.07 and covered > share:
+                best, share = event, covered
+        if best is None or (best.label != NONE and share < COVERED):
+            continue
+        strength = float(segment.frames[segment.first : segment.last + 1].max()) / max(segment.noise, 1e-30)
+        yield WINDOW.apply(segment).astype(np.float16), best.label, best.kind, best.person, strength
+
+
+def from_take(take: Take) -> list[Sample]:
+    """One simulated take."""
+    performed = [Performed(e.label, e.kind, e.participant, e.onset_s, e.offset_s) for e in take.events]
+    return list(matched(cuts(take.frames, take.times), performed))
+
+
+def _wide(seed: int, index: int) -> list[Sample]:
+    return from_take(wide(seed, index))
+
+
+def _cohort(seed: int, index: int) -> list[Sample]:
+    return from_take(cohort_take(seed, index))
+
+
+def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
+    """`count` takes of the stream "wide" or "cohort", from `cache` where they were made before."""
+    code = hashlib.sha256()
+    for package in (gestured.core, gestured.simulator):
+        for path in sorted(Path(str(package.__file__)).parent.glob("*.py")):
+            code.update(path.read_bytes())
+    code.update(Path(__file__).read_bytes())
+    path = cache / f"{stream}-{seed}-{count}-{code.hexdigest()[:12]}.npz"
+    if path.exists():
+        with np.load(path, allow_pickle=False) as stored:
+            return Samples(*(stored[name] for name in Samples.__slots__))
+    make: Callable[[int], list[Sample]] = partial(_wide if stream == "wide" else _cohort, seed)
+    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
+        made = pool.imap(make, range(count), chunksize=50)
+        samples = collect(s for found in progress(made, count, f"simulating {stream}") for s in found)
+    cache.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part.npz")
+    np.savez(part, **{name: getattr(samples, name) for name in Samples.__slots__})
+    part.replace(path)
+    return samples
+
+
+def recorded(recordings: Recordings, seed: int = 0) -> Samples:
+    """Cut gestures or whole sessions as samples; what the truth does not name is left out."""
+    return collect(s for i in range(len(recordings)) for s in _recorded(recordings, i, seed))
+
+
+def _recorded(recordings: Recordings, i: int, seed: int) -> Iterator[Sample]:
+    frames, times = recordings.frames_of(i), recordings.times_of(i)
+    person = int(recordings.subjects[i])
+    if recordings.labels[i] == "session":
+        mine = np.flatnonzero(recordings.event_recording == i)
+        performed = [
+            Performed(
+                str(recordings.event_labels[k]), str(recordings.event_kinds[k]), person,
+                float(recordings.event_onsets[k]), float(recordings.event_offsets[k]),
+            )
+            for k in mine
+        ]  # fmt: skip
+        known = [p for p in performed if p.label != "other"]
+        for segment in cuts(frames, times):
+            if all(
+                segment.offset < p.onset or segment.onset > p.offset for p in performed if p.label == "other"
+            ):
+                yield from matched([segment], known)
+        return
+    frames, times, lead = with_idle(
+        frames, times, int(recordings.onsets[i]), int(recordings.releases[i]), seed + i
+    )
+    first, last = int(recordings.onsets[i]) + lead, int(recordings.releases[i]) + lead
+    label, kind = str(recordings.labels[i]), str(recordings.kinds[i])
+    yield from matched(cuts(frames, times), [Performed(label, kind, person, times[first], times[last])])
+
+
+def with_idle(
+    frames: NDArray[np.generic], times: NDArray[np.float64], first: int, last: int, seed: int, count: int = 20
+) -> tuple[NDArray[np.generic], NDArray[np.float64], int]:
+    """Put `count` idle frames before a cut recording, drawn from its own quiet frames: the front end needs a second.
+
+    Returns frames, times, and how many were added.
+    """
+    quiet = np.concatenate([frames[: max(first - 1, 0)], frames[last + 3 :]])
+    if not len(quiet):
+        quiet = np.minimum(frames.min(axis=0), np.median(frames.min(axis=0))).astype(frames.dtype)[None]
+    rng = np.random.default_rng([seed, 7])
+    step = float(np.median(np.diff(times)))
+    lead = times[0] - step * np.arange(count, 0, -1)
+    return (
+        np.concatenate([quiet[rng.integers(0, len(quiet), count)], frames]),
+        np.concatenate([lead, times]),
+        count,
+    )

@@ -1,0 +1,157 @@
+"""The networks: CNN-LSTM and LSTM of the paper, the trajectory net that checks them, and how they decide together.
+
+All take windows (B, T, R, C) float32, 0..1, at the model's grid and rate. Padding and idle frames at the end
+change nothing by construction: every answer is taken at the last active frame.
+"""
+
+import torch
+from torch import Tensor, nn
+
+ACTIVE = 0.15  # of the segment's peak: below it a frame shows no contact
+
+
+def active_frames(x: Tensor) -> Tensor:
+    """(B, T, R, C) -> (B, T) 1.0 where something is pressed."""
+    return (x.flatten(2).amax(2) >= ACTIVE).to(x.dtype)
+
+
+def last_active(x: Tensor) -> Tensor:
+    """(B, T, R, C) -> (B,) int64 index of the last frame with contact, 0 where there is none."""
+    index = torch.arange(x.shape[1], dtype=x.dtype, device=x.device)
+    return (active_frames(x) * index).amax(1).to(torch.int64)
+
+
+class Recurrent(nn.Module):
+    """An LSTM of 32 units over per-frame features, read at the last active frame, and a linear head."""
+
+    def __init__(self, inputs: int, classes: int, units: int = 32) -> None:
+        super().__init__()
+        self.lstm = nn.LSTM(inputs, units, batch_first=True)
+        self.head = nn.Linear(units, classes)
+
+    def features(self, x: Tensor) -> Tensor:
+        """(B, T, R, C) -> (B, T, inputs); the whole frame, flattened."""
+        return x.flatten(2)
+
+    def embed(self, x: Tensor) -> Tensor:
+        """(B, T, R, C) -> (B, units): the state at the last active frame."""
+        states, _ = self.lstm(self.features(x))
+        index = last_active(x)[:, None, None].expand(-1, 1, states.shape[2])
+        return states.gather(1, index)[:, 0]
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(B, T, R, C) -> (B, classes) logits."""
+        return self.head(self.embed(x))
+
+
+class Lstm(Recurrent):
+    """The paper's LSTM: 81 inputs, 32 units."""
+
+    def __init__(self, rows: int, columns: int, classes: int) -> None:
+        super().__init__(rows * columns, classes)
+
+
+class CnnLstm(Recurrent):
+    """The paper's CNN-LSTM: two convolutions with ReLU and max-pooling on each frame, then the LSTM."""
+
+    def __init__(self, rows: int, columns: int, classes: int) -> None:
+        size = -(-rows // 2) // 2 * (-(-columns // 2) // 2)
+        super().__init__(32 * size, classes)
+        self.convolutions = nn.Sequential(
+            nn.Conv2d(1, 16, 3, padding=1),
+            nn.ReLU(),
+            nn.MaxPool2d(2, ceil_mode=True),
+            nn.Conv2d(16, 32, 3, padding=1),
+            nn.ReLU(),
+            nn.MaxPool2d(2),
+        )
+
+    def features(self, x: Tensor) -> Tensor:
+        """(B, T, R, C) -> (B, T, 32 * cells left after pooling)."""
+        batch, time = x.shape[0], x.shape[1]
+        y = self.convolutions(x.reshape(-1, 1, x.shape[2], x.shape[3]))
+        return y.reshape(batch, time, -1)
+
+
+class Perceptron(nn.Module):
+    """A small feed-forward net on standardised features; the scaling is part of it."""
+
+    def __init__(self, inputs: int, classes: int, units: int = 128) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(inputs))
+        self.register_buffer("scale", torch.ones(inputs))
+        self.layers = nn.Sequential(
+            nn.Linear(inputs, units),
+            nn.ReLU(),
+            nn.Dropout(0.1),
+            nn.Linear(units, units),
+            nn.ReLU(),
+            nn.Dropout(0.1),
+            nn.Linear(units, classes),
+        )
+
+    def fit_scale(self, features: Tensor) -> None:
+        """Learn the standardisation from (N, inputs)."""
+        self.mean.copy_(features.mean(0))
+        self.scale.copy_(features.std(0).clamp(min=1e-3))
+
+    def forward(self, features: Tensor) -> Tensor:
+        """(B, inputs) -> (B, classes) logits."""
+        return self.layers(((features - self.mean) / self.scale).clamp(-6, 6))
+
+
+class Decision(nn.Module):
+    """Two opinions become one answer: calibrated scores, and the probability that it is no gesture.
+
+    `first` and `second` give logits over G gestures and further classes of non-gestures. The scores are a
+    softmax over the weighted sum of both (temperature scaling of each, Guo et al. 2017). The rejection is a
+    logistic regression on what each says of "no gesture", on how far they agree and on how sure they are.
+    """
+
+    CUES = 6
+
+    def __init__(self, gestures: int) -> None:
+        super().__init__()
+        self.gestures = gestures
+        self.register_buffer("share", torch.tensor([0.5, 0.5]))
+        self.register_buffer("weight", torch.zeros(self.CUES))
+        self.register_buffer("bias", torch.zeros(()))
+
+    def cues(self, first: Tensor, second: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, K) and (B, K) logits -> (B, G) log scores, (B, CUES) cues of a non-gesture, bounded."""
+        g = self.gestures
+        one, two = first.log_softmax(1), second.log_softmax(1)
+        scores = (self.share[0] * one[:, :g] + self.share[1] * two[:, :g]).log_softmax(1)
+        best = scores.argmax(1, keepdim=True)
+        cues = torch.stack(
+            [
+                one[:, g:].logsumexp(1) - one[:, :g].logsumexp(1),
+                two[:, g:].logsumexp(1) - two[:, :g].logsumexp(1),
+                -one.gather(1, best)[:, 0],
+                -two.gather(1, best)[:, 0],
+                -scores.gather(1, best)[:, 0],
+                (one[:, :g].softmax(1) - two[:, :g].softmax(1)).abs().sum(1),
+            ],
+            1,
+        )
+        return scores, cues.clamp(-12, 12)
+
+    def forward(self, first: Tensor, second: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits of both -> scores (B, G), unknown (B,)."""
+        scores, cues = self.cues(first, second)
+        return scores.exp(), torch.sigmoid((cues * self.weight).sum(1) + self.bias)
+
+
+class Judged(nn.Module):
+    """What is exported: a recurrent net, the trajectory net as its second opinion, and the decision."""
+
+    def __init__(self, net: nn.Module, trajectory: nn.Module, decision: Decision) -> None:
+        super().__init__()
+        self.net = net
+        self.trajectory = trajectory
+        self.decision = decision
+
+    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, T, R, C) -> scores (B, G) given that it is a gesture, unknown (B,)."""
+        scores, unknown = self.decision(self.net(frames), self.trajectory(frames))
+        return scores, unknown
