@@ -7,7 +7,8 @@ import numpy as np
 
 from .kinematics import ellipse, grid, turning, wander
 from .people import Contact
-from .strokes import Scene, fingers_on, resting_hand, stroke, swipe_length, touch_down
+from .strokes import Scene, fingers_on, stroke, swipe_length, touch_down
+from .things import resting_hand
 
 RIGHT, UP, LEFT, DOWN = 0.0, math.pi / 2, math.pi, -math.pi / 2
 

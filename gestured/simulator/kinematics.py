@@ -54,7 +54,12 @@ def progress(tau: Array, rng: np.random.Generator, moving_ends: float = 0.0) -> 
     first = 0.32 * moving_ends * rng.uniform(0.2, 1.0)
     last = 1.0 - 0.32 * moving_ends * rng.uniform(0.2, 1.0)
     style, sigma = rng.random(), rng.uniform(0.25, 0.65)
-    u = first + (last - first) * np.clip(tau, 0.0, 1.0)
+    v = np.clip(tau, 0.0, 1.0)
+    if rng.random() < 0.15:
+        # Cloth drags: the finger sticks and slips. Still monotone, because the amplitude stays below 1.
+        waves, depth = rng.uniform(2.0, 6.0) * 2.0 * math.pi, rng.uniform(0.2, 0.85)
+        v = v - depth * np.sin(waves * v) * (1.0 - v) / waves
+    u = first + (last - first) * v
     ends = np.array([first, last])
 
     def profile(v: Array) -> Array:

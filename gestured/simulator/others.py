@@ -1,4 +1,4 @@
-"""What people, sleeves, things and electronics do to a pad that is none of the ten gestures."""
+"""What one finger does that is none of the ten gestures, and the list of all non-gestures."""
 
 import math
 from collections.abc import Callable
@@ -8,18 +8,28 @@ import numpy as np
 from .gestures import DOWN, LEFT, RIGHT, UP, swipe
 from .kinematics import Array, arc, ellipse, grid, polyline, progress, turning, wander
 from .people import Artefact, Contact
-from .strokes import Scene, blob, fingers_on, stroke, swipe_length, touch_down
+from .several import drumming, knuckles, pinch, rotation, spread, three_finger_swipe, two_finger_tap
+from .strokes import Scene, fingers_on, stroke, swipe_length, touch_down
+from .things import (
+    electrical_burst,
+    forearm,
+    heel_rest,
+    object_put_down,
+    palm,
+    sleeve_brush,
+    spike,
+    wipe,
+    wrinkle,
+)
 
-Made = list[Contact] | list[Artefact]
 
-
-def long_press(scene: Scene) -> Made:
+def long_press(scene: Scene) -> list[Contact]:
     """A finger that stays for 0.9 s or longer."""
     x, y = scene.spot(3.0, 3.0)
     return [touch_down(scene, x, y, scene.rng.uniform(0.9, 3.0))]
 
 
-def slow_touch(scene: Scene) -> Made:
+def slow_touch(scene: Scene) -> list[Contact]:
     """A light touch that comes and goes slowly and drifts a little: somebody leans or feels."""
     rng = scene.rng
     x, y = scene.spot(3.0, 3.0)
@@ -38,124 +48,12 @@ def slow_touch(scene: Scene) -> Made:
     ]
 
 
-def palm(scene: Scene) -> Made:
-    """A flat hand: three to seven large contacts that land within 0.15 s."""
-    rng = scene.rng
-    total = rng.uniform(0.2, 2.2)
-    cx, cy = scene.spot(0.1 * scene.width, 0.1 * scene.height)
-    spread = rng.uniform(0.15, 0.36) * scene.small
-    made = []
-    for _ in range(int(rng.integers(3, 8))):
-        first = rng.uniform(0.0, min(0.15, 0.3 * total))
-        t = grid(total - first)
-        slide = rng.normal(0.0, 3.0, 2)
-        made.append(
-            blob(
-                scene,
-                t,
-                cx + rng.normal(0.0, spread) + slide[0] * t,
-                cy + rng.normal(0.0, spread) + slide[1] * t,
-                scene.person.force * rng.uniform(0.5, 2.5),
-                rng.uniform(5.0, 13.0),
-                rng.uniform(4.0, 9.0),
-                rng.uniform(0.0, math.pi),
-                start=first,
-                rise_s=rng.uniform(0.03, 0.2),
-            )
-        )
-    return made
-
-
-def heel_rest(scene: Scene) -> Made:
-    """The heel of the hand lies on an edge for seconds, heavy and large."""
-    rng = scene.rng
-    t = grid(rng.uniform(1.0, 4.0))
-    edge = rng.uniform(-0.5, 0.5)
-    places = [(edge, -0.42), (edge, 0.42), (-0.42, edge), (0.42, edge)]
-    px, py = places[int(rng.choice(4, p=[0.55, 0.1, 0.15, 0.2]))]
-    x, y = scene.width * (0.5 + px), scene.height * (0.5 + py)
-    sway = rng.uniform(0.2, 2.0)
-    made = [
-        blob(
-            scene,
-            t,
-            x + sway * wander(t, rng, 0.2, 1.0),
-            y + sway * wander(t, rng, 0.2, 1.0),
-            rng.uniform(1.0, 6.0),
-            rng.uniform(9.0, 18.0),
-            rng.uniform(6.0, 11.0),
-            rng.uniform(0.0, math.pi),
-            rise_s=rng.uniform(0.05, 0.4),
-            fall_s=rng.uniform(0.05, 0.4),
-        )
-    ]
-    if rng.random() < 0.4:
-        made.append(
-            blob(
-                scene,
-                t,
-                x + rng.normal(0.0, 22.0),
-                y + rng.normal(0.0, 12.0),
-                rng.uniform(0.5, 3.0),
-                rng.uniform(6.0, 12.0),
-                rng.uniform(5.0, 9.0),
-                0.3,
-            )
-        )
-    return made
-
-
-def forearm(scene: Scene) -> Made:
-    """An arm laid across the pad: a long band, coming and going slowly, sometimes rolling."""
-    rng = scene.rng
-    t = grid(rng.uniform(0.6, 3.5))
-    x, y = scene.spot(0.1 * scene.width, 0.1 * scene.height)
-    roll = rng.normal(0.0, 0.12, 2) * scene.small * (t / t[-1])[:, None]
-    return [
-        blob(
-            scene,
-            t,
-            x + roll[:, 0],
-            y + roll[:, 1],
-            rng.uniform(2.0, 9.0),
-            rng.uniform(0.3, 0.7) * scene.small,
-            rng.uniform(7.0, 16.0),
-            rng.uniform(0.0, math.pi),
-            rise_s=rng.uniform(0.1, 0.6),
-            fall_s=rng.uniform(0.1, 0.6),
-        )
-    ]
-
-
-def knuckles(scene: Scene) -> Made:
-    """A knock with three or four knuckles at once, once or twice."""
-    rng = scene.rng
-    count, gap = int(rng.integers(3, 5)), rng.uniform(14.0, 22.0)
-    angle = rng.normal(0.0, 0.5)
-    x, y = scene.spot(gap, 4.0)
-    made: list[Contact] = []
-    start = 0.0
-    for _ in range(int(rng.integers(1, 3))):
-        duration = rng.uniform(0.05, 0.2)
-        for k in range(count):
-            along = (k - (count - 1) / 2) * min(gap, 0.8 * scene.small / (count - 1))
-            made.append(
-                touch_down(
-                    scene,
-                    x + along * math.cos(angle),
-                    y + along * math.sin(angle),
-                    duration,
-                    start + rng.uniform(0.0, 0.02),
-                    force=rng.uniform(0.5, 1.5),
-                )
-            )
-        start += duration + rng.uniform(0.15, 0.3)
-    return made
-
-
-def _drawn(scene: Scene, t: Array, x: Array, y: Array) -> Made:
-    """One finger along a path, settled on the pad."""
+def _drawn(scene: Scene, t: Array, x: Array, y: Array) -> list[Contact]:
+    """One finger along a path, settled on the pad, as unsteady as this hand is."""
     x, y = scene.settle(x, y)
+    sway = 0.7 * scene.person.wobble_mm * min(1.0, scene.small / 60.0)
+    x = x + sway * wander(t, scene.rng, 0.4, 3.0, 3)
+    y = y + sway * wander(t, scene.rng, 0.4, 3.0, 3)
     return [scene.finger(t, x, y)]
 
 
@@ -174,14 +72,14 @@ def _leg_s(scene: Scene, length: float) -> float:
 
 def _legs(
     scene: Scene, points: list[tuple[float, float]], overlap: float = 0.25, pause_s: float = 0.0
-) -> Made:
+) -> list[Contact]:
     """One finger through via points."""
     legs = [_leg_s(scene, math.dist(a, b)) for a, b in zip(points[:-1], points[1:], strict=True)]
     t, x, y = polyline(points, legs, overlap, pause_s)
     return _drawn(scene, t, x, y)
 
 
-def scribble(scene: Scene) -> Made:
+def scribble(scene: Scene) -> list[Contact]:
     """A wild line through five to thirteen places."""
     rng = scene.rng
     size = scene.small * rng.uniform(0.25, 0.8)
@@ -189,7 +87,7 @@ def scribble(scene: Scene) -> Made:
     return _legs(scene, points, overlap=rng.uniform(0.1, 0.45))
 
 
-def zigzag(scene: Scene) -> Made:
+def zigzag(scene: Scene) -> list[Contact]:
     """Three to six straight legs to and fro while moving on."""
     rng = scene.rng
     legs = int(rng.integers(3, 7))
@@ -198,7 +96,7 @@ def zigzag(scene: Scene) -> Made:
     return _legs(scene, _turned(points, rng.uniform(-math.pi, math.pi)), overlap=rng.uniform(0.05, 0.35))
 
 
-def check_mark(scene: Scene) -> Made:
+def check_mark(scene: Scene) -> list[Contact]:
     """A short stroke down to the right and a longer one up to the right (or as left-handers draw it)."""
     rng = scene.rng
     size = scene.small * rng.uniform(0.3, 0.8)
@@ -213,7 +111,7 @@ def check_mark(scene: Scene) -> Made:
     return _legs(scene, points, overlap=rng.uniform(0.05, 0.3))
 
 
-def corner(scene: Scene) -> Made:
+def corner(scene: Scene) -> list[Contact]:
     """An L: two strokes at about a right angle."""
     rng = scene.rng
     first, second = scene.small * rng.uniform(0.3, 0.7, 2)
@@ -223,7 +121,7 @@ def corner(scene: Scene) -> Made:
     return _legs(scene, _turned(points, base), overlap=rng.uniform(0.0, 0.25), pause_s=rng.choice([0.0, 0.1]))
 
 
-def back_and_forth(scene: Scene) -> Made:
+def back_and_forth(scene: Scene) -> list[Contact]:
     """A swipe that comes back, once or several times."""
     rng = scene.rng
     length = scene.small * rng.uniform(0.3, 0.8)
@@ -233,7 +131,7 @@ def back_and_forth(scene: Scene) -> Made:
     return _legs(scene, _turned(points, rng.uniform(-math.pi, math.pi)), overlap=rng.uniform(0.0, 0.25))
 
 
-def diagonal_swipe(scene: Scene) -> Made:
+def diagonal_swipe(scene: Scene) -> list[Contact]:
     """A swipe 32 to 58 degrees off the axes."""
     rng = scene.rng
     heading = float(rng.choice([1, 3, 5, 7])) * math.pi / 4
@@ -241,12 +139,7 @@ def diagonal_swipe(scene: Scene) -> Made:
     return fingers_on(scene, path, int(rng.choice([1, 2], p=[0.85, 0.15])), heading)
 
 
-def three_finger_swipe(scene: Scene) -> Made:
-    """Three fingers side by side in any of the four directions."""
-    return swipe(float(scene.rng.choice([RIGHT, UP, LEFT, DOWN])), 3)(scene)
-
-
-def tap_then_swipe(scene: Scene) -> Made:
+def tap_then_swipe(scene: Scene) -> list[Contact]:
     """A tap, and then a swipe from about there."""
     rng = scene.rng
     heading = float(rng.choice([RIGHT, UP, LEFT, DOWN]))
@@ -269,7 +162,7 @@ def tap_then_swipe(scene: Scene) -> Made:
     return [touch_down(scene, float(moved.x[0]) + near[0], float(moved.y[0]) + near[1], tap), shifted]
 
 
-def press_and_slide(scene: Scene) -> Made:
+def press_and_slide(scene: Scene) -> list[Contact]:
     """A finger that holds for 0.9 s or longer and then drags."""
     rng = scene.rng
     heading = rng.uniform(-math.pi, math.pi)
@@ -280,7 +173,7 @@ def press_and_slide(scene: Scene) -> Made:
     return _drawn(scene, t, x, y)
 
 
-def curve(scene: Scene) -> Made:
+def arc_stroke(scene: Scene) -> list[Contact]:
     """An arc of 95 to 200 degrees: too bent for a swipe, too short for a circle."""
     rng = scene.rng
     bend = math.radians(rng.uniform(95.0, 200.0)) * rng.choice([-1.0, 1.0])
@@ -291,7 +184,7 @@ def curve(scene: Scene) -> Made:
     return _drawn(scene, t, x, y)
 
 
-def figure_eight(scene: Scene) -> Made:
+def figure_eight(scene: Scene) -> list[Contact]:
     """A lying or standing eight, once or one and a half times."""
     rng = scene.rng
     move = float(np.clip(1.5 / scene.rate * rng.lognormal(0.0, 0.15), 0.8, 4.0))
@@ -309,7 +202,7 @@ def figure_eight(scene: Scene) -> Made:
     return _drawn(scene, t, x * c - y * s, x * s + y * c)
 
 
-def spiral(scene: Scene) -> Made:
+def spiral(scene: Scene) -> list[Contact]:
     """Two or more turns while the radius grows or shrinks to a third."""
     rng = scene.rng
     turns = rng.uniform(1.9, 3.2)
@@ -326,7 +219,7 @@ def spiral(scene: Scene) -> Made:
     return _drawn(scene, t, x, y)
 
 
-def rubbing(scene: Scene) -> Made:
+def rubbing(scene: Scene) -> list[Contact]:
     """Rubbing round and round, two to five turns on one spot."""
     rng = scene.rng
     turns = rng.uniform(2.0, 5.0)
@@ -339,7 +232,7 @@ def rubbing(scene: Scene) -> Made:
     return _drawn(scene, t, x + drift[0] * t, y + drift[1] * t)
 
 
-def triple_tap(scene: Scene) -> Made:
+def triple_tap(scene: Scene) -> list[Contact]:
     """Three or four taps in a row at about one place."""
     rng = scene.rng
     x, y = scene.spot(4.0, 4.0)
@@ -352,286 +245,78 @@ def triple_tap(scene: Scene) -> Made:
     return made
 
 
-def drumming(scene: Scene) -> Made:
-    """Several fingers tap one after the other at places apart, four to ten taps."""
+def taps_apart(scene: Scene) -> list[Contact]:
+    """Two taps as close in time as a double tap, but at places a third of the pad or more apart."""
     rng = scene.rng
-    fingers = int(rng.integers(2, 5))
-    gap = min(scene.spacing(), 0.8 * scene.small / (fingers - 1))
-    x, y = scene.spot(gap * (fingers - 1) / 2, 6.0)
-    angle = rng.normal(0.0, 0.35)
-    made, start = [], 0.0
-    order = int(rng.choice([-1, 1]))
-    for k in range(int(rng.integers(4, 11))):
-        along = ((order * k) % fingers - (fingers - 1) / 2) * gap
-        made.append(
-            touch_down(
-                scene,
-                x + along * math.cos(angle),
-                y + along * math.sin(angle) + rng.normal(0.0, 2.0),
-                scene.tap_s(),
-                start,
-                force=rng.uniform(0.6, 1.2),
-            )
-        )
-        start += rng.uniform(0.06, 0.2)
-    return made
-
-
-def two_finger_tap(scene: Scene) -> Made:
-    """Two or three fingers at once for 50 to 400 ms, sometimes longer, once or twice."""
-    rng = scene.rng
-    count = int(rng.choice([2, 3], p=[0.75, 0.25]))
-    gap = min(scene.spacing(), 0.8 * scene.small / (count - 1))
-    angle = rng.uniform(-0.9, 0.9)
-    x, y = scene.spot(gap * (count - 1) / 2, gap / 3)
-    made: list[Contact] = []
-    start, held = 0.0, rng.random() < 0.2
-    for _ in range(1 if held else int(rng.choice([1, 2], p=[0.7, 0.3]))):
-        duration = rng.uniform(0.5, 1.6) if held else scene.tap_s() * rng.uniform(1.0, 1.3)
-        for k in range(count):
-            along = (k - (count - 1) / 2) * gap
-            made.append(
-                touch_down(
-                    scene,
-                    x + along * math.cos(angle),
-                    y + along * math.sin(angle),
-                    duration,
-                    start + rng.uniform(0.0, min(0.05, 0.3 * duration)),
-                    rng.uniform(0.5, 1.1),
-                )
-            )
-        start += duration + scene.gap_s()
-    return made
-
-
-def _two(scene: Scene, distance: tuple[float, float], turn: float) -> Made:
-    """Two fingers about their middle: from one distance (mm) to another while the line between them turns."""
-    rng = scene.rng
-    before, after = scene.rests()
-    move = float(np.clip(0.5 / scene.rate * rng.lognormal(0.0, 0.2), 0.18, 1.6))
-    t = grid(before + move + after)
-    s = progress((t - before) / move, rng)
-    angle = rng.uniform(0.0, math.pi) + turn * s
-    half = 0.5 * (distance[0] + (distance[1] - distance[0]) * s)
-    lean = rng.uniform(0.2, 0.8)  # one finger may do most of the way
-    dx, dy = half * np.cos(angle), half * np.sin(angle)
-    shift = rng.normal(0.0, 0.04, 2) * scene.small
-    xs = np.concatenate([2 * lean * dx, -2 * (1 - lean) * dx]) + shift[0] * np.concatenate([s, s])
-    ys = np.concatenate([2 * lean * dy, -2 * (1 - lean) * dy]) + shift[1] * np.concatenate([s, s])
-    xs, ys = scene.settle(xs, ys)
-    n = t.size
+    apart = scene.small * rng.uniform(0.38, 0.7)
+    angle = rng.uniform(-math.pi, math.pi)
+    dx, dy = 0.5 * apart * math.cos(angle), 0.5 * apart * math.sin(angle)
+    x, y = scene.spot(abs(dx), abs(dy))
+    first = scene.tap_s()
     return [
-        scene.finger(
-            t,
-            xs[k * n : (k + 1) * n],
-            ys[k * n : (k + 1) * n],
-            size=1.0 + 0.2 * k,
-            force=rng.uniform(0.6, 1.1),
-            start=k * rng.uniform(0.0, 0.05),
-        )
-        for k in range(2)
+        touch_down(scene, x - dx, y - dy, first),
+        touch_down(scene, x + dx, y + dy, scene.tap_s(), first + scene.gap_s()),
     ]
 
 
-def pinch(scene: Scene) -> Made:
-    """Two fingers move together."""
-    far = scene.small * scene.rng.uniform(0.45, 0.85)
-    return _two(scene, (far, far * scene.rng.uniform(0.15, 0.45)), scene.rng.normal(0.0, 0.25))
-
-
-def spread(scene: Scene) -> Made:
-    """Two fingers move apart."""
-    far = scene.small * scene.rng.uniform(0.45, 0.85)
-    return _two(scene, (far * scene.rng.uniform(0.15, 0.45), far), scene.rng.normal(0.0, 0.25))
-
-
-def rotation(scene: Scene) -> Made:
-    """Two fingers turn about their middle by 50 to 140 degrees."""
-    far = scene.small * scene.rng.uniform(0.35, 0.7)
-    turn = math.radians(scene.rng.uniform(50.0, 140.0)) * scene.rng.choice([-1.0, 1.0])
-    return _two(scene, (far, far * scene.rng.uniform(0.8, 1.2)), turn)
-
-
-def object_put_down(scene: Scene) -> Made:
-    """A thing is put down: cup ring, phone edge, key, bottle. Hard edges, no tremor, stays for 0.4 s to 5 s."""
+def tap_then_hold(scene: Scene) -> list[Contact]:
+    """A tap, and then a press of 0.9 s or longer at the same place."""
     rng = scene.rng
-    total = rng.uniform(0.4, 5.0)
-    t = grid(total)
-    x, y = scene.spot(0.1 * scene.width, 0.1 * scene.height, beyond=0.2)
-    form = int(rng.integers(0, 4))
-    made = []
-    hit = 1.0 + rng.uniform(0.0, 1.5) * np.exp(-t / 0.05)  # the blow when it lands
-    force = rng.uniform(0.4, 4.0)
-    parts: list[tuple[float, float, float, float, float]] = []
-    if form == 0:
-        radius = rng.uniform(12.0, 38.0)
-        count = int(rng.integers(6, 13))
-        for k in range(count):
-            a = 2.0 * math.pi * k / count
-            parts.append((radius * math.cos(a), radius * math.sin(a), 4.0, 3.0, rng.uniform(0.2, 1.0)))
-    elif form == 1:
-        angle = rng.uniform(0.0, math.pi)
-        for k in range(2):
-            parts.append((rng.normal(0.0, 20.0), rng.normal(0.0, 20.0), rng.uniform(10.0, 25.0), 3.0, 1.0))
-        x, y = x + 3.0 * math.cos(angle), y + 3.0 * math.sin(angle)
-    elif form == 2:
-        parts.append((0.0, 0.0, rng.uniform(8.0, 25.0), rng.uniform(8.0, 20.0), 2.0))
-    else:
-        for _ in range(int(rng.integers(1, 5))):
-            parts.append(
-                (
-                    rng.normal(0.0, 12.0),
-                    rng.normal(0.0, 12.0),
-                    rng.uniform(2.0, 6.0),
-                    rng.uniform(2.0, 4.0),
-                    1.0,
-                )
-            )
-    for dx, dy, length, width, share in parts:
-        part = blob(
-            scene,
-            t,
-            x + dx,
-            y + dy,
-            force * share,
-            length,
-            width,
-            rng.uniform(0.0, math.pi),
-            rise_s=rng.uniform(0.01, 0.06),
-            fall_s=rng.uniform(0.03, 0.2),
-            unrest=0.01,
-            flatness=2.5,
-        )
-        made.append(
-            Contact(
-                part.t,
-                part.x,
-                part.y,
-                part.force * hit,
-                part.length,
-                part.width,
-                part.angle,
-                0.05,
-                2.5,
-                False,
-            )
-        )
-    return made
-
-
-def sleeve_brush(scene: Scene) -> Made:
-    """Cloth brushes over: one to four weak, large, ragged patches that wander across in 0.3 to 1.8 s."""
-    rng = scene.rng
-    total = rng.uniform(0.3, 1.8)
-    heading = rng.uniform(-math.pi, math.pi)
-    across = rng.uniform(0.5, 1.6) * scene.small
-    made = []
-    for _ in range(int(rng.integers(1, 5))):
-        first = rng.uniform(0.0, 0.3) * total
-        t = grid(total - first)
-        u = t / t[-1] - 0.5
-        x = (
-            scene.width * rng.uniform(0.25, 0.75)
-            + across * u * math.cos(heading)
-            + 4.0 * wander(t, rng, 0.5, 3.0)
-        )
-        y = (
-            scene.height * rng.uniform(0.25, 0.75)
-            + across * u * math.sin(heading)
-            + 4.0 * wander(t, rng, 0.5, 3.0)
-        )
-        made.append(
-            blob(
-                scene,
-                t,
-                x,
-                y,
-                rng.uniform(0.3, 2.2),
-                rng.uniform(7.0, 24.0),
-                rng.uniform(3.5, 10.0),
-                rng.uniform(0.0, math.pi),
-                start=first,
-                rise_s=rng.uniform(0.05, 0.5),
-                fall_s=rng.uniform(0.05, 0.5),
-                unrest=rng.uniform(0.2, 0.8),
-            )
-        )
-    return made
-
-
-def wrinkle(scene: Scene) -> Made:
-    """The fabric is pulled: a long ridge appears along a fold, shifts, and relaxes."""
-    rng = scene.rng
-    t = grid(rng.uniform(0.4, 3.0))
-    x, y = scene.spot(0.1 * scene.width, 0.1 * scene.height)
-    slide = rng.normal(0.0, 8.0, 2) * (t / t[-1])[:, None]
+    x, y = scene.spot(3.0, 3.0)
+    first = scene.tap_s()
+    dx, dy = rng.normal(0.0, 0.03, 2) * scene.small
     return [
-        blob(
-            scene,
-            t,
-            x + slide[:, 0],
-            y + slide[:, 1],
-            rng.uniform(0.8, 5.0),
-            rng.uniform(0.25, 0.8) * scene.small,
-            rng.uniform(3.0, 6.0),
-            rng.uniform(0.0, math.pi),
-            rise_s=rng.uniform(0.05, 0.8),
-            fall_s=rng.uniform(0.1, 1.0),
-            unrest=rng.uniform(0.05, 0.4),
-        )
+        touch_down(scene, x, y, first),
+        touch_down(scene, x + dx, y + dy, rng.uniform(0.9, 2.0), first + scene.gap_s()),
     ]
 
 
-def electrical_burst(scene: Scene) -> Made:
-    """Interference for 0.05 to 1.5 s: on everything, on rows, columns, blocks, or scattered."""
+def wave(scene: Scene) -> list[Contact]:
+    """A wavy line: one to three periods of a sine along any direction, clearly swinging."""
     rng = scene.rng
-    made, start = [], 0.0
-    for _ in range(int(rng.integers(1, 5))):
-        stop = start + rng.uniform(0.04, 0.6)
-        form = str(rng.choice(["all", "row", "column", "block", "taxels"]))
-        made.append(
-            Artefact(
-                start, stop, form, rng.uniform(0.2, 2.0) * rng.choice([1.0, 1.0, -1.0]), rng.uniform(0.2, 1.0)
-            )
-        )
-        start = stop + rng.uniform(0.0, 0.2)
-    return made
+    periods, length = rng.uniform(1.0, 3.0), scene.small * rng.uniform(0.5, 0.9)
+    t = grid(float(np.clip(0.55 * (1.0 + periods) / scene.rate * rng.lognormal(0.0, 0.15), 0.4, 3.0)))
+    s = progress(t / t[-1], rng)
+    x = length * s
+    y = scene.small * rng.uniform(0.12, 0.25) * np.sin(2.0 * math.pi * periods * s + rng.uniform(0.0, 6.3))
+    angle = rng.uniform(-math.pi, math.pi)
+    return _drawn(scene, t, x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle) + y * math.cos(angle))
 
 
-def spike(scene: Scene) -> Made:
-    """One taxel jumps for one frame or a few."""
-    rng = scene.rng
-    return [Artefact(0.0, rng.uniform(0.02, 0.2), "taxel", rng.uniform(0.4, 4.0), 0.3)]
-
+Made = list[Contact] | list[Artefact]
 
 OTHERS: dict[str, Callable[[Scene], Made]] = {
     "long_press": long_press,
     "slow_touch": slow_touch,
-    "palm": palm,
-    "heel_rest": heel_rest,
-    "forearm": forearm,
-    "knuckles": knuckles,
-    "scribble": scribble,
-    "zigzag": zigzag,
-    "check_mark": check_mark,
-    "corner": corner,
-    "back_and_forth": back_and_forth,
-    "diagonal_swipe": diagonal_swipe,
-    "two_finger_swipe_left": swipe(LEFT, 2),
-    "two_finger_swipe_right": swipe(RIGHT, 2),
-    "three_finger_swipe": three_finger_swipe,
+    "triple_tap": triple_tap,
+    "taps_apart": taps_apart,
+    "tap_then_hold": tap_then_hold,
     "tap_then_swipe": tap_then_swipe,
     "press_and_slide": press_and_slide,
-    "arc": curve,
+    "diagonal_swipe": diagonal_swipe,
+    "back_and_forth": back_and_forth,
+    "check_mark": check_mark,
+    "corner": corner,
+    "zigzag": zigzag,
+    "wave": wave,
+    "scribble": scribble,
+    "arc": arc_stroke,
     "figure_eight": figure_eight,
     "spiral": spiral,
     "rubbing": rubbing,
-    "triple_tap": triple_tap,
-    "drumming": drumming,
+    "two_finger_swipe_left": swipe(LEFT, 2),
+    "two_finger_swipe_right": swipe(RIGHT, 2),
+    "three_finger_swipe": three_finger_swipe,
     "two_finger_tap": two_finger_tap,
+    "drumming": drumming,
+    "knuckles": knuckles,
     "pinch": pinch,
     "spread": spread,
     "rotation": rotation,
+    "palm": palm,
+    "heel_rest": heel_rest,
+    "forearm": forearm,
+    "wipe": wipe,
     "object_put_down": object_put_down,
     "sleeve_brush": sleeve_brush,
     "wrinkle": wrinkle,

@@ -115,7 +115,7 @@ class Participant:
             aim=math.radians(float(rng.uniform(2.0, 7.0))),
             tremor_mm=float(rng.uniform(0.02, 0.25)),
             wobble_mm=float(rng.uniform(0.1, 1.1)),
-            tap_s=float(np.clip(0.15 * rng.lognormal(0.0, 0.35), 0.06, 0.3)),
+            tap_s=float(np.clip(0.16 * rng.lognormal(0.0, 0.4), 0.06, 0.36)),
             gap_s=float(np.clip(0.17 * rng.lognormal(0.0, 0.3), 0.09, 0.32)),
             rest_end=float(rng.beta(1.3, 1.2)),
             rest_start=float(rng.beta(1.1, 2.0)),
@@ -195,7 +195,9 @@ def fingertip(
     fade_in = rng.uniform(0.02, 0.08) if fade_in_s is None else fade_in_s
     fade_out = rng.uniform(0.02, 0.09) if fade_out_s is None else fade_out_s
     shake = person.tremor_mm * float(rng.uniform(0.5, 1.5))
-    width = person.finger_mm * size * float(rng.uniform(0.88, 1.14))
+    # Once in a while it is the thumb or the finger's side.
+    broad = float(rng.uniform(1.2, 1.6)) if rng.random() < 0.08 else 1.0
+    width = min(person.finger_mm * size * broad * float(rng.uniform(0.88, 1.14)), 8.0)
     oblong = float(np.clip(person.oblong * rng.uniform(0.85, 1.2), 1.0, 2.2))
     return Contact(
         t=t + start,

@@ -87,7 +87,7 @@ class Sensor:
     ghost: float = 0.0
     relaxation: tuple[float, ...] = (0.25, 0.08)
     taus_s: tuple[float, ...] = (0.03, 0.9)
-    hysteresis: float = 0.03
+    hysteresis: float = 0.012
     saturation: int = 4095
     dtype: str = "uint16"
     clipped: bool = False  # the firmware subtracts the baseline and sends no negatives
@@ -122,7 +122,7 @@ class Sensor:
             spread=sensor.spread * float(rng.uniform(0.85, 1.2)),
             row_crosstalk=float(rng.uniform(0.005, 0.02)),
             column_crosstalk=float(rng.uniform(0.005, 0.02)),
-            hysteresis=float(rng.uniform(0.01, 0.06)),
+            hysteresis=float(rng.uniform(0.0, 0.03)),
             loss=float(rng.choice([0.0, 0.005])),
         )
 

@@ -42,7 +42,7 @@ class Scene:
     ) -> tuple[float, float]:
         """Centre for something of that half size: on the pad but, in a share `beyond` of cases, partly over the edge."""
         rng, (px, py), spread = self.rng, self.person.place, self.person.place_spread
-        slack = 0.14 if rng.random() < beyond else -0.04
+        slack = 0.09 if rng.random() < beyond else -0.04
         out = []
         for extent, half, habit in ((self.width, half_width, px), (self.height, half_height, py)):
             room = max(extent * (0.5 + slack) - half, 0.0)
@@ -90,8 +90,8 @@ class Scene:
         )
 
     def tap_s(self) -> float:
-        """Duration of one tap in seconds, 0.04 to 0.35."""
-        return float(np.clip(self.person.tap_s * self.rng.lognormal(0.0, 0.22) / self.tempo, 0.04, 0.35))
+        """Duration of one tap in seconds, 0.04 to 0.42 (real ones on a touchscreen: median 0.2)."""
+        return float(np.clip(self.person.tap_s * self.rng.lognormal(0.0, 0.22) / self.tempo, 0.04, 0.42))
 
     def gap_s(self) -> float:
         """Pause between two taps in seconds, 0.08 to 0.4."""
@@ -105,7 +105,7 @@ class Scene:
         return float(np.clip(mix, max(0.16 * self.small, 9.0), max(0.55 * self.small, 12.0)))
 
     def rests(self) -> tuple[float, float]:
-        """Seconds at rest before and after a stroke: none, or up to 0.3 and 0.6."""
+        """Seconds at rest before and after a stroke: none, or up to 0.3 and 0.6, in a few cases 1.1."""
         rng, person, hurry = self.rng, self.person, math.sqrt(self.rate)
         before = (
             rng.uniform(0.02, 0.3) * person.rest_start
@@ -113,7 +113,9 @@ class Scene:
             else 0.0
         )
         after = 0.6 * rng.beta(1.5, 1.8) if rng.random() < 0.1 + 0.8 * person.rest_end else 0.0
-        return before / max(hurry, 0.7), min(after / max(hurry, 0.7), 0.75)
+        if rng.random() < 0.15 * person.rest_end:
+            after += rng.uniform(0.0, 0.5)
+        return before / max(hurry, 0.7), min(after / max(hurry, 0.7), 1.1)
 
 
 def touch_down(
@@ -128,7 +130,8 @@ def touch_down(
     """A finger that stays where it lands for that long, rolling a little."""
     rng = scene.rng
     t = grid(duration_s)
-    roll = rng.normal(0.0, 0.7, 2) * (t / duration_s - 0.5)[:, None]
+    # A fingertip rolls as it loads: its centre moves by a millimetre or two.
+    roll = rng.normal(0.0, 1.3, 2) * (t / duration_s - 0.5)[:, None]
     edge = 0.5 * duration_s
     return scene.finger(
         t,
@@ -137,8 +140,8 @@ def touch_down(
         force=force,
         size=size,
         start=start,
-        fade_in_s=min(rng.uniform(0.015, 0.06), edge),
-        fade_out_s=min(rng.uniform(0.02, 0.08), edge),
+        fade_in_s=min(rng.uniform(0.015, 0.09), edge),
+        fade_out_s=min(rng.uniform(0.02, 0.11), edge),
     )
 
 
@@ -162,7 +165,7 @@ def stroke(scene: Scene, heading: float, length: float, *, limit: float = 0.36) 
     rng, person = scene.rng, scene.person
     error = float(np.clip(scene.turn + rng.normal(0.0, person.aim), -limit, limit))
     bend = float(np.clip(person.bend * length * rng.uniform(0.3, 1.6) + rng.normal(0.0, 0.06), -0.85, 0.85))
-    move = float(np.clip(0.42 * (length / 50.0) ** 0.4 / scene.rate * rng.lognormal(0.0, 0.15), 0.12, 1.6))
+    move = float(np.clip(0.42 * (length / 50.0) ** 0.4 / scene.rate * rng.lognormal(0.0, 0.15), 0.13, 1.6))
     before, after = scene.rests()
     glides = before == 0.0 and after == 0.0 and rng.random() < 0.2 + 0.7 * person.glide
     t = grid(before + move + after)
@@ -178,8 +181,10 @@ def stroke(scene: Scene, heading: float, length: float, *, limit: float = 0.36) 
     sway = person.wobble_mm * wander(t, rng, 0.4, 3.0, 3) * min(1.0, length / 30.0)
     x, y = x - sway * math.sin(heading), y + sway * math.cos(heading)
     half = 0.5 * length
-    fade_in = rng.uniform(0.05, 0.35) * move if glides else rng.uniform(0.02, 0.08)
-    fade_out = rng.uniform(0.05, 0.4) * move if glides else rng.uniform(0.02, 0.1)
+    # A flick that also faded in and out would leave nothing between two frames.
+    soft = min(1.0, move / 0.3)
+    fade_in = soft * rng.uniform(0.05, 0.35) * move if glides else rng.uniform(0.02, 0.08)
+    fade_out = soft * rng.uniform(0.05, 0.4) * move if glides else rng.uniform(0.02, 0.1)
     return Stroke(
         t, x - half * math.cos(heading), y - half * math.sin(heading), float(fade_in), float(fade_out)
     )
@@ -232,49 +237,3 @@ def fingers_on(
             )
         )
     return contacts
-
-
-def blob(
-    scene: Scene,
-    t: Array,
-    x: float | Array,
-    y: float | Array,
-    force: float,
-    length: float,
-    width: float,
-    angle: float,
-    *,
-    rise_s: float = 0.08,
-    fall_s: float = 0.1,
-    start: float = 0.0,
-    unrest: float = 0.08,
-    flatness: float = 1.2,
-) -> Contact:
-    """A contact that is no fingertip: palm, sleeve, thing. Sizes are standard deviations in millimetres."""
-    rng, total = scene.rng, float(t[-1])
-    up, down = min(rise_s, 0.45 * total), min(fall_s, 0.45 * total)
-    level = np.clip(t / up, 0.0, 1.0) * np.clip((total - t) / down, 0.0, 1.0)
-    level = level * np.clip(1.0 + unrest * wander(t, rng, 0.3, 4.0), 0.0, 3.0)
-    ones = np.ones_like(t)
-    return Contact(t + start, x * ones, y * ones, force * level, length, width, angle, 0.15, flatness, False)
-
-
-def resting_hand(scene: Scene, duration_s: float) -> Contact:
-    """The heel of the hand or an idle finger that lies lightly on the pad's edge during a gesture."""
-    rng = scene.rng
-    t = grid(duration_s)
-    side = 1.0 if scene.person.right_handed else -1.0
-    x = scene.width * (0.5 + side * rng.uniform(0.3, 0.55))
-    y = scene.height * rng.uniform(-0.08, 0.12)
-    if rng.random() < 0.5:
-        return blob(
-            scene,
-            t,
-            x,
-            y,
-            rng.uniform(0.2, 0.6),
-            rng.uniform(8.0, 14.0),
-            rng.uniform(5.0, 9.0),
-            rng.uniform(0.0, 3.1),
-        )
-    return blob(scene, t, x, y, rng.uniform(0.1, 0.3), 4.0, 3.5, 0.0)

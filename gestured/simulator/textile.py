@@ -12,7 +12,7 @@ import numpy as np
 
 from .kinematics import Array
 
-REMANENCE_S = 4.0  # after a touch, what hysteresis has left behind fades that fast
+REMANENCE_S = 1.5  # after a touch, what hysteresis has left behind fades that fast
 
 
 def relax(
