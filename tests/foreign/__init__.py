@@ -40,6 +40,7 @@ def _take(kind: str, seed: int, level: str, rows: int, columns: int, rate_hz: fl
         "onset": onset,
         "release": release,
         "seen": seen,
+        "contacts": [(onset + float(p.t[0]), onset + float(p.t[-1])) for p in performed.pads],
     }
 
 
@@ -48,7 +49,8 @@ def take(kind: str, seed: int, level: str = "nominal") -> dict[str, Any]:
 
     Returns `frames` (N, 9, 9) raw counts, `times` (N,) s, `label` (`none` for non-gestures), `kind`,
     `onset` and `release` (s, true first and last contact), and `seen` (N,): the true signal over all noise in
-    each frame; below about 4 nobody can see a touch. Idle for at least 1.3 s before and after.
+    each frame; below about 4 nobody can see a touch. `contacts` are the times (s) of
+    each finger's contact. Idle for at least 1.3 s before and after.
     """
     return _take(kind, seed, level, 9, 9, 15.0)
 
