@@ -1,6 +1,7 @@
 """Takes and sessions: one gesture, many gestures, the cohort of 3060, the endless wide stream.
 
-Every take draws from a stream of its own (PCG64 on a SeedSequence of its coordinates), so any part can be made alone and in parallel.
+Every take draws from a stream of its own (PCG64 on a SeedSequence of its coordinates), so any part can be
+made alone and in parallel.
 """
 
 from collections.abc import Iterator, Sequence
@@ -129,7 +130,7 @@ def cohort_plan(participants: int = 34) -> Iterator[Trial]:
 
 
 def cohort_take(trial: Trial, seed: int = 0) -> Take:
-    """One trial of the cohort on the nominal sensor on that participant's day. Depends on nothing but its arguments."""
+    """One trial of the cohort, on the nominal sensor on that participant's day; needs no other trial."""
     rng = generator(seed, 0xC0, trial.index)
     person = Participant(_person(seed, trial.participant))
     sensor = Sensor.nominal(day=_person(seed, trial.participant))

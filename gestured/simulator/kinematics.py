@@ -1,8 +1,9 @@
 """How fingers move: speed profiles and paths, sampled on a fine time grid.
 
-Sources: minimum jerk (Flash & Hogan 1985), lognormal speed of rapid strokes (Plamondon 1995, sigma-lognormal), overlapping submovements
-that add up (Flash & Henis 1991), the two-thirds power law on curved paths (Lacquaniti, Terzuolo & Viviani 1983). An ellipse that is run
-through with a constant rate of its parameter obeys the two-thirds law exactly, so the circles below need no other device.
+Sources: minimum jerk (Flash & Hogan 1985), lognormal speed of rapid strokes (Plamondon 1995,
+sigma-lognormal), overlapping submovements that add up (Flash & Henis 1991), the two-thirds power law on
+curved paths (Lacquaniti, Terzuolo & Viviani 1983). An ellipse that is run through with a constant rate of its
+parameter obeys the two-thirds law exactly, so the circles below need no other device.
 
 Lengths are millimetres, x to the right, y upward, times seconds, angles radians (counter-clockwise positive).
 """
@@ -48,8 +49,8 @@ def lognormal(tau: Array, sigma: float, mirrored: bool = False) -> Array:
 def progress(tau: Array, rng: np.random.Generator, moving_ends: float = 0.0) -> Array:
     """Progress 0..1 of one stroke with a random human speed profile.
 
-    `moving_ends` (0..1) is how much of the speed is left at landing and leaving: the finger touches only the middle
-    part of a longer movement.
+    `moving_ends` (0..1) is how much of the speed is left at landing and leaving: the finger touches only the
+    middle part of a longer movement.
     """
     first = 0.32 * moving_ends * rng.uniform(0.2, 1.0)
     last = 1.0 - 0.32 * moving_ends * rng.uniform(0.2, 1.0)

@@ -280,7 +280,9 @@ def wave(scene: Scene) -> list[Contact]:
     x = length * s
     y = scene.small * rng.uniform(0.12, 0.25) * np.sin(2.0 * math.pi * periods * s + rng.uniform(0.0, 6.3))
     angle = rng.uniform(-math.pi, math.pi)
-    return _drawn(scene, t, x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle) + y * math.cos(angle))
+    return _drawn(
+        scene, t, x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle) + y * math.cos(angle)
+    )
 
 
 Made = list[Contact] | list[Artefact]

@@ -1,12 +1,14 @@
 """Who performs: participants with their habits, and what a finger leaves on the pad.
 
-A contact's size grows with its force (Hertz: the radius of a sphere pressed on a plane goes with F^(1/3); fingertips measure between
-F^0.1 and F^0.35). Tremor is the physiological 8 to 12 Hz of some hundredths to tenths of a millimetre. Arm poses turn and bend strokes
-about the wrist or the elbow. The distributions are invented within plausible bounds.
+A contact's size grows with its force (Hertz: the radius of a sphere on a plane goes with F^(1/3); the
+participants lie between F^0.08 and F^0.35). Tremor is the physiological 8 to 12 Hz of some hundredths to tenths
+of a millimetre. Arm poses turn and bend strokes about the wrist or the elbow. The distributions are invented
+within plausible bounds.
 """
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -27,8 +29,8 @@ def generator(*key: int) -> np.random.Generator:
 class Contact:
     """One finger (or palm, or thing) on the pad; arrays are (n,) on a fine grid of increasing times.
 
-    Before the first and after the last time there is no contact. Positions are millimetres from the pad's bottom-left
-    corner, x to the right, y upward. `force` is relative: 1 is a normal firm finger.
+    Before the first and after the last time there is no contact. Positions are millimetres from the pad's
+    bottom-left corner, x to the right, y upward. `force` is relative: 1 is a normal firm finger.
     """
 
     t: Array
@@ -100,32 +102,32 @@ class Participant:
 
     def __post_init__(self) -> None:
         rng = generator(self.seed, 0x9E0)
-        draw = dict(
-            finger_mm=float(np.clip(3.7 * rng.lognormal(0.0, 0.24), 2.2, 7.0)),
-            oblong=float(rng.uniform(1.0, 1.7)),
-            growth=float(rng.uniform(0.08, 0.35)),
-            force=float(np.clip(rng.lognormal(0.0, 0.35), 0.35, 2.5)),
-            force_spread=float(rng.uniform(0.08, 0.35)),
-            pace=float(np.clip(rng.lognormal(0.0, 0.22), 0.55, 1.8)),
-            pace_spread=float(rng.uniform(0.06, 0.25)),
-            reach=float(rng.beta(1.6, 1.4)),
-            place=(float(rng.normal(0.0, 0.25)), float(rng.normal(0.0, 0.25))),
-            place_spread=float(rng.uniform(0.1, 0.6)),
-            bias=float(np.clip(rng.normal(0.0, math.radians(5.0)), -0.2, 0.2)),
-            aim=math.radians(float(rng.uniform(2.0, 7.0))),
-            tremor_mm=float(rng.uniform(0.02, 0.25)),
-            wobble_mm=float(rng.uniform(0.1, 1.1)),
-            tap_s=float(np.clip(0.16 * rng.lognormal(0.0, 0.4), 0.06, 0.36)),
-            gap_s=float(np.clip(0.17 * rng.lognormal(0.0, 0.3), 0.09, 0.32)),
-            rest_end=float(rng.beta(1.3, 1.2)),
-            rest_start=float(rng.beta(1.1, 2.0)),
-            glide=float(rng.beta(1.1, 1.2)),
-            spacing_mm=float(np.clip(21.0 * rng.lognormal(0.0, 0.25), 12.0, 40.0)),
-            clumsy=float(rng.beta(0.6, 3.0)),
-            right_handed=bool(rng.random() < 0.85),
-        )
+        draw: dict[str, Any] = {
+            "finger_mm": float(np.clip(3.7 * rng.lognormal(0.0, 0.24), 2.2, 7.0)),
+            "oblong": float(rng.uniform(1.0, 1.7)),
+            "growth": float(rng.uniform(0.08, 0.35)),
+            "force": float(np.clip(rng.lognormal(0.0, 0.35), 0.35, 2.5)),
+            "force_spread": float(rng.uniform(0.08, 0.35)),
+            "pace": float(np.clip(rng.lognormal(0.0, 0.22), 0.55, 1.8)),
+            "pace_spread": float(rng.uniform(0.06, 0.25)),
+            "reach": float(rng.beta(1.6, 1.4)),
+            "place": (float(rng.normal(0.0, 0.25)), float(rng.normal(0.0, 0.25))),
+            "place_spread": float(rng.uniform(0.1, 0.6)),
+            "bias": float(np.clip(rng.normal(0.0, math.radians(5.0)), -0.2, 0.2)),
+            "aim": math.radians(float(rng.uniform(2.0, 7.0))),
+            "tremor_mm": float(rng.uniform(0.02, 0.25)),
+            "wobble_mm": float(rng.uniform(0.1, 1.1)),
+            "tap_s": float(np.clip(0.16 * rng.lognormal(0.0, 0.4), 0.06, 0.36)),
+            "gap_s": float(np.clip(0.17 * rng.lognormal(0.0, 0.3), 0.09, 0.32)),
+            "rest_end": float(rng.beta(1.3, 1.2)),
+            "rest_start": float(rng.beta(1.1, 2.0)),
+            "glide": float(rng.beta(1.1, 1.2)),
+            "spacing_mm": float(np.clip(21.0 * rng.lognormal(0.0, 0.25), 12.0, 40.0)),
+            "clumsy": float(rng.beta(0.6, 3.0)),
+            "right_handed": bool(rng.random() < 0.85),
+        }
         side = 1.0 if draw["right_handed"] else -1.0
-        # The finger comes from the hand's side; strokes bend about the wrist (short radius) or the elbow (long one).
+        # The finger comes from the hand's side; strokes bend about the wrist (short radius) or the elbow.
         draw["finger_angle"] = math.pi / 2.0 + side * float(rng.normal(0.35, 0.45))
         wrist = rng.random() < 0.5
         radius = rng.uniform(60.0, 150.0) if wrist else rng.uniform(250.0, 350.0)
@@ -134,7 +136,7 @@ class Participant:
             object.__setattr__(self, name, value)
 
     def pose(self, inclination: int) -> tuple[float, float, float]:
-        """This person's arm pose at one of three inclinations: (turn in radians, extent factor, force factor)."""
+        """The arm pose at one of three inclinations: (turn in radians, extent factor, force factor)."""
         rng = generator(self.seed, 0x905E, inclination)
         step = inclination - 1
         turn = float(rng.normal(0.0, math.radians(3.0))) + step * math.radians(2.0) * (
@@ -156,7 +158,7 @@ def press(
 ) -> Array:
     """Force over a contact (n,): rise, a plateau that is never even, fall. Zero at both ends.
 
-    Forms seen on real pads: an overshoot at landing and lighter sliding after it, a slow rise to the end, a dome, a dip.
+    Forms: an overshoot at landing and lighter sliding after it, a slow rise or fall, a dome, a dip.
     """
     total = float(t[-1])
     up = min(fade_in_s, 0.45 * total)

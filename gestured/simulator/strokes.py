@@ -40,7 +40,7 @@ class Scene:
     def spot(
         self, half_width: float = 0.0, half_height: float = 0.0, beyond: float = 0.05
     ) -> tuple[float, float]:
-        """Centre for something of that half size: on the pad but, in a share `beyond` of cases, partly over the edge."""
+        """Centre for something of that half size; in a share `beyond` of cases partly over the edge."""
         rng, (px, py), spread = self.rng, self.person.place, self.person.place_spread
         slack = 0.09 if rng.random() < beyond else -0.04
         out = []
@@ -98,7 +98,7 @@ class Scene:
         return float(np.clip(self.person.gap_s * self.rng.lognormal(0.0, 0.2) / self.tempo, 0.08, 0.4))
 
     def spacing(self) -> float:
-        """Distance of two neighbouring fingertips: 0.16 to 0.55 of the pad's shorter edge (1.5 to 5 taxels of nine)."""
+        """Distance of two fingertips: 0.16 to 0.55 of the pad's shorter edge (1.5 to 5 taxels of nine)."""
         free = self.rng.uniform(0.16, 0.55) * self.small
         own = self.person.spacing_mm * float(self.rng.lognormal(0.0, 0.15))
         mix = own if self.rng.random() < 0.7 else free

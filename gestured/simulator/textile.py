@@ -1,8 +1,8 @@
 """How a soft pressure matrix answers: viscoelastic lag, hysteresis, leakage between lines, compression.
 
-Sources: the standard linear solid and its Prony series for relaxation; the play operator as the simplest Preisach element for
-hysteresis; sneak paths in passive matrices for crosstalk and ghosts. Every lag steps by `-expm1(-dt / tau)`, which is exact for an
-input held over dt and stable for any dt / tau.
+Sources: the standard linear solid and its Prony series for relaxation; the play operator as the simplest
+Preisach element for hysteresis; sneak paths in passive matrices for crosstalk and ghosts. Every lag steps by
+`-expm1(-dt / tau)`, which is exact for an input held over dt and stable for any dt / tau.
 """
 
 import math
@@ -20,8 +20,9 @@ def relax(
 ) -> Array:
     """The lagging answer (N, R, C) to a pressure field (N, R, C) with frames dt_s apart.
 
-    Each branch follows the input with its own tau and makes up its amplitude of the answer; a negative amplitude is an
-    overshoot that relaxes. `hysteresis` is the width of the play operator in units of a touch.
+    Each branch follows the input with its own tau and makes up its amplitude of the answer; a negative
+    amplitude is an overshoot that relaxes. `hysteresis` is the width of the play operator in units of a
+    touch.
     """
     if not len(amplitudes) and hysteresis <= 0.0:
         return field
@@ -55,7 +56,7 @@ def relax(
 
 
 def leak(field: Array, row: float, column: float, ghost: float) -> Array:
-    """Crosstalk (N, R, C): each taxel sees a share of its row's and column's sum, and where two touched lines cross, a ghost."""
+    """Crosstalk (N, R, C): a share of each row's and column's sum, and ghosts where touched lines cross."""
     rows, columns = field.sum(axis=2, keepdims=True), field.sum(axis=1, keepdims=True)
     out = field + row * rows + column * columns
     if ghost > 0.0:
@@ -64,7 +65,10 @@ def leak(field: Array, row: float, column: float, ghost: float) -> Array:
 
 
 def compress(field: Array, exponent: float, knee: float) -> Array:
-    """Pressure to signal: u^n (1 + k) / (u^n + k), 1 at a normal touch; n > 1 ignores light ones, a small k saturates."""
+    """Pressure to signal: u^n (1 + k) / (u^n + k), which is 1 at a normal touch.
+
+    n > 1 ignores light touches, a small k saturates. What relaxation made negative stays as it is.
+    """
     u = np.maximum(field, 0.0)
     if exponent != 1.0:
         u = u**exponent
@@ -74,6 +78,6 @@ def compress(field: Array, exponent: float, knee: float) -> Array:
 
 
 def tail_kernel(n: int, reach: float) -> Array:
-    """A mixing matrix (n, n) with rows of sum 1 at most: an exponential tail of `reach` taxels along one axis."""
+    """A mixing matrix (n, n), rows of sum 1 at most: an exponential tail of `reach` taxels along an axis."""
     k = np.exp(-np.abs(np.subtract.outer(np.arange(n), np.arange(n))) / reach)
     return np.asarray(k / k[n // 2].sum())

@@ -23,8 +23,25 @@ def _grid(rng: np.random.Generator) -> tuple[int, int]:
     return (long, small) if rng.random() < 0.6 else (small, long)
 
 
+def _lags(rng: np.random.Generator, hard: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Amplitudes and time constants: viscoelastic branches, firmware that smooths, a baseline that creeps."""
+    branches = int(rng.integers(0, 4))
+    amplitudes = [float(a) for a in rng.uniform(-0.12, 0.3, branches) * (0.3 + 0.7 * hard)]
+    taus = [_log(rng, 0.01, 4.0) for _ in amplitudes]
+    if rng.random() < 0.2 * hard:
+        # Firmware that averages over time.
+        amplitudes = [0.25 * a for a in amplitudes]
+        amplitudes.append(float(rng.uniform(0.3, 0.75)))
+        taus.append(_log(rng, 0.02, 0.12))
+    if rng.random() < 0.2 * hard:
+        # Firmware whose baseline follows under the finger: a held touch fades and leaves a hollow.
+        amplitudes.append(-float(rng.uniform(0.05, 0.4)))
+        taus.append(_log(rng, 0.8, 5.0))
+    return tuple(amplitudes), tuple(taus)
+
+
 def any_sensor(rng: np.random.Generator, hardness: float) -> Sensor:
-    """A random sensor: a fifth are like touchscreens (sharp blobs, no offset, 8 bits), the rest textile matrices."""
+    """A random sensor: a fifth like touchscreens (sharp blobs, no offset, 8 bits), the rest textiles."""
     hard = min(max(hardness, 0.0), 1.0)
     rows, columns = _grid(rng)
     screen = rng.random() < 0.22
@@ -39,8 +56,7 @@ def any_sensor(rng: np.random.Generator, hardness: float) -> Sensor:
     snr = _log(rng, 300.0 * (8.0 / 300.0) ** hard if hard > 0 else 299.0, 300.0)
     noise = 1.0 / snr
     lines = noise * float(rng.uniform(0.0, 0.8)) * hard
-    branches = int(rng.integers(0, 4))
-    relaxation = tuple(float(a) for a in rng.uniform(-0.12, 0.3, branches) * (0.3 + 0.7 * hard))
+    relaxation, taus = _lags(rng, hard)
     offset = 0.0 if screen else float(rng.choice([0.0, 1.0])) * _log(rng, 0.05, 3.0)
     top = 255 if screen or gain < 90.0 else int(max(gain * rng.uniform(1.0, 8.0) * (1.0 + offset), 300.0))
     clipped = screen or bool(rng.random() < 0.15)
@@ -63,6 +79,9 @@ def any_sensor(rng: np.random.Generator, hardness: float) -> Sensor:
         row_noise=lines * float(rng.random()),
         column_noise=lines * float(rng.random()),
         common_noise=lines * float(rng.random()),
+        slow_noise=noise * float(rng.uniform(0.0, 0.8)) if trouble(0.3) else 0.0,
+        signal_noise=float(rng.uniform(0.0, 0.08)) * hard,
+        hum=noise * float(rng.uniform(0.3, 1.5)) if trouble(0.25) else 0.0,
         drift=0.0 if clipped else float(rng.exponential(0.08)) * hard,
         spread=float(rng.uniform(0.05, 0.35))
         if screen
@@ -73,11 +92,12 @@ def any_sensor(rng: np.random.Generator, hardness: float) -> Sensor:
         column_crosstalk=float(rng.uniform(-0.012, 0.04)) * hard,
         ghost=float(rng.uniform(0.0, 0.12)) * hard if rng.random() < 0.25 else 0.0,
         relaxation=relaxation,
-        taus_s=tuple(_log(rng, 0.01, 4.0) for _ in relaxation),
-        hysteresis=float(rng.uniform(0.0, 0.1)) * hard if rng.random() < 0.6 else 0.0,
+        taus_s=taus,
+        hysteresis=float(rng.uniform(0.0, 0.08)) * hard if rng.random() < 0.5 else 0.0,
         saturation=top,
         dtype="uint8" if top <= 255 else "uint16" if top < 65536 and rng.random() < 0.6 else "int32",
         clipped=clipped,
+        dead_zone=float(rng.uniform(1.0, 4.0)) * noise if clipped and rng.random() < 0.4 else 0.0,
         dead=int(rng.integers(1, 4)) if trouble(0.25) else 0,
         stuck=int(rng.integers(1, 3)) if trouble(0.15) else 0,
         bursts_per_minute=float(rng.exponential(6.0)) if trouble(0.2) else 0.0,
