@@ -16,12 +16,12 @@ def _path(recording: dict[str, Any]) -> NDArray[np.float64]:
     idle = frames[times < recording["onset"] - 0.1]
     above = np.clip(frames - np.median(idle, axis=0), 0.0, None)
     strength = above.max(axis=(1, 2))
-    above[above < 0.15 * above.max()] = 0.0
+    above[above < 0.2 * above.max()] = 0.0
     total = above.sum(axis=(1, 2))
     inside = (
         (times > recording["onset"] - 0.05)
         & (times < recording["release"] + 0.05)
-        & (strength > 0.25 * strength.max())
+        & (strength > 0.4 * strength.max())
     )
     rows, columns = np.indices(frames.shape[1:])
     above, total = above[inside], total[inside]
