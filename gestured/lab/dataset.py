@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,10 @@ from gestured.core.frames import Frame, Segment
 from gestured.core.recognizer import Cut, FrontEnd
 from gestured.core.window import Window
 from gestured.lab.progress import progress
-from gestured.recording import Recordings
-from gestured.simulator import Take, cohort_take, wide
+from gestured.simulator import Take, cohort_plan, cohort_take, wide
+
+if TYPE_CHECKING:
+    from gestured.recording import Recordings
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 NONE = "none"
@@ -155,8 +158,11 @@ def _wide(seed: int, index: int) -> list[Sample]:
     return from_take(wide(seed, index))
 
 
+TRIALS = tuple(cohort_plan())  # 34 participants x 10 gestures x 3 speeds x 3 inclinations = 3060
+
+
 def _cohort(seed: int, index: int) -> list[Sample]:
-    return from_take(cohort_take(seed, index))
+    return from_take(cohort_take(TRIALS[index], seed))
 
 
 def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
@@ -181,12 +187,12 @@ def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) ->
     return samples
 
 
-def recorded(recordings: Recordings, seed: int = 0) -> Samples:
+def recorded(recordings: "Recordings", seed: int = 0) -> Samples:
     """Cut gestures or whole sessions as samples; what the truth does not name is left out."""
     return collect(s for i in range(len(recordings)) for s in _recorded(recordings, i, seed))
 
 
-def _recorded(recordings: Recordings, i: int, seed: int) -> Iterator[Sample]:
+def _recorded(recordings: "Recordings", i: int, seed: int) -> Iterator[Sample]:
     frames, times = recordings.frames_of(i), recordings.times_of(i)
     person = int(recordings.subjects[i])
     if recordings.labels[i] == "session":

@@ -1,0 +1,238 @@
+"""Training, to be read aloud: the three networks together on simulated people, then a little on real fingers.
+
+Stage one learns everything that is simulated, once. Stage two goes on from there with real recordings among the
+simulated ones; it is short, so that folds over real subjects can each have their own. Every batch is varied after
+the split (`augment`). Nothing is padded with meaning: answers are read at the last active frame.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from gestured.lab.augment import symmetry_table, turned, varied
+from gestured.lab.dataset import NONE, WINDOW, Samples
+from gestured.lab.nets import CnnLstm, Lstm
+from gestured.lab.progress import progress
+from gestured.lab.trajectory import TrajectoryNet, trajectory_features
+from gestured.simulator import GESTURES, NON_GESTURES
+
+REAL_KINDS = {"tap_hold": "long_press", "drag_diagonal": "diagonal_swipe"}  # what real non-gestures are
+CLASSES: list[str] = [*GESTURES, *NON_GESTURES]  # non-gestures are classes of their own: they reject better so
+
+
+@dataclass(frozen=True, slots=True)
+class FitConfig:
+    """Every number that shapes a training run, with its reason."""
+
+    epochs: int = 22  # the validation error is flat after some 18
+    batch: int = 128
+    rate: float = 3e-3  # the largest that never diverged; falls to 0 with a cosine
+    decay: float = 1e-2
+    smoothing: float = 0.03  # of labels: keeps the scores calibrated
+    clip: float = 1.0
+    longest: int = 80  # frames: five seconds and their context
+    real_epochs: int = 3
+    real_rate: float = 5e-4
+    real_share: float = 0.3  # of stage two's samples that are real
+    real_samples: int = 12000  # simulated samples an epoch of stage two
+    seed: int = 1
+
+
+NETS = ("cnn_lstm", "lstm", "trajectory")
+
+
+def build() -> nn.ModuleDict:
+    """The three untrained networks."""
+    size = (WINDOW.rows, WINDOW.columns, len(CLASSES))
+    return nn.ModuleDict({"cnn_lstm": CnnLstm(*size), "lstm": Lstm(*size), "trajectory": TrajectoryNet(*size)})
+
+
+def targets(samples: Samples) -> NDArray[np.int64]:
+    """(G,) class of each sample; -1 where its kind is none of `CLASSES`."""
+    place = {name: i for i, name in enumerate(CLASSES)}
+    names = np.where(samples.labels == NONE, samples.kinds, samples.labels)
+    return np.array([place.get(REAL_KINDS.get(str(n), str(n)), -1) for n in names], dtype=np.int64)
+
+
+def padded(samples: Samples, index: NDArray[np.int64], longest: int) -> Tensor:
+    """(B, T, R, C) windows with zeros after each one's end."""
+    time = min(int(samples.lengths()[index].max()), longest)
+    out = np.zeros((len(index), time, WINDOW.rows, WINDOW.columns), np.float32)
+    for row, i in enumerate(index):
+        window = samples.frames[samples.offsets[i] : samples.offsets[i + 1]][:time]
+        out[row, : len(window)] = window
+    return torch.from_numpy(out)
+
+
+def one_epoch(
+    nets: nn.ModuleDict,
+    optimiser: torch.optim.Optimizer,
+    schedule: torch.optim.lr_scheduler.LRScheduler,
+    sets: Sequence[tuple[Samples, NDArray[np.int64], NDArray[np.int64]]],
+    config: FitConfig,
+    epoch: int,
+    title: str,
+) -> float:
+    """Go once over `sets` of (samples, labels, chosen); returns the mean loss."""
+    rng = np.random.default_rng([config.seed, epoch])
+    generator = torch.Generator().manual_seed(config.seed * 1000 + epoch)
+    table = symmetry_table(CLASSES)
+    criterion = nn.CrossEntropyLoss(label_smoothing=config.smoothing)
+    nets.train()
+    streams = [list(_plan(s, y, config, rng, chosen)) for s, y, chosen in sets]
+    plan = [item for stream in streams for item in stream]
+    total = 0.0
+    for k in progress(rng.permutation(len(plan)), len(plan), title):
+        samples, labels, index = plan[k]
+        symmetry = int(rng.integers(8))
+        x = varied(turned(padded(samples, index, config.longest), symmetry), generator)
+        y = table[symmetry][torch.from_numpy(labels[index])]
+        loss = torch.stack([criterion(net(x), y) for net in nets.values()]).sum()
+        optimiser.zero_grad()
+        loss.backward()
+        nn.utils.clip_grad_norm_(nets.parameters(), config.clip)
+        optimiser.step()
+        schedule.step()
+        total += float(loss.detach())
+    return total / len(plan)
+
+
+def _plan(
+    samples: Samples, labels: NDArray[np.int64], config: FitConfig, rng: np.random.Generator, chosen: NDArray[np.int64]
+) -> Iterator[tuple[Samples, NDArray[np.int64], NDArray[np.int64]]]:
+    """Groups of samples of similar length, so that little is padded."""
+    lengths, order = samples.lengths(), rng.permutation(chosen)
+    for start in range(0, len(order), 20 * config.batch):
+        pool = order[start : start + 20 * config.batch]
+        pool = pool[np.argsort(lengths[pool] + rng.random(len(pool)) * 3)]
+        for i in range(0, len(pool), config.batch):
+            yield samples, labels, pool[i : i + config.batch]
+
+
+def pretrain(samples: Samples, config: FitConfig, checkpoint: Path) -> nn.ModuleDict:
+    """Stage one, on simulated samples; goes on where an interrupted run stopped."""
+    torch.manual_seed(config.seed)
+    nets = build()
+    labels = targets(samples)
+    chosen = np.flatnonzero(labels >= 0)
+    net = nets["trajectory"]
+    assert isinstance(net, TrajectoryNet)
+    with torch.no_grad():
+        some = np.random.default_rng(config.seed).choice(chosen, min(4000, len(chosen)), replace=False)
+        net.perceptron.fit_scale(
+            torch.cat([trajectory_features(padded(samples, some[i : i + 256], config.longest)) for i in range(0, len(some), 256)])
+        )
+    steps = config.epochs * len(list(_plan(samples, labels, config, np.random.default_rng(0), chosen)))
+    optimiser, schedule = _optimiser(nets, config.rate, config.decay, steps)
+    done = _restore(checkpoint, nets, optimiser, schedule)
+    for epoch in range(done, config.epochs):
+        one_epoch(nets, optimiser, schedule, [(samples, labels, chosen)], config, epoch, f"epoch {epoch + 1}/{config.epochs}")
+        _store(checkpoint, nets, optimiser, epoch + 1)
+    return nets
+
+
+def finetune(start: nn.ModuleDict, simulated: Samples, real: Samples, config: FitConfig, title: str) -> nn.ModuleDict:
+    """Stage two: go on from `start` with real samples among the simulated ones."""
+    torch.manual_seed(config.seed)
+    nets = build()
+    nets.load_state_dict(start.state_dict())
+    rng = np.random.default_rng([config.seed, 77])
+    labels, real_labels = targets(simulated), targets(real)
+    usable, real_usable = np.flatnonzero(labels >= 0), np.flatnonzero(real_labels >= 0)
+    count = min(config.real_samples, len(usable))
+    real_count = int(count * config.real_share / (1 - config.real_share))
+    steps = config.real_epochs * (-(-count // config.batch) + -(-real_count // config.batch) + 2)
+    optimiser, schedule = _optimiser(nets, config.real_rate, config.decay, steps)
+    for epoch in range(config.real_epochs):
+        sets = [
+            (simulated, labels, rng.choice(usable, count, replace=False)),
+            (real, real_labels, balanced(real_labels, real_usable, real_count, rng)),
+        ]
+        one_epoch(nets, optimiser, schedule, sets, config, 1000 + epoch, f"{title}, real {epoch + 1}/{config.real_epochs}")
+    return nets
+
+
+def balanced(
+    labels: NDArray[np.int64], usable: NDArray[np.int64], count: int, rng: np.random.Generator
+) -> NDArray[np.int64]:
+    """`count` indices drawn so that rare classes come more often (square root of their number)."""
+    weight = 1 / np.sqrt(np.bincount(labels[usable], minlength=len(CLASSES)))[labels[usable]]
+    return rng.choice(usable, count, replace=True, p=weight / weight.sum())
+
+
+def _optimiser(
+    nets: nn.ModuleDict, rate: float, decay: float, steps: int
+) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler]:
+    optimiser = torch.optim.AdamW(nets.parameters(), lr=rate, weight_decay=decay)
+    return optimiser, torch.optim.lr_scheduler.OneCycleLR(
+        optimiser, rate, total_steps=max(steps, 2), pct_start=0.1, div_factor=10, cycle_momentum=False
+    )
+
+
+def logits(nets: nn.ModuleDict, samples: Samples, config: FitConfig) -> dict[str, Tensor]:
+    """(G, K) logits of each network for all samples, in their order."""
+    nets.eval()
+    order = np.argsort(samples.lengths(), kind="stable")
+    found: dict[str, list[Tensor]] = {name: [] for name in nets}
+    with torch.no_grad():
+        for i in range(0, len(order), 256):
+            x = padded(samples, order[i : i + 256], config.longest)
+            for name, net in nets.items():
+                found[name].append(net(x))
+    back = torch.from_numpy(np.argsort(order, kind="stable"))
+    return {name: torch.cat(parts)[back] for name, parts in found.items()}
+
+
+def save_nets(path: Path, nets: nn.ModuleDict) -> None:
+    """Weights as plain arrays, without pickles."""
+    _write(path, {name: value.numpy() for name, value in nets.state_dict().items()})
+
+
+def load_nets(path: Path) -> nn.ModuleDict:
+    """What `save_nets` wrote."""
+    nets = build()
+    with np.load(path, allow_pickle=False) as stored:
+        nets.load_state_dict({name: torch.from_numpy(stored[name]) for name in stored.files})
+    return nets
+
+
+def _store(path: Path, nets: nn.ModuleDict, optimiser: torch.optim.Optimizer, epochs: int) -> None:
+    arrays = {f"net.{name}": value.numpy() for name, value in nets.state_dict().items()}
+    for i, state in optimiser.state_dict()["state"].items():
+        arrays |= {f"optimiser.{i}.{name}": value.numpy() for name, value in state.items()}
+    _write(path, arrays | {"epochs": np.array(epochs)})
+
+
+def _restore(
+    path: Path, nets: nn.ModuleDict, optimiser: torch.optim.Optimizer, schedule: torch.optim.lr_scheduler.LRScheduler
+) -> int:
+    """Epochs already done; 0 without a checkpoint."""
+    if not path.exists():
+        return 0
+    with np.load(path, allow_pickle=False) as stored:
+        nets.load_state_dict({n[4:]: torch.from_numpy(stored[n]) for n in stored.files if n.startswith("net.")})
+        state: dict[int, dict[str, Tensor]] = {}
+        for name in stored.files:
+            if name.startswith("optimiser."):
+                _, i, key = name.split(".")
+                state.setdefault(int(i), {})[key] = torch.from_numpy(stored[name])
+        epochs = int(stored["epochs"])
+    whole = optimiser.state_dict()
+    optimiser.load_state_dict({**whole, "state": state})
+    steps = int(next(iter(state.values()))["step"]) if state else 0
+    for _ in range(steps):
+        schedule.step()
+    return epochs
+
+
+def _write(path: Path, arrays: dict[str, NDArray[np.generic]]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(path.name + ".part")
+    with part.open("wb") as file:
+        np.savez(file, **arrays)
+    part.replace(path)
