@@ -41,7 +41,7 @@ def lognormal(tau: Array, sigma: float, mirrored: bool = False) -> Array:
     """
     u = np.clip(tau, 0.0, 1.0)
     if mirrored:
-        return 1.0 - lognormal(1.0 - u, sigma)
+        return np.asarray(1.0 - lognormal(1.0 - u, sigma))
     z = np.log(np.maximum(u, 1e-9)) / sigma + 2.576
     return np.where(u <= 0.0, 0.0, np.minimum(normal_cdf(z) / 0.995, 1.0))
 

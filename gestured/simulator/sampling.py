@@ -57,8 +57,8 @@ def sample(
     n, rows, columns, pitch = times.size, sensor.rows, sensor.columns, sensor.pitch_mm
     field = np.zeros((n, rows, columns))
     fingers = Fingers(n)
-    taxel_x = (np.arange(columns) + 0.5) * pitch
-    taxel_y = (rows - 0.5 - np.arange(rows)) * pitch
+    taxel_x: Array = (np.arange(columns, dtype=np.float64) + 0.5) * pitch
+    taxel_y: Array = (rows - 0.5 - np.arange(rows, dtype=np.float64)) * pitch
     dt = 1.0 / sensor.rate_hz
     turns = np.arange(rows) / rows * sensor.scan * dt
     instants = (np.arange(INSTANTS) + 0.5) / INSTANTS * max(1.0 - sensor.scan, 0.1) * dt

@@ -143,7 +143,7 @@ class Sensor:
         """What this sensor sends in `duration_s` seconds while these performances start at these times."""
         todo = list(performances)
         dt = 1.0 / self.rate_hz
-        times = (np.arange(max(1, int(duration_s * self.rate_hz))) + 1) * dt
+        times: Array = np.arange(1, max(1, int(duration_s * self.rate_hz)) + 1, dtype=np.float64) * dt
         field, fingers = sample(self, todo, times, rng)
         field = leak(field, self.row_crosstalk, self.column_crosstalk, self.ghost)
         field = compress(

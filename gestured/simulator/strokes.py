@@ -90,8 +90,8 @@ class Scene:
         )
 
     def tap_s(self) -> float:
-        """Duration of one tap in seconds, 0.04 to 0.42 (real ones on a touchscreen: median 0.2)."""
-        return float(np.clip(self.person.tap_s * self.rng.lognormal(0.0, 0.22) / self.tempo, 0.04, 0.42))
+        """Duration of one tap in seconds, 0.04 to 0.45 (real ones on a touchscreen: median 0.2)."""
+        return float(np.clip(self.person.tap_s * self.rng.lognormal(0.0, 0.22) / self.tempo, 0.04, 0.45))
 
     def gap_s(self) -> float:
         """Pause between two taps in seconds, 0.08 to 0.4."""

@@ -61,7 +61,7 @@ def leak(field: Array, row: float, column: float, ghost: float) -> Array:
     out = field + row * rows + column * columns
     if ghost > 0.0:
         out += ghost * rows * columns / np.maximum(field.sum(axis=(1, 2), keepdims=True), 1.0)
-    return out
+    return np.asarray(out)
 
 
 def compress(field: Array, exponent: float, knee: float) -> Array:

@@ -114,8 +114,8 @@ def wipe(scene: Scene) -> list[Contact]:
     once = rng.random() < 0.5
     way = progress(u, rng) if once else 0.5 - 0.5 * np.cos(math.pi * rng.uniform(2.0, 5.0) * u)
     along, heading = (way - 0.5) * rng.uniform(0.6, 1.3) * scene.small, rng.uniform(-math.pi, math.pi)
-    x, y = scene.spot(0.2 * scene.width, 0.2 * scene.height)
-    x, y = x + along * math.cos(heading), y + along * math.sin(heading)
+    cx, cy = scene.spot(0.2 * scene.width, 0.2 * scene.height)
+    x, y = cx + along * math.cos(heading), cy + along * math.sin(heading)
     made = []
     for _ in range(int(rng.integers(1, 4))):
         dx, dy = rng.normal(0.0, 10.0, 2)
