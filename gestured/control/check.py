@@ -15,7 +15,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
     parser = commands.add_parser(
         "check",
         help="verify a model file",
-        description="Open a model as the daemon would: its metadata, shapes and self-test. "
+        description="Open a model as the daemon would: its metadata, shapes and self-test.\n"
         "Exit status 3 if it cannot be used.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl check cnn_lstm\n  gesturectl check --json my_model.onnx",

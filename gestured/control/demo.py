@@ -32,10 +32,11 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
     parser = commands.add_parser(
         "demo",
         help="see it recognise simulated gestures",
-        description="Start a daemon with a shipped model and a simulated sensor that sends to it over UDP, "
-        "and show what was performed beside what was recognised.",
+        description="Start a daemon with a shipped model and a simulated sensor that sends to it\n"
+        "over UDP, and show what was performed beside what was recognised.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="examples:\n  gesturectl demo --seconds 20 --speed fast\n  gesturectl demo --json --kinds double_tap",
+        epilog="examples:\n  gesturectl demo --seconds 20 --speed fast\n"
+        "  gesturectl demo --json --kinds double_tap",
     )
     parser.add_argument(
         "--model", default="cnn_lstm", help="a path, or a shipped one's name (default: cnn_lstm)"
@@ -60,7 +61,8 @@ def run(args: argparse.Namespace) -> int:
         host, port = engine.listen
         show.say(
             f"The daemon listens on {host}:{port} with the model {engine.ready['model']}.\n"
-            f"A simulated sensor of {play.rows} x {play.columns} taxels sends OSC to it at {play.rate_hz:g} Hz.\n"
+            f"A simulated sensor of {play.rows} x {play.columns} taxels sends OSC to it "
+            f"at {play.rate_hz:g} Hz.\n"
             "For two seconds nobody touches it. Ctrl-C ends.\n"
         )
         try:

@@ -14,8 +14,9 @@ from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
 from gestured.simulator import Event
 
-DESCRIPTION = """Send the pressure frames of a simulated person on a simulated textile sensor, as OSC over UDP,
-in real time. Says what is performed as it ends, to be compared with what the daemon recognises."""
+DESCRIPTION = """Send the pressure frames of a simulated person on a simulated textile sensor,
+as OSC over UDP, in real time. Says what is performed as it ends, to be compared
+with what the daemon recognises."""
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

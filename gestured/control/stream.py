@@ -37,10 +37,10 @@ class Stream:
                 f"no daemon on {path}: {reason}; start gestured, or name its --socket"
             ) from None
         self.hello = _parsed(first, path)
-        self.hello_line = first.decode().rstrip("\n")
         if self.hello.get("type") != "hello" or self.hello.get("protocol") != PROTOCOL:
             self.close()
             raise Refused(f"{path} does not speak protocol {PROTOCOL} of gestured: {first[:80]!r}")
+        self.hello_line = first.decode().rstrip("\n")
         if subscribe is not None:
             self.socket.sendall(json.dumps({"subscribe": subscribe}).encode() + b"\n")
 
@@ -48,7 +48,8 @@ class Stream:
         """Each line as it came, and parsed; ends when the daemon closes the connection."""
         try:
             for line in self._lines:
-                yield line.decode().rstrip("\n"), _parsed(line, self.path)
+                message = _parsed(line, self.path)
+                yield line.decode().rstrip("\n"), message
         except ConnectionError:
             return
 

@@ -1,0 +1,46 @@
+"""gesturectl check."""
+
+import json
+
+import pytest
+
+from gestured.models import shipped
+
+
+@pytest.mark.parametrize("content", [None, b"", b"not a model", b"\x08\x08" * 1000])
+def test_what_cannot_be_used_is_one_sentence_and_status_3(run, tmp_path, content):
+    path = tmp_path / "mine.onnx"
+    if content is not None:
+        path.write_bytes(content)
+    status, out, err = run("check", path)
+    assert (status, out, err.count("\n")) == (3, "", 1)
+    assert str(path) in err
+
+
+def test_a_name_that_does_not_ship(run):
+    status, _, err = run("check", "cnn_lstn")
+    assert status == 3
+    assert "cnn_lstn" in err and "cnn_lstm" in err
+
+
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_shipped_models_can_be_used(run, name):
+    if not shipped()[name].exists():
+        pytest.skip(f"{shipped()[name]} is not there")
+    status, out, _ = run("check", "--json", name)
+    report = json.loads(out)
+    assert status == 0
+    assert (report["name"], report["shipped"], len(report["gestures"])) == (name, True, 10)
+    status, out, _ = run("check", name)
+    assert status == 0 and out.endswith("usable\n")
+
+
+def test_an_altered_shipped_file_is_refused(run, tmp_path):
+    path = shipped()["cnn_lstm"]
+    if not path.exists():
+        pytest.skip(f"{path} is not there")
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2 :] = b""
+    (tmp_path / "cut.onnx").write_bytes(data)
+    status, _, err = run("check", tmp_path / "cut.onnx")
+    assert status == 3 and "cut.onnx" in err

@@ -1,0 +1,175 @@
+"""gesturectl listen, against a scripted daemon."""
+
+import json
+import signal
+from pathlib import Path
+
+import pytest
+
+GESTURE = {
+    "type": "gesture",
+    "sensor": "armrest",
+    "id": 4,
+    "gesture": "swipe_left",
+    "confidence": 0.98,
+    "sequence": 4,
+    "onset": 1000.0,
+    "offset": 1000.5,
+    "decided": 1000.625,
+    "frames": 8,
+    "lost": 0,
+    "model": "cnn_lstm",
+    "degraded": False,
+    "scores": {"swipe_left": 0.98},
+}
+UNKNOWN = {key: value for key, value in GESTURE.items() if key not in ("gesture", "sequence")} | {
+    "type": "unknown"
+}
+
+
+def test_prints_a_gesture_for_a_person(start, fake):
+    process = start("listen", "--socket", fake.path, "--count", 1)
+    fake.accept()
+    fake.say(GESTURE)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 0
+    (line,) = out.decode().splitlines()
+    assert all(word in line for word in ("armrest", "swipe_left", "0.98", "#4", "125 ms"))
+    assert "cnn_lstm" in err.decode()
+
+
+@pytest.mark.parametrize(
+    ("event", "words"),
+    [
+        (GESTURE | {"degraded": True, "model": "lstm"}, "by lstm, degraded"),
+        (
+            {key: value for key, value in GESTURE.items() if key not in ("gesture", "sequence")}
+            | {"type": "unknown"},
+            "unknown",
+        ),
+        ({"type": "onset", "sensor": "armrest", "id": 4, "onset": 1000.0}, "onset"),
+        ({"type": "cancelled", "sensor": "armrest", "id": 4, "reason": "held"}, "cancelled: held"),
+        ({"type": "release", "sensor": "armrest", "id": 4, "offset": 1000.0}, "release"),
+        (
+            {"type": "status", "state": "ok", "sensors": {"armrest": "ok"}, "model": "m", "time": 1.0},
+            "status: ok (armrest ok)",
+        ),
+        ({"type": "status", "state": "no_data", "sensors": {}, "model": "m", "time": 1.0}, "no sensor"),
+        ({"type": "lost", "count": 7}, "7 events lost"),
+        ({"type": "something_new", "sensor": "armrest"}, "something_new"),
+    ],
+)
+def test_every_type_has_its_line(start, fake, event, words):
+    process = start("listen", "--socket", fake.path)
+    fake.accept()
+    fake.say(event)
+    assert words in process.stdout.readline().decode()
+
+
+def test_json_repeats_the_daemons_lines_to_the_letter(start, fake):
+    line = b'{"type":"gesture",  "id":4, "new_key":[1.50]}\n'
+    process = start("listen", "--socket", fake.path, "--json", "--count", 1)
+    fake.accept()
+    fake.say(line)
+    out, _ = process.communicate(timeout=30)
+    hello, event = out.splitlines(keepends=True)
+    assert json.loads(hello)["type"] == "hello"
+    assert event == line
+
+
+def test_filters_become_one_subscription(start, fake):
+    filters = ("--types", "gesture,unknown", "--sensor", "a", "--sensor", "b", "--gesture", "one_tap")
+    start("listen", "--socket", fake.path, *filters)
+    fake.accept()
+    asked = {"types": ["gesture", "unknown"], "sensors": ["a", "b"], "gestures": ["one_tap"]}
+    assert fake.request() == {"subscribe": asked}
+
+
+def test_a_daemon_that_is_not_there_is_one_sentence(run, tmp_path):
+    status, out, err = run("listen", "--socket", tmp_path / "none.sock")
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    assert str(tmp_path / "none.sock") in err
+
+
+def test_the_default_socket_is_the_sessions(run, tmp_path):
+    _, _, err = run("listen", env={"XDG_RUNTIME_DIR": str(tmp_path), "RUNTIME_DIRECTORY": ""})
+    assert str(tmp_path / "gestured" / "events.sock") in err
+
+
+def test_a_daemon_that_ends_is_said(start, fake):
+    process = start("listen", "--socket", fake.path)
+    fake.accept()
+    fake.close()
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert "closed the connection" in err.decode()
+
+
+def test_reconnect_waits_for_the_next_daemon(start, fake):
+    process = start("listen", "--socket", fake.path, "--reconnect", "--count", 2)
+    for _ in range(2):
+        fake.accept()
+        fake.say(GESTURE)
+        assert b"swipe_left" in process.stdout.readline()
+        fake.close()
+    assert process.wait(30) == 0
+
+
+@pytest.mark.parametrize("first", [{"type": "hello", "protocol": 2}, b"SSH-2.0\n", b"\xff\n", b"[]\n"])
+def test_something_else_on_the_socket_is_refused(start, fake, first):
+    process = start("listen", "--socket", fake.path)
+    fake.accept(first)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert err.count(b"\n") == 1 and str(fake.path) in err.decode()
+
+
+def test_what_the_daemon_refuses_is_said(start, fake):
+    process = start("listen", "--socket", fake.path, "--gesture", "wave")
+    fake.accept()
+    fake.say({"type": "error", "reason": "gestures: 'wave' is not known"})
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert "'wave' is not known" in err.decode()
+
+
+def test_ctrl_c_ends_without_a_word(start, fake):
+    process = start("listen", "--socket", fake.path)
+    fake.accept()
+    fake.say(GESTURE)
+    process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert "Traceback" not in err.decode()
+
+
+def test_a_reader_that_leaves_ends_it_without_a_word(start, fake):
+    process = start("listen", "--socket", fake.path)
+    fake.accept()
+    fake.say(GESTURE)
+    process.stdout.readline()
+    process.stdout.close()
+    fake.say(GESTURE)
+    assert process.wait(30) == 0
+    assert "Traceback" not in process.stderr.read().decode()
+    process.stderr.close()
+
+
+@pytest.mark.parametrize("wrong", [("--types", "gestures"), ("--types", ""), ("--count", "one")])
+def test_wrong_usage(run, wrong, tmp_path: Path):
+    status, _, err = run("listen", *wrong)
+    assert status == 2
+    assert wrong[0] in err
+
+
+def test_the_default_socket_is_where_the_daemon_keeps_it():
+    from gestured.control.address import default_socket
+    from gestured.daemon.settings import default_socket as daemons
+
+    for given in (
+        {},
+        {"XDG_RUNTIME_DIR": "/run/user/1"},
+        {"RUNTIME_DIRECTORY": "/run/a:/run/b", "XDG_RUNTIME_DIR": "/c"},
+    ):
+        assert default_socket(given) == daemons(given)

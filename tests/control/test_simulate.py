@@ -1,0 +1,131 @@
+"""gesturectl simulate, received on a real UDP socket and read with python-osc."""
+
+import json
+import signal
+import socket
+import time
+
+import numpy as np
+import pytest
+from pythonosc.osc_bundle import OscBundle
+from pythonosc.osc_message import OscMessage
+
+FRAMES = 60  # 4 seconds at 15 Hz
+
+
+def received(udp: socket.socket, count: int) -> list[bytes]:
+    return [udp.recv(65536) for _ in range(count)]
+
+
+def to(udp: socket.socket) -> str:
+    return f"127.0.0.1:{udp.getsockname()[1]}"
+
+
+def test_a_bundle_of_pressure_and_trajectory(start, udp):
+    begun = time.time()
+    process = start(
+        "simulate", "--to", to(udp), "--sensor", "seat-2", "--seconds", 4, "--kinds", "one_tap", "--json"
+    )
+    bundles = [OscBundle(data) for data in received(udp, FRAMES)]
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 0
+    pressures = [bundle.content(0) for bundle in bundles]
+    trajectories = [bundle.content(1) for bundle in bundles]
+    assert {message.address for message in pressures} == {"/seat-2/pressure"}
+    assert {message.address for message in trajectories} == {"/seat-2/trajectory"}
+    counters = [message.params[0] for message in pressures]
+    assert counters == sorted(set(counters))
+    frames = np.array([message.params[1:] for message in pressures])
+    assert frames.shape == (FRAMES, 81)
+    (performed,) = map(json.loads, out.splitlines())
+    assert (performed["type"], performed["sensor"], performed["gesture"]) == (
+        "performed",
+        "seat-2",
+        "one_tap",
+    )
+    # The strongest frame lies within what was performed, by the bundles' own time tags; the idle ones before it.
+    moments = np.array([bundle.timestamp for bundle in bundles])
+    strongest = moments[np.ptp(frames - frames[0], axis=1).argmax()]
+    assert performed["onset"] - 0.2 < strongest < performed["offset"] + 0.2
+    assert begun < moments[0] and moments[-1] < time.time() + 1
+    assert any(message.params for message in trajectories)
+    assert all(len(message.params) % 3 == 0 for message in trajectories)
+
+
+@pytest.mark.parametrize(
+    ("flags", "dtype"),
+    [
+        (("--ints",), None),
+        (("--blob",), ">u2"),
+        (("--blob", "uint8"), ">u1"),
+        (("--blob", "float32"), ">f4"),
+        ((), None),
+    ],
+)
+def test_plain_forms_carry_one_matrix(start, udp, flags, dtype):
+    grid = ("--grid", "7x5", "--rate", 100, "--seconds", 1)
+    process = start("simulate", "--to", to(udp), *grid, *flags, "--plain")
+    messages = [OscMessage(data) for data in received(udp, 50)]
+    assert process.wait(30) == 0
+    for message in messages:
+        assert message.address == "/simulated/pressure"
+        values = np.frombuffer(message.params[0], dtype) if dtype else np.array(message.params)
+        assert values.shape == (35,)
+        assert np.isfinite(values).all() and (values >= 0).all() and values.max() > 0
+    assert {type(value) for value in messages[0].params} == {bytes if dtype else int if flags else float}
+
+
+def test_says_in_words_what_is_performed_and_ctrl_c_ends_it(start, udp):
+    process = start("simulate", "--to", to(udp), "--kinds", "palm,double_tap", "--speed", "fast")
+    assert process.stdout.readline().startswith(b"performed no gesture (palm), fast")
+    assert process.stdout.readline().startswith(b"performed double_tap, fast")
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert b"Traceback" not in err
+
+
+def test_the_same_seed_sends_the_same_frames(start, udp):
+    def frames(seed: int) -> list[list[object]]:
+        flags = ("--rate", 200, "--seconds", 1, "--seed", seed, "--plain")
+        assert start("simulate", "--to", to(udp), *flags).wait(30) == 0
+        return [OscMessage(data).params for data in received(udp, 180)]
+
+    first = frames(1)
+    while True:  # what the first run sent beyond that
+        udp.settimeout(0.2)
+        try:
+            udp.recv(65536)
+        except TimeoutError:
+            break
+    udp.settimeout(30)
+    assert frames(1) == first
+
+
+def test_nobody_listening_is_said(run):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        free = f"127.0.0.1:{taken.getsockname()[1]}"
+    status, _, err = run("simulate", "--to", free, "--seconds", 1)
+    assert status == 0
+    assert f"nobody listened on {free}" in err
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ("--to", "nowhere"),
+        ("--to", "127.0.0.1:0"),
+        ("--sensor", "a/b"),
+        ("--kinds", "semaphore"),
+        ("--non-gestures", "2"),
+        ("--rate", "4"),
+        ("--rate", "nan"),
+        ("--grid", "1x9"),
+        ("--blob", "int12"),
+    ],
+)
+def test_wrong_usage_names_the_flag_and_the_value(run, wrong):
+    status, out, err = run("simulate", *wrong)
+    assert (status, out) == (2, "")
+    assert wrong[0] in err and wrong[1] in err
