@@ -31,6 +31,7 @@ Argument = int | float | str | bytes | NDArray[np.generic]
 _BUNDLE = b"#bundle\0"
 _TIMETAG = Struct(">Q").unpack_from
 _NTP_EPOCH = 2_208_988_800 << 32  # 1970 counted from 1900, in 32.32 fixed point
+_NTP_ERA = 2**64 - 1  # which begins anew in 2036: so 1970 to 2106
 _SCALARS = {"i": "i", "f": "f", "d": "d", "h": "q", "t": "Q"}
 _ARRAYS = {"i": np.dtype(">i4"), "f": np.dtype(">f4")}
 _RUNS = tuple(tag * RUN for tag in _ARRAYS)
@@ -147,6 +148,7 @@ def _bundle(
             bundles += 1
             end, timetag, number = at + size, _timetag(data, at + 8, at + size), bundles
             places.clear()
+            places = []  # such a packet is read anew each time
             at += 16
             continue
         seen += 1
@@ -165,7 +167,7 @@ def _timetag(data: bytes, at: int, end: int) -> float | None:
     if end - at < 8:
         raise ProtocolError("bundle", "a bundle without its time tag")
     raw = _TIMETAG(data, at)[0]
-    return None if raw == 1 else (raw - _NTP_EPOCH) / 2**32  # 1 says "immediately"
+    return None if raw == 1 else (raw - _NTP_EPOCH & _NTP_ERA) / 2**32  # 1 says "immediately"
 
 
 def _message(
@@ -292,7 +294,7 @@ def encode_message(address: str, types: str, args: Sequence[Argument] = ()) -> b
 
 def encode_bundle(elements: Sequence[bytes], timetag: float | None = None) -> bytes:
     """A bundle of encoded messages or bundles; `timetag` in seconds since 1970, None is "immediately"."""
-    raw = 1 if timetag is None else round(timetag * 2**32) + _NTP_EPOCH
+    raw = 1 if timetag is None else round(timetag * 2**32) + _NTP_EPOCH & _NTP_ERA
     sized = (part for element in elements for part in (len(element).to_bytes(4, "big"), element))
     return b"".join((_BUNDLE, raw.to_bytes(8, "big"), *sized))
 

@@ -1,7 +1,7 @@
 """The contract's wire: packets -> frames that arrived and when they were felt; events -> OSC and JSON lines.
 
 Reasons of the ProtocolErrors here: those of `osc`, `address` (none of ours), `types`, `size` (not the grid of
-the sensor), `not_finite`, `too_many_touches`, `subscription`. A `Stamper` drops frames as `duplicate` or `late`.
+the sensor), `not_finite`, `too_many_touches`, `subscription`. `Stamper` drops a `duplicate` or `late` frame.
 """
 
 import json
@@ -253,8 +253,8 @@ class Stamper:
 
     `clock` "arrival": when they arrived. "sensor": by the increments of the time tags, as long as these go
     forward by at most `MAX_STEP_S`; else by the arrival. Frames of one call that have one time are spaced
-    backwards from it, by the counter or evenly, at the rate seen so far (`rate_hz` until it is known) and after
-    the frame before. A caller that reads all waiting packets before it stamps gets the right times after a stall.
+    backwards from it, by the counter or evenly, at the rate seen so far (`rate_hz` until it is known), and
+    after the frame before. So read all waiting packets before you stamp: a stall then does no harm.
     """
 
     MAX_STEP_S = 10.0
@@ -279,11 +279,9 @@ class Stamper:
         return t if self._last is None else self._last + max(0.0, t - self._arrived)
 
     def stamp(self, arrivals: Sequence[Arrival], t: float) -> list[Stamp]:
-        """One stamp for each of this sensor's frames that were found waiting at the arrival time `t` s."""
+        """One stamp for each of this sensor's frames that were waiting at the arrival time `t` s."""
         stamps: list[Stamp] = []
-        run: list[
-            tuple[int, int]
-        ] = []  # the frames with one time: index in `stamps`, periods since the one before
+        run: list[tuple[int, int]] = []  # frames with one time: index, periods since the frame before
         for i, arrival in enumerate(arrivals):
             pause = 0.0 if run else t - self._arrived
             steps, dropped, restarted = self._count(arrival.counter, pause)

@@ -1,0 +1,267 @@
+"""Our OSC against any bytes, against itself and against python-osc."""
+
+import math
+import struct
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from pythonosc.osc_bundle import OscBundle
+from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
+from pythonosc.osc_message import OscMessage
+from pythonosc.osc_message_builder import OscMessageBuilder
+
+from gestured.core import osc
+from gestured.core.errors import ProtocolError
+
+REASONS = {"not_osc", "address", "types", "truncated", "trailing", "bundle", "oversized"}
+
+int32 = st.integers(-(2**31), 2**31 - 1)
+float32 = st.floats(width=32)
+text = st.text(st.characters(blacklist_characters="\0", blacklist_categories=["Cs"]), max_size=20)
+addresses = st.text(
+    st.characters(min_codepoint=33, max_codepoint=126, blacklist_characters="#*,?[]{}"), max_size=30
+)
+arguments = st.one_of(
+    st.tuples(st.just("i"), int32),
+    st.tuples(st.just("f"), float32),
+    st.tuples(st.just("d"), st.floats()),
+    st.tuples(st.just("h"), st.integers(-(2**63), 2**63 - 1)),
+    st.tuples(st.just("s"), text),
+    st.tuples(st.just("b"), st.binary(min_size=1, max_size=20)),  # python-osc knows no empty ones
+)
+runs = st.tuples(st.sampled_from("if"), st.integers(1, 20)).map(lambda x: [(x[0], i) for i in range(x[1])])
+argument_lists = st.lists(st.one_of(arguments.map(lambda x: [x]), runs), max_size=6).map(lambda x: sum(x, []))
+messages = st.tuples(addresses.map("/".__add__), argument_lists)
+timetags = st.none() | st.floats(0, 2**31)
+
+
+def encoded(message: tuple[str, list]) -> bytes:
+    address, pairs = message
+    return osc.encode_message(address, "".join(t for t, _ in pairs), [value for _, value in pairs])
+
+
+def flat(args: tuple) -> Iterator:
+    for arg in args:
+        yield from arg.tolist() if isinstance(arg, np.ndarray) else [arg]
+
+
+def same(a: list, b: list) -> bool:
+    """Equal, NaN included."""
+    return len(a) == len(b) and all(x == y or (x != x and y != y) for x, y in zip(a, b, strict=True))
+
+
+def decodes_or_refuses(data: bytes) -> None:
+    first: list | str
+    try:
+        first = [m.types for m in osc.decode(data)]
+    except ProtocolError as error:
+        assert error.reason in REASONS
+        first = error.reason
+    errors: list[ProtocolError] = []
+    kept = osc.decode(data, errors)  # never raises, and says the same
+    assert first == (errors[0].reason if errors else [m.types for m in kept])
+
+
+@given(st.binary(max_size=200))
+@example(b"")
+@example(b"#bundle\0")
+@example(b"#bundle\0" + bytes(8) + struct.pack(">i", -4))  # python-osc loops for ever
+@example(b"/a\0\0,b\0\0\xff\xff\xff\xff")
+@example(b"/\xff\0\0,\0\0\0")
+@example(b"/a\0\0,s\0\0\xff\0\0\0")
+def test_any_bytes_decode_or_raise_protocol_error(data: bytes) -> None:
+    decodes_or_refuses(data)
+
+
+@given(st.lists(messages, min_size=1, max_size=4), timetags, st.data())
+def test_damaged_packets_decode_or_raise_protocol_error(
+    several: list, timetag: float | None, data: st.DataObject
+) -> None:
+    parts = [encoded(m) for m in several]
+    packet = (
+        parts[0] if len(parts) == 1 else osc.encode_bundle([parts[0], osc.encode_bundle(parts[1:])], timetag)
+    )
+    osc.decode(packet)  # a layout that is known must not make the damaged one pass
+    at = data.draw(st.integers(0, len(packet) - 1))
+    for damaged in (
+        packet[:at],
+        packet[:at] + data.draw(st.binary(min_size=1, max_size=8)) + packet[at:],
+        packet[:at] + data.draw(st.binary(min_size=1, max_size=8)) + packet[at + 4 :],
+    ):
+        decodes_or_refuses(damaged)
+
+
+@given(st.lists(st.integers(-(2**31), 2**31 - 1) | st.integers(-8, 64), max_size=12), st.binary(max_size=8))
+def test_bundles_of_any_sizes_decode_or_raise_protocol_error(sizes: list[int], rest: bytes) -> None:
+    data = b"".join(b"#bundle\0" + bytes(8) + struct.pack(">i", size) for size in sizes)
+    decodes_or_refuses(data + rest)
+
+
+@given(messages)
+def test_a_message_comes_back_as_it_was_sent(message: tuple[str, list]) -> None:
+    for _ in range(2):  # the second time its layout is known
+        (got,) = osc.decode(encoded(message))
+        assert (got.address, got.types) == (message[0], "".join(t for t, _ in message[1]))
+        assert same(list(flat(got.args)), [value for _, value in message[1]])
+        assert got.timetag is None and got.bundle == -1
+
+
+@given(st.lists(st.lists(messages, max_size=3), max_size=4), st.lists(timetags, min_size=5, max_size=5))
+def test_bundles_are_flattened_in_order_with_their_own_time_tags(inner: list, tags: list) -> None:
+    tail = ("/tail", [("i", 1)])
+    nested = [osc.encode_bundle([encoded(m) for m in part], tags[i]) for i, part in enumerate(inner)]
+    packet = osc.encode_bundle([*nested, encoded(tail)], tags[4])
+    for _ in range(2):
+        got = osc.decode(packet)
+        sent = [(m[0], tags[i], i + 1) for i, part in enumerate(inner) for m in part] + [
+            ("/tail", tags[4], 0)
+        ]
+        assert [m.address for m in got] == [address for address, _, _ in sent]
+        assert [m.bundle for m in got] == [number for _, _, number in sent]
+        for message, (_, tag, _) in zip(got, sent, strict=True):
+            assert message.timetag == (None if tag is None else pytest.approx(tag, abs=1e-6))
+
+
+@given(messages.filter(lambda m: "," not in m[0]))
+def test_python_osc_reads_what_we_encode(message: tuple[str, list]) -> None:
+    theirs = OscMessage(encoded(message))
+    assert theirs.address == message[0]
+    assert same(list(theirs.params), [value for _, value in message[1]])
+
+
+@given(st.lists(messages, min_size=1, max_size=3), st.floats(1, 2_085_978_000))
+def test_we_read_what_python_osc_builds(several: list, timetag: float) -> None:
+    bundle = OscBundleBuilder(timetag)
+    for address, pairs in several:
+        builder = OscMessageBuilder(address)
+        for tag, value in pairs:
+            builder.add_arg(value, tag)
+        bundle.add_content(builder.build())
+        (alone,) = osc.decode(builder.build().dgram)
+        assert alone.address == address and same(list(flat(alone.args)), [value for _, value in pairs])
+    built = bundle.build()
+    got = osc.decode(built.dgram)
+    assert [m.address for m in got] == [m[0] for m in several]
+    assert got[0].timetag == pytest.approx(timetag, abs=1e-6)
+
+
+def test_time_tags_agree_with_python_osc() -> None:
+    ours = osc.encode_bundle([encoded(("/a", []))], 1_763_712_000.25)
+    assert OscBundle(ours).timestamp == 1_763_712_000.25
+    assert osc.decode(ours)[0].timetag == 1_763_712_000.25
+    assert osc.decode(OscBundleBuilder(IMMEDIATELY).build().dgram) == []
+    (now,) = osc.decode(osc.encode_bundle([encoded(("/a", []))]))
+    assert now.timetag is None
+
+
+def test_a_long_run_is_a_view_and_not_eighty_one_floats() -> None:
+    packet = osc.encode_message("/s/pressure", "i" + "f" * 81, (7, np.arange(81.0)))
+    (message,) = osc.decode(packet)
+    counter, frame = message.args
+    assert counter == 7
+    assert isinstance(frame, np.ndarray) and frame.dtype == ">f4" and not frame.flags.owndata
+    assert frame.tolist() == list(range(81))
+
+
+def test_a_buffer_that_is_used_again_does_not_change_a_message() -> None:
+    buffer = bytearray(osc.encode_message("/s/pressure", "ffff", (np.arange(4.0),)))
+    (message,) = osc.decode(memoryview(buffer))  # type: ignore[arg-type]
+    buffer[:] = bytes(len(buffer))
+    assert list(flat(message.args)) == [0, 1, 2, 3]
+
+
+def test_the_same_head_with_other_sizes_is_read_anew() -> None:
+    for size in (0, 3, 4, 8, 1):
+        (message,) = osc.decode(osc.encode_message("/s", "ib", (1, bytes(size))))
+        assert message.args == (1, bytes(size))
+    long = osc.encode_message("/s/pressure", "ffff", (np.arange(4.0),))
+    osc.decode(long)
+    for packet, reason in ((long[:-4], "truncated"), (long + bytes(4), "trailing")):
+        with pytest.raises(ProtocolError) as caught:
+            osc.decode(packet)
+        assert caught.value.reason == reason
+
+
+def test_known_layouts_are_bounded_and_do_not_mix_up_sensors() -> None:
+    for n in range(3000):
+        (message,) = osc.decode(osc.encode_message(f"/s{n % 700}/pressure", "ffff", (np.full(4, n),)))
+        assert message.address == f"/s{n % 700}/pressure" and list(flat(message.args)) == [n] * 4
+    assert len(osc._layouts) <= osc._MAX_LAYOUTS
+
+
+def test_a_bad_message_does_not_lose_its_siblings() -> None:
+    good, bad = encoded(("/good", [("i", 1)])), b"/bad\0\0\0\0,Q\0\0"
+    errors: list[ProtocolError] = []
+    got = osc.decode(osc.encode_bundle([good, bad, osc.encode_bundle([bad, good]), good]), errors)
+    assert [m.address for m in got] == ["/good"] * 3
+    assert [e.reason for e in errors] == ["types", "types"]
+
+
+@pytest.mark.parametrize(
+    ("packet", "reason"),
+    [
+        (b"hello", "not_osc"),
+        (b"/a\0\0", "types"),
+        (b"/a\0\0,i\0", "truncated"),
+        (b"/a\0\0,f\0\0\0\0", "truncated"),
+        (b"/a\0\0,\0\0\0\0\0\0\0", "trailing"),
+        (b"/a\0\0,Z\0\0", "types"),
+        (b"/\xe4\0\0,\0\0\0", "address"),
+        (b"/" + b"a" * 300 + b"\0\0\0,\0\0\0", "address"),
+        (b"/a\0\0,s\0\0\xff\0\0\0", "types"),
+        (b"/a\0\0,s\0\0abcd", "truncated"),
+        (b"/a\0\0,b\0\0\0\0\0\x08abcd", "truncated"),
+        (b"#bundle\0\0\0\0\0", "bundle"),
+        (b"#bundle\0" + bytes(8) + b"\0\0\0\0", "bundle"),
+        (b"#bundle\0" + bytes(8) + b"\0\0", "bundle"),
+        (b"/a\0\0," + b"f" * 5003 + bytes(4 * 5003), "oversized"),
+        (b"/a\0\0" + bytes(70_000), "oversized"),
+    ],
+)
+def test_each_fault_has_its_reason(packet: bytes, reason: str) -> None:
+    with pytest.raises(ProtocolError) as caught:
+        osc.decode(packet)
+    assert caught.value.reason == reason
+
+
+def test_depth_and_number_are_bounded() -> None:
+    nested = encoded(("/a", []))
+    for depth in range(1, 2000):
+        nested = osc.encode_bundle([nested])
+        if depth == osc.MAX_DEPTH:
+            assert len(osc.decode(nested)) == 1
+    with pytest.raises(ProtocolError, match="deeper"):
+        osc.decode(nested)
+    many = [encoded(("/a", []))] * (osc.MAX_MESSAGES + 1)
+    assert len(osc.decode(osc.encode_bundle(many[1:]))) == osc.MAX_MESSAGES
+    with pytest.raises(ProtocolError, match="more than"):
+        osc.decode(osc.encode_bundle(many))
+    errors: list[ProtocolError] = []
+    osc.decode(osc.encode_bundle([b"/\0\0\0"] * 8000), errors)
+    assert len(errors) == osc.MAX_MESSAGES + 1
+
+
+@pytest.mark.parametrize(
+    ("types", "args"),
+    [
+        ("i", (2**31,)),
+        ("f", ("x",)),
+        ("ff", (1.0,)),
+        ("f", (1.0, 2.0)),
+        ("ffi", (np.arange(3.0),)),
+        ("Z", (1,)),
+    ],
+)
+def test_encoding_nonsense_is_a_value_error(types: str, args: tuple) -> None:
+    with pytest.raises(ValueError):
+        osc.encode_message("/a", types, args)
+    with pytest.raises(ValueError):
+        osc.encode_message("/a\0b", "", ())
+
+
+def test_infinities_survive() -> None:
+    (message,) = osc.decode(osc.encode_message("/a", "fd", (math.inf, -math.inf)))
+    assert message.args == (math.inf, -math.inf)
