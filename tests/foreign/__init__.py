@@ -65,7 +65,7 @@ def session(
 ) -> dict[str, Any]:
     """One person at one sheet for a while, pauses of 0.7 to 3 s between what is done.
 
-    Returns `frames`, `times` and `events`: a list of dictionaries with `label`, `kind`, `onset`, `release`
+    Returns `frames`, `times`, `seen` and `events`: dictionaries with `label`, `kind`, `onset`, `release`
     (s).
     """
     rng = np.random.default_rng([seed, 1000, LEVELS.index(level)])
@@ -82,5 +82,5 @@ def session(
             {"label": _label(performed.kind), "kind": performed.kind, "onset": t, "release": release}
         )
         t = release + float(rng.uniform(0.7, 3.0))
-    frames, times, _ = record(sensor, rng, performances, seconds)
-    return {"frames": frames, "times": times, "events": events}
+    frames, times, seen = record(sensor, rng, performances, seconds)
+    return {"frames": frames, "times": times, "seen": seen, "events": events}
