@@ -69,7 +69,7 @@ def progress(tau: Array, rng: np.random.Generator, moving_ends: float = 0.0) -> 
         return lognormal(v, sigma, mirrored=style > 0.85)
 
     a, b = profile(ends)
-    return (profile(u) - a) / (b - a)
+    return np.asarray((profile(u) - a) / (b - a))
 
 
 def wander(t: Array, rng: np.random.Generator, low_hz: float, high_hz: float, waves: int = 4) -> Array:

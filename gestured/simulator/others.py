@@ -132,10 +132,10 @@ def back_and_forth(scene: Scene) -> list[Contact]:
 
 
 def diagonal_swipe(scene: Scene) -> list[Contact]:
-    """A swipe 32 to 58 degrees off the axes."""
+    """A swipe 31 to 59 degrees off the axes."""
     rng = scene.rng
     heading = float(rng.choice([1, 3, 5, 7])) * math.pi / 4
-    path = stroke(scene, heading, swipe_length(scene, heading) * 0.8, limit=math.radians(11.0))
+    path = stroke(scene, heading, swipe_length(scene, heading) * 0.8, limit=math.radians(14.0))
     return fingers_on(scene, path, int(rng.choice([1, 2], p=[0.85, 0.15])), heading)
 
 

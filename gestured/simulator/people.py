@@ -1,9 +1,9 @@
 """Who performs: participants with their habits, and what a finger leaves on the pad.
 
-A contact's size grows with its force (Hertz: the radius of a sphere on a plane goes as F^(1/3); the
-participants lie between F^0.08 and F^0.35). Tremor is the physiological 8 to 12 Hz of some hundredths to tenths
-of a millimetre. Arm poses turn and bend strokes about the wrist or the elbow. The distributions are invented
-within plausible bounds.
+A contact's size grows with its force: Hertz gives F^(1/3) for the radius of a pressed sphere, the participants
+lie between F^0.08 and F^0.35. Tremor is the physiological 8 to 12 Hz of some hundredths to tenths of a
+millimetre. Arm poses turn and bend strokes about the wrist or the elbow. The distributions are invented within
+plausible bounds.
 """
 
 import math
@@ -118,7 +118,7 @@ class Participant:
             "tremor_mm": float(rng.uniform(0.02, 0.25)),
             "wobble_mm": float(rng.uniform(0.1, 1.1)),
             "tap_s": float(np.clip(0.18 * rng.lognormal(0.0, 0.4), 0.06, 0.4)),
-            "gap_s": float(np.clip(0.17 * rng.lognormal(0.0, 0.3), 0.09, 0.32)),
+            "gap_s": float(np.clip(0.19 * rng.lognormal(0.0, 0.32), 0.1, 0.36)),
             "rest_end": float(rng.beta(1.3, 1.2)),
             "rest_start": float(rng.beta(1.1, 2.0)),
             "glide": float(rng.beta(1.1, 1.2)),

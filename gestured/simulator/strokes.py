@@ -94,8 +94,8 @@ class Scene:
         return float(np.clip(self.person.tap_s * self.rng.lognormal(0.0, 0.22) / self.tempo, 0.04, 0.45))
 
     def gap_s(self) -> float:
-        """Pause between two taps in seconds, 0.08 to 0.4."""
-        return float(np.clip(self.person.gap_s * self.rng.lognormal(0.0, 0.2) / self.tempo, 0.08, 0.4))
+        """Pause between two taps in seconds, 0.08 to 0.42."""
+        return float(np.clip(self.person.gap_s * self.rng.lognormal(0.0, 0.2) / self.tempo, 0.08, 0.42))
 
     def spacing(self) -> float:
         """Distance of two fingertips: 0.16 to 0.55 of the pad's shorter edge (1.5 to 5 taxels of nine)."""
@@ -130,8 +130,10 @@ def touch_down(
     """A finger that stays where it lands for that long, rolling a little."""
     rng = scene.rng
     t = grid(duration_s)
-    # A fingertip rolls as it loads: its centre moves by a millimetre or two.
-    roll = rng.normal(0.0, 1.3, 2) * (t / duration_s - 0.5)[:, None]
+    # A fingertip rolls as it loads: its centre moves with the load: some millimetres.
+    u = t / duration_s
+    roll = np.multiply.outer(u - 0.5, np.clip(rng.normal(0.0, 1.9, 2), -4.5, 4.5))
+    roll += np.multiply.outer(np.sin(math.pi * u), rng.normal(0.0, 0.8, 2))
     edge = 0.5 * duration_s
     return scene.finger(
         t,

@@ -200,6 +200,6 @@ def electrical_burst(scene: Scene) -> list[Artefact]:
 
 
 def spike(scene: Scene) -> list[Artefact]:
-    """One taxel jumps for one frame or a few."""
+    """One taxel jumps for a frame or two."""
     rng = scene.rng
-    return [Artefact(0.0, rng.uniform(0.02, 0.2), "taxel", rng.uniform(0.4, 4.0), 0.3)]
+    return [Artefact(0.0, rng.uniform(0.01, 0.08), "taxel", rng.uniform(0.4, 4.0), 0.3)]
