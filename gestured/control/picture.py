@@ -5,7 +5,9 @@ from numpy.typing import NDArray
 
 SIZE = 9  # columns, and rows: two of them share a line of text
 SHADES = " ░▒▓█"
-DARKEST, STEPS = 232, 23  # the grey ramp of 256-colour terminals
+BLOCKS = {(False, False): " ", (True, False): "▀", (False, True): "▄", (True, True): "█"}
+SEEN = 0.15  # what is fainter is left dark
+BACKGROUND, FAINT, STEPS = 233, 238, 17  # on the grey ramp of 256-colour terminals
 
 
 def trace(frames: NDArray[np.generic]) -> NDArray[np.float32]:
@@ -28,19 +30,16 @@ def trace(frames: NDArray[np.generic]) -> NDArray[np.float32]:
 def draw(picture: NDArray[np.float32], colour: bool) -> list[str]:
     """Five lines of nine characters: half blocks in grey, or shades where there is no colour."""
     padded = np.vstack([picture, np.zeros((len(picture) % 2, picture.shape[1]), np.float32)])
-    pairs = zip(padded[0::2], padded[1::2], strict=True)
-    return [
-        _coloured(upper, lower) if colour else _shaded(np.maximum(upper, lower)) for upper, lower in pairs
-    ]
+    pairs = zip(padded[0::2].tolist(), padded[1::2].tolist(), strict=True)
+    paint = _coloured if colour else _shaded
+    return [paint(list(zip(upper, lower, strict=True))) for upper, lower in pairs]
 
 
-def _coloured(upper: NDArray[np.float32], lower: NDArray[np.float32]) -> str:
-    cells = (
-        f"\x1b[38;5;{DARKEST + round(STEPS * float(u))}m\x1b[48;5;{DARKEST + round(STEPS * float(v))}m▀"
-        for u, v in zip(upper, lower, strict=True)
-    )
-    return "".join(cells) + "\x1b[0m"
+def _coloured(cells: list[tuple[float, float]]) -> str:
+    # The form says where, the grey says when: so it is readable as plain text too.
+    drawn = (f"\x1b[38;5;{FAINT + round(STEPS * max(c))}m{BLOCKS[c[0] > SEEN, c[1] > SEEN]}" for c in cells)
+    return f"\x1b[48;5;{BACKGROUND}m" + "".join(drawn) + "\x1b[0m"
 
 
-def _shaded(row: NDArray[np.float32]) -> str:
-    return "".join(SHADES[round((len(SHADES) - 1) * float(value))] for value in row)
+def _shaded(cells: list[tuple[float, float]]) -> str:
+    return "".join(SHADES[round((len(SHADES) - 1) * max(cell))] for cell in cells)

@@ -43,7 +43,7 @@ def test_a_bundle_of_pressure_and_trajectory(start, udp):
         "seat-2",
         "one_tap",
     )
-    # The strongest frame lies within what was performed, by the bundles' own time tags; the idle ones before it.
+    # The strongest frame lies within what was performed, by the bundles' own time tags.
     moments = np.array([bundle.timestamp for bundle in bundles])
     strongest = moments[np.ptp(frames - frames[0], axis=1).argmax()]
     assert performed["onset"] - 0.2 < strongest < performed["offset"] + 0.2
