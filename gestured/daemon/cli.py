@@ -1,0 +1,86 @@
+"""`gestured`: the daemon's command line."""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from gestured import __version__
+from gestured.core.errors import GesturedError, ModelError, SettingsError
+from gestured.daemon.settings import FLAGS, REPEATED, Settings, load
+
+EXAMPLE = """\
+example:
+  gestured --model cnn_lstm.onnx --listen 127.0.0.1:9000 --publish osc://127.0.0.1:9001 \\
+           --socket /run/gestured/events.sock --metrics 127.0.0.1:9108 --config gestured.toml
+
+Each flag is a variable (GESTURED_MODEL=...) and a key of the TOML file (model = "...") too; flags win over
+variables, these over the file. The file also takes [sensors.NAME] (grid, rotate, mirror, clock), [gestures.NAME]
+(threshold, refractory_s) and [addresses] (pressure, trajectory). SIGHUP reads all of it again.
+
+exit status:
+  0 ended as asked, 2 usage or invalid configuration, 3 a model that cannot be used and no fallback,
+  4 an address or socket that cannot be bound"""
+
+METAVARS = {
+    "model": "MODEL", "fallback": "MODEL", "listen": "HOST:PORT", "publish": "osc://HOST:PORT", "socket": "PATH",
+    "metrics": "HOST:PORT", "grid": "RxC", "gestures": "A,B", "clock": "arrival|sensor", "stale_s": "SECONDS",
+    "max_sensors": "N", "allow": "CIDR", "log_level": "LEVEL",
+}  # fmt: skip
+
+
+def parser() -> argparse.ArgumentParser:
+    """The flags: one for each setting, described by the settings themselves."""
+    flags = argparse.ArgumentParser(
+        prog="gestured",
+        description="Recognises touch gestures in pressure frames that arrive by OSC, and publishes them.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    for key in FLAGS:
+        field = Settings.model_fields[key]
+        text = field.description or ""
+        if key in REPEATED:
+            text += "; may be repeated"
+        elif field.default is not None:
+            text += f" (default: {field.default})"
+        flags.add_argument(
+            "--" + key.replace("_", "-"),
+            action="append" if key in REPEATED else "store",
+            metavar=METAVARS[key],
+            help=text.replace("%", "%%"),
+            default=argparse.SUPPRESS,
+        )
+    flags.add_argument(
+        "--config", metavar="FILE", help="TOML file with the same keys", default=argparse.SUPPRESS
+    )
+    flags.add_argument("--explain", action="store_true", help="say what this configuration does, and exit")
+    flags.add_argument("--version", action="version", version=f"gestured {__version__}")
+    return flags
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `gestured`; returns the exit status."""
+    given: dict[str, Any] = vars(parser().parse_args(arguments))
+    explain = given.pop("explain")
+    try:
+        settings, sources = load(given, os.environ)
+        from gestured.daemon import log
+
+        log.configure(settings.log_level)
+        if explain:
+            from gestured.daemon.explain import explain as describe
+
+            print(describe(settings, sources))
+            return 0
+        from gestured.daemon.service import run
+
+        run(settings, lambda: load(given, os.environ)[0])
+    except GesturedError as error:
+        print(f"gestured: {error}", file=sys.stderr)
+        return 2 if isinstance(error, SettingsError) else 3 if isinstance(error, ModelError) else 4
+    except KeyboardInterrupt:  # before the daemon could take signals itself
+        return 0
+    return 0

@@ -1,0 +1,237 @@
+"""The event stream: JSON lines to any number of clients on a Unix socket.
+
+A line is encoded once and sent at once to each client that wants it. What a client's socket does not take waits
+in a bounded backlog of its own, from which the oldest lines are dropped; the loop waits for nobody. Raw sockets
+instead of transports: a transport's buffer has no bound that drops the oldest.
+"""
+
+import asyncio
+import errno
+import select
+import socket
+import time
+from collections import deque
+from collections.abc import Callable
+
+from gestured.core import wire
+from gestured.core.errors import ProtocolError
+from gestured.core.events import Event
+from gestured.daemon.log import Throttle, log
+from gestured.daemon.metrics import Metrics
+
+CLIENTS = 1024
+BACKLOG_BYTES = 256 << 10
+STALLED_S = 30.0  # a client that takes nothing for this long is cut off
+READ_BYTES = 1024  # small: a client that sends rubbish waits its turn
+
+
+class Client:
+    """One connection: a socket, what it wants, and what waits for it."""
+
+    def __init__(self, server: "EventServer", sock: socket.socket) -> None:
+        self._server, self.sock = server, sock
+        self.subscription = wire.Subscription()
+        self.blocked_since: float | None = None
+        self.half_closed = False
+        self._begun = b""  # rest of a line of which the client already has a part
+        self._waiting: deque[bytes] = deque()
+        self._size = 0
+        self._lost = 0
+        self._request = bytearray()
+
+    @property
+    def backlog(self) -> int:
+        """Bytes that wait."""
+        return len(self._begun) + self._size
+
+    def send(self, line: bytes) -> None:
+        """Send a line now, or keep it; never blocks."""
+        if self.blocked_since is not None:
+            self._keep(line)
+        elif (rest := self._write(line)) is not None:
+            self._begun = rest if len(rest) < len(line) else b""
+            if not self._begun:
+                self._keep(line)
+            self.blocked_since = time.monotonic()
+            self._server.loop.add_writer(self.sock, self.flush)
+
+    def flush(self) -> None:
+        """Send what waits, as far as it goes."""
+        while self.sock.fileno() >= 0:
+            if self._begun:
+                line, self._begun = self._begun, b""
+            elif self._lost:
+                line, self._lost = wire.lost_json(self._lost), 0
+            elif self._waiting:
+                line = self._waiting.popleft()
+                self._size -= len(line)
+            else:
+                self.blocked_since = None
+                self._server.loop.remove_writer(self.sock)
+                return
+            if (rest := self._write(line)) is not None:
+                self._begun = rest  # whole or in part: it goes first, and it is no longer dropped
+                return
+            self.blocked_since = time.monotonic()
+
+    def read(self) -> None:
+        """Take requests; an end of file only means that no more will come."""
+        try:
+            data = self.sock.recv(READ_BYTES)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError:
+            self._server.remove(self)
+            return
+        if not data:
+            self.half_closed = True
+            self._server.loop.remove_reader(self.sock)
+            self._server.check(self)
+            return
+        *lines, rest = data.split(b"\n")
+        for line in lines:
+            self._request += line
+            self._answer(bytes(self._request))
+            self._request.clear()
+        self._request += rest
+        del self._request[wire.MAX_LINE + 1 :]  # one byte too many is enough to refuse it
+
+    def _answer(self, line: bytes) -> None:
+        try:
+            if line.strip():
+                self._server.subscribe(self, wire.parse_subscription(line))
+        except ProtocolError as error:
+            self.send(wire.error_json(str(error)))
+
+    def _write(self, line: bytes) -> bytes | None:
+        """What the socket did not take, or None if it took everything (or is gone)."""
+        try:
+            sent = self.sock.send(line)
+        except (BlockingIOError, InterruptedError):
+            return line
+        except OSError:
+            self._server.remove(self)
+            return None
+        if sent == len(line):
+            return None
+        self.blocked_since = time.monotonic()
+        return line[sent:]
+
+    def _keep(self, line: bytes) -> None:
+        self._waiting.append(line)
+        self._size += len(line)
+        while self._size > BACKLOG_BYTES:
+            self._size -= len(self._waiting.popleft())
+            self._lost += 1
+            self._server.metrics.lost_lines.add()
+
+
+class EventServer:
+    """Accepts clients on a listening Unix socket, greets them with `hello()` and sends them events."""
+
+    def __init__(self, listener: socket.socket, hello: Callable[[], bytes], metrics: Metrics) -> None:
+        self.loop = asyncio.get_running_loop()
+        self.metrics = metrics
+        self._listener, self._hello, self._throttle = listener, hello, Throttle()
+        self._classes: dict[wire.Subscription, set[Client]] = {}
+        self._clients: set[Client] = set()
+        self.loop.add_reader(listener, self._accept)
+
+    @property
+    def count(self) -> int:
+        """How many clients there are."""
+        return len(self._clients)
+
+    @property
+    def backlog(self) -> int:
+        """Bytes that wait for all of them."""
+        return sum(client.backlog for client in tuple(self._clients))
+
+    def publish(self, event: Event, epoch: float) -> None:
+        """Send an event to everyone who wants it; it is encoded once, and only if somebody does."""
+        line = None
+        for subscription, clients in tuple(self._classes.items()):
+            if subscription.matches(event):
+                line = line or wire.to_json(event, epoch)
+                for client in tuple(clients):
+                    client.send(line)
+
+    def subscribe(self, client: Client, subscription: wire.Subscription) -> None:
+        """Change what a client wants."""
+        if client not in self._clients:
+            return  # it went while it was being answered
+        self._leave_class(client)
+        client.subscription = subscription
+        self._classes.setdefault(subscription, set()).add(client)
+
+    def remove(self, client: Client) -> None:
+        """Forget a client that is gone."""
+        if client in self._clients:
+            self._clients.discard(client)
+            self._leave_class(client)
+            self.loop.remove_reader(client.sock)
+            self.loop.remove_writer(client.sock)
+            client.sock.close()
+
+    def check(self, client: Client) -> None:
+        """Remove a client that went quietly, or has taken nothing for too long."""
+        if client.half_closed:
+            poll = select.poll()
+            poll.register(client.sock, 0)
+            if any(flags & (select.POLLHUP | select.POLLERR) for _, flags in poll.poll(0)):
+                self.remove(client)
+                return
+        if client.blocked_since is not None and time.monotonic() - client.blocked_since > STALLED_S:
+            self.metrics.evicted.add("stalled")
+            self._throttle.warn("client cut off", "stalled", seconds=STALLED_S)
+            self.remove(client)
+
+    def tick(self) -> None:
+        """Look after all clients; call it about once a second."""
+        for client in tuple(self._clients):
+            self.check(client)
+
+    async def close(self, drain_s: float) -> None:
+        """Take no new clients, give the others `drain_s` seconds to read what waits, and end."""
+        self.loop.remove_reader(self._listener)
+        end = time.monotonic() + drain_s
+        while any(client.backlog for client in self._clients) and time.monotonic() < end:
+            await asyncio.sleep(0.01)
+        for client in tuple(self._clients):
+            self.remove(client)
+
+    def _leave_class(self, client: Client) -> None:
+        members = self._classes.get(client.subscription)
+        if members is not None:
+            members.discard(client)
+            if not members:
+                del self._classes[client.subscription]
+
+    def _accept(self) -> None:
+        for _ in range(64):
+            try:
+                sock, _ = self._listener.accept()
+            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+                return
+            except (
+                OSError
+            ) as error:  # out of descriptors: the socket stays readable, so do not come back at once
+                log.error("cannot accept a client", reason=errno.errorcode.get(error.errno or 0, str(error)))
+                self.loop.remove_reader(self._listener)
+                self.loop.call_later(1.0, self.loop.add_reader, self._listener, self._accept)
+                return
+            sock.setblocking(False)
+            if len(self._clients) >= CLIENTS:
+                self.metrics.evicted.add("too_many")
+                self._throttle.warn("client turned away", "too many clients", limit=CLIENTS)
+                with sock:
+                    try:
+                        sock.send(wire.error_json(f"more than {CLIENTS} clients"))
+                    except OSError:
+                        pass
+                continue
+            client = Client(self, sock)
+            self._clients.add(client)
+            self.subscribe(client, client.subscription)
+            self.loop.add_reader(sock, client.read)
+            client.send(self._hello())

@@ -1,0 +1,90 @@
+"""`gestured --explain`: what a configuration loads, listens to, computes per frame and leaves out, and why."""
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from gestured import __version__
+from gestured.core.segmentation import Timing
+from gestured.daemon import clients
+from gestured.daemon.pipeline import DOUBLE_TAP
+from gestured.daemon.service import open_ladder
+from gestured.daemon.settings import Settings, default_socket
+from gestured.daemon.sockets import RECEIVE_BYTES
+
+
+def explain(settings: Settings, sources: Mapping[str, str]) -> str:
+    """The text; opens the models to do so, binds nothing. Raises ModelError or SettingsError."""
+    ladder = open_ladder(settings)
+    model: Any = ladder.model
+    window = model.metadata.window
+    used = [g for g in ladder.gestures if settings.gestures is None or g in settings.gestures]
+    path = settings.socket or default_socket(os.environ)
+    grid = settings.grid or f"{ladder.rows}x{ladder.columns}"
+    rungs = (
+        ", ".join(rung.name for rung in ladder.rungs)
+        if hasattr(ladder, "rungs")
+        else ", ".join(settings.fallback)
+    )
+    forest = model.metadata.features is not None
+    timing = Timing(stale_s=settings.stale_s)
+    waits = DOUBLE_TAP in used
+
+    loads = [
+        f"model {ladder.active}: {model.metadata.kind} {model.metadata.version}, {model.size:,} bytes, "
+        f"sha256 {model.sha256[:12]}, {window.rows}x{window.columns} at {window.rate_hz:g} Hz",
+        f"gestures {', '.join(used)}",
+        "numpy, onnxruntime (one thread), uvloop, pydantic, structlog",
+    ]
+    if settings.metrics:
+        loads.append("prometheus_client, and a thread that answers HTTP")
+    listens = [
+        f"udp {settings.listen} for {settings.addresses.pressure}, receive buffer {RECEIVE_BYTES >> 20} MiB if granted",
+        f"frames of {grid}, clock {settings.clock}, up to {settings.max_sensors} sensors, "
+        f"from {', '.join(map(str, settings.allow)) or 'any source'}",
+        *(
+            f"sensor {name}: {sensor.grid or grid}, rotated by {sensor.rotate}, "
+            f"{'mirrored' if sensor.mirror else 'not mirrored'}, clock {sensor.clock or settings.clock}"
+            for name, sensor in settings.sensors.items()
+        ),
+    ]
+    if settings.metrics:
+        listens.append(f"http {settings.metrics} for /metrics, /healthz, /readyz")
+    publishes = [
+        f"unix {path}, mode 0660, at most {clients.CLIENTS} clients with {clients.BACKLOG_BYTES >> 10} KiB waiting each",
+        *(f"osc://{destination}: gestures, and the status once a second" for destination in settings.publish),
+    ]
+    computes = [
+        "decode, check, stamp; subtract the baseline, compare with the noise; no smoothing, no inference",
+        f"after a contact: {'touch-pattern features' if forest else 'the window of its frames'}, one inference",
+        f"a contact is decided {timing.release_s:g} s after it was let go"
+        + (f", a tap {timing.tap_gap_s:g} s after it, since a second one may come" if waits else ""),
+    ]
+    leaves = [
+        "finger positions (trajectory): nothing uses them, they are passed over at their address",
+        "fallback models: opened when the one above fails",
+        "torch, scikit-learn, python-osc: never loaded by the daemon",
+    ]
+    if not settings.metrics:
+        leaves.append("prometheus_client, HTTP: no --metrics")
+    if not settings.publish:
+        leaves.append("OSC output: no --publish")
+    if not waits:
+        leaves.append("waiting for a second tap: double_tap is not in use")
+    if len(used) < len(ladder.gestures):
+        leaves.append(
+            f"gestures {', '.join(g for g in ladder.gestures if g not in used)}: their scores are dropped"
+        )
+    parts = {
+        "loads": loads,
+        "falls back on": [rungs or "nothing"],
+        "listens to": listens,
+        "publishes on": publishes,
+        "computes per frame": computes,
+        "leaves out": leaves,
+        "set by": [f"{key}: {source}" for key, source in sources.items()] or ["nothing, all defaults"],
+    }
+    lines = [f"gestured {__version__}"]
+    for title, items in parts.items():
+        lines += ["", f"{title}:", *(f"  {item}" for item in items)]
+    return "\n".join(lines)

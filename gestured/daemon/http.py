@@ -1,0 +1,86 @@
+"""/metrics, /healthz and /readyz, from a thread with an event loop of its own.
+
+So they answer while the daemon's loop hangs, and then /healthz says 503. A connection has DEADLINE_S in all
+and a bounded request; slow clients wait on their own and hold nobody up. Only loaded where `--metrics` is set.
+"""
+
+import asyncio
+import json
+import socket
+import threading
+from collections.abc import Callable
+
+DEADLINE_S = 5.0
+REQUEST_BYTES = 8192
+CONNECTIONS = 64
+
+Answer = tuple[int, str, bytes]  # status, content type, body
+_REASONS = {
+    200: "OK",
+    400: "Bad Request",
+    404: "Not Found",
+    405: "Method Not Allowed",
+    500: "Internal Server Error",
+    503: "Service Unavailable",
+}
+
+
+def as_json(status: int, **body: object) -> Answer:
+    """An answer of one JSON object."""
+    return status, "application/json", json.dumps(body).encode() + b"\n"
+
+
+class HttpThread:
+    """Serves GET and HEAD of `routes` (path -> function that makes the answer) on a listening socket."""
+
+    def __init__(self, sock: socket.socket, routes: dict[str, Callable[[], Answer]]) -> None:
+        self._sock, self._routes = sock, routes
+        self._loop = asyncio.SelectorEventLoop()
+        self._open = 0
+        self._thread = threading.Thread(target=self._run, name="http", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop serving and close the socket."""
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(1.0)
+        self._sock.close()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        server = self._loop.run_until_complete(
+            asyncio.start_server(self._serve, sock=self._sock, limit=REQUEST_BYTES)
+        )
+        self._loop.run_forever()
+        server.close()
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._open += 1
+        try:
+            if self._open <= CONNECTIONS:
+                async with asyncio.timeout(DEADLINE_S):
+                    head = await reader.readuntil(b"\r\n\r\n")
+                    writer.write(self._answer(head))
+                    await writer.drain()
+        except (OSError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
+            pass  # too slow, too long or gone: not worth an answer
+        finally:
+            self._open -= 1
+            writer.transport.abort() if writer.transport.get_write_buffer_size() else writer.close()
+
+    def _answer(self, head: bytes) -> bytes:
+        words = head.split(b"\r\n", 1)[0].split()
+        if len(words) != 3 or not words[2].startswith(b"HTTP/1."):
+            status, kind, body = as_json(400, error="not an HTTP/1 request")
+        elif words[0] not in (b"GET", b"HEAD"):
+            status, kind, body = as_json(405, error="only GET and HEAD")
+        else:
+            route = self._routes.get(words[1].split(b"?", 1)[0].decode("latin-1"))
+            try:
+                status, kind, body = (
+                    route() if route else as_json(404, error="not found", paths=list(self._routes))
+                )
+            except Exception as error:  # a bug in a route is this answer's end, not the server's
+                status, kind, body = as_json(500, error=repr(error))
+        header = f"HTTP/1.1 {status} {_REASONS[status]}\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\nConnection: close\r\n\r\n"
+        return header.encode() + (b"" if words[:1] == [b"HEAD"] else body)

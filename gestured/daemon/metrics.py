@@ -1,0 +1,136 @@
+"""What is counted. Plain integers, always; prometheus_client only formats them, and only where `--metrics` is set.
+
+The loop's thread counts, the HTTP thread reads copies. The number of series is bounded whatever arrives: labels
+that a peer can choose (sensors) are folded together after the first few.
+"""
+
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from gestured import __version__
+
+NAMED_SENSORS = 8  # further sensors are counted together as "other"
+NAMED_VALUES = 32  # bound of any other label
+INFERENCE_S = (0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.1, 1.0)
+LATENCY_S = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.75, 1.0, 2.0, 5.0)
+
+
+class Counter:
+    """A total for each combination of labels."""
+
+    def __init__(self, name: str, text: str, *labels: str) -> None:
+        self.name, self.text, self.labels = name, text, labels
+        self.values: dict[tuple[str, ...], int] = {}
+
+    def add(self, *labels: str, count: int = 1) -> None:
+        """Count `count` more under these labels."""
+        self.values[labels] = self.values.get(labels, 0) + count
+
+    def total(self) -> int:
+        """The sum over all labels."""
+        return sum(list(self.values.values()))
+
+
+class Histogram:
+    """How often a duration in seconds fell below each bound, for each value of one label (or none)."""
+
+    def __init__(self, name: str, text: str, bounds: Sequence[float], *labels: str) -> None:
+        self.name, self.text, self.bounds, self.labels = name, text, bounds, labels
+        self.values: dict[tuple[str, ...], tuple[list[int], list[float]]] = {}
+
+    def observe(self, seconds: float, *labels: str) -> None:
+        """Count one duration."""
+        if labels not in self.values:
+            if len(self.values) >= NAMED_VALUES:
+                labels = ("other",) * len(labels)
+            self.values.setdefault(labels, ([0] * (len(self.bounds) + 1), [0.0]))
+        buckets, total = self.values[labels]
+        buckets[bisect_left(self.bounds, seconds)] += 1
+        total[0] += seconds
+
+
+class Metrics:
+    """All counters of one daemon."""
+
+    def __init__(self) -> None:
+        self.frames = Counter("gestured_frames", "Frames by what became of them", "sensor", "result")
+        self.dropped = Counter("gestured_dropped", "Packets and messages that were dropped", "reason")
+        self.implausible = Counter("gestured_implausible_time_tags", "Time tags replaced by the arrival time")
+        self.gestures = Counter("gestured_gestures", "Recognised gestures", "gesture")
+        self.unknown = Counter("gestured_unknown", "Segments that are none of the gestures")
+        self.cancelled = Counter("gestured_cancelled", "Segments that were not answered", "reason")
+        self.internal_errors = Counter(
+            "gestured_internal_errors", "Bugs caught; the sensor's recognizer was reset"
+        )
+        self.degraded = Counter("gestured_degraded_answers", "Segments answered by a fallback model")
+        self.reloads = Counter("gestured_reloads", "Reloads of model and configuration", "result")
+        self.sent = Counter("gestured_osc_messages", "OSC messages to destinations", "result")
+        self.lost_lines = Counter("gestured_client_lines_lost", "Lines that slow clients did not get")
+        self.evicted = Counter(
+            "gestured_clients_evicted", "Clients that were cut off or turned away", "reason"
+        )
+        self.inference = Histogram(
+            "gestured_inference_seconds", "Time to classify a segment", INFERENCE_S, "model"
+        )
+        self.latency = Histogram(
+            "gestured_latency_seconds", "From the last touched frame to the event", LATENCY_S
+        )
+        self.gauges: dict[str, tuple[str, Callable[[], float]]] = {}
+        self.active_model: Callable[[], str] = str
+        self._named: set[str] = set()
+
+    def sensor_label(self, sensor: str) -> str:
+        """The sensor's name for the first few, "other" after that."""
+        if sensor in self._named:
+            return sensor
+        if len(self._named) < NAMED_SENSORS:
+            self._named.add(sensor)
+            return sensor
+        return "other"
+
+    def exposition(self) -> bytes:
+        """Everything in the Prometheus text format; imports prometheus_client."""
+        from prometheus_client import CollectorRegistry, generate_latest
+
+        registry = CollectorRegistry()
+        registry.register(_Collector(self))
+        return generate_latest(registry)
+
+
+class _Collector:
+    def __init__(self, metrics: Metrics) -> None:
+        self._metrics = metrics
+
+    def collect(self) -> Iterator[Any]:
+        from prometheus_client.core import (
+            CounterMetricFamily,
+            GaugeMetricFamily,
+            HistogramMetricFamily,
+            InfoMetricFamily,
+        )
+
+        for metric in vars(self._metrics).values():
+            if isinstance(metric, Counter):
+                counter = CounterMetricFamily(metric.name, metric.text, labels=metric.labels)
+                values = dict(metric.values)
+                for labels, value in (values or ({(): 0} if not metric.labels else {})).items():
+                    counter.add_metric(labels, value)
+                yield counter
+            elif isinstance(metric, Histogram):
+                histogram = HistogramMetricFamily(metric.name, metric.text, labels=metric.labels)
+                empty = ([0] * (len(metric.bounds) + 1), [0.0])
+                for labels, (buckets, total) in (
+                    dict(metric.values) or ({} if metric.labels else {(): empty})
+                ).items():
+                    bounds = [*map(str, metric.bounds), "+Inf"]
+                    cumulated = [sum(buckets[: i + 1]) for i in range(len(buckets))]
+                    histogram.add_metric(
+                        labels, list(zip(bounds, cumulated, strict=True)), sum_value=total[0]
+                    )
+                yield histogram
+        for name, (text, read) in self._metrics.gauges.items():
+            yield GaugeMetricFamily(name, text, value=read())
+        info = InfoMetricFamily("gestured_active_model", "The model that answers")
+        info.add_metric([], {"model": self._metrics.active_model(), "version": __version__})
+        yield info

@@ -1,0 +1,241 @@
+"""From arrivals to events: one recognizer a sensor, who may feed it, and what happens when it falls silent or breaks.
+
+Time comes in as an argument. A bug in the path of one sensor is logged with its traceback, counted, and answered
+by resetting that sensor's recognizer: its contact ends, the other sensors go on. That is the one place where a bug
+does not end the program: a daemon in a vehicle that dies of one sensor's odd frame helps nobody.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from gestured.core.conditioning import Mounting
+from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
+from gestured.core.frames import Frame
+from gestured.core.recognizer import FrontEnd, Recognizer
+from gestured.core.segmentation import Timing
+from gestured.core.wire import Arrival, Stamper
+from gestured.daemon.log import Throttle, log
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.settings import Grid, SensorSettings, Settings
+from gestured.models import Ladder
+
+FORGET_S = 60.0  # a sensor that never made a gesture and is silent for this long gives its place to a new one
+DOUBLE_TAP = "double_tap"
+Source = tuple[str, int]  # host and port of a sender
+Emit = Callable[[Event], None]
+
+
+@dataclass(slots=True)
+class Sensor:
+    """One stream: its state and its owner."""
+
+    name: str
+    label: str  # in metrics
+    recognizer: Recognizer
+    stamper: Stamper
+    source: Source
+    before: Source | None = None  # the owner before this one
+    packets: int = 0  # of this owner
+    heard: float = 0.0  # s, monotonic
+    silent: bool = False  # and has been flushed
+    open: int | None = None  # id of the contact that was not released yet
+    answered: bool = True  # whether that contact has its answer
+
+
+class Pipeline:
+    """All sensors. `emit` takes each event as it comes."""
+
+    def __init__(self, settings: Settings, ladder: Ladder, metrics: Metrics, emit: Emit) -> None:
+        self.sensors: dict[str, Sensor] = {}
+        self._settings, self._ladder, self._metrics, self._emit = settings, ladder, metrics, emit
+        self._throttle = Throttle()
+
+    @property
+    def gestures(self) -> tuple[str, ...]:
+        """The gestures in use, in the model's order."""
+        chosen = self._settings.gestures
+        return tuple(g for g in self._ladder.gestures if chosen is None or g in chosen)
+
+    def grid(self, sensor: str) -> Grid:
+        """The grid in which a sensor sends."""
+        own = self._settings.sensors.get(sensor)
+        model = Grid(self._ladder.rows, self._ladder.columns)
+        return (own and own.grid) or self._settings.grid or model
+
+    def admit(self, name: str, source: Source, now: float) -> Sensor | None:
+        """The sensor that a packet of `source` may feed, or None, counted, where it may not."""
+        sensor = self.sensors.get(name)
+        if sensor is None:
+            if self._full(name, now):
+                self.drop("too_many_sensors")
+                return None
+            sensor = self.sensors[name] = self._make(name, source)
+            log.info("new sensor", sensor=name, source=f"{source[0]}:{source[1]}", grid=str(self.grid(name)))
+        elif sensor.source != source:
+            if now - sensor.heard <= self._settings.stale_s and not _one_shot(sensor, source):
+                self.drop("second_source")
+                return None
+            sensor.before, sensor.source, sensor.packets = sensor.source, source, 0
+        sensor.packets += 1
+        sensor.heard, sensor.silent = now, False
+        return sensor
+
+    def take(self, sensor: Sensor, arrivals: Sequence[Arrival], now: float) -> None:
+        """Push frames that were found waiting at `now` (monotonic seconds)."""
+        frames = self._metrics.frames
+        taken = 0
+        for arrival, stamp in zip(arrivals, sensor.stamper.stamp(arrivals, now), strict=True):
+            if stamp.dropped:
+                frames.add(sensor.label, stamp.dropped)
+                continue
+            if stamp.lost:
+                frames.add(sensor.label, "lost", count=stamp.lost)
+            if stamp.implausible:
+                self._metrics.implausible.add()
+            try:
+                if stamp.restarted:
+                    log.info("sensor restarted", sensor=sensor.name)
+                    self._publish(sensor, sensor.recognizer.reset())
+                events = sensor.recognizer.push(Frame(stamp.t, arrival.values, arrival.touches, stamp.lost))
+            except Exception:
+                events = self._recover(sensor, stamp.t)
+                frames.add(sensor.label, "internal_error")
+            else:
+                taken += 1
+            if events:
+                self._publish(sensor, events)
+        if taken:
+            frames.add(sensor.label, "ok", count=taken)
+
+    def tick(self, now: float) -> None:
+        """Close what is open where a sensor has been silent for longer than `stale_s`."""
+        for sensor in self.sensors.values():
+            if not sensor.silent and now - sensor.heard > self._settings.stale_s:
+                log.info("sensor is silent", sensor=sensor.name)
+                self.flush(sensor, now)
+
+    def flush(self, sensor: Sensor, now: float) -> None:
+        """The sensor has nothing more to say: answer or cancel what is open."""
+        sensor.silent = True
+        t = sensor.stamper.at(now)
+        try:
+            events = sensor.recognizer.flush(t)
+        except Exception:
+            events = self._recover(sensor, t)
+        self._publish(sensor, events)
+
+    def reload(self, settings: Settings, ladder: Ladder) -> None:
+        """Go on with other settings and models; what a sensor has learned stays where it still holds."""
+        waits = DOUBLE_TAP in self.gestures
+        old, self._settings, self._ladder = self._settings, settings, ladder
+        for name, sensor in self.sensors.items():
+            front_end = sensor.recognizer.front_end
+            fresh = self._front_end(name)
+            same = (front_end.sent, front_end.mounting, front_end.timing) == (
+                fresh.sent,
+                fresh.mounting,
+                fresh.timing,
+            )
+            same = same and waits == (DOUBLE_TAP in self.gestures)
+            if not same:
+                self._publish(sensor, sensor.recognizer.reset())
+                front_end = fresh
+            if _clock(old, name) != _clock(settings, name):
+                self._publish(sensor, sensor.recognizer.reset())
+                front_end, sensor.stamper = fresh, Stamper(_clock(settings, name))
+            sensor.recognizer = self._recognizer(front_end, sensor.recognizer.sequence)
+
+    def states(self, now: float) -> dict[str, str]:
+        """State of each sensor: "ok", "starting", "degraded" (taxels are bridged) or "stale"."""
+        return {name: self._state(sensor, now) for name, sensor in self.sensors.items()}
+
+    def drop(self, reason: str, count: int = 1, **fields: object) -> None:
+        """Count what was dropped; say so at a bounded rate."""
+        self._metrics.dropped.add(reason, count=count)
+        self._throttle.warn("dropped", reason, **fields)
+
+    def _state(self, sensor: Sensor, now: float) -> str:
+        if now - sensor.heard > self._settings.stale_s:
+            return "stale"
+        if not sensor.recognizer.front_end.ready:
+            return "starting"
+        return "degraded" if sensor.recognizer.front_end.bad_taxels else "ok"
+
+    def _full(self, name: str, now: float) -> bool:
+        """Whether there is no place for a new sensor; places for those in the file are kept free."""
+        named = self._settings.sensors
+        if name in named:
+            return False
+        strangers = [sensor for sensor in self.sensors.values() if sensor.name not in named]
+        if len(strangers) < self._settings.max_sensors - len(named):
+            return False
+        for sensor in strangers:
+            if now - sensor.heard > FORGET_S and sensor.recognizer.sequence == 0:
+                del self.sensors[sensor.name]
+                return False
+        return True
+
+    def _make(self, name: str, source: Source) -> Sensor:
+        recognizer = self._recognizer(self._front_end(name), 0)
+        stamper = Stamper(_clock(self._settings, name))
+        return Sensor(name, self._metrics.sensor_label(name), recognizer, stamper, source)
+
+    def _front_end(self, name: str) -> FrontEnd:
+        own = self._settings.sensors.get(name, SensorSettings())
+        return FrontEnd(
+            name,
+            *self.grid(name),
+            mounting=Mounting(own.rotate, own.mirror),
+            wait_for_double_tap=DOUBLE_TAP in self.gestures,
+            timing=Timing(stale_s=self._settings.stale_s),
+        )
+
+    def _recognizer(self, front_end: FrontEnd, sequence: int) -> Recognizer:
+        parts = self._settings.per_gesture
+        return Recognizer(
+            front_end,
+            self._ladder,
+            gestures=self.gestures,
+            thresholds={name: part.threshold for name, part in parts.items() if part.threshold is not None},
+            refractory={name: part.refractory_s for name, part in parts.items()},
+            sequence=sequence,
+        )
+
+    def _publish(self, sensor: Sensor, events: Sequence[Event]) -> None:
+        for event in events:
+            if isinstance(event, Onset):
+                sensor.open, sensor.answered = event.id, False
+            elif isinstance(event, Gesture | Unknown | Cancelled):
+                sensor.answered = True
+            elif isinstance(event, Release):
+                sensor.open = None
+            self._emit(event)
+
+    def _recover(self, sensor: Sensor, t: float) -> list[Event]:
+        """After a bug: start that sensor clean, and end what its consumers believe to be open."""
+        self._metrics.internal_errors.add()
+        self._throttle.error("a bug; the sensor's recognizer is reset", "internal_error", sensor=sensor.name)
+        try:
+            sensor.recognizer.reset()
+        except Exception:
+            self._throttle.error("cannot reset the recognizer", "reset", sensor=sensor.name)
+        events: list[Event] = []
+        if sensor.open is not None:
+            if not sensor.answered:
+                events.append(Cancelled(sensor.name, sensor.open, "internal_error"))
+            events.append(Release(sensor.name, sensor.open, t))
+        return events
+
+
+def _one_shot(sensor: Sensor, source: Source) -> bool:
+    """Whether the owner may be a program that opens a new port for each packet, as `oscsend` does.
+
+    One packet from a port is no claim against another port of the same host; two are.
+    """
+    return sensor.packets == 1 and source[0] == sensor.source[0] and source != sensor.before
+
+
+def _clock(settings: Settings, name: str) -> Literal["arrival", "sensor"]:
+    own = settings.sensors.get(name)
+    return (own and own.clock) or settings.clock

@@ -1,0 +1,78 @@
+"""Where events go. A sink takes every event and never blocks; what it cannot deliver it counts."""
+
+import socket
+from typing import Protocol
+
+from gestured.core import wire
+from gestured.core.events import Event, Gesture, Status
+from gestured.daemon.log import Throttle, log
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.settings import Address
+from gestured.daemon.sockets import resolve
+
+
+class Sink(Protocol):
+    """Takes every event; `epoch` is what to add to an event's times to get seconds since the Unix epoch."""
+
+    def publish(self, event: Event, epoch: float) -> None:
+        """Deliver or count; never block, never raise."""
+        ...
+
+
+class OscSink:
+    """OSC over UDP to one destination: gestures and the status.
+
+    The socket is connected, so that a port where nobody listens is told to us (by the next call). A
+    destination that cannot be reached costs a failed system call an event, nothing more.
+    """
+
+    def __init__(self, destination: Address, metrics: Metrics) -> None:
+        self.destination = destination
+        self._metrics, self._throttle = metrics, Throttle()
+        self._socket: socket.socket | None = None
+        self._connected = False
+        try:
+            family, self._where = resolve(
+                destination, socket.SOCK_DGRAM
+            )  # once: a look-up may block for seconds
+            self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
+        except OSError as error:
+            log.error("publish: no such destination", destination=str(destination), error=error.strerror)
+
+    def publish(self, event: Event, epoch: float) -> None:
+        """Send a gesture or the status; other events do not travel by OSC."""
+        if isinstance(event, Gesture):
+            self._send(wire.gesture_osc(event, epoch))
+        elif isinstance(event, Status):
+            self._send(wire.status_osc(event.state, len(event.sensors)))
+
+    def close(self) -> None:
+        """Close the socket."""
+        if self._socket is not None:
+            self._socket.close()
+
+    def _send(self, packet: bytes) -> None:
+        if self._socket is None:
+            self._failed("unresolved")
+            return
+        for _ in range(2):
+            try:
+                if not self._connected:
+                    self._socket.connect(self._where)
+                    self._connected = True
+                self._socket.send(packet)
+                self._metrics.sent.add("sent")
+                return
+            except ConnectionRefusedError:
+                self._failed("refused")  # says that of an earlier packet: this one was not sent yet
+            except BlockingIOError:
+                self._failed("full")
+                return
+            except OSError:
+                self._connected = False  # our own address may have changed with the network
+                self._failed("unreachable")
+                return
+
+    def _failed(self, result: str) -> None:
+        self._metrics.sent.add(result)
+        self._throttle.warn("event not delivered", result, destination=str(self.destination))

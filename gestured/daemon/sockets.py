@@ -1,0 +1,150 @@
+"""Sockets are made here, all before the daemon says that it is ready; what cannot be had ends it with status 4."""
+
+import errno
+import fcntl
+import os
+import socket
+import stat
+from pathlib import Path
+
+from gestured.core.errors import GesturedError
+from gestured.daemon.settings import Address
+
+RECEIVE_BYTES = 4 << 20  # the default holds 166 frames of 9 x 9 floats, this 6,500
+BACKLOG = 128
+
+
+class AddressError(GesturedError):
+    """An address or a socket that cannot be bound."""
+
+
+def resolve(address: Address, kind: int) -> tuple[int, tuple[str | int, ...]]:
+    """(family, socket address) of a host and port; blocks while a name is looked up. Raises OSError."""
+    family, _, _, _, where = socket.getaddrinfo(address.host, address.port, type=kind)[0]
+    return family, where
+
+
+def _bind(key: str, address: Address, kind: int) -> socket.socket:
+    try:
+        family, where = resolve(address, kind)
+        sock = socket.socket(family, kind | socket.SOCK_NONBLOCK)
+    except OSError as error:
+        raise AddressError(f"{key}: cannot use {address}: {error.strerror}") from None
+    try:
+        if kind == socket.SOCK_STREAM:
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        sock.bind(where)
+    except OSError as error:
+        sock.close()
+        raise AddressError(f"{key}: cannot bind {address}: {error.strerror}") from None
+    return sock
+
+
+def bind_udp(address: Address) -> socket.socket:
+    """A non-blocking UDP socket with a large receive buffer, as far as the kernel grants it."""
+    sock = _bind("listen", address, socket.SOCK_DGRAM)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
+    return sock
+
+
+def bind_tcp(address: Address) -> socket.socket:
+    """A listening, non-blocking TCP socket."""
+    sock = _bind("metrics", address, socket.SOCK_STREAM)
+    sock.listen(BACKLOG)
+    return sock
+
+
+def name_of(sock: socket.socket) -> str:
+    """HOST:PORT as it was bound."""
+    host, port = sock.getsockname()[:2]
+    return str(Address(host, port))
+
+
+class UnixListener:
+    """A listening Unix stream socket at `path` that no other daemon is using.
+
+    A lock file beside it is held as long as we live, so two daemons that start at once cannot both win. What
+    is already at the path is probed: a socket that answers is another program's, one that refuses is stale and
+    replaced, anything else is not ours to remove.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._lock_path = path.with_name(path.name + ".lock")
+        try:
+            self._lock = self._take_lock()
+        except OSError as error:
+            raise AddressError(f"socket: cannot make {self._lock_path}: {error.strerror}") from None
+        try:
+            self._clear()
+            self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK)
+            before = os.umask(0o117)  # 0660 from the start, not after a moment
+            try:
+                self.sock.bind(str(path))
+            finally:
+                os.umask(before)
+            self.sock.listen(BACKLOG)
+            self._inode = path.stat().st_ino
+        except OSError as error:
+            self._release_lock()
+            raise AddressError(f"socket: cannot bind {path}: {error.strerror}") from None
+        except AddressError:
+            self._release_lock()
+            raise
+
+    def close(self) -> None:
+        """Stop listening; remove the socket if it is still ours, and the lock."""
+        self.sock.close()
+        try:
+            if self.path.lstat().st_ino == self._inode:
+                self.path.unlink()
+        except OSError:
+            pass  # somebody removed it already
+        self._release_lock()
+
+    def _take_lock(self) -> int:
+        while True:
+            lock = os.open(self._lock_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o660)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if os.fstat(lock).st_ino == os.stat(self._lock_path).st_ino:
+                    return lock
+            except BlockingIOError:
+                os.close(lock)
+                raise AddressError(f"socket: another gestured is using {self.path}") from None
+            except FileNotFoundError:
+                pass  # its owner removed it between our open and our flock: try again
+            os.close(lock)
+
+    def _release_lock(self) -> None:
+        try:
+            self._lock_path.unlink()
+        except OSError:
+            pass
+        os.close(self._lock)
+
+    def _clear(self) -> None:
+        try:
+            mode = self.path.lstat().st_mode
+        except FileNotFoundError:
+            return
+        if not stat.S_ISSOCK(mode):
+            raise AddressError(f"socket: {self.path} exists and is not a socket")
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK) as probe:
+            found = probe.connect_ex(str(self.path))
+        if found != errno.ECONNREFUSED:
+            raise AddressError(f"socket: another program is using {self.path}")
+        self.path.unlink()
+
+
+def make_default_directory(directory: Path) -> None:
+    """Make the folder of the default socket, for its owner alone. Raises AddressError."""
+    try:
+        directory.mkdir(0o700, parents=True, exist_ok=True)
+        found = directory.lstat()
+    except OSError as error:
+        raise AddressError(
+            f"socket: cannot make {directory}: {error.strerror}; choose another with --socket"
+        ) from None
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
+        raise AddressError(f"socket: {directory} is not a folder of ours; choose another with --socket")

@@ -1,0 +1,95 @@
+"""OSC over UDP in: reads what waits, decodes it, and hands each sensor its frames.
+
+A reader of its own instead of a DatagramProtocol: it takes everything that waits before it looks at the clock, so
+that after a stall of the loop the frames are spread over the time they took, and it costs less per packet.
+"""
+
+import asyncio
+import ipaddress
+import socket
+import time
+from collections.abc import Callable, Sequence
+
+from gestured.core.wire import Arrival, Decoder
+from gestured.daemon.pipeline import Pipeline, Sensor, Source
+
+PACKET_BYTES = 65_536
+BATCH = 256  # packets in one go: a flood must leave room for everything else
+SOURCES = 1024  # remembered decisions of the allow-list
+
+Network = ipaddress.IPv4Network | ipaddress.IPv6Network
+
+
+def allowed(host: str, networks: Sequence[Network]) -> bool:
+    """Whether a host's address lies in one of the networks; any does where there are none."""
+    address = ipaddress.ip_address(host)
+    mapped = getattr(address, "ipv4_mapped", None)
+    return not networks or any((mapped or address) in network for network in networks)
+
+
+class Receiver:
+    """Reads a UDP socket until it is closed. `decoder` and `allow` may be replaced at any time."""
+
+    def __init__(
+        self,
+        sock: socket.socket,
+        pipeline: Pipeline,
+        decoder: Decoder,
+        allow: Sequence[Network],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._sock, self._pipeline, self._clock = sock, pipeline, clock
+        self.configure(decoder, allow)
+        self._loop.add_reader(sock, self._readable)
+
+    def configure(self, decoder: Decoder, allow: Sequence[Network]) -> None:
+        """Decode and admit by these from now on."""
+        self._decoder, self._allow = decoder, tuple(allow)
+        self._known: dict[str, bool] = {}
+
+    def close(self) -> None:
+        """Stop reading; the socket stays its owner's."""
+        self._loop.remove_reader(self._sock)
+
+    def _readable(self) -> None:
+        receive = self._sock.recvfrom
+        waiting: list[tuple[bytes, Source]] = []
+        try:
+            for _ in range(BATCH):
+                waiting.append(receive(PACKET_BYTES))
+        except (BlockingIOError, InterruptedError):
+            pass
+        except OSError as error:  # the network's complaint about something else; the socket goes on
+            self._pipeline.drop("socket_error", error=error.strerror)
+        now = self._clock()
+        batch: dict[str, tuple[Sensor, list[Arrival]]] = {}
+        for packet, source in waiting:
+            self._packet(packet, source, now, batch)
+        for sensor, arrivals in batch.values():
+            self._pipeline.take(sensor, arrivals, now)
+
+    def _packet(
+        self, packet: bytes, source: Source, now: float, batch: dict[str, tuple[Sensor, list[Arrival]]]
+    ) -> None:
+        if self._allow and not self._may_send(source[0]):
+            self._pipeline.drop("not_allowed", source=source[0])
+            return
+        arrivals, errors = self._decoder.decode(packet, source)
+        for error in errors:
+            self._pipeline.drop(error.reason, source=source[0], error=str(error))
+        for arrival in arrivals:
+            name = arrival.sensor
+            sensor = self._pipeline.admit(name, source, now)
+            if sensor is not None:
+                if name not in batch:
+                    batch[name] = (sensor, [])
+                batch[name][1].append(arrival)
+
+    def _may_send(self, host: str) -> bool:
+        known = self._known.get(host)
+        if known is None:
+            if len(self._known) >= SOURCES:
+                self._known.clear()
+            known = self._known[host] = allowed(host, self._allow)
+        return known
