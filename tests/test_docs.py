@@ -1,0 +1,146 @@
+"""What the documents say is so: flags are described, commands are valid, examples run."""
+
+import argparse
+import json
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from gestured.control.cli import parser as gesturectl_parser
+from gestured.daemon.cli import parser as gestured_parser
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text()
+DOCUMENTS = README + "".join(path.read_text() for path in sorted((ROOT / "docs").glob("**/*.md")))
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def blocks(language: str) -> list[str]:
+    return [text for found, text in BLOCK.findall(README) if found == language]
+
+
+def flags(parser: argparse.ArgumentParser) -> set[str]:
+    found = {
+        option for action in parser._actions for option in action.option_strings if option.startswith("--")
+    }
+    return found - {"--help"}
+
+
+def commands(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            return dict(action.choices)
+    return {}
+
+
+def row(start: str) -> str:
+    """The line of a table in the documents that begins with this cell."""
+    (line,) = [line for line in DOCUMENTS.splitlines() if line.startswith(f"| `{start}`")]
+    return line
+
+
+@pytest.mark.parametrize("flag", sorted(flags(gestured_parser())))
+def test_each_flag_of_the_daemon_has_its_row(flag: str):
+    assert row(flag)
+
+
+def test_no_row_describes_a_flag_that_is_gone():
+    rows = set(re.findall(r"^\| `(--[a-z-]+)`", DOCUMENTS, re.MULTILINE))
+    assert rows == flags(gestured_parser())
+
+
+@pytest.mark.parametrize("command", sorted(commands(gesturectl_parser())))
+def test_each_subcommand_has_its_row_and_flags(command: str):
+    described = row(f"gesturectl {command}")
+    own = flags(commands(gesturectl_parser())[command])
+    if "flags of `simulate`" in described:
+        own -= flags(commands(gesturectl_parser())["simulate"])
+    assert own <= set(re.findall(r"`(--[a-z-]+)`", described))
+    assert set(re.findall(r"`(--[a-z-]+)`", described)) <= flags(commands(gesturectl_parser())[command])
+
+
+def test_shell_blocks_hold_valid_commands():
+    targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    seen = 0
+    for line in "".join(blocks("sh")).replace("\\\n", " ").splitlines():
+        program, *arguments = shlex.split(line, comments=True) or [""]
+        match program.rsplit("/", 1)[-1]:
+            case "":
+                continue
+            case "make":
+                assert [word for word in arguments if "=" not in word][0] in targets, line
+            case "gestured":
+                gestured_parser().parse_args(arguments)
+            case "gesturectl":
+                gesturectl_parser().parse_args(arguments)
+            case "gestured-lab":
+                pass  # the lab is not installed everywhere; its own tests know its flags
+            case "." | "pip" | "git" | "cd":
+                continue
+            case _:
+                raise AssertionError(f"README: {line!r} is no command that a test knows")
+        seen += 1
+    assert seen > 5
+
+
+def test_the_configuration_in_the_readme_is_valid(tmp_path: Path):
+    (text,) = blocks("toml")
+    tomllib.loads(text)
+    (tmp_path / "gestured.toml").write_text(text)
+    command = [
+        sys.executable,
+        "-m",
+        "gestured.daemon",
+        "--config",
+        str(tmp_path / "gestured.toml"),
+        "--explain",
+    ]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert "armrest" in done.stdout
+
+
+def test_every_link_in_the_readme_leads_somewhere():
+    for target in re.findall(r"\]\(([^)#]+)\)", README):
+        assert (ROOT / target).exists(), target
+
+
+def test_the_subscriber_in_the_readme_prints_gestures(tmp_path: Path):
+    import socket
+
+    (code,) = [text for text in blocks("python") if "subscribe" in text]
+    path = tmp_path / "events.sock"
+    gesture = {"type": "gesture", "sensor": "armrest", "gesture": "swipe_left", "confidence": 0.9}
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(path))
+        listener.listen()
+        listener.settimeout(30)
+        code = code.replace("/tmp/gestured.sock", str(path))
+        with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as subscriber:
+            client, _ = listener.accept()
+            request = json.loads(client.makefile().readline())
+            assert request == {"subscribe": {"types": ["gesture"]}}
+            client.sendall(b'{"type":"hello"}\n' + json.dumps(gesture).encode() + b"\n")
+            client.close()
+            out, _ = subscriber.communicate(timeout=30)
+    assert out == "armrest swipe_left 0.9\n"
+
+
+def test_the_sensor_in_the_readme_sends_a_frame():
+    import socket
+
+    from pythonosc.osc_message import OscMessage
+
+    (code,) = [text for text in blocks("python") if "pythonosc" in text]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(30)
+        code = code.replace("9000", str(receiver.getsockname()[1]))
+        subprocess.run([sys.executable, "-c", code], check=True, timeout=30)
+        message = OscMessage(receiver.recv(65536))
+    assert (message.address, len(message.params)) == ("/armrest/pressure", 81)

@@ -1,0 +1,157 @@
+"""What is installed: the wheel's contents, its programs, and that it runs without the extras."""
+
+import argparse
+import importlib.util
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from gestured.control.cli import parser as gesturectl_parser
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+EXTRAS = (
+    "torch",
+    "sklearn",
+    "pywt",
+    "onnx",
+    "onnxscript",
+    "skl2onnx",
+    "matplotlib",
+    "pytest",
+    "hypothesis",
+    "setuptools",
+)
+ALL_BUT_LAB = """
+import importlib, pkgutil, gestured
+names = [m.name for m in pkgutil.walk_packages(gestured.__path__, "gestured.") if not m.name.endswith("__main__")]
+for name in names:
+    if not name.startswith("gestured.lab"):
+        importlib.import_module(name)
+"""
+
+
+def subcommands(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            return dict(action.choices)
+    return {}
+
+
+def python_without(
+    absent: tuple[str, ...], code: str, path: Path, tmp_path: Path
+) -> "subprocess.CompletedProcess[str]":
+    """Runs code with gestured from `path`, as if the packages named in `absent` were not installed."""
+    blocked = (
+        f"import sys\nfor name in {absent!r}: sys.modules[name] = None\nsys.path.insert(0, {str(path)!r})\n"
+    )
+    command = [sys.executable, "-c", blocked + code]
+    return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+
+
+@pytest.fixture(scope="session")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the contents of the wheel, built from what is in the project."""
+    if importlib.util.find_spec("setuptools") is None:
+        pytest.skip("setuptools is not installed: no wheel can be built")
+    source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
+    for name in ("pyproject.toml", "README.md", "LICENSE", "NOTICE"):
+        shutil.copy(ROOT / name, source / name)
+    for name in ("gestured", "models"):
+        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
+    build = f"import setuptools.build_meta as backend; backend.build_wheel({str(out)!r})"
+    done = subprocess.run(
+        [sys.executable, "-c", build], cwd=source, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    (wheel,) = out.glob("gestured-*-py3-none-any.whl")
+    zipfile.ZipFile(wheel).extractall(out / "installed")
+    return out / "installed"
+
+
+def test_every_folder_with_code_is_installed():
+    folders = {".".join(path.parent.relative_to(ROOT).parts) for path in (ROOT / "gestured").rglob("*.py")}
+    assert folders | {"gestured_models"} == set(PROJECT["tool"]["setuptools"]["packages"])
+
+
+def test_the_wheel_holds_models_types_and_licences_and_nothing_else(installed: Path):
+    for path in (ROOT / "models").iterdir():
+        if path.suffix in (".onnx", ".md") or path.name == "manifest.json":
+            assert (installed / "gestured_models" / path.name).read_bytes() == path.read_bytes()
+    assert (installed / "gestured" / "py.typed").exists()
+    (information,) = installed.glob("*.dist-info")
+    assert "Apache License" in (information / "licenses" / "LICENSE").read_text()
+    assert "CapFingerId" in (information / "licenses" / "NOTICE").read_text()
+    assert {path.name for path in installed.iterdir()} == {"gestured", "gestured_models", information.name}
+
+
+def test_shipped_models_are_found_where_they_are_installed(installed: Path, tmp_path: Path):
+    code = "from gestured.models import shipped\nfor path in shipped().values(): print(path)"
+    done = python_without(EXTRAS, code, installed, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {Path(line).parent for line in done.stdout.splitlines()} == {installed / "gestured_models"}
+
+
+def test_everything_but_the_lab_imports_without_the_extras(installed: Path, tmp_path: Path):
+    done = python_without(EXTRAS, ALL_BUT_LAB, installed, tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_core_needs_numpy_alone(installed: Path, tmp_path: Path):
+    absent = (*EXTRAS, "onnxruntime", "pydantic", "structlog", "uvloop", "prometheus_client", "pythonosc")
+    code = ALL_BUT_LAB.replace('not name.startswith("gestured.lab")', 'name.startswith("gestured.core")')
+    done = python_without(absent, code, installed, tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("program", sorted(PROJECT["project"]["scripts"]))
+def test_each_program_prints_help_without_the_extras(installed: Path, tmp_path: Path, program: str):
+    module, function = PROJECT["project"]["scripts"][program].split(":")
+    code = f"sys.argv = [{program!r}, '--help']\nfrom {module} import {function}\nsys.exit({function}())"
+    done = python_without(EXTRAS, code, installed, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f"usage: {program}")
+    assert "example" in done.stdout
+
+
+def test_without_the_extra_the_lab_says_what_to_install(installed: Path, tmp_path: Path):
+    code = "sys.argv = ['gestured-lab', 'train']\nfrom gestured.lab.cli import main\nsys.exit(main())"
+    done = python_without(EXTRAS, code, installed, tmp_path)
+    assert done.returncode != 0
+    assert "Traceback" not in done.stderr and done.stderr.count("\n") == 1
+    assert "gestured[lab]" in done.stderr or "make lab" in done.stderr
+
+
+@pytest.mark.parametrize("command", sorted(subcommands(gesturectl_parser())))
+def test_each_subcommand_shows_an_example_that_is_valid(command: str):
+    help_text = subcommands(gesturectl_parser())[command].format_help()
+    examples = [line.strip() for line in help_text.splitlines() if line.strip().startswith("gesturectl ")]
+    assert examples
+    for example in examples:
+        program, *arguments = shlex.split(example)
+        assert arguments[0] == command
+        gesturectl_parser().parse_args(arguments)
+
+
+def test_what_prints_a_table_prints_json_too():
+    for name, parser in subcommands(gesturectl_parser()).items():
+        assert "--json" in parser.format_help(), name
+
+
+def test_the_version_is_the_packages():
+    import gestured
+
+    done = subprocess.run(
+        [sys.executable, "-m", "gestured.control", "--version"],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=60,
+    )
+    assert done.stdout == f"gesturectl {gestured.__version__}\n"
