@@ -1,0 +1,126 @@
+"""The import rule of ARCHITECTURE.md: core <- models, recording, simulator <- daemon | control | lab."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "gestured"
+
+CORE_MAY = {"numpy", "dataclasses", "enum", "math", "struct", "json", "typing", "collections"}
+LAYERS = {"core": 0, "daemon": 2, "control": 2, "lab": 2}  # everything else is between them
+LAB_ONLY = {"torch", "sklearn", "pywt", "onnx", "onnxscript", "skl2onnx", "matplotlib", "joblib", "scipy"}
+ONLY_IN = {
+    "onnxruntime": {"gestured/models.py"},
+    "prometheus_client": {"gestured/daemon/metrics.py", "gestured/daemon/http.py"},
+}
+
+
+def imports(path: Path) -> Iterator[tuple[str, bool]]:
+    """(full name of each imported module, whether only inside a function)."""
+    package = path.relative_to(ROOT).with_suffix("").parts[:-1]
+
+    def walk(node: ast.AST, inside: bool) -> Iterator[tuple[str, bool]]:
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name, inside
+        elif isinstance(node, ast.ImportFrom):
+            base = ".".join(package[: len(package) - node.level + 1]) if node.level else ""
+            module = ".".join(part for part in (base, node.module) if part)
+            for alias in node.names:
+                yield f"{module}.{alias.name}", inside
+        inside = inside or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+        for child in ast.iter_child_nodes(node):
+            yield from walk(child, inside)
+
+    yield from walk(ast.parse(path.read_text()), False)
+
+
+def faults(path: Path) -> list[str]:
+    """What the imports of one file break."""
+    where = path.relative_to(ROOT).as_posix()
+    room = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    found = []
+    for name, inside in imports(path):
+        top = name.split(".")[0]
+        if top == "gestured":
+            other = (name.split(".") + [""])[1]
+            above = LAYERS.get(
+                other, 1 if (PACKAGE / other).is_dir() or (PACKAGE / f"{other}.py").exists() else 0
+            )
+            beside = above == LAYERS.get(room, 1) == 2 and other != room
+            if beside or above > LAYERS.get(room, 1):
+                found.append(f"{where}: {room} must not import {name}")
+        elif room == "core" and top not in CORE_MAY:
+            found.append(f"{where}: core must not import {name}")
+        if room != "lab" and top in LAB_ONLY:
+            found.append(f"{where}: only the lab imports {name}")
+        if room != "lab" and top in ONLY_IN and where not in ONLY_IN[top]:
+            found.append(f"{where}: {name} belongs into {', '.join(sorted(ONLY_IN[top]))}")
+        if room != "lab" and top == "onnxruntime" and not inside:
+            found.append(f"{where}: {name} is imported where a model is opened, not before")
+    return found
+
+
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_imports_go_downwards_only(path: Path) -> None:
+    assert faults(path) == []
+
+
+@pytest.mark.parametrize(
+    ("where", "line"),
+    [
+        ("core/x.py", "import asyncio"),
+        ("core/x.py", "from os import path"),
+        ("core/x.py", "def f():\n    import pythonosc"),
+        ("core/x.py", "from gestured import models"),
+        ("core/x.py", "from ..recording import read"),
+        ("models.py", "import onnxruntime"),
+        ("models.py", "from gestured.daemon import log"),
+        ("daemon/x.py", "from gestured.lab import nets"),
+        ("daemon/x.py", "from ..control import cli"),
+        ("control/x.py", "def f():\n    import gestured.daemon.settings"),
+        ("lab/x.py", "from gestured import daemon"),
+        ("simulator/x.py", "import torch"),
+        ("daemon/x.py", "import prometheus_client"),
+        ("daemon/x.py", "def f():\n    import onnxruntime"),
+    ],
+)
+def test_the_rule_notices(where: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules[__name__], "ROOT", tmp_path)
+    monkeypatch.setattr(sys.modules[__name__], "PACKAGE", tmp_path / "gestured")
+    for name in ("models.py", "recording.py"):
+        (tmp_path / "gestured").mkdir(exist_ok=True)
+        (tmp_path / "gestured" / name).touch()
+    path = tmp_path / "gestured" / where
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(line)
+    assert len(faults(path)) == 1
+
+
+def test_the_core_runs_where_only_numpy_is_installed() -> None:
+    modules = [
+        f"gestured.core.{path.stem}" for path in (PACKAGE / "core").glob("*.py") if path.stem != "__init__"
+    ]
+    script = f"""
+import sys
+import numpy
+before = set(sys.modules)
+for name in {modules}:
+    __import__(name)
+print(*sorted({{name.split(".")[0] for name in set(sys.modules) - before}}))
+"""
+    shown = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    new = set(shown.stdout.split())
+    assert new >= {"gestured"}
+    assert new - {"gestured", "numpy"} <= sys.stdlib_module_names
+    assert not new & {"asyncio", "socket", "selectors", "logging", "sqlite3", "subprocess"}
