@@ -8,7 +8,8 @@ from typing import Any
 
 from gestured import __version__
 from gestured.core.errors import GesturedError, ModelError, SettingsError
-from gestured.daemon.settings import FLAGS, REPEATED, Settings, load
+from gestured.daemon.merge import load
+from gestured.daemon.settings import FLAGS, REPEATED, Settings
 
 EXAMPLE = """\
 example:
@@ -16,17 +17,17 @@ example:
            --socket /run/gestured/events.sock --metrics 127.0.0.1:9108 --config gestured.toml
 
 Each flag is a variable (GESTURED_MODEL=...) and a key of the TOML file (model = "...") too; flags win over
-variables, these over the file. The file also takes [sensors.NAME] (grid, rotate, mirror, clock), [gestures.NAME]
-(threshold, refractory_s) and [addresses] (pressure, trajectory). SIGHUP reads all of it again.
+variables, these over the file. The file also takes [sensors.NAME] (grid, rotate, mirror, clock),
+[gestures.NAME] (threshold, refractory_s) and [addresses] (pressure, trajectory). SIGHUP reads it again.
 
 exit status:
   0 ended as asked, 2 usage or invalid configuration, 3 a model that cannot be used and no fallback,
   4 an address or socket that cannot be bound"""
 
 METAVARS = {
-    "model": "MODEL", "fallback": "MODEL", "listen": "HOST:PORT", "publish": "osc://HOST:PORT", "socket": "PATH",
-    "metrics": "HOST:PORT", "grid": "RxC", "gestures": "A,B", "clock": "arrival|sensor", "stale_s": "SECONDS",
-    "max_sensors": "N", "allow": "CIDR", "log_level": "LEVEL",
+    "model": "MODEL", "fallback": "MODEL", "listen": "HOST:PORT", "publish": "osc://HOST:PORT",
+    "socket": "PATH", "metrics": "HOST:PORT", "grid": "RxC", "gestures": "A,B", "clock": "arrival|sensor",
+    "stale_s": "SECONDS", "max_sensors": "N", "allow": "CIDR", "log_level": "LEVEL",
 }  # fmt: skip
 
 

@@ -1,8 +1,8 @@
 """The event stream: JSON lines to any number of clients on a Unix socket.
 
-A line is encoded once and sent at once to each client that wants it. What a client's socket does not take waits
-in a bounded backlog of its own, from which the oldest lines are dropped; the loop waits for nobody. Raw sockets
-instead of transports: a transport's buffer has no bound that drops the oldest.
+A line is encoded once and sent at once to each client that wants it. What a client's socket does not take
+waits in a bounded backlog of its own, from which the oldest lines are dropped; the loop waits for nobody. Raw
+sockets instead of transports: a transport's buffer has no bound that drops the oldest.
 """
 
 import asyncio

@@ -1,4 +1,4 @@
-"""`gestured --explain`: what a configuration loads, listens to, computes per frame and leaves out, and why."""
+"""`gestured --explain`: what a configuration loads, listens to, computes per frame, leaves out, and why."""
 
 import os
 from collections.abc import Mapping
@@ -7,8 +7,8 @@ from typing import Any
 from gestured import __version__
 from gestured.core.segmentation import Timing
 from gestured.daemon import clients
+from gestured.daemon.ladder import open_ladder
 from gestured.daemon.pipeline import DOUBLE_TAP
-from gestured.daemon.service import open_ladder
 from gestured.daemon.settings import Settings, default_socket
 from gestured.daemon.sockets import RECEIVE_BYTES
 
@@ -39,7 +39,8 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     if settings.metrics:
         loads.append("prometheus_client, and a thread that answers HTTP")
     listens = [
-        f"udp {settings.listen} for {settings.addresses.pressure}, receive buffer {RECEIVE_BYTES >> 20} MiB if granted",
+        f"udp {settings.listen} for {settings.addresses.pressure}",
+        f"receive buffer {RECEIVE_BYTES >> 20} MiB, as far as the kernel grants it",
         f"frames of {grid}, clock {settings.clock}, up to {settings.max_sensors} sensors, "
         f"from {', '.join(map(str, settings.allow)) or 'any source'}",
         *(
@@ -51,12 +52,12 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     if settings.metrics:
         listens.append(f"http {settings.metrics} for /metrics, /healthz, /readyz")
     publishes = [
-        f"unix {path}, mode 0660, at most {clients.CLIENTS} clients with {clients.BACKLOG_BYTES >> 10} KiB waiting each",
+        f"unix {path}, mode 0660, for {clients.CLIENTS} clients, {clients.BACKLOG_BYTES >> 10} KiB waiting each",
         *(f"osc://{destination}: gestures, and the status once a second" for destination in settings.publish),
     ]
     computes = [
         "decode, check, stamp; subtract the baseline, compare with the noise; no smoothing, no inference",
-        f"after a contact: {'touch-pattern features' if forest else 'the window of its frames'}, one inference",
+        f"after a contact: {'touch-pattern features' if forest else 'its frames as a window'}, one inference",
         f"a contact is decided {timing.release_s:g} s after it was let go"
         + (f", a tap {timing.tap_gap_s:g} s after it, since a second one may come" if waits else ""),
     ]

@@ -1,14 +1,15 @@
 """/metrics, /healthz and /readyz, from a thread with an event loop of its own.
 
 So they answer while the daemon's loop hangs, and then /healthz says 503. A connection has DEADLINE_S in all
-and a bounded request; slow clients wait on their own and hold nobody up. Only loaded where `--metrics` is set.
+and a bounded request; slow clients wait on their own and hold nobody up. Only loaded where `--metrics` is
+set.
 """
 
 import asyncio
 import json
 import socket
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 DEADLINE_S = 5.0
 REQUEST_BYTES = 8192
@@ -25,7 +26,7 @@ _REASONS = {
 }
 
 
-def as_json(status: int, **body: object) -> Answer:
+def as_json(status: int, body: Mapping[str, object]) -> Answer:
     """An answer of one JSON object."""
     return status, "application/json", json.dumps(body).encode() + b"\n"
 
@@ -71,16 +72,21 @@ class HttpThread:
     def _answer(self, head: bytes) -> bytes:
         words = head.split(b"\r\n", 1)[0].split()
         if len(words) != 3 or not words[2].startswith(b"HTTP/1."):
-            status, kind, body = as_json(400, error="not an HTTP/1 request")
+            status, kind, body = as_json(400, {"error": "not an HTTP/1 request"})
         elif words[0] not in (b"GET", b"HEAD"):
-            status, kind, body = as_json(405, error="only GET and HEAD")
+            status, kind, body = as_json(405, {"error": "only GET and HEAD"})
         else:
             route = self._routes.get(words[1].split(b"?", 1)[0].decode("latin-1"))
             try:
                 status, kind, body = (
-                    route() if route else as_json(404, error="not found", paths=list(self._routes))
+                    route() if route else as_json(404, {"error": "not found", "paths": list(self._routes)})
                 )
             except Exception as error:  # a bug in a route is this answer's end, not the server's
-                status, kind, body = as_json(500, error=repr(error))
-        header = f"HTTP/1.1 {status} {_REASONS[status]}\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\nConnection: close\r\n\r\n"
-        return header.encode() + (b"" if words[:1] == [b"HEAD"] else body)
+                status, kind, body = as_json(500, {"error": repr(error)})
+        header = (
+            f"HTTP/1.1 {status} {_REASONS[status]}",
+            f"Content-Type: {kind}",
+            f"Content-Length: {len(body)}",
+            "Connection: close\r\n\r\n",
+        )
+        return "\r\n".join(header).encode() + (b"" if words[:1] == [b"HEAD"] else body)

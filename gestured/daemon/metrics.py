@@ -1,7 +1,8 @@
-"""What is counted. Plain integers, always; prometheus_client only formats them, and only where `--metrics` is set.
+"""What is counted. Plain integers, always; prometheus_client only formats them, and only where `--metrics`
+is set.
 
-The loop's thread counts, the HTTP thread reads copies. The number of series is bounded whatever arrives: labels
-that a peer can choose (sensors) are folded together after the first few.
+The loop's thread counts, the HTTP thread reads copies. The number of series is bounded whatever arrives:
+labels that a peer can choose (sensors) are folded together after the first few.
 """
 
 from bisect import bisect_left
@@ -9,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from gestured import __version__
+from gestured.core.events import Cancelled, Event, Gesture, Unknown
 
 NAMED_SENSORS = 8  # further sensors are counted together as "other"
 NAMED_VALUES = 32  # bound of any other label
@@ -79,6 +81,20 @@ class Metrics:
         self.gauges: dict[str, tuple[str, Callable[[], float]]] = {}
         self.active_model: Callable[[], str] = str
         self._named: set[str] = set()
+
+    def event(self, event: Event, run_s: float) -> None:
+        """Count an event; `run_s` is what the classifier took for it."""
+        if isinstance(event, Gesture | Unknown):
+            self.inference.observe(run_s, event.model)
+            self.latency.observe(event.decided - event.offset)
+            if event.degraded:
+                self.degraded.add()
+        if isinstance(event, Gesture):
+            self.gestures.add(event.gesture)
+        elif isinstance(event, Unknown):
+            self.unknown.add()
+        elif isinstance(event, Cancelled):
+            self.cancelled.add(event.reason)
 
     def sensor_label(self, sensor: str) -> str:
         """The sensor's name for the first few, "other" after that."""

@@ -1,8 +1,10 @@
-"""From arrivals to events: one recognizer a sensor, who may feed it, and what happens when it falls silent or breaks.
+"""From arrivals to events: one recognizer a sensor, who may feed it, and what happens when it falls silent
+or breaks.
 
-Time comes in as an argument. A bug in the path of one sensor is logged with its traceback, counted, and answered
-by resetting that sensor's recognizer: its contact ends, the other sensors go on. That is the one place where a bug
-does not end the program: a daemon in a vehicle that dies of one sensor's odd frame helps nobody.
+Time comes in as an argument. A bug in the path of one sensor is logged with its traceback, counted, and
+answered by resetting that sensor's recognizer: its contact ends, the other sensors go on. That is the one
+place where a bug does not end the program: a daemon in a vehicle that dies of one sensor's odd frame helps
+nobody.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +19,8 @@ from gestured.core.segmentation import Timing
 from gestured.core.wire import Arrival, Stamper
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.settings import Grid, SensorSettings, Settings
+from gestured.daemon.settings import SensorSettings, Settings
+from gestured.daemon.values import Grid
 from gestured.models import Ladder
 
 FORGET_S = 60.0  # a sensor that never made a gesture and is silent for this long gives its place to a new one

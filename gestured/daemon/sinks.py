@@ -7,8 +7,8 @@ from gestured.core import wire
 from gestured.core.events import Event, Gesture, Status
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.settings import Address
 from gestured.daemon.sockets import resolve
+from gestured.daemon.values import Address
 
 
 class Sink(Protocol):

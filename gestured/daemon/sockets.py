@@ -1,4 +1,5 @@
-"""Sockets are made here, all before the daemon says that it is ready; what cannot be had ends it with status 4."""
+"""Sockets are made here, all before the daemon says that it is ready; what cannot be had ends it with status
+4."""
 
 import errno
 import fcntl
@@ -6,9 +7,10 @@ import os
 import socket
 import stat
 from pathlib import Path
+from typing import Any
 
 from gestured.core.errors import GesturedError
-from gestured.daemon.settings import Address
+from gestured.daemon.values import Address
 
 RECEIVE_BYTES = 4 << 20  # the default holds 166 frames of 9 x 9 floats, this 6,500
 BACKLOG = 128
@@ -18,7 +20,7 @@ class AddressError(GesturedError):
     """An address or a socket that cannot be bound."""
 
 
-def resolve(address: Address, kind: int) -> tuple[int, tuple[str | int, ...]]:
+def resolve(address: Address, kind: int) -> tuple[int, Any]:
     """(family, socket address) of a host and port; blocks while a name is looked up. Raises OSError."""
     family, _, _, _, where = socket.getaddrinfo(address.host, address.port, type=kind)[0]
     return family, where
@@ -64,8 +66,8 @@ class UnixListener:
     """A listening Unix stream socket at `path` that no other daemon is using.
 
     A lock file beside it is held as long as we live, so two daemons that start at once cannot both win. What
-    is already at the path is probed: a socket that answers is another program's, one that refuses is stale and
-    replaced, anything else is not ours to remove.
+    is already at the path is probed: a socket that answers is another program's, one that refuses is stale
+    and replaced, anything else is not ours to remove.
     """
 
     def __init__(self, path: Path) -> None:

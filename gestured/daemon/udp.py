@@ -1,7 +1,8 @@
 """OSC over UDP in: reads what waits, decodes it, and hands each sensor its frames.
 
-A reader of its own instead of a DatagramProtocol: it takes everything that waits before it looks at the clock, so
-that after a stall of the loop the frames are spread over the time they took, and it costs less per packet.
+A reader of its own instead of a DatagramProtocol: it takes everything that waits before it looks at the
+clock, so that after a stall of the loop the frames are spread over the time they took, and it costs less per
+packet.
 """
 
 import asyncio

@@ -1,0 +1,32 @@
+"""The models that a configuration asks for."""
+
+from gestured.core.errors import SettingsError
+from gestured.daemon.log import log
+from gestured.daemon.settings import Settings
+from gestured.models import Ladder, ladder_for
+
+
+def open_ladder(settings: Settings) -> Ladder:
+    """Open and test them. Raises ModelError, or SettingsError for gestures that they do not know."""
+    early: list[str] = []
+    opened = False  # until then a failure may end the start, and the error says it all
+
+    def report(sentence: str) -> None:
+        if opened:
+            log.warning("model", what=sentence)
+        else:
+            early.append(sentence)
+
+    ladder = ladder_for(settings.model, settings.fallback or None, report=report)
+    opened = True
+    for sentence in early:
+        report(sentence)
+    known = ladder.gestures
+    for name in (*(settings.gestures or ()), *settings.per_gesture):
+        if name not in known:
+            raise SettingsError(
+                f"gestures: {name!r} is no gesture of {ladder.name}, expected any of {', '.join(known)}"
+            )
+    if settings.gestures == ():
+        raise SettingsError("gestures: an empty list, expected at least one gesture")
+    return ladder

@@ -1,0 +1,111 @@
+"""Where settings come from, and what is said when they are wrong.
+
+Flags win over `GESTURED_*` in the environment, that over the TOML file, that over the defaults. The three are
+merged first and validated once, as a whole; an error names the key, the value, where it came from and what
+was expected. pydantic-settings would do the merging for 105 ms more at every start.
+"""
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from gestured.core.errors import SettingsError
+from gestured.daemon.settings import FLAGS, AddressSettings, GestureSettings, Part, SensorSettings, Settings
+
+ENVIRONMENT = "GESTURED_"
+
+
+def _from_file(path: str) -> dict[str, Any]:
+    try:
+        found = tomllib.loads(Path(path).read_text("utf-8"))
+    except OSError as error:
+        raise SettingsError(f"config: cannot read {path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SettingsError(f"config: {path} is not valid TOML: {error}") from None
+    if "per_gesture" in found:  # our own name for the tables of [gestures], no key of the file's
+        raise SettingsError(f"per_gesture ({path}): unknown key, expected [gestures.NAME]")
+    if isinstance(found.get("gestures"), dict):
+        tables = found.pop("gestures")
+        if isinstance(tables.get("use"), list):
+            found["gestures"] = tables.pop("use")
+        found["per_gesture"] = tables
+    return found
+
+
+def _from_environment(environ: Mapping[str, str]) -> dict[str, str]:
+    found = {
+        name.removeprefix(ENVIRONMENT).lower(): value
+        for name, value in environ.items()
+        if name.startswith(ENVIRONMENT)
+    }
+    for key in found:
+        if key not in FLAGS and key != "config":
+            name = ENVIRONMENT + key.upper()
+            known = tuple(ENVIRONMENT + flag.upper() for flag in FLAGS)
+            raise SettingsError(f"{name} = {found[key]!r} (environment): {_unknown(name, known)}")
+    return found
+
+
+def _unknown(key: str, known: tuple[str, ...]) -> str:
+    near = difflib.get_close_matches(key, known, 1)
+    return (
+        f"unknown key, did you mean {near[0]}?"
+        if near
+        else f"unknown key, expected one of {', '.join(known)}"
+    )
+
+
+def _keys_at(place: tuple[Any, ...]) -> tuple[str, ...]:
+    if len(place) < 2:
+        return tuple("gestures" if name == "per_gesture" else name for name in Settings.model_fields)
+    parts: dict[str, type[Part]] = {
+        "sensors": SensorSettings,
+        "per_gesture": GestureSettings,
+        "addresses": AddressSettings,
+    }
+    return tuple(parts[place[0]].model_fields)
+
+
+def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:
+    place = tuple(part for part in problem["loc"] if part not in ("[key]",))
+    source = sources.get(str(place[0]), "default")
+    if problem["type"] == "extra_forbidden":
+        expected = _unknown(str(place[-1]), _keys_at(place))
+    else:
+        ours = problem["type"] == "value_error"
+        message = problem["msg"].removeprefix("Value error, " if ours else "Input should be ")
+        message = message if ours else message[0].lower() + message[1:]
+        expected = message if "expected" in message else "expected " + message
+    key = ".".join("gestures" if part == "per_gesture" else str(part) for part in place)
+    return f"{key} = {problem['input']!r} ({source}): {expected}"
+
+
+def load(flags: Mapping[str, Any], environ: Mapping[str, str]) -> tuple[Settings, dict[str, str]]:
+    """Merge and validate. `flags` holds only what was given on the command line, and `config`.
+
+    Returns the settings and where each key that was set came from. Raises SettingsError.
+    """
+    environment = _from_environment(environ)
+    path = flags.get("config") or environment.pop("config", None)
+    environment.pop("config", None)
+    file = _from_file(path) if path else {}
+    merged: dict[str, Any] = {}
+    sources: dict[str, str] = {}
+    for values, source in (
+        (file, str(path)),
+        (environment, "environment"),
+        ({key: value for key, value in flags.items() if key != "config"}, "command line"),
+    ):
+        merged |= values
+        sources |= dict.fromkeys(values, source)
+    try:
+        return Settings.model_validate(merged), sources
+    except ValidationError as error:
+        problems = error.errors(include_url=False, include_context=False)
+        raise SettingsError(
+            "; ".join(dict.fromkeys(_explain(problem, sources) for problem in problems))
+        ) from None

@@ -1,0 +1,87 @@
+"""Values that settings are made of: how they are written, and what is said where they are not."""
+
+import ipaddress
+import os
+import re
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+from pydantic import BeforeValidator
+
+SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
+
+
+class Address(NamedTuple):
+    """A host (name or literal) and a port; port 0 means any free one."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+
+
+class Grid(NamedTuple):
+    """Rows and columns of a sensor's frames as they are sent, before rotation."""
+
+    rows: int
+    columns: int
+
+    def __str__(self) -> str:
+        return f"{self.rows}x{self.columns}"
+
+
+def _address(value: object) -> Address:
+    match = re.fullmatch(r"(?:\[([0-9A-Fa-f:.%\w]+)\]|([^\[\]:/\s]+)):(\d{1,5})", str(value))
+    if not isinstance(value, str) or match is None or int(match[3]) > 65535:
+        raise ValueError("HOST:PORT with a port from 0 to 65535, such as 127.0.0.1:9000 or [::1]:9000")
+    return Address(match[1] or match[2], int(match[3]))
+
+
+def _destination(value: object) -> Address:
+    try:
+        if not isinstance(value, str) or not value.startswith("osc://"):
+            raise ValueError
+        address = _address(value.removeprefix("osc://").rstrip("/"))
+        if address.port == 0:
+            raise ValueError
+    except ValueError:
+        raise ValueError(
+            "osc://HOST:PORT with a port from 1 to 65535, such as osc://127.0.0.1:9001"
+        ) from None
+    return address
+
+
+def _grid(value: object) -> Grid:
+    match = re.fullmatch(r"(\d{1,3})x(\d{1,3})", str(value))
+    if not isinstance(value, str) or match is None or not all(2 <= int(n) <= 64 for n in match.groups()):
+        raise ValueError("ROWSxCOLUMNS, each from 2 to 64, such as 9x9 or 27x15")
+    return Grid(int(match[1]), int(match[2]))
+
+
+def _socket(value: object) -> Path:
+    if not isinstance(value, str | Path) or not str(value) or len(os.fsencode(value)) > SOCKET_PATH_BYTES:
+        raise ValueError(f"the path of a Unix socket, at most {SOCKET_PATH_BYTES} bytes long")
+    return Path(value)
+
+
+def _network(value: object) -> ipaddress.IPv4Network | ipaddress.IPv6Network:
+    try:
+        if isinstance(value, str):
+            return ipaddress.ip_network(value, strict=False)
+    except ValueError:
+        pass
+    raise ValueError("an address or a network, such as 127.0.0.1, 192.168.7.0/24 or fd00::/8")
+
+
+def _listed(value: object) -> object:
+    """A flag or a variable holds several values with commas between them; the file holds a list."""
+    return [word.strip() for word in value.split(",") if word.strip()] if isinstance(value, str) else value
+
+
+Listed = BeforeValidator(_listed)
+AddressField = Annotated[Address, BeforeValidator(_address)]
+GridField = Annotated[Grid, BeforeValidator(_grid)]
+NetworkField = Annotated[ipaddress.IPv4Network | ipaddress.IPv6Network, BeforeValidator(_network)]
+DestinationField = Annotated[Address, BeforeValidator(_destination)]
+SocketField = Annotated[Path, BeforeValidator(_socket)]
