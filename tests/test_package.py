@@ -30,7 +30,8 @@ EXTRAS = (
 )
 ALL_BUT_LAB = """
 import importlib, pkgutil, gestured
-names = [m.name for m in pkgutil.walk_packages(gestured.__path__, "gestured.") if not m.name.endswith("__main__")]
+found = pkgutil.walk_packages(gestured.__path__, "gestured.")
+names = [module.name for module in found if not module.name.endswith("__main__")]
 for name in names:
     if not name.startswith("gestured.lab"):
         importlib.import_module(name)
