@@ -50,17 +50,18 @@ def circle(sense: float) -> Callable[[Scene], list[Contact]]:
 
     def performed(scene: Scene) -> list[Contact]:
         rng, person = scene.rng, scene.person
-        radius = float(np.clip(scene.small * (0.12 + 0.28 * scene.reach()) * scene.grow, 6.0, 60.0))
+        radius = float(np.clip(scene.small * (0.1 + 0.31 * scene.reach()) * scene.grow, 6.0, 60.0))
         total = math.radians(rng.uniform(300.0, 400.0) if rng.random() < 0.75 else rng.uniform(270.0, 450.0))
         move = float(np.clip(0.95 * (radius / 18.0) ** 0.3 / scene.rate * rng.lognormal(0.0, 0.2), 0.45, 3.2))
         before, after = (0.6 * rest for rest in scene.rests())
         t = grid(before + move + after)
         tau = np.clip((t - before) / move, 0.0, 1.0)
         first = rng.normal(math.pi / 2, 0.9) if rng.random() < 0.55 else rng.uniform(-math.pi, math.pi)
-        size = radius * (1.0 + rng.normal(0.0, 0.12) * (tau - 0.5) * 2.0)
-        x, y = ellipse(
-            first + sense * total * turning(tau, rng), size, rng.uniform(1.0, 1.6), rng.uniform(0.0, math.pi)
-        )
+        phase = first + sense * total * turning(tau, rng)
+        # It does not close, and it has the corners of an egg or a rounded triangle.
+        egg = rng.uniform(0.0, 0.09) * np.cos(int(rng.integers(2, 4)) * phase + rng.uniform(0.0, 6.3))
+        size = radius * (1.0 + rng.normal(0.0, 0.12) * (tau - 0.5) * 2.0 + egg)
+        x, y = ellipse(phase, size, rng.uniform(1.0, 1.6), rng.uniform(0.0, math.pi))
         drift = rng.normal(0.0, 0.13, 2) * radius
         sway = 0.6 * person.wobble_mm * min(1.0, radius / 15.0)
         x = x + drift[0] * tau + sway * wander(t, rng, 0.4, 3.0, 3)

@@ -2,7 +2,7 @@
 
 A contact's size grows with its force: Hertz gives F^(1/3) for a pressed sphere's radius; these people lie
 between F^0.08 and F^0.35. Tremor is the physiological 8 to 12 Hz of some hundredths to tenths of a mm. Arm
-poses turn and bend strokes about the wrist or the elbow. The distributions are invented within plausible bounds.
+poses turn and bend strokes about wrist or elbow. The distributions are invented within plausible bounds.
 """
 
 import math

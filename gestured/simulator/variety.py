@@ -12,10 +12,12 @@ def _log(rng: np.random.Generator, low: float, high: float) -> float:
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
-def _grid(rng: np.random.Generator) -> tuple[int, int]:
-    """Mostly 9 x 9, else 5 to 32 rows and columns, at most twice as long as wide."""
+def _grid(rng: np.random.Generator, screen: bool) -> tuple[int, int]:
+    """Mostly 9 x 9, else 5 to 32 rows and columns, at most twice as long as wide; phones often 27 x 15."""
     if rng.random() < 0.7:
         return 9, 9
+    if screen and rng.random() < 0.6:
+        return 27, 15
     small = int(rng.integers(5, 21)) if rng.random() < 0.8 else int(rng.integers(20, 33))
     if rng.random() < 0.4:
         return small, small
@@ -43,8 +45,8 @@ def _lags(rng: np.random.Generator, hard: float) -> tuple[tuple[float, ...], tup
 def any_sensor(rng: np.random.Generator, hardness: float) -> Sensor:
     """A random sensor: a fifth like touchscreens (sharp blobs, no offset, 8 bits), the rest textiles."""
     hard = min(max(hardness, 0.0), 1.0)
-    rows, columns = _grid(rng)
     screen = rng.random() < 0.22
+    rows, columns = _grid(rng, screen)
     # The pad measures 40 to 130 mm across whatever its grid: hands do not scale with taxels.
     pitch = _log(rng, 45.0, 120.0) / min(rows, columns)
     rate = 15.0 * float(rng.normal(1.0, 0.03)) if rng.random() < 0.75 else _log(rng, 10.0, 100.0)
