@@ -23,6 +23,10 @@ NOISE_TAU_S = 30.0
 REVIEW_S = 0.5  # noise moves slowly: it is looked at twice a second
 RESTLESS = 5.0  # a taxel that moves more than this many times the sensor's noise was touched, or is bad
 NOISY = 8.0  # a taxel with more than this many times the sensor's noise is bad
+FROZEN_S = 0.4  # a pressed taxel that does not change by its noise for so long is no finger
+COMMON = 4.0  # noise units of what all taxels share that are taken off; a palm must not cancel itself
+BLOB = (0.5, 1.0, 0.5)  # a fingertip over three taxels, in rows and in columns
+BLOB_GAIN = sum(BLOB) ** 2 / sum(b * b for b in BLOB)  # of a level that all taxels share
 STRIKES = 2  # gestures in which a taxel stood still while its neighbours were pressed
 
 
@@ -60,7 +64,7 @@ class Mounting:
         return x, y
 
 
-Learned = tuple[Array, Array, NDArray[np.bool_], bool, float]  # baseline, noise, constant taxels, stable?, activity
+Learned = tuple[Array, Array, NDArray[np.bool_], bool, float, Array]  # baseline, noise, constant, stable, step, frames
 
 
 class Settling:
@@ -93,19 +97,18 @@ class Settling:
         if t - frames[0][0] < SETTLE_S or len(frames) < 4:
             return None
         stack = np.array([f for _, f in frames])  # (n, N)
-        baseline, noise, constant, restless = _idle(stack)
-        activity = float(np.median(((stack - baseline) / noise).max(axis=1)))
+        baseline, noise, constant, restless, step = _idle(stack)
         stable = restless <= min(3, raw.size // 20)
         if not stable and not (patience and t - self._since >= PATIENCE_S):
             while t - frames[0][0] >= SETTLE_S / 2:  # the newer half may be the first half of a stable second
                 frames.popleft()
             return None
         self.clear()
-        return baseline, noise, constant, stable, activity
+        return baseline, noise, constant, stable, step, stack
 
 
-def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int]:
-    """(n, N) counts -> baseline (N,), noise (N,), taxels that never changed (N,), how many taxels moved."""
+def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int, float]:
+    """(n, N) counts -> baseline (N,), noise (N,), taxels that never changed (N,), how many moved, quantum."""
     n = len(stack)
     baseline = np.median(stack, axis=0)
     # Successive differences see noise and not slow movement; mean absolute values, since one outlier must not rule.
@@ -124,7 +127,7 @@ def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int]:
     constant = ~jumps.any(axis=0)
     if clipped or pooled < step or np.count_nonzero(constant) > stack.shape[1] // 4:
         constant[:] = False  # a clipped or coarse sensor stands still when idle: that proves nothing
-    return baseline, noise, constant, moved
+    return baseline, noise, constant, moved, step
 
 
 def quantum(stack: Array, jumps: Array) -> float:
@@ -149,12 +152,18 @@ class Conditioner:
         self._sigma: Array = np.ones(rows * columns)
         self._weight: Array = np.ones(rows * columns)  # 1 / noise, 0 for bad taxels
         self._stuck = np.zeros(rows * columns, dtype=bool)
+        self._frozen = np.zeros(rows * columns, dtype=bool)
+        self._still_since = np.full(rows * columns, math.inf)  # s
+        self._previous: Array = np.zeros(rows * columns)  # raw counts
+        self._rail = -math.inf  # the largest raw count seen under a touch
+        self._step = math.inf  # quantisation
         self._strikes = np.zeros(rows * columns, dtype=np.int64)
         self.bad = np.zeros(rows * columns, dtype=bool)
         self.noise = 1.0  # counts, the median taxel's standard deviation
         self._tracked: float | None = None
         self._reviewed = 0.0
-        self._typical = 0.8 * math.sqrt(2 * math.log(rows * columns))  # median of the largest of N normal deviates
+        self._down, self._across = _blob(rows), _blob(columns)
+        self._typical = 0.88 * math.sqrt(2 * math.log(rows * columns))  # median activity of N normal deviates
         self._usual = self._typical  # idle activity, as it is
         self._scale = 1.0  # by which single taxels' noise understates the idle activity
 
@@ -171,18 +180,31 @@ class Conditioner:
         self._tracked = None
 
     def deviation(self, raw: Array) -> tuple[Array, float, float]:
-        """(N,) raw counts -> (N,) counts above the baseline; the largest (activity) and the lowest in units of noise."""
+        """(N,) raw counts -> (N,) counts above the baseline; activity and the lowest taxel in units of noise."""
         d = raw - self._baseline
         scaled = d * self._weight
-        return d, float(scaled.max()), float(scaled.min())
+        return d, self.activity(scaled), float(scaled.min())
+
+    def activity(self, scaled: Array) -> float:
+        """The strongest spot of (N,) deviations in units of noise: a taxel alone, or with its neighbours.
+
+        A finger between taxels gives each of them half of what it gives; weighing the neighbours in (the matched
+        filter of a blob, normalised to the same noise) finds it all the same. What all taxels share is no finger.
+        """
+        middle = float(np.partition(scaled, scaled.size // 2)[scaled.size // 2])
+        spots = self._down @ scaled.reshape(self.rows, self.columns) @ self._across
+        common = min(max(middle, -COMMON), COMMON)
+        return max(float(scaled.max()) - common, float(spots.max()) - common * BLOB_GAIN)
 
     def place(self, d: Array) -> tuple[float, float]:
-        """Centroid (row, column) of what clearly rises above the baseline, bad taxels left out."""
+        """Centroid (row, column) of what clearly rises above baseline and noise, bad taxels left out."""
         pressed = np.where(self._weight > 0, d, 0.0)
         top = float(pressed.max())
-        pressed = np.maximum(pressed / top - 0.3, 0.0) if top > 0 else np.ones_like(pressed)
-        grid = pressed.reshape(self.rows, self.columns)
+        cut = 0.3 * top if 3.5 * self.noise >= top else max(0.3 * top, 3.5 * self.noise)
+        grid = np.maximum(pressed - cut, 0.0).reshape(self.rows, self.columns)
         total = float(grid.sum())
+        if not total > 0:
+            return (self.rows - 1) / 2, (self.columns - 1) / 2
         return (
             float(grid.sum(axis=1) @ np.arange(self.rows)) / total,
             float(grid.sum(axis=0) @ np.arange(self.columns)) / total,
@@ -193,11 +215,15 @@ class Conditioner:
         learned = self._settling.push(t, raw, patience=not self.ready)
         if learned is None:
             return False
-        self._baseline, self._sigma, self._stuck, stable, activity = learned
+        self._baseline, self._sigma, self._stuck, stable, self._step, stack = learned
+        self._frozen[:] = False
         self._provisional = not stable
         self.ready = True
         self._tracked = self._reviewed = t
-        self._scale, self._usual = 1.0, activity
+        self._scale, self._usual = 1.0, 0.0
+        self._review()
+        scaled = (stack - self._baseline) * self._weight
+        self._usual = float(np.median([self.activity(row) for row in scaled]))
         self._review()
         return True
 
@@ -219,6 +245,8 @@ class Conditioner:
             self.settle(t, raw)
         elif self._settling.started:
             self._settling.clear()
+        if self._frozen.any():
+            self._freeze(t, raw, d)
         if self._tracked is not None:
             tau = RECOVERY_TAU_S if recovering else BASELINE_TAU_S
             self._usual += (min(activity, 2 * self._typical) * self._scale - self._usual) * -math.expm1(
@@ -232,11 +260,25 @@ class Conditioner:
                 self._review()
         self._tracked = t
 
-    def busy(self) -> None:
-        """The sensor is touched: nothing is learned, and the time that passes is not tracked afterwards."""
+    def busy(self, t: float, raw: Array, d: Array) -> None:
+        """The sensor is touched: the baseline stands still, and taxels that froze in mid-air are found."""
         self._tracked = None
         if self._settling.started:
             self._settling.clear()
+        self._freeze(t, raw, d)
+
+    def _freeze(self, t: float, raw: Array, d: Array) -> None:
+        """A finger trembles; what stays pressed to the last digit, below the sensor's limit, is a fault of the sensor."""
+        changed = raw != self._previous
+        self._previous = raw
+        self._still_since = np.where(changed, t, np.minimum(self._still_since, t))
+        if self.noise < 0.6 * self._step:  # too coarse to see a finger tremble
+            return
+        self._rail = max(self._rail, float(raw.max()))
+        frozen = (t - self._still_since >= FROZEN_S) & (d > 3 * self._sigma) & (raw < self._rail)
+        if (frozen != self._frozen).any():
+            self._frozen = frozen
+            self._review()
 
     def inspect(self, frames: Array) -> None:
         """Look at a finished contact (T, N), not yet bridged: a taxel that stood still under pressure is stuck."""
@@ -270,12 +312,19 @@ class Conditioner:
     def _review(self) -> None:
         """Weights, the sensor's noise and its bad taxels from what is known of each taxel."""
         self.noise = float(np.median(self._sigma))
-        self.bad = self._stuck | (self._sigma > NOISY * self.noise)
+        self.bad = self._stuck | self._frozen | (self._sigma > NOISY * self.noise)
         if self.bad.all():
             self.bad = np.zeros_like(self.bad)
         # Clipping, hum and bursts make idle maxima larger than normal deviates': activity is told in what is usual here.
         self._scale = min(max(self._usual / self._typical, 1.0), 5.0)
         self._weight = np.where(self.bad, 0.0, 1.0 / (self._scale * np.maximum(self._sigma, 0.2 * self.noise)))
+
+
+def _blob(size: int) -> Array:
+    """(size, size) banded weights of `BLOB`, normalised so that white noise keeps its size."""
+    side, middle, _ = BLOB
+    band = middle * np.eye(size) + side * (np.eye(size, k=1) + np.eye(size, k=-1))
+    return np.asarray(band / math.sqrt(sum(b * b for b in BLOB)))
 
 
 def _neighbour_mean(grid: NDArray[np.floating], good: NDArray[np.bool_]) -> Array:

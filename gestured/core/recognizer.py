@@ -141,7 +141,7 @@ class FrontEnd:
         for action in segmenter.push(t, activity, place):
             out += self._act(action, t)
         if segmenter.phase in TOUCHED:
-            conditioner.busy()
+            conditioner.busy(t, raw, d)
             return out
         while kept[0][0] < t - LEAD_S:
             kept.popleft()
@@ -180,12 +180,22 @@ class FrontEnd:
             return [Onset(self.sensor, self._id, t)]
         if action is Action.HELD:
             return [Cancelled(self.sensor, self._id, "held")]
-        release = Release(self.sensor, self._id, offset)
         if action is Action.LEFT:
-            return [release]
+            return [Release(self.sensor, self._id, offset)]
+        if action is Action.SPLIT:
+            first = self._closed(t, self.segmenter.split_onset, self.segmenter.earlier)
+            self._id += 1
+            return [*first, Onset(self.sensor, self._id, self.segmenter.onset)]
+        return self._closed(t, self.segmenter.onset, offset)
+
+    def _closed(self, t: float, onset: float, offset: float) -> list[Contact]:
+        release = Release(self.sensor, self._id, offset)
         if self.segmenter.contact_s() < self.timing.glitch_s:
             return [Cancelled(self.sensor, self._id, "glitch"), release]
-        return [Cut(self._id, self._segment(), t), release]
+        segment = self._segment(onset, offset)
+        if float(segment.frames.max()) < self.segmenter.off * segment.noise:  # nothing is left without its bad taxels
+            return [Cancelled(self.sensor, self._id, "stuck"), release]
+        return [Cut(self._id, segment, t), release]
 
     def _cancel(self, reason: str) -> list[Contact]:
         release = Release(self.sensor, self._id, self.segmenter.last_touched)
@@ -193,11 +203,11 @@ class FrontEnd:
             return [release]
         return [Cancelled(self.sensor, self._id, reason), release]
 
-    def _segment(self) -> Segment:
+    def _segment(self, onset: float, offset: float) -> Segment:
         times = np.array([k[0] for k in self._kept])
         stack = np.array([k[1] for k in self._kept])
-        first = int(np.searchsorted(times, self.segmenter.onset))
-        last = int(np.searchsorted(times, self.segmenter.last_touched))
+        first = int(np.searchsorted(times, onset))
+        last = int(np.searchsorted(times, offset))
         self.conditioner.inspect(stack[first : last + 1])
         limit = float(np.finfo(np.float32).max)
         frames = np.clip(self.conditioner.bridge(stack), -limit, limit).astype(np.float32)

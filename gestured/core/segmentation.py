@@ -4,6 +4,7 @@ Activity is the largest taxel in units of its own noise. The cases, and what bec
 
     tap          ##..............   one segment, decided after `tap_gap_s` of quiet: a second tap may come
     double tap   ##...##..          one segment of two contacts, decided `release_s` after the second
+    tap, swipe   ##...######..      two segments, told apart as soon as the second contact moves
     swipe        ########..         one segment, decided `release_s` after the finger left
     flicker      ###.####..         one contact: a single quiet frame is shorter than `release_s`
     hold         ############...    after `limit_s` cancelled ("held"); nothing more until it is let go
@@ -57,6 +58,7 @@ class Signal(Enum):
     RELEASED = auto()  # quiet for release_s
     TAPPED = auto()  # the same, and the segment is one tap so far
     GAP_OVER = auto()  # quiet for tap_gap_s
+    MOVED = auto()  # the second contact is no tap, so it does not belong to the first
     LIMIT = auto()
 
 
@@ -65,6 +67,7 @@ class Action(Enum):
 
     OPEN = auto()
     CLOSE = auto()
+    SPLIT = auto()  # the first contact is a segment, the second one begins another
     HELD = auto()  # give the segment up
     LEFT = auto()  # a given-up contact was let go
 
@@ -77,6 +80,7 @@ TRANSITIONS: dict[tuple[Phase, Signal], tuple[Phase, Action | None]] = {
     (P.CONTACT, S.QUIET): (P.RELEASING, None),
     (P.CONTACT, S.WEAK): (P.CONTACT, None),
     (P.CONTACT, S.STRONG): (P.CONTACT, None),
+    (P.CONTACT, S.MOVED): (P.CONTACT, A.SPLIT),
     (P.CONTACT, S.LIMIT): (P.SPENT, A.HELD),
     (P.RELEASING, S.QUIET): (P.RELEASING, None),
     (P.RELEASING, S.WEAK): (P.RELEASING, None),
@@ -116,6 +120,7 @@ class Segmenter:
         """Start clean, in IDLE."""
         self.phase = Phase.IDLE
         self.onset = self.last_touched = 0.0  # s, of the segment
+        self.earlier = self.split_onset = 0.0  # s, when its first contact was last touched; its onset, once split off
         self._began = 0.0  # s, of the contact
         self._contacts = 0
         self._peak = 0.0
@@ -138,10 +143,11 @@ class Segmenter:
         elif self.phase is Phase.CONTACT:
             if before is not Phase.CONTACT and before is not Phase.RELEASING:
                 self._began = t
-                self._box = None
+                self._box, self._widest = None, 0.0
                 self._contacts = 1 if before is Phase.IDLE else self._contacts + 1
+                self.earlier = self.last_touched
             if before is Phase.IDLE:
-                self.onset, self._peak, self._widest = t, 0.0, 0.0
+                self.onset, self._peak = t, 0.0
             elif self._contacts == 1 and self._peak < OFF_SHARE * activity:
                 # What came before was too faint to belong to this contact: a hover, or noise.
                 self.onset = self._began = t
@@ -151,6 +157,9 @@ class Segmenter:
             self._quiet_since = None
             if place is not None and level is Signal.STRONG:
                 self._follow(place)
+            if self._contacts == 2 and not self._tap_so_far():
+                self._step(t, Signal.MOVED, actions)
+                self.split_onset, self.onset, self._contacts = self.onset, self._began, 1
         elif self.phase is not Phase.IDLE:
             self._quiet_since = self._since(t)
         return actions
@@ -201,7 +210,7 @@ class Segmenter:
         if self.phase is Phase.IDLE:
             if activity < on:  # the common case first
                 return Signal.QUIET if activity < off else Signal.WEAK
-            return Signal.STRONG if activity >= self.after_effect(t) else Signal.WEAK
+            return Signal.STRONG if activity >= on + self.after_effect(t) else Signal.WEAK
         if self.phase is Phase.SPENT:
             return Signal.QUIET if activity < off else Signal.STRONG
         if activity < max(off, OFF_SHARE * self._peak):
@@ -215,12 +224,9 @@ class Segmenter:
         self._box = (top, left, bottom, right)
         self._widest = max(self._widest, math.hypot(bottom - top, right - left))
 
+    def _tap_so_far(self) -> bool:
+        """Whether the contact is short and stayed where it was."""
+        return self.last_touched - self._began <= self.timing.tap_s and self._widest <= self._travel
+
     def _is_tap(self) -> bool:
-        short = self.last_touched - self._began <= self.timing.tap_s
-        return (
-            self._wait
-            and self.phase is Phase.RELEASING
-            and self._contacts == 1
-            and short
-            and self._widest <= self._travel
-        )
+        return self._wait and self.phase is Phase.RELEASING and self._contacts == 1 and self._tap_so_far()
