@@ -52,6 +52,7 @@ class Daemon:
         )
         assert self.process.stdout is not None
         self.ready: dict[str, Any] = json.loads(self.process.stdout.readline())
+        self.ending = False
         self.port = int(self.ready["listen"].rsplit(":", 1)[1])
 
     def stream(self, *types: str) -> Stream:
@@ -63,8 +64,14 @@ class Daemon:
             lines = answer.read().decode().splitlines()
         return int(sum(float(line.split()[-1]) for line in lines if line.startswith("gestured_frames_total")))
 
+    def end(self) -> None:
+        """Ask it to end, once; what it has still to say, it says before."""
+        if not self.ending:
+            self.ending = True
+            self.process.terminate()
+
     def close(self) -> int:
-        self.process.terminate()
+        self.end()
         status = self.process.wait(20)
         self.process.stdout.close()
         return status
@@ -144,7 +151,7 @@ def test_real_fingers(daemon: Daemon):
     stream = daemon.stream("gesture", "release")
     begun = {number: send_session(daemon, sessions, number) for number in chosen}
     assert daemon.process.poll() is None
-    daemon.process.terminate()  # what it has still to say, it says before it ends
+    daemon.end()
     events = [event for event in stream if event["type"] == "gesture"]
     right = wrong = performed = 0
     for number in chosen:
