@@ -9,6 +9,7 @@ import hashlib
 import json
 import math
 import os
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -28,7 +29,9 @@ from gestured.model_file import Metadata, inspect, read_bytes
 
 LADDER = ("cnn_lstm", "lstm", "touch_pattern_rf")  # the shipped models, best first
 TOLERANCE = 1e-3  # of the self-test: other processors round differently, another model is further off
-OPENING_BYTES = 2 << 30  # address space that opening and self-testing a model may take
+OPENING_BYTES = (
+    512 << 20
+)  # of address space that opening and self-testing may take; a shipped one needs 30 MiB
 
 
 class Model:
@@ -63,7 +66,7 @@ class Model:
         """
         with np.errstate(all="ignore"):  # counts near the limits of float32 overflow; checked below
             window = self.metadata.window.apply(segment)
-            usable = len(window) > 0 and bool(np.isfinite(window).all())
+            usable = len(window) > 0 and all(np.isfinite(a).all() for a in (segment.frames, window))
             if usable and self._input == "features":
                 window = touch_pattern(window, self.metadata.rate_hz)
                 usable = bool(np.isfinite(window).all())
@@ -148,13 +151,16 @@ def _open_session(data: bytes) -> Any:
     os.environ["ORT_DISABLE_TELEMETRY"] = "1"
     import onnxruntime
 
+    onnxruntime.set_default_logger_severity(4)  # what is wrong comes as an exception; stderr is for the log
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idling burns cores otherwise
-    options.log_severity_level = 4  # what is wrong comes as an exception; stderr belongs to the daemon's log
+    options.log_severity_level = 4
     try:
-        return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(
+            data, options, providers=["CPUExecutionProvider"], enable_fallback=0
+        )
     except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
         raise ValueError(f"onnxruntime cannot open it: {_brief(error)}") from None
 
@@ -183,6 +189,7 @@ def _bounded_memory() -> Iterator[None]:
 
 def _brief(error: BaseException) -> str:
     text = " ".join(str(error).split()) or type(error).__name__
+    text = re.sub(r"^\[ONNXRuntimeError\] : \d+ : ", "", text)
     return text if len(text) <= 200 else text[:197] + "..."
 
 

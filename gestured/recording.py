@@ -181,7 +181,7 @@ def _joined(parts: list[NDArray[Any]]) -> NDArray[np.int64]:
 def _load(path: str | Path) -> Recordings:
     try:
         # Non-blocking: opening a FIFO must not wait for a writer.
-        with os.fdopen(os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK), "rb") as file:
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise _Wrong("is not a regular file")
             with zipfile.ZipFile(file) as archive:
