@@ -30,7 +30,7 @@ from gestured.simulator import (
 from gestured.simulator.kinematics import progress
 from gestured.simulator.textile import relax
 
-# Integer frames and counters of 51 trials of the cohort and 40 wide takes. It changes when the simulated data change;
+# Integer frames and counters of 51 cohort trials and 40 wide takes. It changes when the simulated data do;
 # whoever changes them on purpose trains anew and writes the new value here.
 GOLDEN = "13af4cc9a4a26b133b530ccee989927989db20d92a70f70d22c1b648484e6651"
 
