@@ -23,8 +23,9 @@ help:  ## this list
 	@echo "usage: make TARGET [NAME=VALUE ...]"
 	@sed -n 's/^\([a-z]*\):.*## /  \1\t/p' Makefile | expand -t 10
 
+# At a terminal the demo is a job of its own, so that Ctrl-C is for it and not for make.
 demo: .venv/.runtime  ## recognise simulated gestures with the real daemon: SECONDS=20 MODEL=lstm SPEED=fast ARGS="--seed 7"
-	@.venv/bin/gesturectl demo --seconds "$(SECONDS)" --model "$(MODEL)" $(if $(SPEED),--speed "$(SPEED)") $(ARGS)
+	@[ ! -t 0 ] || set -m; .venv/bin/gesturectl demo --seconds "$(SECONDS)" --model "$(MODEL)" $(if $(SPEED),--speed "$(SPEED)") $(ARGS)
 
 test: .venv-dev/.dev  ## run the tests: ARGS="tests/core -k tap"
 	@$(MAKE) --no-print-directory .venv-dev/.lab || echo "note: without the lab's packages its tests are skipped" >&2

@@ -5,6 +5,7 @@ import json
 import math
 import os
 import queue
+import signal
 import sys
 import threading
 import time
@@ -52,6 +53,8 @@ def run(args: argparse.Namespace) -> int:
 
     if not 5.0 <= args.seconds <= 600.0:
         raise GesturedError(f"--seconds {args.seconds:g}: expected 5 to 600")
+    for signalled in (signal.SIGTERM, signal.SIGHUP):  # a closed terminal must not leave the daemon behind
+        signal.signal(signalled, signal.default_int_handler)
     play = play_from(args)
     ((_, take),) = play.takes(args.seconds)
     show = Show(take, args.json)
