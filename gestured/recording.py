@@ -372,8 +372,8 @@ def _labels(field: str, value: NDArray[np.str_], count: int, *, of: str = "recor
 
 
 def _text(field: str, value: NDArray[Any]) -> None:
-    if value.dtype.kind == "U":
-        try:
-            value.tolist()
-        except (ValueError, UnicodeError):
-            raise _Wrong(f"{field}: holds what is no text") from None
+    """Python would make broken strings of numbers that are no characters."""
+    if value.dtype.kind == "U" and value.size:
+        codes = np.ascontiguousarray(value).view(np.uint32)
+        if ((codes > 0x10FFFF) | ((codes >= 0xD800) & (codes < 0xE000))).any():
+            raise _Wrong(f"{field}: holds what is no text")
