@@ -9,6 +9,7 @@ import signal
 import sys
 import threading
 import time
+from contextlib import closing
 from typing import Any
 
 from gestured.control.engine import Engine
@@ -59,22 +60,20 @@ def run(args: argparse.Namespace) -> int:
     ((_, take),) = play.takes(args.seconds)
     show = Show(take, args.json)
     with Engine(args.model, play.rows, play.columns) as engine:
-        stream = Stream(engine.socket, {"types": ["gesture", "unknown"]})
-        sensor = Sensor(engine.listen, Form(SENSOR))
-        host, port = engine.listen
-        show.say(
-            f"The daemon listens on {host}:{port} with the model {engine.ready['model']}.\n"
-            f"A simulated sensor of {play.rows} x {play.columns} taxels sends OSC to it "
-            f"at {play.rate_hz:g} Hz.\n"
-            "For two seconds nobody touches it. Ctrl-C ends.\n"
-        )
         try:
-            show.follow(sensor, stream)
+            with (
+                closing(Stream(engine.socket, {"types": ["gesture", "unknown"]})) as stream,
+                closing(Sensor(engine.listen, Form(SENSOR))) as sensor,
+            ):
+                host, port = engine.listen
+                show.say(
+                    f"The daemon listens on {host}:{port} with the model {engine.ready['model']}.\n"
+                    f"A simulated sensor of {play.rows} x {play.columns} taxels sends OSC to it "
+                    f"at {play.rate_hz:g} Hz.\nFor two seconds nobody touches it. Ctrl-C ends.\n"
+                )
+                show.follow(sensor, stream)
         except KeyboardInterrupt:
             show.say("")
-        finally:
-            sensor.close()
-            stream.close()
     show.conclude()
     return 0
 

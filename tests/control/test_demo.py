@@ -1,0 +1,77 @@
+"""gesturectl demo, with the real daemon and the shipped model."""
+
+import json
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from gestured.models import shipped
+
+pytestmark = [
+    pytest.mark.e2e,
+    pytest.mark.skipif(not shipped()["cnn_lstm"].exists(), reason=f"{shipped()['cnn_lstm']} is not there"),
+]
+
+
+def daemons(mark: Path) -> list[int]:
+    """Processes of the daemon that were started with this folder for temporary files."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if str(mark).encode() in (folder / "cmdline").read_bytes():
+                found.append(int(folder.name))
+        except OSError:
+            continue
+    return found
+
+
+def test_outcomes_add_up_to_the_summary(run, tmp_path):
+    kinds = ("--kinds", "swipe_left,one_tap", "--speed", "normal")
+    status, out, err = run("demo", "--seconds", 9, *kinds, "--json", env={"TMPDIR": str(tmp_path)})
+    assert (status, err) == (0, "")
+    *outcomes, summary = map(json.loads, out.splitlines())
+    assert summary.pop("type") == "summary"
+    performed = [outcome["performed"] for outcome in outcomes if outcome["verdict"] != "false"]
+    assert performed[:2] == ["swipe_left", "one_tap"]
+    for verdict in ("right", "wrong", "missed", "rejected", "false"):
+        assert summary[verdict] == sum(outcome["verdict"] == verdict for outcome in outcomes)
+    for outcome in outcomes:
+        if outcome["verdict"] == "right":
+            assert outcome["recognised"] == outcome["performed"]
+            assert -100 < outcome["latency_ms"] < 5000
+    assert summary["right"] >= 1
+    assert daemons(tmp_path) == [] and os.listdir(tmp_path) == []
+
+
+def test_without_a_terminal_no_escape_codes_and_a_summary(run):
+    status, out, _ = run("demo", "--seconds", 6, "--kinds", "swipe_up")
+    assert status == 0
+    assert "\x1b" not in out
+    assert "performed   swipe_up" in out and "Summary" in out
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_ended_early_it_still_sums_up_and_leaves_nothing_behind(start, tmp_path, how):
+    process = start("demo", "--seconds", 60, env={"TMPDIR": str(tmp_path)})
+    assert b"listens on" in process.stdout.readline()
+    assert len(daemons(tmp_path)) == 1
+    process.send_signal(how)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert b"Summary" in out and err == b""
+    assert daemons(tmp_path) == [] and os.listdir(tmp_path) == []
+
+
+def test_a_model_that_cannot_be_used_is_one_sentence(run, tmp_path):
+    status, out, err = run("demo", "--model", tmp_path / "none.onnx", env={"TMPDIR": str(tmp_path)})
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    assert "none.onnx" in err
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("seconds", ["0", "nan", "1e9"])
+def test_a_time_that_cannot_be(run, seconds):
+    status, _, err = run("demo", "--seconds", seconds)
+    assert status == 1 and "--seconds" in err
