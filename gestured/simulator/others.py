@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from .drawn import (
     arc_stroke,
@@ -75,17 +76,7 @@ def tap_then_swipe(scene: Scene) -> list[Contact]:
     made = fingers_on(scene, path, 1, heading)
     tap, gap = scene.tap_s(), scene.gap_s()
     moved = made[0]
-    shifted = Contact(
-        moved.t + tap + gap,
-        moved.x,
-        moved.y,
-        moved.force,
-        moved.length,
-        moved.width,
-        moved.angle,
-        moved.growth,
-        moved.flatness,
-    )
+    shifted = replace(moved, t=moved.t + tap + gap)
     near = rng.normal(0.0, 0.03, 2) * scene.small
     return [touch_down(scene, float(moved.x[0]) + near[0], float(moved.y[0]) + near[1], tap), shifted]
 

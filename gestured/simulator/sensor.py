@@ -69,9 +69,9 @@ class Sensor:
     gain: float = 900.0  # counts of a normal touch
     gain_spread: float = 0.06
     force_exponent: float = 1.0  # a touchscreen hardly sees force (0.2), a pressure matrix does (1)
-    exponent: float = 0.9
+    exponent: float = 0.9  # of the response curve, see textile.compress
     knee: float = 3.0
-    offset: float = 0.4
+    offset: float = 0.4  # the idle level
     offset_spread: float = 0.05
     preload: float = 0.02  # what stretching over another inclination adds
     noise: float = 0.012
@@ -81,14 +81,14 @@ class Sensor:
     slow_noise: float = 0.0  # correlated over eight frames
     signal_noise: float = 0.01  # share of the signal itself
     hum: float = 0.0  # mains beating with the scan
-    drift: float = 0.03  # in a minute
+    drift: float = 0.03  # size of a wander with periods from 20 s to 8 min
     spread: float = 0.45  # taxels, Gaussian
     tail: float = 0.06  # share of a touch that reaches further
     tail_taxels: float = 1.0
     row_crosstalk: float = 0.012
     column_crosstalk: float = 0.01
-    ghost: float = 0.0
-    relaxation: tuple[float, ...] = (0.25, 0.08)
+    ghost: float = 0.0  # where touched rows and columns cross
+    relaxation: tuple[float, ...] = (0.25, 0.08)  # shares of the answer that lag, with these time constants
     taus_s: tuple[float, ...] = (0.03, 0.9)
     hysteresis: float = 0.012
     saturation: int = 4095
@@ -99,7 +99,7 @@ class Sensor:
     stuck: int = 0
     bursts_per_minute: float = 0.0
     jitter_s: float = 0.003
-    loss: float = 0.0
+    loss: float = 0.0  # probability of a frame, as the next two
     duplicates: float = 0.0
     late: float = 0.0
     touch_noise: float = 0.1  # taxels; NaN where the sensor reports no fingers
@@ -133,14 +133,18 @@ class Sensor:
     @staticmethod
     def wide(rng: np.random.Generator, hardness: float = 0.6) -> "Sensor":
         """Any sensor at all; `hardness` 0 (clean) .. 1 (as bad as it may get) scales all that disturbs."""
-        from .variety import any_sensor
+        from .variety import any_sensor  # which builds Sensors itself
 
         return any_sensor(rng, hardness)
 
     def record(
         self, performances: Sequence[tuple[float, Performance]], duration_s: float, rng: np.random.Generator
     ) -> Take:
-        """What this sensor sends in `duration_s` seconds while these performances start at these times."""
+        """What this sensor sends in `duration_s` seconds while these performances start at these times.
+
+        A start may be negative: then the pad is touched from the first frame on. No performances at all give
+        an idle recording.
+        """
         todo = list(performances)
         dt = 1.0 / self.rate_hz
         times: Array = np.arange(1, max(1, int(duration_s * self.rate_hz)) + 1, dtype=np.float64) * dt

@@ -130,7 +130,7 @@ def touch_down(
     """A finger that stays where it lands for that long, rolling a little."""
     rng = scene.rng
     t = grid(duration_s)
-    # A fingertip rolls as it loads: its centre moves with the load: some millimetres.
+    # A fingertip rolls on and off and its centre moves with the load: some millimetres on a real panel.
     u = t / duration_s
     roll = np.multiply.outer(u - 0.5, np.clip(rng.normal(0.0, 1.9, 2), -4.5, 4.5))
     roll += np.multiply.outer(np.sin(math.pi * u), rng.normal(0.0, 0.8, 2))

@@ -60,7 +60,7 @@ def any_sensor(rng: np.random.Generator, hardness: float) -> Sensor:
     lines = noise * float(rng.uniform(0.0, 0.8)) * hard
     relaxation, taus = _lags(rng, hard)
     offset = 0.0 if screen else float(rng.choice([0.0, 1.0])) * _log(rng, 0.05, 3.0)
-    top = 255 if screen or gain < 90.0 else int(max(gain * rng.uniform(1.0, 8.0) * (1.0 + offset), 300.0))
+    top = 255 if screen or gain < 90.0 else int(max(gain * rng.uniform(1.2, 8.0) * (1.0 + offset), 300.0))
     clipped = screen or bool(rng.random() < 0.15)
     return Sensor(
         seed=int(rng.integers(1 << 31)),
@@ -75,7 +75,7 @@ def any_sensor(rng: np.random.Generator, hardness: float) -> Sensor:
         exponent=float(rng.uniform(0.65, 1.4)),
         knee=_log(rng, 0.5, 30.0) if rng.random() < 0.7 else math.inf,
         offset=offset,
-        offset_spread=offset * float(rng.uniform(0.0, 0.35)),
+        offset_spread=offset * float(rng.uniform(0.0, 0.25)),
         preload=float(rng.uniform(0.0, 0.12)) * hard,
         noise=noise,
         row_noise=lines * float(rng.random()),
