@@ -52,7 +52,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     if settings.metrics:
         listens.append(f"http {settings.metrics} for /metrics, /healthz, /readyz")
     publishes = [
-        f"unix {path}, mode 0660, for {clients.CLIENTS} clients, {clients.BACKLOG_BYTES >> 10} KiB waiting each",
+        f"unix {path}, mode 0660, {clients.CLIENTS} clients, {clients.BACKLOG_BYTES >> 10} KiB waiting each",
         *(f"osc://{destination}: gestures, and the status once a second" for destination in settings.publish),
     ]
     computes = [

@@ -82,14 +82,14 @@ class Service:
         """Look after timers, until `stop`; then finish what is in flight."""
         watchdog = systemd.watchdog_period()
         period = min(TICK_S, watchdog or TICK_S)
-        status_at = 0.0
+        status_at = time.monotonic()
         reloading: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         reloading.set_result(None)
         while not stop.is_set():
             now = self._health.beat = time.monotonic()
             self._pipeline.tick(now)
             if now >= status_at:
-                status_at = now + STATUS_S
+                status_at = max(status_at + STATUS_S, now)  # on time, but not all at once after a stall
                 self._clients.tick()
                 self._emit(self._health.status(now))
             if watchdog:
@@ -98,7 +98,7 @@ class Service:
                 reload.clear()
                 reloading = asyncio.ensure_future(self._reload())  # a task: frames and timers go on
             try:
-                async with asyncio.timeout(period):
+                async with asyncio.timeout(min(period, status_at - now)):
                     await stop.wait()
             except TimeoutError:
                 pass
@@ -129,6 +129,9 @@ class Service:
         except GesturedError as error:
             self._metrics.reloads.add("refused")
             log.error("reload refused, nothing has changed", reason=str(error))
+        except Exception:
+            self._metrics.reloads.add("refused")
+            log.exception("reload refused because of a bug, nothing has changed")
         else:
             for key in ("listen", "socket", "metrics"):
                 if getattr(settings, key) != getattr(self._settings, key):
@@ -165,6 +168,10 @@ async def _run(settings: Settings, load: Loader) -> None:
     """Bind, open, serve. What cannot be had ends it before it says that it is ready."""
     loop = asyncio.get_running_loop()
     stop, reload = asyncio.Event(), asyncio.Event()
+    throttle = Throttle()
+    loop.set_exception_handler(
+        lambda _, what: throttle.error("a bug in a callback", what["message"], exc_info=what.get("exception"))
+    )
     loop.add_signal_handler(signal.SIGTERM, stop.set)
     loop.add_signal_handler(signal.SIGINT, stop.set)
     loop.add_signal_handler(signal.SIGHUP, reload.set)

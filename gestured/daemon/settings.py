@@ -132,7 +132,7 @@ REPEATED = ("fallback", "publish", "allow")
 
 
 def default_socket(environ: Mapping[str, str]) -> Path:
-    """Where the event socket stands when nobody says so: where systemd, else the session, keeps such things."""
+    """Where the event socket stands when nobody says so: where systemd or the session keeps such things."""
     if directory := environ.get("RUNTIME_DIRECTORY"):
         return Path(directory.split(":")[0]) / "events.sock"
     if directory := environ.get("XDG_RUNTIME_DIR"):

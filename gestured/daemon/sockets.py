@@ -14,6 +14,7 @@ from gestured.daemon.values import Address
 
 RECEIVE_BYTES = 4 << 20  # the default holds 166 frames of 9 x 9 floats, this 6,500
 BACKLOG = 128
+SO_RCVBUFFORCE = 33  # Linux; not in Python's socket module
 
 
 class AddressError(GesturedError):
@@ -45,7 +46,10 @@ def _bind(key: str, address: Address, kind: int) -> socket.socket:
 def bind_udp(address: Address) -> socket.socket:
     """A non-blocking UDP socket with a large receive buffer, as far as the kernel grants it."""
     sock = _bind("listen", address, socket.SOCK_DGRAM)
-    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES)  # beyond the limit, for CAP_NET_ADMIN
+    except OSError:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
     return sock
 
 

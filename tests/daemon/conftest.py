@@ -1,0 +1,41 @@
+"""One small model for all, and daemons that tests share where they do not change them."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.daemon import tiny_model
+from tests.daemon.harness import Daemon
+
+
+@pytest.fixture(scope="session")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A valid model file named tiny."""
+    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+    return tiny_model.make(tmp_path_factory.mktemp("model") / "tiny.onnx")
+
+
+@pytest.fixture(scope="session")
+def shared(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A daemon with the sensor's clock and metrics, for tests that use sensors of their own."""
+    folder = tmp_path_factory.mktemp("shared")
+    daemon = Daemon.start(folder, model, "--clock", "sensor", "--metrics", "127.0.0.1:0")
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+    assert "Traceback" not in daemon.stderr()
+
+
+@pytest.fixture
+def start(model: Path, tmp_path: Path) -> Iterator[Callable[..., Daemon]]:
+    """Starts daemons that end with the test."""
+    daemons: list[Daemon] = []
+
+    def start(*flags: object, model: object = model, **more: Any) -> Daemon:
+        daemons.append(Daemon.start(tmp_path, model, *flags, **more))
+        return daemons[-1]
+
+    yield start
+    for daemon in daemons:
+        daemon.stop()

@@ -1,0 +1,201 @@
+"""Frames in, events out: what a client of a healthy daemon sees."""
+
+import json
+import re
+import select
+import socket
+import time
+import zlib
+
+import pytest
+
+from tests.daemon import harness
+from tests.daemon.harness import Daemon, Sensor
+
+
+def test_hello_comes_first_and_says_who_speaks(shared: Daemon) -> None:
+    Sensor(shared, "greeted").begin().perform("left")
+    shared.client().subscribe("gesture", sensors=["greeted"])
+    first, second = shared.client().hello, shared.client().hello
+    assert first["type"] == "hello" and first["protocol"] == 1 and first["model"] == "tiny"
+    assert first["gestures"][:2] == ["one_tap", "double_tap"] and len(first["gestures"]) == 10
+    assert first["instance"] == second["instance"] and first["version"]
+
+
+def test_a_swipe_is_one_gesture_with_all_fields(shared: Daemon) -> None:
+    client = shared.client()
+    before = time.time()
+    Sensor(shared, "fields").begin().perform("left")
+    (event,) = client.events("gesture", "fields")
+    assert list(event) == [
+        "type", "sensor", "id", "gesture", "confidence", "sequence", "onset", "offset", "decided", "frames",
+        "lost", "model", "degraded", "scores",
+    ]  # fmt: skip
+    assert (event["gesture"], event["sequence"], event["frames"], event["lost"]) == ("swipe_left", 1, 7, 0)
+    assert 0.5 < event["confidence"] <= 1 and event["degraded"] is False and event["model"] == "tiny"
+    assert set(event["scores"]) == set(client.hello["gestures"])
+    assert event["offset"] - event["onset"] == pytest.approx(6 / 15, abs=1e-3)
+    assert 0.1 <= event["decided"] - event["offset"] < 0.3
+    # The sensor's clock begins at the arrival of its first frame, whatever its time tags say.
+    assert before + 1.5 < event["onset"] < time.time() + 10
+
+
+def test_every_onset_has_one_answer_and_one_release(shared: Daemon) -> None:
+    client = shared.client().subscribe("gesture", "unknown", "cancelled", "onset", "release", sensors=["grammar"])
+    sensor = Sensor(shared, "grammar").begin().perform("tap", "up", "down")
+    sensor.send([sensor.hand.frame(4.0) for _ in range(30)], sensor.hand.idle(1.0))  # pressed for two seconds
+    lines = client.until(lambda line: line["type"] == "release" and line["id"] == 4)
+    kinds = {i: [line["type"] for line in lines if line["id"] == i] for i in (1, 2, 3, 4)}
+    assert kinds == {i: ["onset", "gesture", "release"] for i in (1, 2, 3)} | {4: ["onset", "unknown", "release"]}
+    assert [line["gesture"] for line in lines if line["type"] == "gesture"] == ["one_tap", "swipe_up", "swipe_down"]
+    assert [line["sequence"] for line in lines if line["type"] == "gesture"] == [1, 2, 3]
+    unknown = next(line for line in lines if line["type"] == "unknown")
+    assert "gesture" not in unknown and "sequence" not in unknown
+
+
+def test_all_forms_of_a_frame_give_the_same_events(shared: Daemon) -> None:
+    client = shared.client().subscribe("gesture", sensors=[])
+    forms = {
+        "floats": harness.floats, "ints": harness.ints, "counted": harness.counted, "blob4": harness.blob(">f4"),
+        "blob2": harness.blob(">u2"), "blob1": harness.blob("u1"), "counted_blob": harness.counted_blob,
+    }  # fmt: skip
+    answers = []
+    for name, encode in forms.items():
+        client.subscribe("gesture", sensors=[name])
+        Sensor(shared, name, encode).begin().perform("right", "tap")
+        events = client.events("gesture", name, 2)
+        answers.append([(e["gesture"], e["confidence"], e["frames"], e["scores"]) for e in events])
+    assert [gesture for gesture, *_ in answers[0]] == ["swipe_right", "one_tap"]
+    assert all(answer == answers[0] for answer in answers)
+
+
+def test_many_frames_in_one_packet_and_lost_ones_by_the_counter(shared: Daemon) -> None:
+    from gestured.core import osc
+
+    client = shared.client()
+    sensor = Sensor(shared, "packed", harness.counted).begin()
+    for part in (sensor.hand.swipe("down"), sensor.hand.idle(1.0)):
+        packets = [sensor.packet(frame) for frame in part]
+        if len(part) == 7:
+            del packets[3]  # lost on the way
+        sensor.sock.send(osc.encode_bundle(packets))
+    (event,) = client.events("gesture", "packed")
+    assert (event["gesture"], event["lost"], event["frames"]) == ("swipe_down", 1, 6)
+    assert shared.metric("gestured_frames_total", sensor="packed", result="lost") in (0.0, 1.0)
+
+
+def test_subscriptions_filter_by_type_sensor_and_gesture(shared: Daemon) -> None:
+    only_left = shared.client().subscribe(gestures=["swipe_left"], sensors=["one", "two"])
+    only_two = shared.client().subscribe("gesture", "onset", sensors=["two"])
+    everything = shared.client()
+    for name in ("one", "two"):
+        Sensor(shared, name).begin().perform("left", "right", "left")
+        everything.events("gesture", name, 3)
+    found = [only_left.line() for _ in range(4)]
+    assert [(e["sensor"], e["gesture"]) for e in found] == [(s, "swipe_left") for s in "one one two two".split()]
+    kinds = [(e["type"], e["sensor"]) for e in (only_two.line() for _ in range(6))]
+    assert kinds == [("onset", "two"), ("gesture", "two")] * 3
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (b"hello\n", "JSON"),
+        (b'{"subscribe":{"types":["gestures"]}}\n', "types"),
+        (b'{"subscribe":{"kinds":["gesture"]}}\n', "kinds"),
+        (b'{"subscribe":{"sensors":"armrest"}}\n', "sensors"),
+        (b'{"unsubscribe":{}}\n', "subscribe"),
+        (b"[" * 4000 + b"\n", ""),
+        (b"x" * 100_000 + b"\n", "4096"),
+        (b"\xff\xfe\n", ""),
+        (b"[]\n", "subscribe"),
+    ],
+)
+def test_a_bad_request_is_answered_and_the_connection_goes_on(shared: Daemon, line: bytes, said: str) -> None:
+    client = shared.client().ask(line)
+    answer = client.line()
+    assert answer["type"] == "error" and said in answer["reason"]
+    name = f"after_error_{zlib.crc32(line)}"  # each its own: the first one's port still owns the name
+    Sensor(shared, name).begin().perform("left")
+    assert client.events("gesture", name)
+
+
+def test_status_comes_by_itself_and_names_each_sensor(shared: Daemon) -> None:
+    client = shared.client().subscribe("status")
+    sensor = Sensor(shared, "living")
+    seen = []
+    while "ok" not in seen:
+        while not select.select([client.sock], [], [], 0.2)[0]:
+            sensor.send(sensor.hand.idle(0.2))  # it must not fall silent between two signs of life
+        line = client.line()
+        seen.append(line["sensors"].get("living", "absent"))
+    assert list(dict.fromkeys(seen))[-2:] == ["starting", "ok"] and line["state"] == "ok"
+    assert line["model"] == "tiny" and abs(line["time"] - time.time()) < 5
+    client.until(lambda line: line["sensors"]["living"] == "stale")
+
+
+def test_a_sensor_that_falls_silent_is_answered(shared: Daemon) -> None:
+    client = shared.client().subscribe("gesture", "cancelled", "release", sensors=["mute_tap", "mute_press"])
+    tapped, pressed = Sensor(shared, "mute_tap").begin(), Sensor(shared, "mute_press").begin()
+    tapped.send(tapped.hand.tap(), tapped.hand.idle(0.2))  # a second tap may come, but nothing does
+    pressed.send(pressed.hand.tap())
+    lines = [client.line() for _ in range(4)]
+    assert {(e["sensor"], e["type"], e.get("gesture", e.get("reason"))) for e in lines} == {
+        ("mute_tap", "gesture", "one_tap"), ("mute_tap", "release", None),
+        ("mute_press", "cancelled", "silence"), ("mute_press", "release", None),
+    }  # fmt: skip
+
+
+def test_osc_goes_out_to_every_destination(start) -> None:
+    outs = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2)]
+    flags: list[object] = []
+    for out in outs:
+        out.bind(("127.0.0.1", 0))
+        out.settimeout(harness.DEADLINE_S)
+        flags += ["--publish", f"osc://127.0.0.1:{out.getsockname()[1]}"]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as nobody:
+        nobody.bind(("127.0.0.1", 0))
+        flags += ["--publish", f"osc://127.0.0.1:{nobody.getsockname()[1]}"]
+    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", *flags)
+    osc_message = pytest.importorskip("pythonosc.osc_message")
+    assert osc_message.OscMessage(outs[0].recv(9999)).address == "/gestured/status"
+    client = daemon.client()
+    Sensor(daemon, "arm").begin().perform("up")
+    (event,) = client.events("gesture", "arm")
+    for out in outs:
+        seen: dict[str, list] = {}
+        while len(seen) < 2:
+            message = osc_message.OscMessage(out.recv(9999))
+            seen[message.address] = message.params
+        assert seen["/gestured/status"] in (["no_data", 0], ["ok", 1], ["no_data", 1])
+        label, confidence, sequence, onset, offset = seen["/gestured/arm/gesture"]
+        assert (label, sequence) == ("swipe_up", 1)
+        assert confidence == pytest.approx(event["confidence"], abs=1e-6)
+        assert (onset, offset) == pytest.approx((event["onset"], event["offset"]), abs=0.05)
+    while daemon.metric("gestured_osc_messages_total", result="refused") == 0:
+        outs[0].recv(9999)  # a port where nobody listens is told apart, once a second
+    assert daemon.metric("gestured_osc_messages_total", result="sent") > 0
+
+
+def test_metrics_count_what_happened(shared: Daemon) -> None:
+    pytest.importorskip("prometheus_client")
+    client = shared.client()
+    before = shared.metric("gestured_gestures_total", gesture="swipe_left")
+    Sensor(shared, "counting").begin().perform("left")
+    client.events("gesture", "counting")
+    assert shared.metric("gestured_gestures_total", gesture="swipe_left") == before + 1
+    assert shared.metric("gestured_inference_seconds_count", model="tiny") >= 1
+    assert shared.metric("gestured_latency_seconds_count") >= 1
+    assert shared.metric("gestured_active_model_info", model="tiny", version=client.hello["version"]) == 1
+    assert shared.metric("gestured_sensors") >= 1
+    text = shared.get("/metrics")[1]
+    assert re.search(r'gestured_frames_total\{result="ok",sensor="[^"]+"\}', text)
+    assert text.count("\n") - text.count("\n#") < 200
+
+
+def test_health_and_readiness_explain_themselves(shared: Daemon) -> None:
+    status, body = shared.get("/healthz")
+    assert status == 200 and json.loads(body)["healthy"] is True
+    status, body = shared.get("/readyz")
+    assert status == 200 and json.loads(body)["ready"] is True and json.loads(body)["model"] == "tiny"
+    assert shared.get("/nothing")[0] == 404
