@@ -1,0 +1,289 @@
+"""Export: the file gives what the trained model gives, for every batch and length, or there is no file."""
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="needs the extra [lab]")
+pytest.importorskip("onnx", reason="needs the extra [lab]")
+pytest.importorskip("sklearn", reason="needs the extra [lab]")
+
+import onnx  # noqa: E402
+from sklearn.ensemble import RandomForestClassifier  # noqa: E402
+from torch import nn  # noqa: E402
+
+from gestured.core.errors import ModelError  # noqa: E402
+from gestured.core.features import feature_names  # noqa: E402
+from gestured.core.frames import Segment  # noqa: E402
+from gestured.core.window import Window  # noqa: E402
+from gestured.lab.export import export_forest, export_net, forest_outputs, write_manifest  # noqa: E402
+from gestured.models import open_model  # noqa: E402
+
+GESTURES = ("one_tap", "swipe_up", "swipe_left")
+WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=0.1, tail_s=0.1, floor=4.0)
+CARD: dict[str, Any] = {
+    "kind": "test_net",
+    "version": "1.2.0",
+    "gestures": GESTURES,
+    "window": WINDOW,
+    "calibration": {"temperature": 1.7, "unknown_scale": 0.8, "unknown_offset": -0.3},
+    "training_data": hashlib.sha256(b"data").hexdigest(),
+    "quantiles": {"duration_s": [0.1, 0.4, 1.2]},
+}
+
+
+class Net(nn.Module):
+    """Like a real one: convolutions per frame, an LSTM read at the last active frame, a trajectory."""
+
+    def __init__(self, seed: int = 0) -> None:
+        super().__init__()
+        torch.manual_seed(seed)
+        self.first, self.second = nn.Conv2d(1, 4, 3, padding=1), nn.Conv2d(4, 8, 3, padding=1)
+        self.lstm = nn.LSTM(8 * 2 * 2, 16, batch_first=True)
+        self.head = nn.Linear(16, len(GESTURES))
+        self.judge = nn.Linear(3, 1)
+        rows, columns = torch.meshgrid(torch.arange(9.0), torch.arange(9.0), indexing="ij")
+        self.register_buffer("places", torch.stack([columns.flatten(), 8 - rows.flatten()], 1))
+
+    def forward(self, frames: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        batch, length = frames.shape[0], frames.shape[1]
+        x = frames.reshape(-1, 1, 9, 9)
+        x = torch.max_pool2d(torch.relu(self.first(x)), 2)
+        x = torch.max_pool2d(torch.relu(self.second(x)), 2)
+        states, _ = self.lstm(x.reshape(batch, length, -1))
+        active = (frames.flatten(2).amax(2) >= 0.1).to(frames.dtype)
+        last = (active * torch.arange(length, dtype=frames.dtype)).amax(1).to(torch.int64)
+        state = states.gather(1, last[:, None, None].expand(-1, 1, 16))[:, 0]
+        centre = frames.flatten(2) @ self.places / frames.flatten(2).sum(2, keepdim=True).clamp(min=1e-3)
+        step = nn.functional.pad((centre[:, 1:] - centre[:, :-1]) * active[:, 1:, None], (0, 0, 1, 0))
+        cues = torch.stack([torch.cumsum(step.abs().sum(2), 1)[:, -1], active.sum(1), centre[:, 0, 0]], 1)
+        return torch.softmax(self.head(state) / 1.7, 1), torch.sigmoid(self.judge(cues / 10))[:, 0]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def one_thread() -> Iterator[None]:
+    """Nets this small are slower on several threads, above all where something else computes."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.fixture(scope="module")
+def net(tmp_path_factory: pytest.TempPathFactory) -> tuple[Net, Path, dict[str, float]]:
+    module = Net()
+    path = tmp_path_factory.mktemp("net") / "test_net.onnx"
+    return module, path, export_net(module, path, **CARD)
+
+
+def segment() -> Segment:
+    values = np.zeros((8, 9, 9), np.float32)
+    for t in range(6):
+        values[t + 1, 8 - t, 3:5] = 100.0
+    return Segment(values, np.arange(8) / 15.0, 1, 6, 1.0)
+
+
+@pytest.mark.parametrize("batch", [1, 3])
+@pytest.mark.parametrize("length", [1, 2, 37, 200])
+def test_file_equals_torch(net: tuple[Net, Path, dict[str, float]], batch: int, length: int) -> None:
+    module, path, _ = net
+    frames = np.random.default_rng(length).random((batch, length, 9, 9), np.float32) ** 4
+    scores, unknown = open_model(path).run(frames)
+    with torch.no_grad():
+        expected = module(torch.from_numpy(frames))
+    np.testing.assert_allclose(scores, expected[0].numpy(), atol=1e-4)
+    np.testing.assert_allclose(unknown, expected[1].numpy(), atol=1e-4)
+
+
+def test_daemon_reads_back_what_was_said_of_the_model(net: tuple[Net, Path, dict[str, float]]) -> None:
+    module, path, report = net
+    model = open_model(path)
+    known = model.metadata
+    assert (model.name, known.kind, known.version) == ("test_net", "test_net", "1.2.0")
+    assert (known.gestures, known.window, known.features) == (GESTURES, WINDOW, None)
+    assert known.calibration == CARD["calibration"]
+    assert known.quantiles == CARD["quantiles"]
+    assert known.training_data == CARD["training_data"]
+    assert report["size"] == path.stat().st_size
+    assert 0 <= report["largest_difference"] <= 1e-4
+    with torch.no_grad():
+        scores, unknown = module(torch.from_numpy(WINDOW.apply(segment())[np.newaxis]))
+    found = model.classify(segment())
+    np.testing.assert_allclose(found.values, scores[0].numpy(), atol=1e-4)
+    assert found.unknown == pytest.approx(float(unknown[0]), abs=1e-4)
+
+
+def test_file_names_no_place_on_this_machine(net: tuple[Net, Path, dict[str, float]]) -> None:
+    data = net[1].read_bytes()
+    for place in (str(Path.home()), str(net[1].parent), str(Path(__file__).parent), sys.prefix):
+        assert place.encode() not in data
+
+
+def test_the_same_module_is_the_same_file(net: tuple[Net, Path, dict[str, float]], tmp_path: Path) -> None:
+    export_net(net[0], tmp_path / "again.onnx", **CARD)
+    assert (tmp_path / "again.onnx").read_bytes() == net[1].read_bytes()
+
+
+class Frozen(Net):
+    """Asks for the length in Python: the answer for the example is built into the graph."""
+
+    def forward(self, frames: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        scores, unknown = super().forward(frames)
+        return (scores, unknown) if int(frames.shape[1]) <= 20 else (scores, unknown * 0.5)
+
+
+class Mixing(Net):
+    """One gesture's answer depends on the others in its batch."""
+
+    def forward(self, frames: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        scores, unknown = super().forward(frames)
+        return scores, torch.sigmoid(unknown - 10 * unknown.mean())
+
+
+class Logits(Net):
+    """Gives no probabilities."""
+
+    def forward(self, frames: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        scores, unknown = super().forward(frames)
+        return torch.log(scores), unknown
+
+
+@pytest.mark.parametrize("module", [Frozen(), Mixing(), Logits()], ids=lambda m: type(m).__name__)
+def test_net_that_the_file_cannot_stand_for_is_not_written(module: Net, tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r"wrong\.onnx: not written"):
+        export_net(module, tmp_path / "wrong.onnx", **CARD)
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("gestures", ("one_tap", "swipe_up")), ("gestures", ("A", "B", "C")), ("training_data", "unknown")],
+)
+def test_metadata_that_would_be_refused_is_not_written(key: str, value: Any, tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="not written"):
+        export_net(Net(), tmp_path / "wrong.onnx", **{**CARD, key: value})
+    assert os.listdir(tmp_path) == []
+
+
+# --- the forest ---
+
+FEATURES = feature_names(9, 9)
+
+
+def forest(classes: int, trees: int = 12, depth: int | None = 5, seed: int = 0) -> RandomForestClassifier:
+    random = np.random.default_rng(seed)
+    labels = np.arange(400) % classes
+    values = random.normal(size=(400, len(FEATURES))) + 0.4 * labels[:, None] * (np.arange(len(FEATURES)) % 3)
+    return RandomForestClassifier(trees, max_depth=depth, random_state=seed).fit(
+        values.astype(np.float32), labels
+    )
+
+
+@pytest.mark.parametrize(
+    ("classes", "trees", "depth"), [(3, 1, 1), (3, 12, 5), (5, 12, 5), (4, 3, None), (6, 40, 9)]
+)
+def test_forest_equals_scikit_learn(classes: int, trees: int, depth: int | None, tmp_path: Path) -> None:
+    trained = forest(classes, trees, depth)
+    report = export_forest(trained, tmp_path / "rf.onnx", **CARD, features=FEATURES)
+    assert report["largest_difference"] <= 1e-4
+    model = open_model(tmp_path / "rf.onnx")
+    values = np.random.default_rng(5).normal(size=(300, len(FEATURES))).astype(np.float32) * 3
+    scores, unknown = model.run(values)
+    expected = forest_outputs(trained.predict_proba(values), len(GESTURES), CARD["calibration"])
+    np.testing.assert_allclose(scores, expected[0], atol=1e-4)
+    np.testing.assert_allclose(unknown, expected[1], atol=1e-4)
+    assert model.metadata.features == FEATURES
+    assert model.classify(segment()).values.sum() == pytest.approx(1.0, abs=1e-5)
+
+
+def test_values_on_a_threshold_go_where_scikit_learn_sends_them(tmp_path: Path) -> None:
+    trained = forest(5)
+    export_forest(trained, tmp_path / "rf.onnx", **CARD, features=FEATURES)
+    model = open_model(tmp_path / "rf.onnx")
+    thresholds = np.concatenate([tree.tree_.threshold for tree in trained.estimators_])
+    for toward in (-np.inf, 0.0, np.inf):
+        values = np.float32(np.random.default_rng(1).choice(thresholds, (200, len(FEATURES))))
+        if toward:
+            values = np.nextafter(values, np.float32(toward))
+        expected = forest_outputs(trained.predict_proba(values), len(GESTURES), CARD["calibration"])
+        np.testing.assert_allclose(model.run(values)[0], expected[0], atol=1e-5)
+
+
+def test_uncalibrated_outputs_are_the_forests_own() -> None:
+    probabilities = np.array([[0.3, 0.1, 0.2, 0.25, 0.15], [0.6, 0.4, 0.0, 0.0, 0.0], [0, 0, 0, 0, 1.0]])
+    scores, unknown = forest_outputs(probabilities, 3, {})
+    np.testing.assert_allclose(scores[0], [0.5, 1 / 6, 1 / 3], atol=1e-6)
+    np.testing.assert_allclose(unknown, [0.4, 0.0, 1.0], atol=2e-3)
+    np.testing.assert_allclose(scores.sum(axis=1), 1.0, atol=1e-6)
+
+
+def test_temperature_sharpens_and_flattens() -> None:
+    probabilities = np.array([[0.6, 0.3, 0.1]])
+    sharp, own, flat = (
+        forest_outputs(probabilities, 3, {"temperature": t})[0][0, 0] for t in (0.5, 1.0, 2.0)
+    )
+    assert sharp > own > flat > 1 / 3
+
+
+def test_forest_that_does_not_fit_is_not_written(tmp_path: Path) -> None:
+    path = tmp_path / "rf.onnx"
+    with pytest.raises(ModelError, match="features"):
+        export_forest(forest(5), path, **CARD, features=FEATURES[:-1])
+    with pytest.raises(ModelError, match="'features'"):
+        export_forest(forest(5), path, **CARD, features=FEATURES[::-1])
+    with pytest.raises(ModelError, match="classes"):
+        export_forest(forest(2), path, **CARD, features=FEATURES)
+    named = forest(5).set_params(n_estimators=1)
+    named.fit(np.zeros((6, len(FEATURES))), np.array(["a", "b", "c"] * 2))
+    with pytest.raises(ModelError, match="classes"):
+        export_forest(named, path, **CARD, features=FEATURES)
+    with pytest.raises(ModelError, match="temperature"):
+        export_forest(forest(3), path, **{**CARD, "calibration": {"temperature": 0}}, features=FEATURES)
+    assert os.listdir(tmp_path) == []
+
+
+# --- the manifest ---
+
+
+def test_manifest_knows_every_file(net: tuple[Net, Path, dict[str, float]], tmp_path: Path) -> None:
+    (tmp_path / "cnn_lstm.onnx").write_bytes(net[1].read_bytes())
+    export_forest(forest(5), tmp_path / "touch_pattern_rf.onnx", **CARD, features=FEATURES)
+    path = write_manifest(tmp_path, {"cnn_lstm": {"accuracy": 0.97}})
+    models = json.loads(path.read_text())["models"]
+    assert sorted(models) == ["cnn_lstm.onnx", "touch_pattern_rf.onnx"]
+    for name, entry in models.items():
+        data = (tmp_path / name).read_bytes()
+        assert entry["sha256"] == hashlib.sha256(data).hexdigest()
+        assert (entry["size"], entry["version"], entry["gestures"]) == (len(data), "1.2.0", list(GESTURES))
+    assert models["cnn_lstm.onnx"]["figures"] == {"accuracy": 0.97}
+
+
+def test_manifest_refuses_a_file_that_says_nothing_of_itself(net: Any, tmp_path: Path) -> None:
+    proto = onnx.load(net[1])
+    del proto.metadata_props[:]
+    onnx.save(proto, tmp_path / "silent.onnx")
+    with pytest.raises(ModelError, match=r"silent\.onnx"):
+        write_manifest(tmp_path, {})
+
+
+def test_exported_file_opens_without_the_lab(net: tuple[Net, Path, dict[str, float]]) -> None:
+    script = (
+        "import sys\nfor name in ('torch', 'onnx', 'sklearn'): sys.modules[name] = None\n"
+        "from gestured.models import open_model\nprint(open_model(sys.argv[1]).gestures[0])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, net[1]],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout == "one_tap\n", done.stderr
