@@ -10,6 +10,7 @@ import json
 import math
 import os
 import re
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -165,26 +166,31 @@ def _open_session(data: bytes) -> Any:
         raise ValueError(f"onnxruntime cannot open it: {_brief(error)}") from None
 
 
+_opening = threading.Lock()
+
+
 @contextmanager
 def _bounded_memory() -> Iterator[None]:
     """Bounds this process's address space: some 20 bytes of ONNX can ask for a tensor of any size.
 
-    Only where the system can say how much is in use (Linux); elsewhere nothing is bounded.
+    Only where the system can say how much is in use (Linux); elsewhere nothing is bounded. One at a time: the
+    limit is the process's, and a reload may open models while the loop opens a fallback.
     """
-    try:
-        import resource
+    with _opening:
+        try:
+            import resource
 
-        used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    except (ImportError, OSError, ValueError, IndexError):
-        yield
-        return
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    limits = [limit for limit in (soft, hard) if limit != resource.RLIM_INFINITY]
-    resource.setrlimit(resource.RLIMIT_AS, (min([used + OPENING_BYTES, *limits]), hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+            used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        except (ImportError, OSError, ValueError, IndexError):
+            yield
+            return
+        soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+        limits = [limit for limit in (soft, hard) if limit != resource.RLIM_INFINITY]
+        resource.setrlimit(resource.RLIMIT_AS, (min([used + OPENING_BYTES, *limits]), hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 def _brief(error: BaseException) -> str:
@@ -286,7 +292,7 @@ def check(source: str | Path) -> dict[str, Any]:
     }
 
 
-class _Rung:
+class Rung:
     """One model of a ladder: opened when it is first needed."""
 
     def __init__(self, source: str | Path | Classifier) -> None:
@@ -339,7 +345,7 @@ class Ladder:
         """
         if not rungs:
             raise ModelError("a ladder needs at least one model")
-        self._rungs = [_Rung(source) for source in rungs]
+        self.rungs = tuple(Rung(source) for source in rungs)
         self.slow_s, self.slow_runs, self.retry_after = slow_s, slow_runs, retry_after
         self._clock = clock
         self._report = report or (lambda sentence: None)
@@ -349,13 +355,13 @@ class Ladder:
         self.gestures: tuple[str, ...] = tuple(opened.gestures)
         self.rows = int(getattr(opened, "rows", 0))
         self.columns = int(getattr(opened, "columns", 0))
-        for rung in self._rungs:
+        for rung in self.rungs:
             self._check_gestures(rung)
 
     @property
     def name(self) -> str:
         """The best rung's name, whether or not it can be used."""
-        return self._rungs[0].name
+        return self.rungs[0].name
 
     @property
     def active(self) -> str:
@@ -365,7 +371,7 @@ class Ladder:
     @property
     def degraded(self) -> bool:
         """Whether `active` is a fallback."""
-        return self._active is not self._rungs[0]
+        return self._active is not self.rungs[0]
 
     @property
     def model(self) -> Classifier:
@@ -375,8 +381,8 @@ class Ladder:
     def classify(self, segment: Segment) -> Scores:
         """Scores of the best rung that can give them; raises ModelError where none can."""
         now = self._clock()
-        ready = [rung for rung in self._rungs if now >= rung.aside_until]
-        aside = [rung for rung in self._rungs if now < rung.aside_until]
+        ready = [rung for rung in self.rungs if now >= rung.aside_until]
+        aside = [rung for rung in self.rungs if now < rung.aside_until]
         for rung in ready + aside:
             try:
                 model = rung.open()
@@ -396,11 +402,11 @@ class Ladder:
                 self._active = rung
             self.last_run_s = took
             return replace(scores, degraded=scores.degraded or self.degraded)
-        raise ModelError(f"no model could classify: {', '.join(rung.name for rung in self._rungs)}")
+        raise ModelError(f"no model could classify: {', '.join(rung.name for rung in self.rungs)}")
 
-    def _first_open(self) -> tuple[_Rung, Classifier]:
+    def _first_open(self) -> tuple[Rung, Classifier]:
         reasons = []
-        for rung in self._rungs:
+        for rung in self.rungs:
             try:
                 return rung, rung.open()
             except ModelError as error:
@@ -408,7 +414,7 @@ class Ladder:
                 self._put_aside(rung, str(error))
         raise ModelError("; ".join(reasons))
 
-    def _check_gestures(self, rung: _Rung) -> None:
+    def _check_gestures(self, rung: Rung) -> None:
         """A fallback that cannot be read now may come back; one that knows other gestures is a mistake."""
         try:
             gestures = rung.gestures()
@@ -422,13 +428,13 @@ class Ladder:
                 f"same order ({', '.join(self.gestures)}), found {', '.join(gestures)}"
             )
 
-    def _put_aside(self, rung: _Rung, reason: str) -> None:
+    def _put_aside(self, rung: Rung, reason: str) -> None:
         self.failures += 1
         rung.slow = 0
         rung.aside_until = self._clock() + self.retry_after
         self._report(f"{rung.name} is put aside for {self.retry_after:g} s: {reason}")
 
-    def _timed(self, rung: _Rung, took: float) -> None:
+    def _timed(self, rung: Rung, took: float) -> None:
         rung.slow = rung.slow + 1 if took > self.slow_s else 0
         if rung.slow >= self.slow_runs:
             rung.slow = 0

@@ -6,6 +6,7 @@ import os
 import resource
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -348,6 +349,9 @@ def test_opening_leaves_the_limits_of_the_process_as_they_were(tmp_path: Path) -
     before = resource.getrlimit(resource.RLIMIT_AS)
     open_model(build(tmp_path / "good.onnx"))
     refusal(build(tmp_path / "bad.onnx", extra="bomb"))
+    assert resource.getrlimit(resource.RLIMIT_AS) == before
+    with ThreadPoolExecutor(8) as pool:  # as a reload does it beside the loop
+        assert len(list(pool.map(open_model, [tmp_path / "good.onnx"] * 40))) == 40
     assert resource.getrlimit(resource.RLIMIT_AS) == before
 
 
