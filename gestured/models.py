@@ -174,7 +174,8 @@ def _bounded_memory() -> Iterator[None]:
     """Bounds this process's address space: some 20 bytes of ONNX can ask for a tensor of any size.
 
     Only where the system can say how much is in use (Linux); elsewhere nothing is bounded. One at a time: the
-    limit is the process's, and a reload may open models while the loop opens a fallback.
+    limit is the process's (other threads share what it leaves), and a reload may open models while the loop
+    opens a fallback.
     """
     with _opening:
         try:

@@ -350,7 +350,7 @@ def test_opening_leaves_the_limits_of_the_process_as_they_were(tmp_path: Path) -
     open_model(build(tmp_path / "good.onnx"))
     refusal(build(tmp_path / "bad.onnx", extra="bomb"))
     assert resource.getrlimit(resource.RLIMIT_AS) == before
-    with ThreadPoolExecutor(8) as pool:  # as a reload does it beside the loop
+    with ThreadPoolExecutor(2) as pool:  # as a reload does it beside the loop
         assert len(list(pool.map(open_model, [tmp_path / "good.onnx"] * 40))) == 40
     assert resource.getrlimit(resource.RLIMIT_AS) == before
 
