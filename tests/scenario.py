@@ -3,8 +3,9 @@
 One statement a line, in order; `#` begins a comment. A taxel is `ROW,COLUMN` from the top left, a duration
 `130ms`, `2s` or `3 frames`, an amplitude a share of the sensor's full scale.
 
-    sensor KEY VALUE ...              grid 9x9, rate 15 (Hz), noise 2, gain 600, baseline 300 (counts), jitter 0ms,
-                                      width 0.9 (of a finger, taxels), waiting yes (for a second tap)
+    sensor KEY VALUE ...              grid 9x9, rate 15 (Hz), noise 2, gain 600, baseline 300 (counts),
+                                      jitter 0ms, width 0.9 (taxels, of a finger),
+                                      waiting yes (for a second tap)
     quiet for D                       frames without a finger
     press R,C A [and R,C A] for D     fingers that stay where they are
     move R,C to R,C A [and ...] in D  fingers that slide
