@@ -27,7 +27,7 @@ def listed(path: Path) -> object:
     return pytest.param(path, id=path.stem, marks=marks)
 
 
-@pytest.mark.parametrize("path", map(listed, SCENARIOS))
+@pytest.mark.parametrize("path", [listed(path) for path in SCENARIOS])
 def test_scenario(path: Path) -> None:
     scenario = load(path)
     assert any(step.verb == "expect" for step in scenario.steps)
