@@ -36,23 +36,26 @@ class HttpThread:
 
     def __init__(self, sock: socket.socket, routes: dict[str, Callable[[], Answer]]) -> None:
         self._sock, self._routes = sock, routes
-        self._loop = asyncio.SelectorEventLoop()
         self._open = 0
+        self._started = threading.Event()
         self._thread = threading.Thread(target=self._run, name="http", daemon=True)
         self._thread.start()
+        self._started.wait()
 
     def close(self) -> None:
         """Stop serving and close the socket."""
-        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._loop.call_soon_threadsafe(self._stop.set)
         self._thread.join(1.0)
-        self._sock.close()
 
     def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        server = self._loop.run_until_complete(
-            asyncio.start_server(self._serve, sock=self._sock, limit=REQUEST_BYTES)
-        )
-        self._loop.run_forever()
+        with asyncio.Runner(loop_factory=asyncio.SelectorEventLoop) as runner:
+            runner.run(self._main())
+
+    async def _main(self) -> None:
+        self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
+        server = await asyncio.start_server(self._serve, sock=self._sock, limit=REQUEST_BYTES)
+        self._started.set()
+        await self._stop.wait()
         server.close()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -47,7 +47,9 @@ def bind_udp(address: Address) -> socket.socket:
     """A non-blocking UDP socket with a large receive buffer, as far as the kernel grants it."""
     sock = _bind("listen", address, socket.SOCK_DGRAM)
     try:
-        sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES)  # beyond the limit, for CAP_NET_ADMIN
+        sock.setsockopt(
+            socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES
+        )  # beyond the limit, for CAP_NET_ADMIN
     except OSError:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
     return sock

@@ -82,7 +82,9 @@ class Client:
 class Daemon:
     """`gestured` as a process. `start` waits for its ready line."""
 
-    def __init__(self, folder: Path, *flags: object, env: dict[str, str] | None = None, python: Iterable[str] = ()):
+    def __init__(
+        self, folder: Path, *flags: object, env: dict[str, str] | None = None, python: Iterable[str] = ()
+    ):
         self.folder = folder
         self.stderr_path = folder / "stderr.txt"
         clean = {key: value for key, value in os.environ.items() if not key.startswith("GESTURED_")}
@@ -133,7 +135,9 @@ class Daemon:
     def get(self, path: str) -> tuple[int, str]:
         """Status and body of an HTTP request."""
         try:
-            with urllib.request.urlopen(f"http://{self.ready['metrics']}{path}", timeout=DEADLINE_S) as answer:
+            with urllib.request.urlopen(
+                f"http://{self.ready['metrics']}{path}", timeout=DEADLINE_S
+            ) as answer:
                 return answer.status, answer.read().decode()
         except urllib.error.HTTPError as error:
             return error.code, error.read().decode()
@@ -228,7 +232,9 @@ class Sensor:
     def perform(self, *directions: str) -> "Sensor":
         """Swipes ("left" ...) and taps ("tap"), a quiet second after each."""
         for direction in directions:
-            self.send(self.hand.tap() if direction == "tap" else self.hand.swipe(direction), self.hand.idle(1.0))
+            self.send(
+                self.hand.tap() if direction == "tap" else self.hand.swipe(direction), self.hand.idle(1.0)
+            )
         return self
 
 

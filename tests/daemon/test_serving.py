@@ -41,13 +41,21 @@ def test_a_swipe_is_one_gesture_with_all_fields(shared: Daemon) -> None:
 
 
 def test_every_onset_has_one_answer_and_one_release(shared: Daemon) -> None:
-    client = shared.client().subscribe("gesture", "unknown", "cancelled", "onset", "release", sensors=["grammar"])
+    client = shared.client().subscribe(
+        "gesture", "unknown", "cancelled", "onset", "release", sensors=["grammar"]
+    )
     sensor = Sensor(shared, "grammar").begin().perform("tap", "up", "down")
     sensor.send([sensor.hand.frame(4.0) for _ in range(30)], sensor.hand.idle(1.0))  # pressed for two seconds
     lines = client.until(lambda line: line["type"] == "release" and line["id"] == 4)
     kinds = {i: [line["type"] for line in lines if line["id"] == i] for i in (1, 2, 3, 4)}
-    assert kinds == {i: ["onset", "gesture", "release"] for i in (1, 2, 3)} | {4: ["onset", "unknown", "release"]}
-    assert [line["gesture"] for line in lines if line["type"] == "gesture"] == ["one_tap", "swipe_up", "swipe_down"]
+    assert kinds == {i: ["onset", "gesture", "release"] for i in (1, 2, 3)} | {
+        4: ["onset", "unknown", "release"]
+    }
+    assert [line["gesture"] for line in lines if line["type"] == "gesture"] == [
+        "one_tap",
+        "swipe_up",
+        "swipe_down",
+    ]
     assert [line["sequence"] for line in lines if line["type"] == "gesture"] == [1, 2, 3]
     unknown = next(line for line in lines if line["type"] == "unknown")
     assert "gesture" not in unknown and "sequence" not in unknown
@@ -92,7 +100,9 @@ def test_subscriptions_filter_by_type_sensor_and_gesture(shared: Daemon) -> None
         Sensor(shared, name).begin().perform("left", "right", "left")
         everything.events("gesture", name, 3)
     found = [only_left.line() for _ in range(4)]
-    assert [(e["sensor"], e["gesture"]) for e in found] == [(s, "swipe_left") for s in "one one two two".split()]
+    assert [(e["sensor"], e["gesture"]) for e in found] == [
+        (s, "swipe_left") for s in "one one two two".split()
+    ]
     kinds = [(e["type"], e["sensor"]) for e in (only_two.line() for _ in range(6))]
     assert kinds == [("onset", "two"), ("gesture", "two")] * 3
 

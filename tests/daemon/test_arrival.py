@@ -1,0 +1,73 @@
+"""Other people's OSC clients, in real time: frames count when they arrive."""
+
+import json
+import select
+import shutil
+import subprocess
+from collections.abc import Callable
+
+import pytest
+
+from tests.daemon.harness import Client, Daemon, Frame, Hand
+
+STEP_S = 1 / 60  # faster than a real sensor, so that the test is
+
+
+def stream(client: Client, send: Callable[[Frame], None], sensor: str) -> dict:
+    """Be a sensor: quiet until it is known, then one swipe, then quiet until it is answered."""
+    hand = Hand()
+    client.subscribe("gesture", "unknown", "cancelled", "status", sensors=[sensor])
+    swipe: list[Frame] | None = None
+    while True:
+        # The pace of a sensor, kept by waiting for what the daemon says.
+        if select.select([client.sock], [], [], STEP_S)[0]:
+            line = client.line()
+            if line["type"] != "status":
+                return line
+            if line["sensors"].get(sensor) == "ok" and swipe is None:
+                swipe = [hand.frame(4.0, 1 + i / 4) for i in range(25)]
+        send(swipe.pop(0) if swipe else hand.frame())
+
+
+def test_python_osc(start) -> None:
+    udp_client = pytest.importorskip("pythonosc.udp_client")
+    daemon: Daemon = start()
+    sender = udp_client.SimpleUDPClient(*daemon.address)
+    event = stream(
+        daemon.client(), lambda frame: sender.send_message("/arm/pressure", frame.ravel().tolist()), "arm"
+    )
+    assert (event["type"], event.get("gesture")) == ("gesture", "swipe_right")
+
+
+def test_oscsend(start) -> None:
+    program = shutil.which("oscsend")
+    if program is None:
+        pytest.skip("oscsend is not here (Debian: liblo-tools)")
+    daemon: Daemon = start("--metrics", "127.0.0.1:0")
+    host, port = daemon.address
+
+    def send(frame: Frame) -> None:
+        values = [f"{value:g}" for value in frame.ravel()]
+        subprocess.run([program, host, str(port), "/lo/pressure", "f" * frame.size, *values], check=True)
+
+    event = stream(daemon.client(), send, "lo")
+    assert (event["type"], event.get("gesture")) == ("gesture", "swipe_right")
+    assert daemon.metric("gestured_dropped_total", reason="second_source") == 0  # each came from another port
+
+
+def test_a_plain_message_without_a_bundle_can_be_a_blob(start) -> None:
+    builder = pytest.importorskip("pythonosc.osc_message_builder")
+    udp_client = pytest.importorskip("pythonosc.udp_client")
+    daemon: Daemon = start()
+    sender = udp_client.UDPClient(*daemon.address)
+    count = 0
+
+    def send(frame: Frame) -> None:
+        nonlocal count
+        count += 1
+        message = builder.OscMessageBuilder("/arm/pressure")
+        message.add_arg(count, "i")
+        message.add_arg(frame.astype("u1").tobytes(), "b")
+        sender.send(message.build())
+
+    assert json.dumps(stream(daemon.client(), send, "arm")["gesture"]) == '"swipe_right"'

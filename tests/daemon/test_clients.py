@@ -1,0 +1,173 @@
+"""Clients that do not read, vanish, or are too many: the others notice nothing."""
+
+import asyncio
+import json
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gestured.core import wire
+from gestured.core.events import Onset
+from gestured.daemon import clients
+from gestured.daemon.clients import EventServer
+from gestured.daemon.metrics import Metrics
+from tests.daemon.harness import Daemon, Sensor
+
+
+def test_a_slow_client_is_told_what_it_lost_and_others_get_everything(start) -> None:
+    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0")
+    slow = daemon.client()
+    slow.sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    quick = daemon.client()
+    sensor = Sensor(daemon, "arm").begin()
+    done = 0
+    while done < 600 or daemon.metric("gestured_client_lines_lost_total") == 0:
+        sensor.perform(*["tap"] * 20)
+        done += 20
+        assert [e["sequence"] for e in quick.events("gesture", "arm", 20)] == list(range(done - 19, done + 1))
+    lines = slow.until(lambda line: line.get("sequence") == done)
+    lost = [line for line in lines if line["type"] == "lost"]
+    sequences = [line["sequence"] for line in lines if line["type"] == "gesture"]
+    assert len(lost) >= 1 and sum(line["count"] for line in lost) + len(sequences) == done
+    # The gap is where the lines were lost, and nowhere else.
+    at = lines.index(lost[0])
+    assert lines[at + 1]["sequence"] - lines[at - 1]["sequence"] == lost[0]["count"] + 1
+    assert [line["sequence"] for line in lines[:at]] == list(range(1, at + 1))
+
+
+def test_clients_that_vanish_in_mid_line_are_forgotten(shared: Daemon) -> None:
+    for _ in range(20):
+        client = shared.client()
+        client.sock.sendall(b'{"subscribe":')
+        client.close()
+    client = shared.client()
+    Sensor(shared, "vanish").begin().perform("left")
+    assert client.events("gesture", "vanish")
+    client.subscribe("status")
+    while shared.metric("gestured_clients") > 1:
+        client.line()
+
+
+def test_a_client_that_only_closes_its_writing_side_still_gets_events(shared: Daemon) -> None:
+    client = shared.client().subscribe("gesture", sensors=["half"])
+    client.sock.shutdown(socket.SHUT_WR)
+    Sensor(shared, "half").begin().perform("left")
+    assert client.line()["gesture"] == "swipe_left"
+
+
+@pytest.fixture
+def listener(tmp_path: Path) -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_UNIX) as sock:
+        sock.bind(str(tmp_path / "s"))
+        sock.listen(64)
+        sock.setblocking(False)
+        yield sock
+
+
+def connect(listener: socket.socket) -> socket.socket:
+    client = socket.socket(socket.AF_UNIX)
+    client.connect(listener.getsockname())
+    client.setblocking(False)
+    return client
+
+
+async def turn() -> None:
+    """Let the loop look at its sockets."""
+    for _ in range(5):
+        await asyncio.sleep(0)
+
+
+def test_a_client_that_reads_nothing_for_long_is_cut_off(listener, monkeypatch) -> None:
+    async def main() -> None:
+        metrics = Metrics()
+        server = EventServer(listener, lambda: b"hello\n", metrics)
+        with connect(listener) as stalled, connect(listener) as idle:
+            await turn()
+            (first, second) = server._clients
+            stalled_one = first if first.sock.fileno() < second.sock.fileno() else second
+            while stalled_one.blocked_since is None:
+                stalled_one.send(b"x" * 1000 + b"\n")
+            server.tick()
+            assert server.count == 2
+            monkeypatch.setattr(clients, "STALLED_S", -1.0)
+            server.tick()
+            assert server.count == 1 and metrics.evicted.values == {("stalled",): 1}
+            assert idle.recv(100) == b"hello\n"
+            await server.close(0.1)
+            assert server.count == 0 and idle.recv(100) == b""
+
+    asyncio.run(main())
+
+
+def test_the_backlog_is_bounded_and_drops_the_oldest(listener) -> None:
+    async def main() -> None:
+        metrics = Metrics()
+        server = EventServer(listener, lambda: b"", metrics)
+        with connect(listener) as sock:
+            await turn()
+            (client,) = server._clients
+            client.subscription = wire.Subscription()
+            for i in range(5000):
+                client.send(b"%06d" % i + b"." * 493 + b"\n")
+                assert client.backlog <= clients.BACKLOG_BYTES + 500
+            received = b""
+            while b"004999" not in received:
+                try:
+                    received += sock.recv(1 << 16)
+                except BlockingIOError:
+                    await turn()
+            lines = received.split(b"\n")[:-1]
+            numbers = [int(line[:6]) for line in lines if not line.startswith(b"{")]
+            lost = [json.loads(line)["count"] for line in lines if line.startswith(b"{")]
+            assert numbers == sorted(numbers) and numbers[-1] == 4999
+            assert len(numbers) + sum(lost) == 5000 and sum(lost) == metrics.lost_lines.total()
+            await server.close(0)
+
+    asyncio.run(main())
+
+
+def test_more_clients_than_there_is_room_for_are_told_so(listener, monkeypatch) -> None:
+    monkeypatch.setattr(clients, "CLIENTS", 2)
+
+    async def main() -> None:
+        metrics = Metrics()
+        server = EventServer(listener, lambda: b"hello\n", metrics)
+        with connect(listener) as a, connect(listener) as b, connect(listener) as c:
+            await turn()
+            assert (a.recv(99), b.recv(99)) == (b"hello\n", b"hello\n")
+            assert json.loads(c.recv(99))["type"] == "error" and c.recv(99) == b""
+            assert server.count == 2 and metrics.evicted.values == {("too_many",): 1}
+            await server.close(0)
+
+    asyncio.run(main())
+
+
+def test_an_event_is_encoded_once_for_all(listener, monkeypatch) -> None:
+    calls = []
+    encode = wire.to_json
+    monkeypatch.setattr(wire, "to_json", lambda event, epoch: calls.append(event) or encode(event, epoch))
+
+    async def main() -> None:
+        server = EventServer(listener, lambda: b"", Metrics())
+        socks = [connect(listener) for _ in range(10)]
+        await turn()
+        server.publish(Onset("arm", 1, 2.0), 0.0)
+        assert calls == []  # nobody wants it
+        for sock in socks[:6]:
+            sock.send(b'{"subscribe":{"types":["onset"]}}\n')
+        socks[6].send(b'{"subscribe":{"types":["onset","gesture"]}}\n')
+        await turn()
+        server.publish(Onset("arm", 1, 2.0), 10.0)
+        assert len(calls) == 1
+        assert {sock.recv(999) for sock in socks[:7]} == {
+            b'{"type":"onset","sensor":"arm","id":1,"onset":12.0}\n'
+        }
+        for sock in socks:
+            sock.close()
+        await turn()
+        assert server.count == 0
+        await server.close(0)
+
+    asyncio.run(main())

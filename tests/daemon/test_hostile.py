@@ -1,0 +1,133 @@
+"""Whatever arrives on the UDP port is dropped and counted by reason; the next good frame is taken."""
+
+import math
+import socket
+import struct
+
+import pytest
+
+from gestured.core import osc
+from tests.daemon import harness
+from tests.daemon.harness import Daemon, Hand, Sensor, raw_message
+
+GOOD = Hand().frame().ravel()
+NAN = GOOD.copy()
+NAN[40] = math.nan
+RUBBISH = {
+    "empty": (b"", "not_osc"),
+    "text": (b"GET / HTTP/1.1\r\n\r\n", "not_osc"),
+    "too few values": (raw_message(b"/bad/pressure", b"," + b"f" * 80, *GOOD[:80]), "size"),
+    "80 values and 81 type tags": (raw_message(b"/bad/pressure", b"," + b"f" * 81, *GOOD[:80]), "truncated"),
+    "81 values and 80 type tags": (raw_message(b"/bad/pressure", b"," + b"f" * 80, *GOOD), "trailing"),
+    "not finite": (raw_message(b"/bad/pressure", b"," + b"f" * 81, *NAN), "not_finite"),
+    "strings": (raw_message(b"/bad/pressure", b",s") + b"abc\0", "types"),
+    "no type tags": (b"/bad/pressure\0\0\0", "types"),
+    "blob of a wrong size": (osc.encode_message("/bad/pressure", "b", (b"1234",)), "size"),
+    "unknown address": (raw_message(b"/bad/humidity", b",f", 1.0), "address"),
+    "wildcard address": (raw_message(b"/[a-z]*/pressure", b",f", 1.0), "address"),
+    "wildcard address with commas": (raw_message(b"/{a,b,c}*/pressure", b",f", 1.0), "types"),
+    "name that is no name": (raw_message(b"/b d/pressure", b",f", 1.0), "address"),
+    "not ASCII": (raw_message(b"/\xff\xfe/pressure", b",f", 1.0), "address"),
+    "negative bundle element": (b"#bundle\0" + bytes(7) + b"\1" + struct.pack(">i", -4) + bytes(4), "bundle"),
+    "deep nesting": (b"", "bundle"),
+    "a whole datagram of zeros": (bytes(60_000), "not_osc"),
+}
+nested = raw_message(b"/bad/pressure", b",f", 1.0)
+for _ in range(40):
+    nested = osc.encode_bundle([nested])
+RUBBISH["deep nesting"] = (nested, "bundle")
+
+
+@pytest.mark.parametrize("name", RUBBISH)
+def test_rubbish_is_counted_and_nobody_else_notices(shared: Daemon, name: str) -> None:
+    packet, reason = RUBBISH[name]
+    client = shared.client()
+    before = shared.metric("gestured_dropped_total", reason=reason)
+    sensor = Sensor(shared, "beside_" + "".join(c for c in name if c.isalnum())).begin()
+    sensor.sock.send(packet)
+    for frame in sensor.hand.swipe("left"):
+        sensor.send([frame]).sock.send(packet)
+    sensor.send(sensor.hand.idle(1.0))
+    assert client.events("gesture", sensor.name)[0]["gesture"] == "swipe_left"
+    assert shared.metric("gestured_dropped_total", reason=reason) == before + 8
+
+
+def test_a_bundle_from_the_future_stops_nothing(start) -> None:
+    daemon = start("--metrics", "127.0.0.1:0")
+    client = daemon.client().subscribe("status")
+    sensor = Sensor(daemon, "prophet")
+    sensor.t = 9e9
+    sensor.begin()
+    assert client.until(lambda line: "prophet" in line["sensors"])
+
+
+def test_what_is_dropped_is_logged_at_a_bounded_rate(start) -> None:
+    daemon = start("--metrics", "127.0.0.1:0")
+    sensor = Sensor(daemon, "noisy")
+    for _ in range(100):
+        sensor.sock.send(b"rubbish!")
+    client = daemon.client().subscribe("status")
+    while daemon.metric("gestured_dropped_total", reason="not_osc") < 100:
+        client.line()
+    daemon.stop()
+    lines = [line for line in harness.lines_of(daemon.stderr()) if line.get("reason") == "not_osc"]
+    assert len(lines) == 1 and lines[0]["source"] == "127.0.0.1" and lines[0]["level"] == "warning"
+
+
+def test_a_sensor_belongs_to_the_source_that_sent_first(shared: Daemon) -> None:
+    client = shared.client()
+    before = shared.metric("gestured_dropped_total", reason="second_source")
+    owner = Sensor(shared, "owned").begin()
+    intruder = Sensor(shared, "owned")
+    for frame in owner.hand.swipe("left"):
+        owner.send([frame])
+        intruder.send([intruder.hand.frame(4.0)])
+    owner.send(owner.hand.idle(1.0))
+    assert client.events("gesture", "owned")[0]["gesture"] == "swipe_left"
+    assert shared.metric("gestured_dropped_total", reason="second_source") == before + 7
+    states = shared.client().subscribe("status")
+    states.until(lambda line: line["sensors"]["owned"] == "stale")
+    intruder.begin().perform("right")  # nobody else sends now
+    assert client.events("gesture", "owned")[0]["sequence"] == 2
+
+
+def test_only_allowed_sources_may_send(start) -> None:
+    daemon = start(
+        "--allow", "127.0.0.2", "--allow", "10.0.0.0/8", "--clock", "sensor", "--metrics", "127.0.0.1:0"
+    )
+    client = daemon.client()
+    Sensor(daemon, "stranger").begin().perform("left")
+    friend = Sensor(daemon, "friend")
+    friend.sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    friend.sock.bind(("127.0.0.2", 0))
+    friend.sock.connect(daemon.address)
+    friend.begin().perform("left")
+    assert client.line()["sensor"] == "friend"
+    assert daemon.metric("gestured_dropped_total", reason="not_allowed") == 30 + 7 + 15
+    assert list(daemon.client().hello["sensors"]) == ["friend"]
+
+
+def test_more_sensors_than_allowed_are_dropped_but_those_in_the_file_have_a_place(start, tmp_path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text("max_sensors = 3\n[sensors.mine]\nmirror = true\n")
+    daemon = start("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0")
+    client = daemon.client()
+    for name in ("a", "b", "c", "mine"):
+        Sensor(daemon, name).begin().perform("left")
+    events = [client.line() for _ in range(3)]
+    assert [(e["sensor"], e["gesture"]) for e in events] == [
+        ("a", "swipe_left"), ("b", "swipe_left"), ("mine", "swipe_right"),
+    ]  # fmt: skip
+    assert daemon.metric("gestured_dropped_total", reason="too_many_sensors") == 30 + 7 + 15
+
+
+def test_sensors_in_metrics_are_folded_together(shared: Daemon) -> None:
+    for i in range(12):
+        Sensor(shared, f"crowd{i}").begin()
+    client = shared.client().subscribe("status")
+    client.until(lambda line: "crowd11" in line["sensors"])
+    samples = [
+        line for line in shared.get("/metrics")[1].splitlines() if line.startswith("gestured_frames_total")
+    ]
+    names = {line.split('sensor="')[1].split('"')[0] for line in samples}
+    assert len(names) <= 9 and "other" in names

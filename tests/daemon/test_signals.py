@@ -1,0 +1,118 @@
+"""SIGTERM, SIGINT, SIGHUP; and what systemd is told."""
+
+import signal
+import socket
+from pathlib import Path
+
+import pytest
+
+from tests.daemon import tiny_model
+from tests.daemon.harness import DEADLINE_S, Daemon, Sensor, lines_of
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_the_end_answers_what_is_in_flight(start, number: int) -> None:
+    daemon = start("--clock", "sensor")
+    client = daemon.client().subscribe("gesture", "onset", "cancelled", "release")
+    sensor = Sensor(daemon, "arm").begin()
+    sensor.send(sensor.hand.tap(), sensor.hand.idle(0.2))  # a second tap may still come
+    assert client.line()["type"] == "onset"
+    daemon.signal(number)
+    assert [client.line()["type"] for _ in range(2)] == ["gesture", "release"]
+    assert daemon.wait() == 0
+    assert client.sock.recv(1) == b""
+    assert not daemon.socket.exists() and not daemon.socket.with_name("events.sock.lock").exists()
+    assert "Traceback" not in daemon.stderr()
+
+
+def reload(daemon: Daemon, result: str) -> None:
+    """Send SIGHUP and wait until it is over."""
+    before = daemon.metric("gestured_reloads_total", result=result)
+    client = daemon.client().subscribe("status")
+    daemon.signal(signal.SIGHUP)
+    while daemon.metric("gestured_reloads_total", result=result) == before:
+        client.line()
+
+
+def test_reload_takes_a_new_model_and_configuration_and_keeps_what_was_learned(
+    start, model, tmp_path
+) -> None:
+    path = tmp_path / "mine.onnx"
+    path.write_bytes(model.read_bytes())
+    config = tmp_path / "gestured.toml"
+    config.write_text("")
+    daemon = start("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0", model=path)
+    client = daemon.client().subscribe("gesture", "unknown")
+    sensor = Sensor(daemon, "arm").begin().perform("left")
+    assert client.line()["gesture"] == "swipe_left"
+    tiny_model.make(path, gestures=("knock", *tiny_model.GESTURES[1:]))
+    config.write_text("[gestures.swipe_left]\nthreshold = 1.0\n")
+    reload(daemon, "done")
+    sensor.perform("left", "tap")  # at once: the baseline is still known
+    lines = [client.line() for _ in range(2)]
+    assert [(e["type"], e.get("gesture"), e["id"]) for e in lines] == [
+        ("unknown", None, 2),
+        ("gesture", "knock", 3),
+    ]
+    assert lines[1]["sequence"] == 2
+    assert daemon.client().hello["gestures"][0] == "knock"
+    assert daemon.client().hello["instance"] == client.hello["instance"]
+
+
+def test_reload_with_other_gestures_changes_what_is_waited_for(start, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text("")
+    daemon = start("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0")
+    client = daemon.client()
+    config.write_text('gestures = ["one_tap", "swipe_left"]\n')
+    sensor = Sensor(daemon, "arm").begin().perform("tap")
+    slow = client.line()
+    reload(daemon, "done")
+    sensor.begin().perform("tap")
+    quick = client.line()
+    assert (slow["gesture"], quick["gesture"], quick["sequence"]) == ("one_tap", "one_tap", 2)
+    assert slow["decided"] - slow["offset"] > 0.5 > 0.25 > quick["decided"] - quick["offset"]
+    assert set(quick["scores"]) == {"one_tap", "swipe_left"} == set(daemon.client().hello["gestures"])
+
+
+@pytest.mark.parametrize("what", ["configuration", "model"])
+def test_reload_of_something_invalid_changes_nothing(start, model: Path, tmp_path: Path, what: str) -> None:
+    path = tmp_path / "mine.onnx"
+    path.write_bytes(model.read_bytes())
+    config = tmp_path / "gestured.toml"
+    config.write_text("")
+    daemon = start("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0", model=path)
+    client = daemon.client()
+    sensor = Sensor(daemon, "arm").begin()
+    config.write_text(
+        "[gestures.swipe_left]\nthreshold = 1.0\n" + ("nonsense = 1\n" if what == "configuration" else "")
+    )
+    if what == "model":
+        path.write_bytes(model.read_bytes()[:3000])
+    reload(daemon, "refused")
+    sensor.perform("left")
+    assert client.events("gesture", "arm")[0]["gesture"] == "swipe_left"
+    (said,) = (line for line in lines_of(daemon.stderr()) if "refused" in line["event"])
+    assert ("nonsense" if what == "configuration" else str(path)) in said["reason"]
+
+
+def test_systemd_is_told(start, tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
+        supervisor.bind(str(tmp_path / "notify"))
+        supervisor.settimeout(DEADLINE_S)
+
+        def until(word: str) -> str:
+            while word not in (said := supervisor.recv(4096).decode()):
+                pass
+            return said
+
+        daemon = start(env={"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "300000"})
+        assert supervisor.recv(4096).decode().startswith("READY=1\nSTATUS=")
+        until("WATCHDOG=1")
+        until("WATCHDOG=1")
+        daemon.signal(signal.SIGHUP)
+        assert "MONOTONIC_USEC=" in until("RELOADING=1")
+        until("READY=1")
+        daemon.signal(signal.SIGTERM)
+        until("STOPPING=1")
+        assert daemon.wait() == 0

@@ -1,0 +1,227 @@
+"""From nothing to ready, and every way in which that ends early."""
+
+import json
+import os
+import socket
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.daemon import tiny_model
+from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
+
+
+def run(*flags: object, env: dict[str, str] | None = None) -> tuple[int, str, str]:
+    """Exit status and output of a daemon that is expected to end at once."""
+    done = subprocess.run(
+        [sys.executable, "-m", "gestured.daemon", *map(str, flags)],
+        capture_output=True, text=True, timeout=DEADLINE_S, env=os.environ | (env or {}),
+    )  # fmt: skip
+    return done.returncode, done.stdout, done.stderr
+
+
+def refused(status: int, *flags: object, env: dict[str, str] | None = None) -> str:
+    """What a daemon says that ends with this status; it must be one sentence, and no traceback."""
+    found, _, stderr = run(*flags, env=env)
+    assert found == status, stderr
+    last = stderr.strip().splitlines()[-1]
+    assert last.startswith("gestured: ") and "Traceback" not in stderr
+    return last
+
+
+def test_the_ready_line_says_where_everything_is(start) -> None:
+    daemon = start("--metrics", "127.0.0.1:0")
+    assert list(daemon.ready) == ["type", "listen", "socket", "metrics", "model"]
+    assert daemon.ready["type"] == "ready" and daemon.ready["model"] == "tiny"
+    assert not daemon.ready["listen"].endswith(":0") and not daemon.ready["metrics"].endswith(":0")
+    assert stat.S_IMODE(daemon.socket.stat().st_mode) == 0o660
+    assert json.loads(daemon.get("/readyz")[1])["ready"] is True
+
+
+def test_it_listens_on_ipv6_too(start) -> None:
+    try:
+        socket.socket(socket.AF_INET6, socket.SOCK_DGRAM).bind(("::1", 0))
+    except OSError as error:
+        pytest.skip(f"no IPv6 here: {error}")
+    assert start("--listen", "[::1]:0").ready["listen"].startswith("[::1]:")
+
+
+@pytest.mark.parametrize("key", ["listen", "metrics"])
+def test_an_address_that_is_taken(model: Path, tmp_path: Path, key: str) -> None:
+    kind = socket.SOCK_DGRAM if key == "listen" else socket.SOCK_STREAM
+    with socket.socket(socket.AF_INET, kind) as taken:
+        taken.bind(("127.0.0.1", 0))
+        if kind == socket.SOCK_STREAM:
+            taken.listen()
+        address = f"127.0.0.1:{taken.getsockname()[1]}"
+        flags = {"--listen": "127.0.0.1:0", "--socket": tmp_path / "s", "--model": model, f"--{key}": address}
+        said = refused(4, *(word for pair in flags.items() for word in pair))
+    assert key in said and address in said and "in use" in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_second_daemon_leaves_the_first_one_alone(start, model: Path) -> None:
+    first = start("--clock", "sensor")
+    client = first.client()
+    said = refused(4, "--model", model, "--listen", "127.0.0.1:0", "--socket", first.socket)
+    assert str(first.socket) in said and "another" in said
+    Sensor(first, "arm").begin().perform("left")
+    assert client.events("gesture", "arm")
+    assert first.client().hello["instance"] == client.hello["instance"]
+
+
+def test_a_stale_socket_is_taken_over_and_anything_else_is_not(start, model: Path, tmp_path: Path) -> None:
+    path = tmp_path / "events.sock"
+    with socket.socket(socket.AF_UNIX) as dead:
+        dead.bind(str(path))
+    daemon = start("--socket", path)
+    assert daemon.client().hello["type"] == "hello"
+    daemon.stop()
+    assert not path.exists()
+    path.write_text("somebody's notes")
+    assert "not a socket" in refused(4, "--model", model, "--listen", "127.0.0.1:0", "--socket", path)
+    assert path.read_text() == "somebody's notes"
+    with socket.socket(socket.AF_UNIX) as alive:
+        other = tmp_path / "other.sock"
+        alive.bind(str(other))
+        alive.listen()
+        assert "another program" in refused(4, "--model", model, "--listen", "127.0.0.1:0", "--socket", other)
+        assert other.exists()
+    missing = tmp_path / "no" / "such" / "folder.sock"
+    assert str(missing) in refused(4, "--model", model, "--listen", "127.0.0.1:0", "--socket", missing)
+
+
+def test_the_default_socket_is_the_sessions(model: Path, tmp_path: Path) -> None:
+    flags = ("--model", model, "--listen", "127.0.0.1:0", "--explain")
+    assert (
+        "/run/x/events.sock" in run(*flags, env={"RUNTIME_DIRECTORY": "/run/x", "XDG_RUNTIME_DIR": "/y"})[1]
+    )
+    env = {key: value for key, value in os.environ.items() if key != "RUNTIME_DIRECTORY"}
+    (tmp_path / "run").mkdir()
+    daemon = Daemon(tmp_path, *flags[:-1], env=env | {"XDG_RUNTIME_DIR": str(tmp_path / "run")})
+    assert daemon.process.stdout is not None
+    daemon.ready = json.loads(daemon.process.stdout.readline())
+    assert daemon.socket == tmp_path / "run" / "gestured" / "events.sock"
+    assert stat.S_IMODE(daemon.socket.parent.stat().st_mode) == 0o700
+    assert daemon.client().hello["type"] == "hello"
+    assert daemon.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ("flags", "env", "file", "said"),
+    [
+        (("--listen", "here"), {}, "", ("listen", "'here'", "HOST:PORT", "command line")),
+        ((), {"GESTURED_STALE_S": "soon"}, "", ("stale_s", "'soon'", "number", "environment")),
+        ((), {"GESTURED_SOCKETT": "/x"}, "", ("GESTURED_SOCKETT", "GESTURED_SOCKET")),
+        ((), {}, "modell = 'x'", ("modell", "did you mean model", "gestured.toml")),
+        (
+            (),
+            {},
+            "[sensors.arm]\nrotate = 45",
+            ("sensors.arm.rotate", "45", "0, 90, 180 or 270", "gestured.toml"),
+        ),
+        (
+            (),
+            {},
+            "[gestures.one_tap]\nthreshold = 2",
+            ("gestures.one_tap.threshold", "2", "less than or equal to 1"),
+        ),
+        ((), {}, "[gestures.one_tab]\nthreshold = 0.5", ("gestures", "one_tab", "one_tap")),
+        ((), {}, "[addresses]\npressure = 'x'", ("addresses", "pressure", "{sensor}")),
+        ((), {}, "max_sensors = 0", ("max_sensors", "0", "greater than or equal to 1")),
+        ((), {}, "listen = !", ("gestured.toml", "TOML", "line 1")),
+        (("--gestures", "wink"), {}, "", ("gestures", "wink", "one_tap")),
+        (("--config", "/no/such/file"), {}, "", ("config", "/no/such/file")),
+    ],
+)
+def test_settings_that_are_not_valid(model, tmp_path, flags, env, file, said) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text(file)
+    where = () if "--config" in flags else ("--config", config)
+    text = refused(2, "--model", model, "--socket", tmp_path / "s", *where, *flags, env=env)
+    assert all(word in text for word in said), text
+
+
+def test_flags_nobody_knows_and_help() -> None:
+    assert run("--bogus")[0] == 2
+    status, out, _ = run("--help")
+    assert status == 0 and "gestured --model cnn_lstm.onnx" in out and "--stale-s" in out
+    assert run("--version")[1].startswith("gestured ")
+
+
+@pytest.mark.parametrize("broken", ["missing", "empty", "truncated", "self_test", "text"])
+def test_a_model_that_cannot_be_used(model: Path, tmp_path: Path, broken: str) -> None:
+    path = tmp_path / "bad.onnx"
+    data = model.read_bytes()
+    if broken == "self_test":
+        tiny_model.make(path, broken="self_test")
+    elif broken != "missing":
+        text = {"empty": b"", "truncated": data[: len(data) // 2], "text": b"hello " * 100}
+        path.write_bytes(text[broken])
+    flags = ("--listen", "127.0.0.1:0", "--socket", tmp_path / "s")
+    assert str(path) in refused(3, "--model", path, *flags)
+    assert not (tmp_path / "s").exists()
+
+
+def test_a_fallback_answers_where_the_first_model_cannot(start, model: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "broken.onnx"
+    broken.write_bytes(model.read_bytes()[:1000])
+    daemon = start("--fallback", model, "--clock", "sensor", model=broken)
+    assert daemon.ready["model"] == "tiny"
+    client = daemon.client()
+    Sensor(daemon, "arm").begin().perform("left")
+    (event,) = client.events("gesture", "arm")
+    assert (event["model"], event["degraded"], event["gesture"]) == ("tiny", True, "swipe_left")
+    assert client.subscribe("status").line()["state"] == "degraded"
+    assert str(broken) in daemon.stderr()
+
+
+def test_a_fallback_must_know_the_same_gestures(model: Path, tmp_path: Path) -> None:
+    names = ("wink", *tiny_model.GESTURES[1:])
+    other = tiny_model.make(tmp_path / "other.onnx", gestures=names)
+    said = refused(
+        3, "--model", model, "--fallback", other, "--listen", "127.0.0.1:0", "--socket", tmp_path / "s"
+    )
+    assert "same gestures" in said and "wink" in said
+
+
+def test_explain_says_what_is_loaded_and_what_is_left_out(model: Path, tmp_path: Path) -> None:
+    minimal = run("--model", model, "--explain")[1]
+    assert "prometheus_client, HTTP: no --metrics" in minimal and "OSC output: no --publish" in minimal
+    flags = (
+        "--metrics",
+        "127.0.0.1:0",
+        "--publish",
+        "osc://127.0.0.1:9",
+        "--gestures",
+        "swipe_left,swipe_right",
+    )
+    full = run("--model", model, *flags, "--explain")[1]
+    assert "osc://127.0.0.1:9:" in full
+    assert "waiting for a second tap: double_tap is not in use" in full and "no --metrics" not in full
+    assert "gestures: command line" in full
+
+
+def test_a_scene_loads_only_what_it_needs(start, tmp_path: Path) -> None:
+    never = ("torch", "sklearn", "pythonosc", "onnx", "matplotlib", "pywt", "mcap")
+    for flags, also_never in (
+        ((), ("prometheus_client", "gestured.daemon.http")),
+        (("--metrics", "127.0.0.1:0"), ()),
+    ):
+        daemon = start("--clock", "sensor", *flags, python=["-X", "importtime"])
+        client = daemon.client()
+        Sensor(daemon, "arm").begin().perform("left")
+        client.events("gesture", "arm")
+        if flags:
+            daemon.get("/metrics")
+        daemon.stop()
+        lines = daemon.stderr().splitlines()
+        loaded = {line.rsplit("|", 1)[1].strip() for line in lines if line.startswith("import time:")}
+        assert "onnxruntime" in loaded
+        roots = {name.split(".")[0] for name in loaded} | loaded
+        assert not roots & {*never, *also_never}
+        assert ("prometheus_client" in loaded) == bool(flags)
+        daemon.stderr_path.unlink()
