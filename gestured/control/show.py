@@ -29,7 +29,8 @@ def block(outcome: Outcome, picture: NDArray[np.float32], colour: bool) -> str:
     """Picture and words of one outcome, six lines with the empty one after it."""
     event, performed = outcome.event, outcome.performed
     if event:
-        answer = f"{event['gesture']}  {event['confidence']:.2f}"
+        by = f"  by {event['model']}, degraded" if event["degraded"] else ""
+        answer = f"{event['gesture']}  {event['confidence']:.2f}{by}"
     else:
         answer = "unknown" if performed and performed.unknown else "-"
     when = f"{1000 * outcome.latency_s:.0f} ms after its end" if outcome.latency_s is not None else ""

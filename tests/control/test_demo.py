@@ -52,6 +52,12 @@ def test_without_a_terminal_no_escape_codes_and_a_summary(run):
     assert "performed   swipe_up" in out and "Summary" in out
 
 
+def test_a_terminal_without_block_characters_gets_words(run):
+    status, out, err = run("demo", "--seconds", 6, "--kinds", "swipe_up", env={"PYTHONIOENCODING": "ascii"})
+    assert (status, err) == (0, "")
+    assert "performed   swipe_up" in out and "Summary" in out
+
+
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_ended_early_it_still_sums_up_and_leaves_nothing_behind(start, tmp_path, how):
     process = start("demo", "--seconds", 60, env={"TMPDIR": str(tmp_path)})
