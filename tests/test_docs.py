@@ -13,6 +13,7 @@ import pytest
 
 from gestured.control.cli import parser as gesturectl_parser
 from gestured.daemon.cli import parser as gestured_parser
+from gestured.models import shipped
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
@@ -144,3 +145,50 @@ def test_the_sensor_in_the_readme_sends_a_frame():
         subprocess.run([sys.executable, "-c", code], check=True, timeout=30)
         message = OscMessage(receiver.recv(65536))
     assert (message.address, len(message.params)) == ("/armrest/pressure", 81)
+
+
+@pytest.mark.e2e
+def test_the_first_steps_in_the_readme_lead_to_a_gesture(tmp_path: Path):
+    """The daemon, the simulated sensor and the listener as the README starts them, but for the addresses."""
+    if not shipped()["cnn_lstm"].exists():
+        pytest.skip(f"{shipped()['cnn_lstm']} is not there")
+    lines = [line for line in "".join(blocks("sh")).splitlines() if line.startswith("gesture")]
+    daemon_line, simulate_line, listen_line = lines[0], lines[1], lines[2]
+    path = str(tmp_path / "events.sock")
+    running = []
+
+    def begin(line: str, *more: str) -> "subprocess.Popen[str]":
+        program, *arguments = shlex.split(line.replace("/tmp/gestured.sock", path))
+        module = {"gestured": "gestured.daemon", "gesturectl": "gestured.control"}[program]
+        command = [sys.executable, "-m", module, *arguments, *more]
+        process = subprocess.Popen(
+            command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
+        running.append(process)
+        return process
+
+    try:
+        ready = json.loads(begin(daemon_line, "--listen", "127.0.0.1:0").stdout.readline())
+        begin(simulate_line.replace("127.0.0.1:9000", ready["listen"]), "--kinds", "swipe_up,one_tap")
+        assert "armrest" in begin(listen_line).stdout.readline()
+    finally:
+        for process in running:
+            process.terminate()
+            process.communicate(timeout=30)
+
+
+def test_each_command_of_the_lab_has_its_row_and_an_example():
+    pytest.importorskip("gestured.lab.cli", reason="the lab has no command line yet")
+    done = subprocess.run(
+        [sys.executable, "-m", "gestured.lab.cli", "--help"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    named = re.search(r"\{([a-z,-]+)\}", done.stdout)
+    found = named[1].split(",") if named else re.findall(r"^    ([a-z-]+) ", done.stdout, re.MULTILINE)
+    assert "train" in found
+    for command in found:
+        assert row(f"gestured-lab {command}")
