@@ -29,9 +29,10 @@ RUN = 4  # so many `i` or `f` in a row come as one array
 Argument = int | float | str | bytes | NDArray[np.generic]
 
 _BUNDLE = b"#bundle\0"
-_TIMETAG = Struct(">Q").unpack_from
-_NTP_EPOCH = 2_208_988_800 << 32  # 1970 counted from 1900, in 32.32 fixed point
-_NTP_ERA = 2**64 - 1  # which begins anew in 2036: so 1970 to 2106
+_TIMETAG = Struct(">II").unpack_from  # seconds and their fraction
+_NTP_EPOCH = (
+    2_208_988_800  # s, 1970 counted from 1900; the count begins anew in 2036, so we tell 1970 to 2106
+)
 _SCALARS = {"i": "i", "f": "f", "d": "d", "h": "q", "t": "Q"}
 _ARRAYS = {"i": np.dtype(">i4"), "f": np.dtype(">f4")}
 _RUNS = tuple(tag * RUN for tag in _ARRAYS)
@@ -53,21 +54,20 @@ class Message(NamedTuple):
     bundle: int = -1  # the bundle's number in the packet; -1 is none
 
 
-class _Place(NamedTuple):
-    """Where a packet of a known layout has one message: scalars, then a run; both may be missing."""
-
-    start: int
-    head: bytes  # address and type tags, padded; in a bundle the size before them
-    address: str
-    types: str
-    unpack: Callable[[bytes, int], tuple[Any, ...]] | None
-    scalars: int
-    dtype: "np.dtype[Any] | None"
-    values: int
-    run: int
-
-
+# Where a packet of a known layout has one message: scalars, then a run; both may be missing.
+_Place = tuple[
+    int,  # where it starts
+    bytes,  # its head there: address and type tags, padded; in a bundle the size before them
+    str,  # address
+    str,  # types
+    Callable[[bytes, int], tuple[Any, ...]] | None,  # unpacks the scalars
+    int,  # where the scalars are
+    Any,  # the run's dtype
+    int,  # its length, 0 for none
+    int,  # where the run is
+]
 _new = tuple.__new__  # Message(...) takes twice the time
+_frombuffer = np.frombuffer
 # By bytes of the first head: a packet's length, and its messages. Bounded: hostile senders invent layouts.
 _layouts: dict[bytes, tuple[int, list[_Place]]] = {}
 
@@ -114,11 +114,11 @@ def _read_places(data: bytes, places: list[_Place], bundled: bool) -> list[Messa
         if not data.startswith(head, start):
             return None
         if unpack is None:
-            args: tuple[Argument, ...] = (np.frombuffer(data, dtype, count, run),) if count else ()
+            args: tuple[Argument, ...] = (_frombuffer(data, dtype, count, run),) if count else ()
         else:
             args = unpack(data, scalars)
             if count:
-                args += (np.frombuffer(data, dtype, count, run),)
+                args += (_frombuffer(data, dtype, count, run),)
         messages.append(_new(Message, (address, types, args, timetag, bundle)))
     return messages
 
@@ -166,8 +166,10 @@ def _bundle(
 def _timetag(data: bytes, at: int, end: int) -> float | None:
     if end - at < 8:
         raise ProtocolError("bundle", "a bundle without its time tag")
-    raw = _TIMETAG(data, at)[0]
-    return None if raw == 1 else (raw - _NTP_EPOCH & _NTP_ERA) / 2**32  # 1 says "immediately"
+    seconds, fraction = _TIMETAG(data, at)
+    if seconds == 0 and fraction == 1:  # "immediately"
+        return None
+    return float((seconds - _NTP_EPOCH) % 2**32 + fraction * 2**-32)
 
 
 def _message(
@@ -193,7 +195,7 @@ def _message(
             kinds += "r"
             dtype, count, run = _ARRAYS[tag], stop - i, at
             at = _after(at, 4 * count, end)
-            args += (np.frombuffer(data, dtype, count, run),)
+            args += (_frombuffer(data, dtype, count, run),)
         elif tag in _SCALARS:
             while stop < len(types) and types[stop] in _SCALARS and types[stop : stop + RUN] not in _RUNS:
                 stop += 1
@@ -210,7 +212,7 @@ def _message(
         raise ProtocolError("trailing", f"{end - at} bytes more than the type tags say")
     if kinds in ("", "s", "r", "sr"):
         unpack = layout.unpack_from if "s" in kinds else None
-        places.append(_Place(begin, head, address, types, unpack, scalars, dtype, count, run))
+        places.append((begin, head, address, types, unpack, scalars, dtype, count, run))
     return Message(address, types, args, timetag, bundle)
 
 
@@ -294,7 +296,7 @@ def encode_message(address: str, types: str, args: Sequence[Argument] = ()) -> b
 
 def encode_bundle(elements: Sequence[bytes], timetag: float | None = None) -> bytes:
     """A bundle of encoded messages or bundles; `timetag` in seconds since 1970, None is "immediately"."""
-    raw = 1 if timetag is None else round(timetag * 2**32) + _NTP_EPOCH & _NTP_ERA
+    raw = 1 if timetag is None else (round(timetag * 2**32) + (_NTP_EPOCH << 32)) % 2**64
     sized = (part for element in elements for part in (len(element).to_bytes(4, "big"), element))
     return b"".join((_BUNDLE, raw.to_bytes(8, "big"), *sized))
 
