@@ -179,13 +179,9 @@ def test_the_first_steps_in_the_readme_lead_to_a_gesture(tmp_path: Path):
 
 def test_each_command_of_the_lab_has_its_row_and_an_example():
     pytest.importorskip("gestured.lab.cli", reason="the lab has no command line yet")
-    done = subprocess.run(
-        [sys.executable, "-m", "gestured.lab.cli", "--help"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    code = "import sys; sys.argv = ['gestured-lab', '--help']; from gestured.lab.cli import main; main()"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     named = re.search(r"\{([a-z,-]+)\}", done.stdout)
     found = named[1].split(",") if named else re.findall(r"^    ([a-z-]+) ", done.stdout, re.MULTILINE)
