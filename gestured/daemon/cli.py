@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -64,6 +65,9 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `gestured`; returns the exit status."""
+    # Until the loop takes signals: a stop is no failure, and a reload has nothing to reload yet.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
     given: dict[str, Any] = vars(parser().parse_args(arguments))
     explain = given.pop("explain")
     try:

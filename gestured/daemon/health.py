@@ -67,5 +67,5 @@ class Health:
             "reason": "; ".join(reasons) or None,
             "model": self.ladder.active,
             "degraded": self.ladder.degraded,
-            "sensors": dict(self.pipeline.states(now)),
+            "sensors": self.pipeline.states(now),
         }

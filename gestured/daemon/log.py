@@ -1,10 +1,11 @@
 """Logs go to standard error: readable at a terminal, JSON otherwise. Nothing is logged per packet."""
 
 import math
+import os
 import sys
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TextIO
 
 import structlog
 
@@ -14,7 +15,7 @@ REASONS = 64  # more reasons than there are; a bound in case one slips in that a
 
 def configure(level: str) -> None:
     """Set structlog up once, or again with another level ("debug", "info", "warning", "error")."""
-    tty = sys.stderr.isatty()
+    tty = sys.stderr is not None and sys.stderr.isatty()
     structlog.configure(
         processors=[
             structlog.processors.add_log_level,
@@ -23,9 +24,29 @@ def configure(level: str) -> None:
             structlog.dev.ConsoleRenderer() if tty else structlog.processors.JSONRenderer(),
         ],
         wrapper_class=structlog.make_filtering_bound_logger(level),
-        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+        logger_factory=lambda *_: _Printer(),
         cache_logger_on_first_use=False,
     )
+
+
+class _Printer:
+    """Writes lines to standard error; one that nobody reads any more must not stop the daemon."""
+
+    def msg(self, line: str) -> None:
+        if sys.stderr is not None:
+            say(sys.stderr, line)
+
+    debug = info = warning = error = exception = critical = msg
+
+
+def say(stream: TextIO, line: str) -> None:
+    """Write a line at once. Where the other end is gone, this and all that follows is thrown away."""
+    try:
+        print(line, file=stream, flush=True)
+    except OSError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())  # what is still buffered must not fail at the end either
+        os.close(nowhere)
 
 
 log: Any = structlog.get_logger()

@@ -151,7 +151,7 @@ class Pipeline:
 
     def states(self, now: float) -> dict[str, str]:
         """State of each sensor: "ok", "starting", "degraded" (taxels are bridged) or "stale"."""
-        return {name: self._state(sensor, now) for name, sensor in self.sensors.items()}
+        return {name: self._state(sensor, now) for name, sensor in tuple(self.sensors.items())}
 
     def drop(self, reason: str, count: int = 1, **fields: object) -> None:
         """Count what was dropped; say so at a bounded rate."""

@@ -6,6 +6,7 @@ import os
 import resource
 import signal
 import socket
+import sys
 import time
 from collections.abc import Callable
 from typing import Any
@@ -55,7 +56,7 @@ class Service:
         self._pipeline = Pipeline(settings, ladder, self._metrics, self._emit)
         self._health = Health(self._pipeline, ladder)
         self._clients = EventServer(listener.sock, self._health.hello, self._metrics)
-        self._osc = [OscSink(destination, self._metrics) for destination in settings.publish]
+        self._osc = [OscSink(address, self._metrics) for address in settings.publish]
         self._receiver = Receiver(udp, self._pipeline, make_decoder(settings, self._pipeline), settings.allow)
         self._http: Any = None
 
@@ -120,12 +121,16 @@ class Service:
             self._http.close()
         log.info("ended")
 
+    def _open(self, settings: Settings) -> tuple[Ladder, list[OscSink]]:
+        """What may take long: models, and names of hosts."""
+        return open_ladder(settings), [OscSink(address, self._metrics) for address in settings.publish]
+
     async def _reload(self) -> None:
         """Read everything anew, and only where all of it is valid, change anything."""
         systemd.notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
         try:
             settings = self._load()
-            ladder = await asyncio.to_thread(open_ladder, settings)  # frames are served meanwhile
+            ladder, osc = await asyncio.to_thread(self._open, settings)  # frames are served meanwhile
         except GesturedError as error:
             self._metrics.reloads.add("refused")
             log.error("reload refused, nothing has changed", reason=str(error))
@@ -142,7 +147,7 @@ class Service:
             self._receiver.configure(make_decoder(settings, self._pipeline), settings.allow)
             for sink in self._osc:
                 sink.close()
-            self._osc = [OscSink(destination, self._metrics) for destination in settings.publish]
+            self._osc = osc
             self._metrics.reloads.add("done")
             log.info("reloaded", model=ladder.active)
         systemd.notify("READY=1")
@@ -200,10 +205,8 @@ def _announce(udp: socket.socket, listener: UnixListener, http: socket.socket | 
         ready["metrics"] = name_of(http)
     ready["model"] = model
     log.info("ready", **{key: value for key, value in ready.items() if key != "type"})
-    try:
-        print(json.dumps(ready, separators=(",", ":")), flush=True)
-    except OSError:
-        pass  # nobody reads our standard output any more
+    if sys.stdout is not None:
+        logging.say(sys.stdout, json.dumps(ready, separators=(",", ":")))
     systemd.notify(f"READY=1\nSTATUS={model} on {ready['listen']}")
 
 

@@ -83,16 +83,25 @@ class Daemon:
     """`gestured` as a process. `start` waits for its ready line."""
 
     def __init__(
-        self, folder: Path, *flags: object, env: dict[str, str] | None = None, python: Iterable[str] = ()
-    ):
+        self,
+        folder: Path,
+        *flags: object,
+        env: dict[str, str] | None = None,
+        python: Iterable[str] = (),
+        pipes: bool = False,
+    ) -> None:
+        """`python` are flags of the interpreter; `pipes` makes standard error a pipe that nobody reads."""
         self.folder = folder
         self.stderr_path = folder / "stderr.txt"
         clean = {key: value for key, value in os.environ.items() if not key.startswith("GESTURED_")}
         with self.stderr_path.open("ab") as errors:
             self.process = subprocess.Popen(
                 [sys.executable, *python, "-m", "gestured.daemon", *map(str, flags)],
-                stdout=subprocess.PIPE, stderr=errors, env=clean | (env or {}), text=True,
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE if pipes else errors,
+                env=clean | (env or {}), text=True,
             )  # fmt: skip
+        if self.process.stderr is not None:
+            self.process.stderr.close()
         self.ready: Line = {}
 
     @classmethod

@@ -83,12 +83,11 @@ def test_a_client_that_reads_nothing_for_long_is_cut_off(listener, monkeypatch) 
     async def main() -> None:
         metrics = Metrics()
         server = EventServer(listener, lambda: b"hello\n", metrics)
-        with connect(listener) as stalled, connect(listener) as idle:
+        with connect(listener), connect(listener) as idle:
             await turn()
-            (first, second) = server._clients
-            stalled_one = first if first.sock.fileno() < second.sock.fileno() else second
-            while stalled_one.blocked_since is None:
-                stalled_one.send(b"x" * 1000 + b"\n")
+            stalled = min(server._clients, key=lambda client: client.sock.fileno())  # who came first
+            while stalled.blocked_since is None:
+                stalled.send(b"x" * 1000 + b"\n")
             server.tick()
             assert server.count == 2
             monkeypatch.setattr(clients, "STALLED_S", -1.0)

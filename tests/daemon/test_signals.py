@@ -116,3 +116,24 @@ def test_systemd_is_told(start, tmp_path: Path) -> None:
         daemon.signal(signal.SIGTERM)
         until("STOPPING=1")
         assert daemon.wait() == 0
+
+
+def test_nobody_reads_its_output_any_more(start) -> None:
+    daemon = start("--clock", "sensor", "--log-level", "debug", pipes=True)
+    daemon.process.stdout.close()
+    client = daemon.client()
+    Sensor(daemon, "arm").begin().perform("left", "tap")  # each event is logged to a pipe without a reader
+    assert len(client.events("gesture", "arm", 2)) == 2
+    daemon.signal(signal.SIGTERM)
+    assert daemon.wait() == 0
+
+
+def test_a_stop_before_it_is_ready_is_no_failure(model: Path, tmp_path: Path) -> None:
+    daemon = Daemon(
+        tmp_path, "--model", model, "--listen", "127.0.0.1:0", "--socket", tmp_path / "s", python=["-v"]
+    )
+    with daemon.stderr_path.open() as log:
+        while "import 'onnxruntime" not in log.read():
+            assert daemon.process.poll() is None
+    assert daemon.stop() == 0
+    assert not (tmp_path / "s").exists()
