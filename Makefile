@@ -28,7 +28,7 @@ demo: .venv/.runtime  ## recognise simulated gestures with the real daemon: SECO
 	@[ ! -t 0 ] || set -m; .venv/bin/gesturectl demo --seconds "$(SECONDS)" --model "$(MODEL)" $(if $(SPEED),--speed "$(SPEED)") $(ARGS)
 
 test: .venv-dev/.dev  ## run the tests: ARGS="tests/core -k tap"
-	@$(MAKE) --no-print-directory .venv-dev/.lab || echo "note: without the lab's packages its tests are skipped" >&2
+	@$(MAKE) -s --no-print-directory .venv-dev/.lab || echo "note: without the lab's packages its tests are skipped" >&2
 	@.venv-dev/bin/python -m pytest $(ARGS)
 
 lint: .venv-dev/.dev  ## ruff and mypy
