@@ -21,11 +21,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     used = [g for g in ladder.gestures if settings.gestures is None or g in settings.gestures]
     path = settings.socket or default_socket(os.environ)
     grid = settings.grid or f"{ladder.rows}x{ladder.columns}"
-    rungs = (
-        ", ".join(rung.name for rung in ladder.rungs)
-        if hasattr(ladder, "rungs")
-        else ", ".join(settings.fallback)
-    )
+    rungs = [f"{rung.name}{'' if rung.model is None else ', in use'}" for rung in ladder.rungs[1:]]
     forest = model.metadata.features is not None
     timing = Timing(stale_s=settings.stale_s)
     waits = DOUBLE_TAP in used
@@ -78,7 +74,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
         )
     parts = {
         "loads": loads,
-        "falls back on": [rungs or "nothing"],
+        "falls back on": rungs or ["nothing"],
         "listens to": listens,
         "publishes on": publishes,
         "computes per frame": computes,

@@ -1,13 +1,16 @@
 """The models that a configuration asks for."""
 
-from gestured.core.errors import SettingsError
+from gestured.core.errors import ModelError, SettingsError
 from gestured.daemon.log import log
 from gestured.daemon.settings import Settings
 from gestured.models import Ladder, ladder_for
 
 
-def open_ladder(settings: Settings) -> Ladder:
-    """Open and test them. Raises ModelError, or SettingsError for gestures that they do not know."""
+def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
+    """Open and test them. Raises ModelError, or SettingsError for gestures that they do not know.
+
+    With `insist` a fallback is not good enough: what runs already is better than that.
+    """
     early: list[str] = []
     opened = False  # until then a failure may end the start, and the error says it all
 
@@ -18,6 +21,8 @@ def open_ladder(settings: Settings) -> Ladder:
             early.append(sentence)
 
     ladder = ladder_for(settings.model, settings.fallback or None, report=report)
+    if insist and ladder.degraded:
+        raise ModelError("; ".join(early))
     opened = True
     for sentence in early:
         report(sentence)

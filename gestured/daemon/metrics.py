@@ -78,7 +78,9 @@ class Metrics:
         self.latency = Histogram(
             "gestured_latency_seconds", "From the last touched frame to the event", LATENCY_S
         )
-        self.gauges: dict[str, tuple[str, Callable[[], float]]] = {}
+        self.readings: dict[
+            str, tuple[str, Callable[[], float]]
+        ] = {}  # gauges, and counters that end in _total
         self.active_model: Callable[[], str] = str
         self._named: set[str] = set()
 
@@ -145,8 +147,11 @@ class _Collector:
                         labels, list(zip(bounds, cumulated, strict=True)), sum_value=total[0]
                     )
                 yield histogram
-        for name, (text, read) in self._metrics.gauges.items():
-            yield GaugeMetricFamily(name, text, value=read())
+        for name, (text, read) in self._metrics.readings.items():
+            if name.endswith("_total"):
+                yield CounterMetricFamily(name.removesuffix("_total"), text, value=read())
+            else:
+                yield GaugeMetricFamily(name, text, value=read())
         info = InfoMetricFamily("gestured_active_model", "The model that answers")
         info.add_metric([], {"model": self._metrics.active_model(), "version": __version__})
         yield info

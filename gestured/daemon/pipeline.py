@@ -133,20 +133,14 @@ class Pipeline:
         waits = DOUBLE_TAP in self.gestures
         old, self._settings, self._ladder = self._settings, settings, ladder
         for name, sensor in self.sensors.items():
-            front_end = sensor.recognizer.front_end
-            fresh = self._front_end(name)
-            same = (front_end.sent, front_end.mounting, front_end.timing) == (
-                fresh.sent,
-                fresh.mounting,
-                fresh.timing,
-            )
-            same = same and waits == (DOUBLE_TAP in self.gestures)
-            if not same:
+            front_end, fresh = sensor.recognizer.front_end, self._front_end(name)
+            another_clock = _clock(old, name) != _clock(settings, name)
+            if another_clock or waits != (DOUBLE_TAP in self.gestures) or not _alike(front_end, fresh):
                 self._publish(sensor, sensor.recognizer.reset())
+                fresh._id = front_end._id  # its segments are numbered on
                 front_end = fresh
-            if _clock(old, name) != _clock(settings, name):
-                self._publish(sensor, sensor.recognizer.reset())
-                front_end, sensor.stamper = fresh, Stamper(_clock(settings, name))
+            if another_clock:
+                sensor.stamper = Stamper(_clock(settings, name))
             sensor.recognizer = self._recognizer(front_end, sensor.recognizer.sequence)
 
     def states(self, now: float) -> dict[str, str]:
@@ -237,6 +231,10 @@ def _one_shot(sensor: Sensor, source: Source) -> bool:
     One packet from a port is no claim against another port of the same host; two are.
     """
     return sensor.packets == 1 and source[0] == sensor.source[0] and source != sensor.before
+
+
+def _alike(one: FrontEnd, other: FrontEnd) -> bool:
+    return (one.sent, one.mounting, one.timing) == (other.sent, other.mounting, other.timing)
 
 
 def _clock(settings: Settings, name: str) -> Literal["arrival", "sensor"]:

@@ -24,7 +24,14 @@ from gestured.daemon.metrics import Metrics
 from gestured.daemon.pipeline import Pipeline
 from gestured.daemon.settings import Settings, default_socket
 from gestured.daemon.sinks import OscSink, Sink
-from gestured.daemon.sockets import UnixListener, bind_tcp, bind_udp, make_default_directory, name_of
+from gestured.daemon.sockets import (
+    UnixListener,
+    bind_tcp,
+    bind_udp,
+    kernel_drops,
+    make_default_directory,
+    name_of,
+)
 from gestured.daemon.udp import Receiver
 from gestured.models import Ladder
 
@@ -66,10 +73,11 @@ class Service:
 
         started, metrics, health = time.time(), self._metrics, self._health
         metrics.active_model = lambda: self._ladder.active
-        metrics.gauges = {
+        metrics.readings = {
             "gestured_sensors": ("Sensors that were heard", lambda: len(self._pipeline.sensors)),
             "gestured_clients": ("Clients of the event socket", lambda: self._clients.count),
             "gestured_backlog_bytes": ("Bytes that wait for slow clients", lambda: self._clients.backlog),
+            "gestured_kernel_drops_total": ("Packets that found no room", lambda: kernel_drops(self._udp)),
             "gestured_start_time_seconds": ("When the daemon started", lambda: started),
         }
         routes = {
@@ -87,6 +95,7 @@ class Service:
         reloading: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         reloading.set_result(None)
         while not stop.is_set():
+            self._receiver.read_all()  # a sensor whose frames wait for us is not silent
             now = self._health.beat = time.monotonic()
             self._pipeline.tick(now)
             if now >= status_at:
@@ -110,6 +119,7 @@ class Service:
         """Answer what is in flight, give clients a moment to read it, and say goodbye."""
         self._health.stopping = True
         systemd.notify("STOPPING=1")
+        self._receiver.read_all()
         self._receiver.close()
         now = time.monotonic()
         for sensor in tuple(self._pipeline.sensors.values()):
@@ -123,7 +133,9 @@ class Service:
 
     def _open(self, settings: Settings) -> tuple[Ladder, list[OscSink]]:
         """What may take long: models, and names of hosts."""
-        return open_ladder(settings), [OscSink(address, self._metrics) for address in settings.publish]
+        return open_ladder(settings, insist=True), [
+            OscSink(address, self._metrics) for address in settings.publish
+        ]
 
     async def _reload(self) -> None:
         """Read everything anew, and only where all of it is valid, change anything."""

@@ -6,6 +6,7 @@ import fcntl
 import os
 import socket
 import stat
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ from gestured.core.errors import GesturedError
 from gestured.daemon.values import Address
 
 RECEIVE_BYTES = 4 << 20  # the default holds 166 frames of 9 x 9 floats, this 6,500
-BACKLOG = 128
-SO_RCVBUFFORCE = 33  # Linux; not in Python's socket module
+BACKLOG = 1024  # a thousand clients may come back at once after a restart
+SO_RCVBUFFORCE = 33  # Linux; these two are not in Python's socket module
+SO_MEMINFO = 55  # nine numbers, the last of which counts drops
 
 
 class AddressError(GesturedError):
@@ -53,6 +55,11 @@ def bind_udp(address: Address) -> socket.socket:
     except OSError:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
     return sock
+
+
+def kernel_drops(sock: socket.socket) -> int:
+    """How many datagrams the kernel has dropped because the socket's buffer was full."""
+    return int.from_bytes(sock.getsockopt(socket.SOL_SOCKET, SO_MEMINFO, 36)[32:], sys.byteorder)
 
 
 def bind_tcp(address: Address) -> socket.socket:

@@ -16,6 +16,7 @@ from gestured.daemon.pipeline import Pipeline, Sensor, Source
 
 PACKET_BYTES = 65_536
 BATCH = 256  # packets in one go: a flood must leave room for everything else
+CATCH_UP = 16  # batches
 SOURCES = 1024  # remembered decisions of the allow-list
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
@@ -42,7 +43,7 @@ class Receiver:
         self._loop = asyncio.get_running_loop()
         self._sock, self._pipeline, self._clock = sock, pipeline, clock
         self.configure(decoder, allow)
-        self._loop.add_reader(sock, self._readable)
+        self._loop.add_reader(sock, self.read)
 
     def configure(self, decoder: Decoder, allow: Sequence[Network]) -> None:
         """Decode and admit by these from now on."""
@@ -53,7 +54,14 @@ class Receiver:
         """Stop reading; the socket stays its owner's."""
         self._loop.remove_reader(self._sock)
 
-    def _readable(self) -> None:
+    def read_all(self) -> None:
+        """Take everything that waits, within reason: after a stall timers run before readers do."""
+        for _ in range(CATCH_UP):
+            if self.read() < BATCH:
+                break
+
+    def read(self) -> int:
+        """Take what waits, at most a batch; says how many packets that were."""
         receive = self._sock.recvfrom
         waiting: list[tuple[bytes, Source]] = []
         try:
@@ -69,6 +77,7 @@ class Receiver:
             self._packet(packet, source, now, batch)
         for sensor, arrivals in batch.values():
             self._pipeline.take(sensor, arrivals, now)
+        return len(waiting)
 
     def _packet(
         self, packet: bytes, source: Source, now: float, batch: dict[str, tuple[Sensor, list[Arrival]]]

@@ -6,6 +6,7 @@ import select
 import socket
 import time
 import zlib
+from pathlib import Path
 
 import pytest
 
@@ -201,6 +202,13 @@ def test_metrics_count_what_happened(shared: Daemon) -> None:
     text = shared.get("/metrics")[1]
     assert re.search(r'gestured_frames_total\{result="ok",sensor="[^"]+"\}', text)
     assert text.count("\n") - text.count("\n#") < 200
+
+
+def test_the_names_of_metrics_are_an_interface(shared: Daemon) -> None:
+    """`metrics.txt` holds name, type and help of each; a change shows in its diff, and in the changelog."""
+    pytest.importorskip("prometheus_client")
+    found = [line for line in shared.get("/metrics")[1].splitlines() if line.startswith("#")]
+    assert "\n".join(found) + "\n" == (Path(__file__).parent / "metrics.txt").read_text()
 
 
 def test_health_and_readiness_explain_themselves(shared: Daemon) -> None:

@@ -75,23 +75,27 @@ def test_reload_with_other_gestures_changes_what_is_waited_for(start, tmp_path: 
     assert set(quick["scores"]) == {"one_tap", "swipe_left"} == set(daemon.client().hello["gestures"])
 
 
-@pytest.mark.parametrize("what", ["configuration", "model"])
+@pytest.mark.parametrize("what", ["configuration", "model", "model with a fallback"])
 def test_reload_of_something_invalid_changes_nothing(start, model: Path, tmp_path: Path, what: str) -> None:
     path = tmp_path / "mine.onnx"
     path.write_bytes(model.read_bytes())
     config = tmp_path / "gestured.toml"
     config.write_text("")
-    daemon = start("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0", model=path)
+    flags: tuple[object, ...] = ("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0")
+    if what == "model with a fallback":
+        flags += ("--fallback", model)  # good enough to start with, but not to leave a good model for
+    daemon = start(*flags, model=path)
     client = daemon.client()
     sensor = Sensor(daemon, "arm").begin()
     config.write_text(
         "[gestures.swipe_left]\nthreshold = 1.0\n" + ("nonsense = 1\n" if what == "configuration" else "")
     )
-    if what == "model":
+    if what != "configuration":
         path.write_bytes(model.read_bytes()[:3000])
     reload(daemon, "refused")
     sensor.perform("left")
-    assert client.events("gesture", "arm")[0]["gesture"] == "swipe_left"
+    (event,) = client.events("gesture", "arm")
+    assert (event["gesture"], event["model"]) == ("swipe_left", "mine")
     (said,) = (line for line in lines_of(daemon.stderr()) if "refused" in line["event"])
     assert ("nonsense" if what == "configuration" else str(path)) in said["reason"]
 
@@ -137,3 +141,20 @@ def test_a_stop_before_it_is_ready_is_no_failure(model: Path, tmp_path: Path) ->
             assert daemon.process.poll() is None
     assert daemon.stop() == 0
     assert not (tmp_path / "s").exists()
+
+
+def test_a_stall_of_the_daemon_is_not_taken_for_silence_of_the_sensor(start, shared: Daemon) -> None:
+    daemon = start("--clock", "sensor", "--stale-s", "0.2")
+    client = daemon.client().subscribe("gesture", "unknown", "cancelled", "onset")
+    elsewhere = shared.client().subscribe("status")
+    sensor = Sensor(daemon, "arm").begin()
+    frames = sensor.hand.swipe("left") + sensor.hand.idle(1.0)
+    sensor.send(frames[:3])
+    assert client.line()["type"] == "onset"
+    daemon.signal(signal.SIGSTOP)
+    sensor.send(frames[3:])
+    for _ in range(2):
+        elsewhere.line()  # at least a second
+    daemon.signal(signal.SIGCONT)
+    answer = client.line()
+    assert (answer["type"], answer.get("gesture"), answer.get("frames")) == ("gesture", "swipe_left", 7)
