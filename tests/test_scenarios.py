@@ -17,17 +17,7 @@ SCENARIOS = sorted((Path(__file__).parent / "scenarios").glob("*.txt"))
 
 
 # Faults of the front end that are known; a mended one makes its test fail until its line is taken out.
-LATE = "the contract says ready when let go for a second, it takes up to 1.36 s"
-FAULTS = {"hand-at-the-start": LATE, "moving-hand-at-the-start": LATE}
-
-
-def listed(path: Path) -> object:
-    reason = FAULTS.get(path.stem)
-    marks = [pytest.mark.xfail(strict=True, reason=reason)] if reason else []
-    return pytest.param(path, id=path.stem, marks=marks)
-
-
-@pytest.mark.parametrize("path", [listed(path) for path in SCENARIOS])
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
 def test_scenario(path: Path) -> None:
     scenario = load(path)
     assert any(step.verb == "expect" for step in scenario.steps)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 SETTLE_S = 0.93  # a stable second at 15 Hz: half-way between its last two frames, so jitter cannot miss it
+LOOK_S = 0.06  # how often it is looked whether the last second was stable
 SETTLE_FRAMES = 64  # frames kept of that second; faster sensors are thinned out
 PATIENCE_S = 5.0  # a sensor that never settles (hum, a hand that never rests) is used all the same after this
 BASELINE_TAU_S = 2.0
@@ -100,7 +101,7 @@ class Settling:
         baseline, noise, constant, restless, step = _idle(stack)
         stable = restless <= min(3, raw.size // 20)
         if not stable and not (patience and t - self._since >= PATIENCE_S):
-            while t - frames[0][0] >= SETTLE_S / 2:  # the newer half may be the first half of a stable second
+            while t - frames[0][0] >= SETTLE_S - LOOK_S:  # look again soon: movement may just have ended
                 frames.popleft()
             return None
         self.clear()
@@ -167,12 +168,13 @@ class Conditioner:
         self._usual = self._typical  # idle activity, as it is
         self._scale = 1.0  # by which single taxels' noise understates the idle activity
 
-    def reset(self) -> None:
-        """Forget the baseline: the next stable second is a new one."""
+    def reset(self, *, keep: bool = False) -> None:
+        """Forget the baseline: the next stable second is a new one. `keep`: what `settle` was offered counts for it."""
         self.ready = False
         self._provisional = False
-        self._settling.clear()
         self._tracked = None
+        if not keep:
+            self._settling.clear()
 
     def doubt(self) -> None:
         """After a silence: go on with the baseline, but replace it by the next stable second."""

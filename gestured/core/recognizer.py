@@ -128,8 +128,8 @@ class FrontEnd:
             # Interference passes and its frames are lost; a sensor that restarted, or a hand that left, stays so.
             self._shifted = t if self._shifted is None else self._shifted
             if t - self._shifted >= self.timing.shift_s:
-                out += self.reset("restart")
-                conditioner.settle(t, raw)
+                out += self._restart(keep=True)
+            conditioner.settle(t, raw)
             return out
         self._shifted = None
         if segmenter.phase is not Phase.IDLE:
@@ -164,11 +164,14 @@ class FrontEnd:
         self.conditioner.doubt()
         return out
 
-    def reset(self, reason: str = "restart") -> list[Contact]:
-        """Start clean and learn the idle sensor anew; an open contact is cancelled."""
-        out = self._cancel(reason) if self.touched else []
+    def reset(self) -> list[Contact]:
+        """The sensor restarted: start clean and learn the idle sensor anew; an open contact is cancelled."""
+        return self._restart(keep=False)
+
+    def _restart(self, *, keep: bool) -> list[Contact]:
+        out = self._cancel("restart") if self.touched else []
         self.segmenter.reset()
-        self.conditioner.reset()
+        self.conditioner.reset(keep=keep)
         self._kept.clear()
         self._shifted = None
         return out

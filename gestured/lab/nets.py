@@ -7,6 +7,7 @@ change nothing by construction: every answer is taken at the last active frame.
 import torch
 from torch import Tensor, nn
 
+SCALE = 3.0  # windows are mostly zeros: without it the first layers hardly move
 ACTIVE = 0.15  # of the segment's peak: below it a frame shows no contact
 
 
@@ -27,11 +28,13 @@ class Recurrent(nn.Module):
     def __init__(self, inputs: int, classes: int, units: int = 32) -> None:
         super().__init__()
         self.lstm = nn.LSTM(inputs, units, batch_first=True)
+        with torch.no_grad():  # remember by default (Jozefowicz et al. 2015): a gesture's beginning decides its name
+            self.lstm.bias_hh_l0[units : 2 * units] += 1.0
         self.head = nn.Linear(units, classes)
 
     def features(self, x: Tensor) -> Tensor:
         """(B, T, R, C) -> (B, T, inputs); the whole frame, flattened."""
-        return x.flatten(2)
+        return SCALE * x.flatten(2)
 
     def embed(self, x: Tensor) -> Tensor:
         """(B, T, R, C) -> (B, units): the state at the last active frame."""
@@ -69,7 +72,7 @@ class CnnLstm(Recurrent):
     def features(self, x: Tensor) -> Tensor:
         """(B, T, R, C) -> (B, T, 32 * cells left after pooling)."""
         batch, time = x.shape[0], x.shape[1]
-        y = self.convolutions(x.reshape(-1, 1, x.shape[2], x.shape[3]))
+        y = self.convolutions(SCALE * x.reshape(-1, 1, x.shape[2], x.shape[3]))
         return y.reshape(batch, time, -1)
 
 

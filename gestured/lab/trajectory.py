@@ -106,6 +106,7 @@ def trajectory_features(x: Tensor) -> Tensor:
     px, py = rx - dx, ry - dy
     cross, dot = px * ry - py * rx, px * rx + py * ry
     moved = (step > 0.02).to(x.dtype) * active
+    moved = moved * ((dot > 0) | (cross.abs() > 1e-3 * dot.abs())).to(x.dtype)  # half a turn has no sense
     angle = _angle(cross, dot) * moved
     area = (cross * moved).sum(1) / 2
     qx, qy = _before(dx), _before(dy)
