@@ -88,7 +88,12 @@ class Pipeline:
         """Push frames that were found waiting at `now` (monotonic seconds)."""
         frames = self._metrics.frames
         taken = 0
-        for arrival, stamp in zip(arrivals, sensor.stamper.stamp(arrivals, now), strict=True):
+        try:
+            stamps = sensor.stamper.stamp(arrivals, now)
+        except Exception:
+            self._publish(sensor, self._recover(sensor, now))
+            return
+        for arrival, stamp in zip(arrivals, stamps, strict=True):
             if stamp.dropped:
                 frames.add(sensor.label, stamp.dropped)
                 continue
@@ -98,7 +103,7 @@ class Pipeline:
                 self._metrics.implausible.add()
             try:
                 if stamp.restarted:
-                    log.info("sensor restarted", sensor=sensor.name)
+                    self._throttle.warn("sensor restarted", "restarted", sensor=sensor.name)
                     self._publish(sensor, sensor.recognizer.reset())
                 events = sensor.recognizer.push(Frame(stamp.t, arrival.values, arrival.touches, stamp.lost))
             except Exception:
@@ -115,7 +120,7 @@ class Pipeline:
         """Close what is open where a sensor has been silent for longer than `stale_s`."""
         for sensor in self.sensors.values():
             if not sensor.silent and now - sensor.heard > self._settings.stale_s:
-                log.info("sensor is silent", sensor=sensor.name)
+                self._throttle.warn("sensor is silent", "silent", sensor=sensor.name)
                 self.flush(sensor, now)
 
     def flush(self, sensor: Sensor, now: float) -> None:
@@ -151,6 +156,11 @@ class Pipeline:
         """Count what was dropped; say so at a bounded rate."""
         self._metrics.dropped.add(reason, count=count)
         self._throttle.warn("dropped", reason, **fields)
+
+    def bug(self, what: str, **fields: object) -> None:
+        """Count a bug that was caught; log its traceback at a bounded rate."""
+        self._metrics.internal_errors.add()
+        self._throttle.error("a bug, caught", what, **fields)
 
     def _state(self, sensor: Sensor, now: float) -> str:
         if now - sensor.heard > self._settings.stale_s:
@@ -211,12 +221,11 @@ class Pipeline:
 
     def _recover(self, sensor: Sensor, t: float) -> list[Event]:
         """After a bug: start that sensor clean, and end what its consumers believe to be open."""
-        self._metrics.internal_errors.add()
-        self._throttle.error("a bug; the sensor's recognizer is reset", "internal_error", sensor=sensor.name)
+        self.bug("in the path of a sensor; its recognizer is reset", sensor=sensor.name)
         try:
             sensor.recognizer.reset()
         except Exception:
-            self._throttle.error("cannot reset the recognizer", "reset", sensor=sensor.name)
+            self.bug("in the reset of a recognizer", sensor=sensor.name)
         events: list[Event] = []
         if sensor.open is not None:
             if not sensor.answered:

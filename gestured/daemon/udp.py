@@ -74,7 +74,10 @@ class Receiver:
         now = self._clock()
         batch: dict[str, tuple[Sensor, list[Arrival]]] = {}
         for packet, source in waiting:
-            self._packet(packet, source, now, batch)
+            try:
+                self._packet(packet, source, now, batch)
+            except Exception:  # what came before and after it in this batch is good
+                self._pipeline.bug("in the decoding of a packet", source=source[0])
         for sensor, arrivals in batch.values():
             self._pipeline.take(sensor, arrivals, now)
         return len(waiting)

@@ -1,5 +1,6 @@
 """Parts of the daemon by themselves, where a whole one cannot be brought into the state."""
 
+import asyncio
 import ipaddress
 import json
 import socket
@@ -11,15 +12,19 @@ import pytest
 
 from gestured.core.errors import SettingsError
 from gestured.core.events import Event
-from gestured.core.wire import Arrival
+from gestured.core.wire import Addresses, Arrival, Decoder
+from gestured.daemon import log
 from gestured.daemon.health import Health
 from gestured.daemon.http import HttpThread, as_json
 from gestured.daemon.merge import load
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.pipeline import Pipeline
 from gestured.daemon.settings import FLAGS, Settings
-from gestured.daemon.udp import allowed
+from gestured.daemon.sockets import bind_udp
+from gestured.daemon.udp import Receiver, allowed
+from gestured.daemon.values import Address
 from gestured.models import ladder_for
+from tests.daemon import harness
 from tests.daemon.harness import DEADLINE_S, Hand
 
 
@@ -105,6 +110,7 @@ def feed(
 def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(
     pipeline, monkeypatch, capsys
 ) -> None:
+    log.configure("warning")
     line, events, metrics = pipeline
     hand = Hand()
     t = max(feed(line, name, hand.idle(2.0), 0.0) for name in ("good", "bad"))
@@ -125,10 +131,32 @@ def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(
     assert kinds[:3] == [("Onset", "bad"), ("Cancelled", "bad"), ("Release", "bad")]
     assert [kind for kind, sensor in kinds if sensor == "good"] == ["Onset", "Gesture", "Release"]
     assert metrics.internal_errors.total() == 2
+    assert capsys.readouterr().err.count("ZeroDivisionError: a bug") == 1  # logged at a bounded rate
     feed(line, "bad", hand.idle(2.0) + hand.swipe("left") + hand.idle(1.0), t + 1)
     assert [type(e).__name__ for e in events[-3:]] == ["Onset", "Gesture", "Release"] and events[
         -1
     ].sensor == "bad"
+
+
+def test_a_bug_in_the_decoder_costs_one_packet(pipeline, monkeypatch) -> None:
+    line, _, metrics = pipeline
+    decoder = Decoder(Addresses(), line.grid)
+    decode = decoder.decode
+    monkeypatch.setattr(decoder, "decode", lambda data, source: decode(data, source) if data else 1 / 0)
+
+    async def main() -> None:
+        with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
+            receiver = Receiver(sock, line, decoder, ())
+            sender.connect(sock.getsockname())
+            for packet in (harness.floats("/a/pressure", Hand().frame(), 0), b"", b"rubbish!", b""):
+                sender.send(packet)
+            sender.send(harness.floats("/a/pressure", Hand().frame(), 0))
+            receiver.read_all()
+            receiver.close()
+
+    asyncio.run(main())
+    assert metrics.internal_errors.total() == 2 and metrics.dropped.values == {("not_osc",): 1}
+    assert metrics.frames.values == {("a", "ok"): 2}
 
 
 def test_one_packet_from_a_port_is_no_claim_but_two_are(pipeline) -> None:
