@@ -12,7 +12,7 @@ import os
 import re
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -48,6 +48,7 @@ class Model:
         self.rows = self.metadata.rows
         self.columns = self.metadata.columns
         self.quantiles = self.metadata.quantiles
+        self.threshold = _threshold(self.metadata.calibration)
         if self.metadata.features is not None:
             expected = feature_names(self.rows, self.columns)
             if self.metadata.features != expected:
@@ -78,7 +79,7 @@ class Model:
             scores, unknown = self.run(window[np.newaxis])
         except ValueError as error:
             raise ModelError(f"{self.name}: {error}") from None
-        return Scores(scores[0], float(unknown[0]), self.name)
+        return Scores(scores[0], float(unknown[0]), self.name, threshold=self.threshold)
 
     def run(self, batch: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """(B, T, R, C) windows or (B, F) features -> scores (B, G), unknown (B,).
@@ -145,6 +146,14 @@ class Model:
                 f"self-test: {difference:.3g} from the stored outputs, expected {TOLERANCE} at most"
             )
         return difference
+
+
+def _threshold(calibration: Mapping[str, Any]) -> float:
+    """The confidence from which an answer is published: the calibration's `threshold`, else 0.5."""
+    value = calibration.get("threshold", 0.5)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
+        raise ValueError(f"metadata 'calibration': threshold: expected a number from 0 to 1, found {value!r}")
+    return float(value)
 
 
 def _open_session(data: bytes) -> Any:

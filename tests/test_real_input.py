@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gestured.control.stream import Stream
+from gestured.client.stream import Stream
 from gestured.core.osc import encode_bundle, encode_message
 from gestured.models import shipped
 

@@ -12,13 +12,13 @@ import time
 from contextlib import closing
 from typing import Any
 
-from gestured.control.engine import Engine
+from gestured.client.engine import Engine
 from gestured.control.picture import trace
 from gestured.control.play import add_arguments, frames, play_from
-from gestured.control.score import Outcome, Performed, Tally
-from gestured.control.sensor import Form, Sensor
+from gestured.client.score import Outcome, Performed, Tally
+from gestured.client.sensor import Form, Sensor
 from gestured.control.show import as_dict, block, summary
-from gestured.control.stream import Stream
+from gestured.client.stream import Stream
 from gestured.core.errors import GesturedError
 from gestured.simulator import Take
 

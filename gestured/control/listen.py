@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gestured.control.address import default_socket
-from gestured.control.stream import Refused, Stream, Unreachable
+from gestured.client.stream import Refused, Stream, Unreachable
 
 TYPES = ("gesture", "unknown", "cancelled", "onset", "release", "status")
 RETRY_S = 0.5

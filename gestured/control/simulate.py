@@ -9,7 +9,7 @@ from typing import Any
 
 from gestured.control.address import host_port
 from gestured.control.play import add_arguments, frames, play_from
-from gestured.control.sensor import BLOBS, Form, Sensor
+from gestured.client.sensor import BLOBS, Form, Sensor
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
 from gestured.simulator import Event

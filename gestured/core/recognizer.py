@@ -25,6 +25,7 @@ class Scores:
     unknown: float  # probability that it is none of them
     model: str
     degraded: bool = False  # a fallback answered
+    threshold: float = 0.5  # confidence from which the model's calibration has it published
 
 
 class Classifier(Protocol):
@@ -228,7 +229,7 @@ class Recognizer:
     """Frames of one sensor in, events out. `classifier` may be replaced between two frames.
 
     `gestures` restricts the answer to a subset; what falls to the others is not given to those that are left.
-    `thresholds` are the confidences below which a gesture is unknown; `refractory` seconds in which the same
+    `thresholds` are the confidences below which a gesture is unknown, where not the model's own is to hold; `refractory` seconds in which the same
     gesture is not published again.
     """
 
@@ -239,7 +240,6 @@ class Recognizer:
         *,
         gestures: Sequence[str] | None = None,
         thresholds: Mapping[str, float] | None = None,
-        default_threshold: float = 0.5,
         refractory: Mapping[str, float] | None = None,
         sequence: int = 0,
     ) -> None:
@@ -248,7 +248,6 @@ class Recognizer:
         self.sequence = sequence
         self._gestures = tuple(gestures) if gestures is not None else classifier.gestures
         self._thresholds = dict(thresholds or {})
-        self._default_threshold = default_threshold
         self._refractory = dict(refractory or {})
         self._last_offset: dict[str, float] = {}
 
@@ -282,7 +281,7 @@ class Recognizer:
         best = max(scores, key=scores.__getitem__)
         confidence = scores[best] * (1.0 - answer.unknown)
         frames = segment.last - segment.first + 1
-        if not confidence >= self._thresholds.get(best, self._default_threshold):
+        if not confidence >= self._thresholds.get(best, answer.threshold):
             return Unknown(
                 sensor, cut.id, confidence, segment.onset, segment.offset, cut.decided,
                 frames, segment.lost, answer.model, answer.degraded, scores,

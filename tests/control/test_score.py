@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.control.score import NONE, PATIENCE_S, Performed, Tally
+from gestured.client.score import NONE, PATIENCE_S, Performed, Tally
 
 
 def gesture(name: str, onset: float, offset: float) -> dict:

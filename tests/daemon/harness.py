@@ -144,9 +144,7 @@ class Daemon:
     def get(self, path: str) -> tuple[int, str]:
         """Status and body of an HTTP request."""
         try:
-            with urllib.request.urlopen(
-                f"http://{self.ready['metrics']}{path}", timeout=DEADLINE_S
-            ) as answer:
+            with urllib.request.urlopen(f"http://{self.ready['metrics']}{path}", timeout=DEADLINE_S) as answer:
                 return answer.status, answer.read().decode()
         except urllib.error.HTTPError as error:
             return error.code, error.read().decode()
@@ -241,9 +239,7 @@ class Sensor:
     def perform(self, *directions: str) -> "Sensor":
         """Swipes ("left" ...) and taps ("tap"), a quiet second after each."""
         for direction in directions:
-            self.send(
-                self.hand.tap() if direction == "tap" else self.hand.swipe(direction), self.hand.idle(1.0)
-            )
+            self.send(self.hand.tap() if direction == "tap" else self.hand.swipe(direction), self.hand.idle(1.0))
         return self
 
 

@@ -33,9 +33,7 @@ def test_python_osc(start) -> None:
     udp_client = pytest.importorskip("pythonosc.udp_client")
     daemon: Daemon = start()
     sender = udp_client.SimpleUDPClient(*daemon.address)
-    event = stream(
-        daemon.client(), lambda frame: sender.send_message("/arm/pressure", frame.ravel().tolist()), "arm"
-    )
+    event = stream(daemon.client(), lambda frame: sender.send_message("/arm/pressure", frame.ravel().tolist()), "arm")
     assert (event["type"], event.get("gesture")) == ("gesture", "swipe_right")
 
 

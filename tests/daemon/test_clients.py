@@ -160,9 +160,7 @@ def test_an_event_is_encoded_once_for_all(listener, monkeypatch) -> None:
         await turn()
         server.publish(Onset("arm", 1, 2.0), 10.0)
         assert len(calls) == 1
-        assert {sock.recv(999) for sock in socks[:7]} == {
-            b'{"type":"onset","sensor":"arm","id":1,"onset":12.0}\n'
-        }
+        assert {sock.recv(999) for sock in socks[:7]} == {b'{"type":"onset","sensor":"arm","id":1,"onset":12.0}\n'}
         for sock in socks:
             sock.close()
         await turn()

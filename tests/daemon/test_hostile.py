@@ -92,9 +92,7 @@ def test_a_sensor_belongs_to_the_source_that_sent_first(shared: Daemon) -> None:
 
 
 def test_only_allowed_sources_may_send(start) -> None:
-    daemon = start(
-        "--allow", "127.0.0.2", "--allow", "10.0.0.0/8", "--clock", "sensor", "--metrics", "127.0.0.1:0"
-    )
+    daemon = start("--allow", "127.0.0.2", "--allow", "10.0.0.0/8", "--clock", "sensor", "--metrics", "127.0.0.1:0")
     client = daemon.client()
     Sensor(daemon, "stranger").begin().perform("left")
     friend = Sensor(daemon, "friend")
@@ -126,8 +124,6 @@ def test_sensors_in_metrics_are_folded_together(shared: Daemon) -> None:
         Sensor(shared, f"crowd{i}").begin()
     client = shared.client().subscribe("status")
     client.until(lambda line: "crowd11" in line["sensors"])
-    samples = [
-        line for line in shared.get("/metrics")[1].splitlines() if line.startswith("gestured_frames_total")
-    ]
+    samples = [line for line in shared.get("/metrics")[1].splitlines() if line.startswith("gestured_frames_total")]
     names = {line.split('sensor="')[1].split('"')[0] for line in samples}
     assert len(names) <= 9 and "other" in names

@@ -61,14 +61,10 @@ def test_a_subset_and_thresholds_stand_side_by_side_in_the_file(tmp_path: Path) 
     path.write_text('[gestures]\nuse = ["one_tap"]\n[gestures.one_tap]\nthreshold = 0.9\nrefractory_s = 1\n')
     settings, _ = load({"config": str(path)}, {})
     assert settings.gestures == ("one_tap",)
-    assert (
-        settings.per_gesture["one_tap"].threshold == 0.9 and settings.per_gesture["one_tap"].refractory_s == 1
-    )
+    assert settings.per_gesture["one_tap"].threshold == 0.9 and settings.per_gesture["one_tap"].refractory_s == 1
 
 
-@pytest.mark.parametrize(
-    "text", ["127.0.0.1", "127.0.0.1:70000", ":9000", "::1:9000", "a b:1", "", "host:-1"]
-)
+@pytest.mark.parametrize("text", ["127.0.0.1", "127.0.0.1:70000", ":9000", "::1:9000", "a b:1", "", "host:-1"])
 def test_what_is_no_address(text: str) -> None:
     with pytest.raises(SettingsError, match=r"listen = .*command line.*expected HOST:PORT"):
         load({"listen": text}, {})
@@ -96,9 +92,7 @@ def pipeline(model: Path) -> tuple[Pipeline, list[Event], Metrics]:
     return Pipeline(settings, ladder_for(model), metrics, events.append), events, metrics
 
 
-def feed(
-    pipeline: Pipeline, name: str, frames: list, t: float, source: tuple[str, int] = ("10.0.0.1", 1)
-) -> float:
+def feed(pipeline: Pipeline, name: str, frames: list, t: float, source: tuple[str, int] = ("10.0.0.1", 1)) -> float:
     for frame in frames:
         t += 1 / 15
         sensor = pipeline.admit(name, source, t)
@@ -107,9 +101,7 @@ def feed(
     return t
 
 
-def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(
-    pipeline, monkeypatch, capsys
-) -> None:
+def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(pipeline, monkeypatch, capsys) -> None:
     log.configure("warning")
     line, events, metrics = pipeline
     hand = Hand()
@@ -133,9 +125,7 @@ def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(
     assert metrics.internal_errors.total() == 2
     assert capsys.readouterr().err.count("ZeroDivisionError: a bug") == 1  # logged at a bounded rate
     feed(line, "bad", hand.idle(2.0) + hand.swipe("left") + hand.idle(1.0), t + 1)
-    assert [type(e).__name__ for e in events[-3:]] == ["Onset", "Gesture", "Release"] and events[
-        -1
-    ].sensor == "bad"
+    assert [type(e).__name__ for e in events[-3:]] == ["Onset", "Gesture", "Release"] and events[-1].sensor == "bad"
 
 
 def test_a_bug_in_the_decoder_costs_one_packet(pipeline, monkeypatch) -> None:

@@ -34,9 +34,7 @@ def reload(daemon: Daemon, result: str) -> None:
         client.line()
 
 
-def test_reload_takes_a_new_model_and_configuration_and_keeps_what_was_learned(
-    start, model, tmp_path
-) -> None:
+def test_reload_takes_a_new_model_and_configuration_and_keeps_what_was_learned(start, model, tmp_path) -> None:
     path = tmp_path / "mine.onnx"
     path.write_bytes(model.read_bytes())
     config = tmp_path / "gestured.toml"
@@ -133,9 +131,7 @@ def test_nobody_reads_its_output_any_more(start) -> None:
 
 
 def test_a_stop_before_it_is_ready_is_no_failure(model: Path, tmp_path: Path) -> None:
-    daemon = Daemon(
-        tmp_path, "--model", model, "--listen", "127.0.0.1:0", "--socket", tmp_path / "s", python=["-v"]
-    )
+    daemon = Daemon(tmp_path, "--model", model, "--listen", "127.0.0.1:0", "--socket", tmp_path / "s", python=["-v"])
     with daemon.stderr_path.open() as log:
         while "import 'onnxruntime" not in log.read():
             assert daemon.process.poll() is None

@@ -96,9 +96,7 @@ def test_a_stale_socket_is_taken_over_and_anything_else_is_not(start, model: Pat
 
 def test_the_default_socket_is_the_sessions(model: Path, tmp_path: Path) -> None:
     flags = ("--model", model, "--listen", "127.0.0.1:0", "--explain")
-    assert (
-        "/run/x/events.sock" in run(*flags, env={"RUNTIME_DIRECTORY": "/run/x", "XDG_RUNTIME_DIR": "/y"})[1]
-    )
+    assert "/run/x/events.sock" in run(*flags, env={"RUNTIME_DIRECTORY": "/run/x", "XDG_RUNTIME_DIR": "/y"})[1]
     env = {key: value for key, value in os.environ.items() if key != "RUNTIME_DIRECTORY"}
     (tmp_path / "run").mkdir()
     daemon = Daemon(tmp_path, *flags[:-1], env=env | {"XDG_RUNTIME_DIR": str(tmp_path / "run")})
@@ -182,9 +180,7 @@ def test_a_fallback_answers_where_the_first_model_cannot(start, model: Path, tmp
 def test_a_fallback_must_know_the_same_gestures(model: Path, tmp_path: Path) -> None:
     names = ("wink", *tiny_model.GESTURES[1:])
     other = tiny_model.make(tmp_path / "other.onnx", gestures=names)
-    said = refused(
-        3, "--model", model, "--fallback", other, "--listen", "127.0.0.1:0", "--socket", tmp_path / "s"
-    )
+    said = refused(3, "--model", model, "--fallback", other, "--listen", "127.0.0.1:0", "--socket", tmp_path / "s")
     assert "same gestures" in said and "wink" in said
 
 

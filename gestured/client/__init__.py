@@ -1,0 +1,1 @@
+"""What talks to a running daemon from outside: shared by gesturectl and the lab."""
