@@ -55,9 +55,7 @@ def parser() -> argparse.ArgumentParser:
             help=text.replace("%", "%%"),
             default=argparse.SUPPRESS,
         )
-    flags.add_argument(
-        "--config", metavar="FILE", help="TOML file with the same keys", default=argparse.SUPPRESS
-    )
+    flags.add_argument("--config", metavar="FILE", help="TOML file with the same keys", default=argparse.SUPPRESS)
     flags.add_argument("--explain", action="store_true", help="say what this configuration does, and exit")
     flags.add_argument("--version", action="version", version=f"gestured {__version__}")
     return flags

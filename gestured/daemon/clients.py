@@ -213,9 +213,7 @@ class EventServer:
                 sock, _ = self._listener.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
-            except (
-                OSError
-            ) as error:  # out of descriptors: the socket stays readable, so do not come back at once
+            except OSError as error:  # out of descriptors: the socket stays readable, so do not come back at once
                 log.error("cannot accept a client", reason=errno.errorcode.get(error.errno or 0, str(error)))
                 self.loop.remove_reader(self._listener)
                 self.loop.call_later(1.0, self.loop.add_reader, self._listener, self._accept)

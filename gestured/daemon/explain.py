@@ -69,9 +69,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     if not waits:
         leaves.append("waiting for a second tap: double_tap is not in use")
     if len(used) < len(ladder.gestures):
-        leaves.append(
-            f"gestures {', '.join(g for g in ladder.gestures if g not in used)}: their scores are dropped"
-        )
+        leaves.append(f"gestures {', '.join(g for g in ladder.gestures if g not in used)}: their scores are dropped")
     parts = {
         "loads": loads,
         "falls back on": rungs or ["nothing"],

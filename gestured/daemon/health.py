@@ -41,9 +41,7 @@ class Health:
     def hello(self) -> bytes:
         """The first line to a client."""
         sequences = {name: sensor.recognizer.sequence for name, sensor in self.pipeline.sensors.items()}
-        return wire.hello_json(
-            __version__, self.instance, self.ladder.active, self.pipeline.gestures, sequences
-        )
+        return wire.hello_json(__version__, self.instance, self.ladder.active, self.pipeline.gestures, sequences)
 
     def healthz(self) -> tuple[int, dict[str, object]]:
         """Whether the loop turns."""

@@ -9,6 +9,7 @@ from typing import Any, TextIO
 
 import structlog
 
+LEVELS = {"debug": 10, "info": 20, "warning": 30, "error": 40}
 PERIOD_S = 10.0  # at most one line a reason in this time
 REASONS = 64  # more reasons than there are; a bound in case one slips in that a peer can choose
 
@@ -23,7 +24,7 @@ def configure(level: str) -> None:
             *([] if tty else [structlog.processors.format_exc_info]),
             structlog.dev.ConsoleRenderer() if tty else structlog.processors.JSONRenderer(),
         ],
-        wrapper_class=structlog.make_filtering_bound_logger(level),
+        wrapper_class=structlog.make_filtering_bound_logger(LEVELS[level]),
         logger_factory=lambda *_: _Printer(),
         cache_logger_on_first_use=False,
     )

@@ -38,9 +38,7 @@ def _from_file(path: str) -> dict[str, Any]:
 
 def _from_environment(environ: Mapping[str, str]) -> dict[str, str]:
     found = {
-        name.removeprefix(ENVIRONMENT).lower(): value
-        for name, value in environ.items()
-        if name.startswith(ENVIRONMENT)
+        name.removeprefix(ENVIRONMENT).lower(): value for name, value in environ.items() if name.startswith(ENVIRONMENT)
     }
     for key in found:
         if key not in FLAGS and key != "config":
@@ -52,11 +50,7 @@ def _from_environment(environ: Mapping[str, str]) -> dict[str, str]:
 
 def _unknown(key: str, known: tuple[str, ...]) -> str:
     near = difflib.get_close_matches(key, known, 1)
-    return (
-        f"unknown key, did you mean {near[0]}?"
-        if near
-        else f"unknown key, expected one of {', '.join(known)}"
-    )
+    return f"unknown key, did you mean {near[0]}?" if near else f"unknown key, expected one of {', '.join(known)}"
 
 
 def _keys_at(place: tuple[Any, ...]) -> tuple[str, ...]:
@@ -106,6 +100,4 @@ def load(flags: Mapping[str, Any], environ: Mapping[str, str]) -> tuple[Settings
         return Settings.model_validate(merged), sources
     except ValidationError as error:
         problems = error.errors(include_url=False, include_context=False)
-        raise SettingsError(
-            "; ".join(dict.fromkeys(_explain(problem, sources) for problem in problems))
-        ) from None
+        raise SettingsError("; ".join(dict.fromkeys(_explain(problem, sources) for problem in problems))) from None

@@ -62,25 +62,15 @@ class Metrics:
         self.gestures = Counter("gestured_gestures", "Recognised gestures", "gesture")
         self.unknown = Counter("gestured_unknown", "Segments that are none of the gestures")
         self.cancelled = Counter("gestured_cancelled", "Segments that were not answered", "reason")
-        self.internal_errors = Counter(
-            "gestured_internal_errors", "Bugs caught; the sensor's recognizer was reset"
-        )
+        self.internal_errors = Counter("gestured_internal_errors", "Bugs caught; the sensor's recognizer was reset")
         self.degraded = Counter("gestured_degraded_answers", "Segments answered by a fallback model")
         self.reloads = Counter("gestured_reloads", "Reloads of model and configuration", "result")
         self.sent = Counter("gestured_osc_messages", "OSC messages to destinations", "result")
         self.lost_lines = Counter("gestured_client_lines_lost", "Lines that slow clients did not get")
-        self.evicted = Counter(
-            "gestured_clients_evicted", "Clients that were cut off or turned away", "reason"
-        )
-        self.inference = Histogram(
-            "gestured_inference_seconds", "Time to classify a segment", INFERENCE_S, "model"
-        )
-        self.latency = Histogram(
-            "gestured_latency_seconds", "From the last touched frame to the event", LATENCY_S
-        )
-        self.readings: dict[
-            str, tuple[str, Callable[[], float]]
-        ] = {}  # gauges, and counters that end in _total
+        self.evicted = Counter("gestured_clients_evicted", "Clients that were cut off or turned away", "reason")
+        self.inference = Histogram("gestured_inference_seconds", "Time to classify a segment", INFERENCE_S, "model")
+        self.latency = Histogram("gestured_latency_seconds", "From the last touched frame to the event", LATENCY_S)
+        self.readings: dict[str, tuple[str, Callable[[], float]]] = {}  # gauges, and counters that end in _total
         self.active_model: Callable[[], str] = str
         self._named: set[str] = set()
 
@@ -138,14 +128,10 @@ class _Collector:
             elif isinstance(metric, Histogram):
                 histogram = HistogramMetricFamily(metric.name, metric.text, labels=metric.labels)
                 empty = ([0] * (len(metric.bounds) + 1), [0.0])
-                for labels, (buckets, total) in (
-                    dict(metric.values) or ({} if metric.labels else {(): empty})
-                ).items():
+                for labels, (buckets, total) in (dict(metric.values) or ({} if metric.labels else {(): empty})).items():
                     bounds = [*map(str, metric.bounds), "+Inf"]
                     cumulated = [sum(buckets[: i + 1]) for i in range(len(buckets))]
-                    histogram.add_metric(
-                        labels, list(zip(bounds, cumulated, strict=True)), sum_value=total[0]
-                    )
+                    histogram.add_metric(labels, list(zip(bounds, cumulated, strict=True)), sum_value=total[0])
                 yield histogram
         for name, (text, read) in self._metrics.readings.items():
             if name.endswith("_total"):

@@ -1,6 +1,7 @@
 """One daemon: sockets, pipeline, sinks, timers and signals, from start to end."""
 
 import asyncio
+import gc
 import json
 import os
 import resource
@@ -133,9 +134,7 @@ class Service:
 
     def _open(self, settings: Settings) -> tuple[Ladder, list[OscSink]]:
         """What may take long: models, and names of hosts."""
-        return open_ladder(settings, insist=True), [
-            OscSink(address, self._metrics) for address in settings.publish
-        ]
+        return open_ladder(settings, insist=True), [OscSink(address, self._metrics) for address in settings.publish]
 
     async def _reload(self) -> None:
         """Read everything anew, and only where all of it is valid, change anything."""
@@ -205,6 +204,7 @@ async def _run(settings: Settings, load: Loader) -> None:
             service = Service(settings, ladder, udp, listener, load)
             if http is not None:
                 service.serve_http(http)
+            gc.freeze()  # what the start has made stays: later collections need not walk through it
             _announce(udp, listener, http, ladder.active)
             await service.serve(stop, reload)
         finally:

@@ -33,24 +33,16 @@ class SensorSettings(Part):
     grid: GridField | None = Field(
         default=None, description="rows x columns of its frames; by default the general `grid`"
     )
-    rotate: Literal[0, 90, 180, 270] = Field(
-        default=0, description="how far it is turned, in degrees clockwise"
-    )
+    rotate: Literal[0, 90, 180, 270] = Field(default=0, description="how far it is turned, in degrees clockwise")
     mirror: bool = Field(default=False, description="whether left and right are exchanged")
-    clock: Literal["arrival", "sensor"] | None = Field(
-        default=None, description="by default the general `clock`"
-    )
+    clock: Literal["arrival", "sensor"] | None = Field(default=None, description="by default the general `clock`")
 
 
 class GestureSettings(Part):
     """`[gestures.NAME]`: when one gesture counts."""
 
-    threshold: float | None = Field(
-        default=None, ge=0, le=1, description="confidence below which it is unknown"
-    )
-    refractory_s: float = Field(
-        default=0, ge=0, le=3600, description="seconds after it in which it is not repeated"
-    )
+    threshold: float | None = Field(default=None, ge=0, le=1, description="confidence below which it is unknown")
+    refractory_s: float = Field(default=0, ge=0, le=3600, description="seconds after it in which it is not repeated")
 
 
 class AddressSettings(Part):
@@ -112,18 +104,14 @@ class Settings(Part):
     allow: Annotated[tuple[NetworkField, ...], Listed] = Field(
         default=(), description="addresses or networks that may send frames; any unless set"
     )
-    log_level: Literal["debug", "info", "warning", "error"] = Field(
-        default="info", description="how much is logged"
-    )
+    log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="how much is logged")
     sensors: dict[Annotated[str, Field(pattern=SENSOR_NAME)], SensorSettings] = Field(
         default={}, description="tables `[sensors.NAME]`, in the file only"
     )
     per_gesture: dict[str, GestureSettings] = Field(
         default={}, description="tables `[gestures.NAME]`, in the file only"
     )
-    addresses: AddressSettings = Field(
-        default=AddressSettings(), description="table `[addresses]`, in the file only"
-    )
+    addresses: AddressSettings = Field(default=AddressSettings(), description="table `[addresses]`, in the file only")
 
 
 TABLES = ("sensors", "per_gesture", "addresses")  # in the file only

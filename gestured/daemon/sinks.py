@@ -32,9 +32,7 @@ class OscSink:
         self._socket: socket.socket | None = None
         self._connected = False
         try:
-            family, self._where = resolve(
-                destination, socket.SOCK_DGRAM
-            )  # once: a look-up may block for seconds
+            family, self._where = resolve(destination, socket.SOCK_DGRAM)  # once: a look-up may block for seconds
             self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         except OSError as error:
             log.error("publish: no such destination", destination=str(destination), error=error.strerror)
@@ -44,7 +42,8 @@ class OscSink:
         if isinstance(event, Gesture):
             self._send(wire.gesture_osc(event, epoch))
         elif isinstance(event, Status):
-            self._send(wire.status_osc(event.state, len(event.sensors)))
+            heard = sum(state != "stale" for state in event.sensors.values())
+            self._send(wire.status_osc(event.state, heard))
 
     def close(self) -> None:
         """Close the socket."""

@@ -49,9 +49,7 @@ def bind_udp(address: Address) -> socket.socket:
     """A non-blocking UDP socket with a large receive buffer, as far as the kernel grants it."""
     sock = _bind("listen", address, socket.SOCK_DGRAM)
     try:
-        sock.setsockopt(
-            socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES
-        )  # beyond the limit, for CAP_NET_ADMIN
+        sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES)  # beyond the limit, for CAP_NET_ADMIN
     except OSError:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
     return sock
@@ -158,8 +156,7 @@ def make_default_directory(directory: Path) -> None:
         directory.mkdir(0o700, parents=True, exist_ok=True)
         found = directory.lstat()
     except OSError as error:
-        raise AddressError(
-            f"socket: cannot make {directory}: {error.strerror}; choose another with --socket"
-        ) from None
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
+        raise AddressError(f"socket: cannot make {directory}: {error.strerror}; choose another with --socket") from None
+    shared = directory.parent == Path("/tmp")  # where anybody could have made it before us
+    if not stat.S_ISDIR(found.st_mode) or (shared and found.st_uid != os.getuid()):
         raise AddressError(f"socket: {directory} is not a folder of ours; choose another with --socket")

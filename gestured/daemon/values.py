@@ -46,9 +46,7 @@ def _destination(value: object) -> Address:
         if address.port == 0:
             raise ValueError
     except ValueError:
-        raise ValueError(
-            "osc://HOST:PORT with a port from 1 to 65535, such as osc://127.0.0.1:9001"
-        ) from None
+        raise ValueError("osc://HOST:PORT with a port from 1 to 65535, such as osc://127.0.0.1:9001") from None
     return address
 
 
