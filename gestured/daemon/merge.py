@@ -24,7 +24,7 @@ def _from_file(path: str) -> dict[str, Any]:
         found = tomllib.loads(Path(path).read_text("utf-8"))
     except OSError as error:
         raise SettingsError(f"config: cannot read {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise SettingsError(f"config: {path} is not valid TOML: {error}") from None
     if "per_gesture" in found:  # our own name for the tables of [gestures], no key of the file's
         raise SettingsError(f"per_gesture ({path}): unknown key, expected [gestures.NAME]")

@@ -41,7 +41,9 @@ class SensorSettings(Part):
 class GestureSettings(Part):
     """`[gestures.NAME]`: when one gesture counts."""
 
-    threshold: float | None = Field(default=None, ge=0, le=1, description="confidence below which it is unknown")
+    threshold: float | None = Field(
+        default=None, ge=0, le=1, description="confidence below which it is unknown; by default the model's own"
+    )
     refractory_s: float = Field(default=0, ge=0, le=3600, description="seconds after it in which it is not repeated")
 
 

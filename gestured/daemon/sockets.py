@@ -152,11 +152,11 @@ class UnixListener:
 
 def make_default_directory(directory: Path) -> None:
     """Make the folder of the default socket, for its owner alone. Raises AddressError."""
+    shared = directory.parent == Path("/tmp")  # where anybody could have made it, or a link, before us
     try:
         directory.mkdir(0o700, parents=True, exist_ok=True)
-        found = directory.lstat()
+        found = directory.lstat() if shared else directory.stat()
     except OSError as error:
         raise AddressError(f"socket: cannot make {directory}: {error.strerror}; choose another with --socket") from None
-    shared = directory.parent == Path("/tmp")  # where anybody could have made it before us
     if not stat.S_ISDIR(found.st_mode) or (shared and found.st_uid != os.getuid()):
         raise AddressError(f"socket: {directory} is not a folder of ours; choose another with --socket")

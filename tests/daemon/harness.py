@@ -157,6 +157,11 @@ class Daemon:
                 return float(match[3])
         return 0.0
 
+    def frames(self) -> int:
+        """Frames of all sensors that it has looked at."""
+        samples = re.findall(r'^gestured_frames_total\{result="ok".*\} (\S+)$', self.get("/metrics")[1], re.MULTILINE)
+        return round(sum(map(float, samples)))
+
     def signal(self, number: int) -> None:
         """Send a signal."""
         self.process.send_signal(number)
