@@ -21,7 +21,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def shared(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     """A daemon with the sensor's clock and metrics, for tests that use sensors of their own."""
     folder = tmp_path_factory.mktemp("shared")
-    daemon = Daemon.start(folder, model, "--clock", "sensor", "--metrics", "127.0.0.1:0")
+    daemon = Daemon.start(folder, model, "--clock", "sensor", "--metrics", "127.0.0.1:0", "--max-sensors", 500)
     yield daemon
     assert daemon.stop() == 0, daemon.stderr()
     assert "Traceback" not in daemon.stderr()
