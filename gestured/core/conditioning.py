@@ -65,7 +65,7 @@ class Mounting:
         return x, y
 
 
-Learned = tuple[Array, Array, NDArray[np.bool_], bool, float, Array]  # baseline, noise, constant, stable, step, frames
+Learned = tuple[Array, Array, NDArray[np.bool_], bool, bool, Array]  # baseline, noise, constant, stable, fine, frames
 
 
 class Settling:
@@ -98,18 +98,18 @@ class Settling:
         if t - frames[0][0] < SETTLE_S or len(frames) < 4:
             return None
         stack = np.array([f for _, f in frames])  # (n, N)
-        baseline, noise, constant, restless, step = _idle(stack)
+        baseline, noise, constant, restless, fine = _idle(stack)
         stable = restless <= min(3, raw.size // 20)
         if not stable and not (patience and t - self._since >= PATIENCE_S):
             while t - frames[0][0] >= SETTLE_S - LOOK_S:  # look again soon: movement may just have ended
                 frames.popleft()
             return None
         self.clear()
-        return baseline, noise, constant, stable, step, stack
+        return baseline, noise, constant, stable, fine, stack
 
 
-def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int, float]:
-    """(n, N) counts -> baseline (N,), noise (N,), taxels that never changed (N,), how many moved, quantum."""
+def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int, bool]:
+    """(n, N) counts -> baseline (N,), noise (N,), taxels that never changed (N,), how many moved, does noise show?"""
     n = len(stack)
     baseline = np.median(stack, axis=0)
     # Successive differences see noise and not slow movement; mean absolute values, since one outlier must not rule.
@@ -119,7 +119,7 @@ def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int, float]:
     clipped = np.count_nonzero((stack == stack.min()).sum(axis=0) >= 2) * 4 >= rough.size
     pooled = float(np.quantile(rough[rough > 0], 0.75 if clipped else 0.5)) if rough.any() else 0.0
     step = quantum(stack, jumps)
-    floor = max(pooled, step / 2 if pooled > 0 else step)
+    floor = max(pooled, step)  # below one step noise cannot be known: one step stands for it
     spread = np.abs(stack - baseline).mean(axis=0) * 1.2533
     shift = np.abs(np.median(stack[: n // 2], axis=0) - np.median(stack[n // 2 :], axis=0))
     moved = int(np.count_nonzero((spread > RESTLESS * floor) | (shift > RESTLESS * floor)))
@@ -128,7 +128,7 @@ def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int, float]:
     constant = ~jumps.any(axis=0)
     if clipped or pooled < step or np.count_nonzero(constant) > stack.shape[1] // 4:
         constant[:] = False  # a clipped or coarse sensor stands still when idle: that proves nothing
-    return baseline, noise, constant, moved, step
+    return baseline, noise, constant, moved, pooled >= 0.35 * step
 
 
 def quantum(stack: Array, jumps: Array) -> float:
@@ -157,7 +157,7 @@ class Conditioner:
         self._still_since = np.full(rows * columns, math.inf)  # s
         self._previous: Array = np.zeros(rows * columns)  # raw counts
         self._rail = -math.inf  # the largest raw count seen under a touch
-        self._step = math.inf  # quantisation
+        self._fine = False  # whether a finger's tremble shows in the last digit
         self._strikes = np.zeros(rows * columns, dtype=np.int64)
         self.bad = np.zeros(rows * columns, dtype=bool)
         self.noise = 1.0  # counts, the median taxel's standard deviation
@@ -217,7 +217,7 @@ class Conditioner:
         learned = self._settling.push(t, raw, patience=not self.ready)
         if learned is None:
             return False
-        self._baseline, self._sigma, self._stuck, stable, self._step, stack = learned
+        self._baseline, self._sigma, self._stuck, stable, self._fine, stack = learned
         self._frozen[:] = False
         self._provisional = not stable
         self.ready = True
@@ -274,7 +274,7 @@ class Conditioner:
         changed = raw != self._previous
         self._previous = raw
         self._still_since = np.where(changed, t, np.minimum(self._still_since, t))
-        if self.noise < 0.6 * self._step:  # too coarse to see a finger tremble
+        if not self._fine:
             return
         self._rail = max(self._rail, float(raw.max()))
         frozen = (t - self._still_since >= FROZEN_S) & (d > 3 * self._sigma) & (raw < self._rail)

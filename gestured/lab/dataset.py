@@ -22,14 +22,17 @@ from gestured.core.frames import Frame, Segment
 from gestured.core.recognizer import Cut, FrontEnd
 from gestured.core.window import Window
 from gestured.lab.progress import progress
-from gestured.simulator import Take, cohort_plan, cohort_take, wide
+from gestured.simulator import (
+    NON_GESTURES, SPEEDS, Participant, Sensor, Take, cohort_plan, cohort_take, generator, gesture_take, wide,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from gestured.recording import Recordings
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 NONE = "none"
-COVERED = 0.6  # of a performed gesture must lie in a segment for it to carry its label
+COMPOSED = ("tap_then_swipe", "tap_then_hold", "triple_tap")  # gestures one after the other, and cut as such
+COVERED = 0.5  # of a performed gesture must lie in a segment for it to carry its label
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,14 +136,17 @@ def cuts(frames: NDArray[np.generic], times: NDArray[np.float64]) -> list[Segmen
 
 
 def matched(segments: Iterable[Segment], performed: Sequence[Performed]) -> Iterator[Sample]:
-    """Windows of the segments that hold a performed gesture, or nothing but a non-gesture."""
+    """Windows of the segments that hold a performed gesture, or nothing but a non-gesture.
+
+    A frame stands for the time up to its neighbours: contact is known to one frame only.
+    """
+    frame = 1 / WINDOW.rate_hz
     for segment in segments:
         best, share = None, 0.0
         for event in performed:
-            common = min(segment.offset, event.offset) - max(segment.onset, event.onset)
-            length = max(event.offset - event.onset, 0.05)
-            covered = (common + 0.07) / (length + 0.07)
-            if common > -0.07 and covered > share:
+            common = min(segment.offset + frame, event.offset) - max(segment.onset - frame, event.onset)
+            covered = common / max(event.offset - event.onset, 1e-3)
+            if covered > share:
                 best, share = event, covered
         if best is None or (best.label != NONE and share < COVERED):
             continue
@@ -154,19 +160,31 @@ def from_take(take: Take) -> list[Sample]:
     return list(matched(cuts(take.frames, take.times), performed))
 
 
+TRIALS = tuple(cohort_plan())  # 34 participants x 10 gestures x 3 speeds x 3 inclinations = 3060
+OTHERS = tuple((p, k, s) for p in range(34) for k in NON_GESTURES if k not in COMPOSED for s in SPEEDS)  # the same people do something else
+
+
 def _wide(seed: int, index: int) -> list[Sample]:
     return from_take(wide(seed, index))
 
 
-TRIALS = tuple(cohort_plan())  # 34 participants x 10 gestures x 3 speeds x 3 inclinations = 3060
+def _others(seed: int, index: int) -> list[Sample]:
+    number, kind, speed = OTHERS[index]
+    person = seed * 1000 + number
+    rng = generator(seed, 0x07, index)
+    take = gesture_take(kind, Participant(person), Sensor.nominal(day=person), rng, speed, int(rng.integers(3)))
+    return from_take(take)
 
 
 def _cohort(seed: int, index: int) -> list[Sample]:
     return from_take(cohort_take(TRIALS[index], seed))
 
 
+STREAMS = {"wide": _wide, "cohort": _cohort, "others": _others}
+
+
 def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
-    """`count` takes of the stream "wide" or "cohort", from `cache` where they were made before."""
+    """The first `count` takes of one of `STREAMS`, from `cache` where they were made before."""
     code = hashlib.sha256()
     for package in (gestured.core, gestured.simulator):
         for path in sorted(Path(str(package.__file__)).parent.glob("*.py")):
@@ -176,7 +194,7 @@ def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) ->
     if path.exists():
         with np.load(path, allow_pickle=False) as stored:
             return Samples(*(stored[name] for name in Samples.__slots__))
-    make: Callable[[int], list[Sample]] = partial(_wide if stream == "wide" else _cohort, seed)
+    make: Callable[[int], list[Sample]] = partial(STREAMS[stream], seed)
     with multiprocessing.get_context("spawn").Pool(jobs) as pool:
         made = pool.imap(make, range(count), chunksize=50)
         samples = collect(s for found in progress(made, count, f"simulating {stream}") for s in found)
@@ -222,18 +240,16 @@ def _recorded(recordings: "Recordings", i: int, seed: int) -> Iterator[Sample]:
 def with_idle(
     frames: NDArray[np.generic], times: NDArray[np.float64], first: int, last: int, seed: int, count: int = 20
 ) -> tuple[NDArray[np.generic], NDArray[np.float64], int]:
-    """Put `count` idle frames before a cut recording, drawn from its own quiet frames: the front end needs a second.
+    """Put `count` idle frames before and after a cut recording, drawn from its own quiet frames.
 
-    Returns frames, times, and how many were added.
+    The front end needs a second to learn the idle sensor, and many recordings end where the next touch began.
+    Returns frames, times, and how many were put before.
     """
     quiet = np.concatenate([frames[: max(first - 1, 0)], frames[last + 3 :]])
     if not len(quiet):
         quiet = np.minimum(frames.min(axis=0), np.median(frames.min(axis=0))).astype(frames.dtype)[None]
     rng = np.random.default_rng([seed, 7])
     step = float(np.median(np.diff(times)))
-    lead = times[0] - step * np.arange(count, 0, -1)
-    return (
-        np.concatenate([quiet[rng.integers(0, len(quiet), count)], frames]),
-        np.concatenate([lead, times]),
-        count,
-    )
+    around = quiet[rng.integers(0, len(quiet), 2 * count)]
+    before, after = times[0] - step * np.arange(count, 0, -1), times[-1] + step * np.arange(1, count + 1)
+    return np.concatenate([around[:count], frames, around[count:]]), np.concatenate([before, times, after]), count

@@ -3,8 +3,6 @@
 All of it is fitted on people that the networks have not learned from.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -64,42 +62,3 @@ def threshold(scores: NDArray[np.float32], unknown: NDArray[np.float32], known: 
     """The confidence that `lost` of the known gestures do not reach."""
     confidence = scores.max(axis=1) * (1 - unknown)
     return float(np.clip(np.quantile(confidence[known], lost), 0.05, 0.95))
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What a model's answers are worth on a set, as shares."""
-
-    gestures: int
-    others: int
-    right_before: float  # of the gestures, without rejection
-    right: float  # of the gestures, with it
-    wrong: float
-    lost: float  # to unknown
-    rejected: float  # of the non-gestures
-
-    def line(self, title: str) -> str:
-        """One row of a table."""
-        return (
-            f"{title:<34}{self.gestures:>6} gestures: {self.right_before:6.3f} right before rejection; then "
-            f"{self.right:6.3f} right {self.wrong:6.3f} wrong {self.lost:6.3f} lost;"
-            f"{self.others:>6} others: {self.rejected:6.3f} rejected"
-        )
-
-
-def outcome(
-    scores: NDArray[np.float32], unknown: NDArray[np.float32], labels: NDArray[np.int64], least: float
-) -> Outcome:
-    """Judge answers (N, G), (N,) against classes (N,), published from a confidence of `least` on."""
-    known = (labels >= 0) & (labels < scores.shape[1])
-    best = scores.argmax(axis=1)
-    published = scores.max(axis=1) * (1 - unknown) >= least
-    right = best == labels
-
-    def share(chosen: NDArray[np.bool_], of: NDArray[np.bool_]) -> float:
-        return float(chosen[of].mean()) if of.any() else float("nan")
-
-    return Outcome(
-        int(known.sum()), int((~known).sum()), share(right, known), share(right & published, known),
-        share(~right & published, known), share(~published, known), share(~published, ~known),
-    )  # fmt: skip

@@ -79,7 +79,7 @@ class CnnLstm(Recurrent):
 class Perceptron(nn.Module):
     """A small feed-forward net on standardised features; the scaling is part of it."""
 
-    def __init__(self, inputs: int, classes: int, units: int = 128) -> None:
+    def __init__(self, inputs: int, classes: int, units: int = 160) -> None:
         super().__init__()
         self.register_buffer("mean", torch.zeros(inputs))
         self.register_buffer("scale", torch.ones(inputs))

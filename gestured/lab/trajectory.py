@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from gestured.lab.nets import Perceptron, active_frames, last_active
 
 POINTS = 8  # of the path
+BLOB = 7  # taxels across the mean contact
 FLOOR = 0.12  # of the peak: below it a taxel counts for nothing
 EPS = 1e-6
 MAXIMUM = 0.2  # of the peak: lower local maxima are no fingers
@@ -61,14 +62,28 @@ def per_frame(x: Tensor) -> dict[str, Tensor]:
     }
 
 
+def mean_blob(x: Tensor, s: dict[str, Tensor], weight: Tensor) -> Tensor:
+    """(B, T, R, C) -> (B, BLOB * BLOB): the contact, each frame moved to its centroid, averaged: one finger, two, a palm."""
+    rows, columns = x.shape[2], x.shape[3]
+    offset = torch.arange(BLOB, dtype=x.dtype) - BLOB // 2
+    row = (1 - s["y"]) / 2 * (rows - 1)
+    column = (s["x"] + 1) / 2 * (columns - 1)
+    at_row = row[:, :, None, None] + offset[:, None] - torch.arange(rows, dtype=x.dtype)  # (B, T, BLOB, R)
+    at_column = column[:, :, None, None] + offset[:, None] - torch.arange(columns, dtype=x.dtype)
+    moved = F.relu(1 - at_row.abs()) @ x @ F.relu(1 - at_column.abs()).transpose(2, 3)
+    blob = (moved * weight[:, :, None, None]).sum(1) / (weight.sum(1)[:, None, None] + EPS)
+    return (blob / (blob.amax((1, 2), keepdim=True) + 0.05)).flatten(1)
+
+
 def trajectory_features(x: Tensor) -> Tensor:
     """(B, T, R, C) windows -> (B, F) features; idle frames at the end change nothing."""
-    batch, time = x.shape[0], x.shape[1]
+    time = x.shape[1]
     index = torch.arange(time, dtype=x.dtype)
     active = active_frames(x)
     last = last_active(x).to(x.dtype)[:, None]
     span = (index[None, :] <= last).to(x.dtype)
     s = per_frame(x)
+    blob = mean_blob(x, s, active * s["peak"])
     n = active.sum(1) + EPS
     first = (active * (time - index)).amax(1)
     first = time - first  # index of the first active frame
@@ -149,7 +164,7 @@ def trajectory_features(x: Tensor) -> Tensor:
         _mean(s["x"], two) - _mean(s["x"], one), _mean(s["y"], two) - _mean(s["y"], one),
         _top(s["peak"], one) - _top(s["peak"], two),
     ]  # fmt: skip
-    return torch.cat([torch.stack(single, 1), path_x / size, path_y / size, path_x, path_y, *by_slot], 1)
+    return torch.cat([torch.stack(single, 1), path_x / size, path_y / size, path_x, path_y, *by_slot, blob], 1)
 
 
 def _before(v: Tensor) -> Tensor:

@@ -1,0 +1,87 @@
+"""Model cards: what a shipped model is, what it learned from, what it is worth and where it ends."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from gestured.lab.train import Plan
+from gestured.models import open_model
+
+WHAT = {
+    "cnn_lstm": "Two convolutions with ReLU and max-pooling on each frame, an LSTM of 32 units over the frames (the paper's "
+    "CNN-LSTM), and a second opinion: a small net on trajectory features. Both give the scores and the rejection together.",
+    "lstm": "An LSTM of 32 units on the 81 taxels of each frame (the paper's LSTM), with the same second opinion.",
+    "touch_pattern_rf": "A random forest (200 trees, depth 9) on the paper's touch-pattern features. They ignore the order of "
+    "the frames, so it cannot tell a swipe from its reverse; it publishes only where it is sure.",
+}
+LIMITS = """\
+- Not a safety function. A wrong event must not be able to hurt anybody.
+- Trained on simulated textile recordings and on real touchscreen recordings; no textile recording was at hand.
+- Circles and two-finger swipes are simulated only. Two fingers that the sensor shows as one blob are one finger.
+- Gestures that follow each other without the finger leaving for two frames are one segment, and unknown."""
+
+
+def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: Plan) -> None:
+    """One Markdown file beside each model."""
+    for name, found in figures.items():
+        (folder / f"{name}.md").write_text(_card(folder / f"{name}.onnx", name, found, plan))
+
+
+def _card(path: Path, name: str, found: Mapping[str, Any], plan: Plan) -> str:
+    model = open_model(path)
+    real = "real" in found
+    rows = [(f"simulated, {test} ", values) for test, values in found["simulated"].items()]
+    rows += [(f"real, {k}", v) for k, v in found.get("real", {}).items() if k != "kinds"]
+    table = "\n".join(_row(title.strip(), values) for title, values in rows)
+    held = found.get("held_out_kinds")
+    extra = (
+        f"\nNon-gestures of kinds that heads and calibration had not seen (three groups, {held['count']} simulated segments): "
+        f"{held['rejected']:.3f} rejected.\n"
+        if held
+        else ""
+    )
+    return f"""# {name}
+
+{WHAT[name]}
+
+| | |
+|---|---|
+| version | {model.metadata.version} |
+| SHA-256 | `{model.sha256}` |
+| size | {model.size:,} bytes |
+| gestures | {", ".join(model.gestures)} |
+| window | `{model.metadata.window.to_json()}` |
+| published from a confidence of | {model.threshold:.3f} |
+| training data (SHA-256) | `{model.metadata.training_data}` |
+
+## Data
+
+{plan.wide} takes of the simulator's wide stream, the simulated cohort's participants 0 to 23 (gestures and non-gestures)
+{"and the real development recordings of CapFingerId (ten subjects; MIT licence, see NOTICE)" if real else "and no real recordings"}.
+Training settings: `{asdict(plan.fit)}`.
+
+## Figures
+
+Printed by `gestured-lab evaluate`. *Simulated* is gestured's own simulator: *nominal* the cohort's participants 28 to 33 on the
+nominal 9 x 9 sensor, *wide* other people on randomised sensors of every quality, some of them hopeless. *Real* is CapFingerId,
+each subject judged by networks that have not seen them (three folds). Shares of the gestures that were performed; *right\\** is
+before rejection, *lost* is unknown or never cut out; *rejected* is of the non-gestures.
+
+| set | gestures | right\\* | right | wrong | lost | non-gestures | rejected |
+|---|---|---|---|---|---|---|---|
+{table}
+{extra}
+## Limits
+
+{LIMITS}
+"""
+
+
+def _row(title: str, values: Mapping[str, Any]) -> str:
+    numbers = [values[n] for n in ("right_before", "right", "wrong", "lost")]
+    shares = " | ".join(f"{n:.3f}" for n in numbers)
+    rejected = f"{values['rejected']:.3f}" if values["others"] else "-"
+    return f"| {title} | {values['gestures']} | {shares} | {values['others']} | {rejected} |"
+
+

@@ -1,0 +1,88 @@
+"""`gestured-lab`: train, evaluate and measure. Needs the extra [lab] (torch, scikit-learn, onnx)."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from gestured import __version__
+from gestured.core.errors import GesturedError
+
+CACHE = Path(".cache/lab")
+MODELS = Path("models")
+REAL = Path("../shared/data")
+NEEDED = ("torch", "sklearn", "onnx")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line; every subcommand's help has an example."""
+    top = argparse.ArgumentParser(
+        prog="gestured-lab",
+        description="Train and evaluate gestured's models.",
+        epilog="example: gestured-lab train --out models",
+    )
+    top.add_argument("--version", action="version", version=f"gestured-lab {__version__}")
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    def add(name: str, text: str, example: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(name, help=text, description=text, epilog=f"example: {example}")
+        command.add_argument("--json", action="store_true", help="print the figures as JSON")
+        return command
+
+    def add_data(command: argparse.ArgumentParser) -> None:
+        command.add_argument("--cache", type=Path, default=CACHE, help=f"where finished steps are kept ({CACHE})")
+        command.add_argument(
+            "--real", type=Path, default=REAL, help=f"folder of the real recordings; left out where it is not ({REAL})"
+        )
+        command.add_argument("--jobs", type=int, default=2, help="processes and threads (2)")
+        command.add_argument("--quick", action="store_true", help="a small run to try it; its models are worth nothing")
+
+    train = add("train", "make the three models again from nothing; goes on where it was interrupted",
+                "gestured-lab train --out models --jobs 2")  # fmt: skip
+    train.add_argument("--out", type=Path, default=MODELS, help=f"folder for the models ({MODELS})")
+    add_data(train)
+    evaluate = add("evaluate", "print what the models are worth on people they have never seen; writes cards and manifest",
+                   "gestured-lab evaluate --models models")  # fmt: skip
+    evaluate.add_argument("--models", type=Path, default=MODELS, help=f"folder of the models ({MODELS})")
+    add_data(evaluate)
+    online = add("online", "send continuous simulated sessions to a running daemon over UDP and score its events",
+                 "gestured-lab online --model cnn_lstm --minutes 10")  # fmt: skip
+    online.add_argument("--model", default="cnn_lstm", help="model of the daemon that is started (cnn_lstm)")
+    online.add_argument("--minutes", type=float, default=20, help="minutes of sessions (20)")
+    online.add_argument("--idle-minutes", type=float, default=5, help="minutes of an untouched sensor (5)")
+    online.add_argument("--speed", type=float, default=100, help="times real time (100)")
+    online.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (900)")
+    bench = add("bench", "measure replay, start and memory on this machine", "gestured-lab bench")
+    bench.add_argument("--model", default="cnn_lstm", help="the model to run (cnn_lstm)")
+    return top
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    args = parser().parse_args(arguments)
+    try:
+        if args.command == "online":
+            from gestured.lab import online
+
+            return online.run(args)
+        if args.command == "bench":
+            from gestured.lab import bench
+
+            return bench.run(args)
+        try:
+            from gestured.lab import commands
+        except ModuleNotFoundError as error:
+            if (error.name or "").split(".")[0] not in NEEDED:
+                raise
+            raise GesturedError(f"{error.name} is missing: pip install 'gestured[lab]', or make lab") from None
+        return commands.train_models(args) if args.command == "train" else commands.evaluate_models(args)
+    except GesturedError as error:
+        print(f"gestured-lab: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("\ngestured-lab: interrupted; what is finished is kept", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

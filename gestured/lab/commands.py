@@ -1,0 +1,54 @@
+"""`gestured-lab train` and `evaluate`, put together."""
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from gestured.core.errors import GesturedError
+from gestured.lab.cards import write_cards
+from gestured.lab.evaluate import Outcome, held_out_kinds, real_figures, simulated_figures
+from gestured.lab.export import write_manifest
+from gestured.lab.train import Plan, calibration_set, learn, load, train
+from gestured.models import LADDER
+
+
+def _plan(args: argparse.Namespace) -> tuple[Plan, Path | None]:
+    if args.jobs < 1:
+        raise GesturedError(f"--jobs: expected 1 or more, found {args.jobs}")
+    torch.set_num_threads(args.jobs)
+    real = args.real if args.real.is_dir() else None
+    return (Plan.quick() if args.quick else Plan()), real
+
+
+def train_models(args: argparse.Namespace) -> int:
+    """Train, export, evaluate."""
+    plan, real = _plan(args)
+    start = time.monotonic()
+    train(plan, args.out, args.cache, real, args.jobs)
+    print(f"trained in {(time.monotonic() - start) / 60:.1f} minutes (finished steps are taken from {args.cache})", flush=True)
+    args.models = args.out
+    return evaluate_models(args)
+
+
+def evaluate_models(args: argparse.Namespace) -> int:
+    """Print the figures, and keep them in the manifest and the cards."""
+    plan, real = _plan(args)
+    paths = {name: args.models / f"{name}.onnx" for name in LADDER}
+    data = load(plan, args.cache, real, args.jobs)
+    print(Outcome.HEAD, flush=True)
+    figures: dict[str, dict[str, Any]] = {
+        name: {"simulated": found} for name, found in simulated_figures(paths, data).items()
+    }
+    trained = learn(plan, data, args.cache)
+    for name, found in real_figures(trained, calibration_set(trained, data, plan), data).items():
+        figures[name]["real"] = found
+    figures["cnn_lstm"]["held_out_kinds"] = held_out_kinds(trained, data, plan)
+    write_manifest(args.models, figures)
+    write_cards(args.models, figures, plan)
+    if args.json:
+        print(json.dumps(figures, indent=2))
+    return 0

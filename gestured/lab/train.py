@@ -1,0 +1,253 @@
+"""The shipped models from nothing: simulate, learn, calibrate, export. Each step is kept, so a run can go on later.
+
+Who is who (participants never cross): the cohort's participants 0 to 23 teach, 24 to 27 calibrate, 28 to 33 test;
+the wide stream's seeds 1, 2 and 3 do the same, each with people of its own. Real subjects calibrate and test only
+networks that have not seen them: three folds, which share what was learned from simulation.
+"""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from sklearn.ensemble import RandomForestClassifier
+from torch import Tensor, nn
+
+import gestured
+from gestured.core.features import feature_names
+from gestured.lab.dataset import OTHERS, TRIALS, WINDOW, Samples, join, recorded, simulated
+from gestured.lab.decide import fit_decision, threshold
+from gestured.lab.export import export_forest, export_net, forest_outputs, write_manifest
+from gestured.lab.fit import CLASSES, FitConfig, finetune, load_nets, logits, pretrain, save_nets, targets
+from gestured.lab.nets import Judged
+from gestured.recording import read
+from gestured.simulator import GESTURES
+
+REAL = ("capfingerid_gestures_dev.npz", "capfingerid_sessions_dev.npz")
+FOLDS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How much is simulated; the numbers behind the shipped models are the defaults."""
+
+    wide: int = 60_000
+    wide_check: int = 4_000  # takes to calibrate, and as many to test
+    cohort: int = len(TRIALS)
+    others: int = len(OTHERS)
+    forest: int = 14_000  # simulated samples for the forest
+    fit: FitConfig = field(default_factory=FitConfig)
+
+    @classmethod
+    def quick(cls) -> "Plan":
+        """A run of some minutes, to try the pipeline; its models are worth nothing."""
+        return cls(1_500, 400, len(TRIALS), 1_000, 2_000, FitConfig(epochs=3, real_epochs=1, real_samples=1_000))
+
+
+@dataclass(frozen=True, slots=True)
+class Data:
+    """Everything that is learned from or judged on, split by participant."""
+
+    teach: Samples
+    calibrate: Samples
+    tests: dict[str, Samples]  # by name
+    performed: dict[str, int]  # gestures that were performed in each test, cut out or not
+    real: Samples | None
+
+
+def load(plan: Plan, cache: Path, real: Path | None, jobs: int) -> Data:
+    """Simulate, or take from the cache, and read the real recordings where they are."""
+    teach, check, test = (
+        simulated(cache, "wide", seed, count, jobs)
+        for seed, count in ((1, plan.wide), (2, plan.wide_check), (3, plan.wide_check))
+    )
+    cohort = simulated(cache, "cohort", 0, plan.cohort, jobs)
+    others = simulated(cache, "others", 0, plan.others, jobs)
+    both = join([cohort, others])
+    person = both.people % 1000
+    plans = np.array([trial.participant for trial in TRIALS[: plan.cohort]])
+    return Data(
+        join([teach, both.take(person < 24)]),
+        join([check, both.take((person >= 24) & (person < 28))]),
+        {"nominal": both.take(person >= 28), "wide": test},
+        {"nominal": int((plans >= 28).sum()), "wide": int((test.labels != "none").sum())},
+        _real(cache, real),
+    )
+
+
+def _real(cache: Path, folder: Path | None) -> Samples | None:
+    paths = [folder / name for name in REAL] if folder else []
+    if not paths or not all(path.exists() for path in paths):
+        return None
+    parts = []
+    for path in paths:
+        parts.append(recorded(read(path)))
+    return join(parts)
+
+
+def folds(real: Samples) -> list[NDArray[np.bool_]]:
+    """Which samples each fold holds out: every subject once."""
+    subjects = np.unique(real.people)
+    return [np.isin(real.people, subjects[k::FOLDS]) for k in range(FOLDS)]
+
+
+@dataclass(slots=True)
+class Trained:
+    """The networks, and what those that had not seen them say of the real subjects."""
+
+    nets: nn.ModuleDict
+    held_out: dict[str, Tensor] | None  # (G, K) logits of each net over the real samples, None without any
+
+
+def learn(plan: Plan, data: Data, cache: Path) -> Trained:
+    """Both stages and the folds; what is done already is read from the cache."""
+    key = hashlib.sha256(json.dumps([asdict(plan), data.teach.digest(), CLASSES, _code()]).encode()).hexdigest()[:12]
+    first = cache / f"simulated-{key}.npz"
+    if not first.exists():
+        save_nets(first, pretrain(data.teach, plan.fit, cache / f"checkpoint-{key}.npz"))
+    start = load_nets(first)
+    if data.real is None:
+        return Trained(start, None)
+    key += data.real.digest()[:6]
+    held_out = {name: torch.zeros(len(data.real), len(CLASSES)) for name in start}
+    for k, held in enumerate(folds(data.real)):
+        nets = _kept(cache / f"fold{k}-{key}.npz", start, data, data.real.take(~held), plan, f"fold {k + 1}/{FOLDS}")
+        for name, found in logits(nets, data.real.take(held), plan.fit).items():
+            held_out[name][torch.from_numpy(held)] = found
+    return Trained(_kept(cache / f"final-{key}.npz", start, data, data.real, plan, "final"), held_out)
+
+
+def _kept(path: Path, start: nn.ModuleDict, data: Data, real: Samples, plan: Plan, title: str) -> nn.ModuleDict:
+    if not path.exists():
+        save_nets(path, finetune(start, data.teach, real, plan.fit, title))
+    return load_nets(path)
+
+
+def _code() -> str:
+    """A digest of what shapes training besides the data and the plan."""
+    here = Path(__file__).parent
+    return hashlib.sha256(b"".join((here / f"{n}.py").read_bytes() for n in ("fit", "nets", "trajectory", "augment"))).hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class Calibrated:
+    """Logits to calibrate on, and their classes."""
+
+    logits: dict[str, Tensor]
+    labels: NDArray[np.int64]
+
+
+def calibration_set(trained: Trained, data: Data, plan: Plan) -> Calibrated:
+    """People that no network has seen: simulated ones, and each real subject by the fold that left it out."""
+    found, labels = logits(trained.nets, data.calibrate, plan.fit), targets(data.calibrate)
+    if data.real is not None and trained.held_out is not None:
+        found = {name: torch.cat([found[name], trained.held_out[name]]) for name in found}
+        labels = np.concatenate([labels, targets(data.real)])
+    usable = labels >= 0
+    return Calibrated({name: x[torch.from_numpy(usable)] for name, x in found.items()}, labels[usable])
+
+
+def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged, dict[str, Any]]:
+    """A network with its second opinion and their calibration."""
+    first, second = calibrated.logits[name], calibrated.logits["trajectory"]
+    decision = fit_decision(first, second, calibrated.labels, len(GESTURES))
+    with torch.no_grad():
+        scores, unknown = decision(first, second)
+    least = threshold(scores.numpy(), unknown.numpy(), calibrated.labels < len(GESTURES))
+    calibration = {
+        "temperature": (1 / decision.share.clamp(min=1e-6)).tolist(),  # of the network and of the trajectory net
+        "unknown_weight": decision.weight.tolist(),
+        "unknown_bias": float(decision.bias),
+        "threshold": least,
+    }
+    return Judged(trained.nets[name], trained.nets["trajectory"], decision).eval(), calibration
+
+
+def grow_forest(data: Data, plan: Plan) -> tuple[RandomForestClassifier, dict[str, Any]]:
+    """The touch-pattern forest of the paper's Table IV (200 trees, depth 9), with a class for what is no gesture."""
+    rng = np.random.default_rng(plan.fit.seed)
+    count = min(plan.forest, len(data.teach))
+    parts = [data.teach.take(rng.choice(len(data.teach), count, replace=False))]
+    if data.real is not None:
+        parts.append(data.real)
+    samples = join(parts)
+    forest = RandomForestClassifier(
+        200, max_depth=9, min_samples_leaf=4, n_jobs=2, random_state=plan.fit.seed, class_weight="balanced"
+    )
+    forest.fit(samples.features(), np.minimum(_classes(samples), len(GESTURES)))
+    labels = np.minimum(_classes(data.calibrate), len(GESTURES))
+    chances = forest.predict_proba(data.calibrate.features())
+    return forest, _forest_calibration(chances, labels)
+
+
+def _classes(samples: Samples) -> NDArray[np.int64]:
+    labels = targets(samples)
+    return np.where(labels < 0, len(CLASSES), labels)
+
+
+def _forest_calibration(chances: NDArray[np.float64], labels: NDArray[np.int64]) -> dict[str, Any]:
+    """Temperature by likelihood; a threshold from which at most 6 % of the calibration gestures are answered wrongly."""
+    known = labels < len(GESTURES)
+    best: tuple[float, dict[str, Any]] | None = None
+    for temperature in np.geomspace(0.2, 2.0, 24):
+        calibration = {"temperature": float(temperature), "unknown_scale": 1.0, "unknown_offset": 0.0}
+        scores, _ = forest_outputs(chances, len(GESTURES), calibration)
+        loss = -float(np.log(np.maximum(scores[known, labels[known]], 1e-9)).mean())
+        if best is None or loss < best[0]:
+            best = loss, calibration
+    assert best is not None
+    calibration = best[1]
+    scores, unknown = forest_outputs(chances, len(GESTURES), calibration)
+    confidence = scores.max(axis=1) * (1 - unknown)
+    wrong = known & (scores.argmax(axis=1) != labels)
+    for least in np.linspace(0.05, 0.95, 91):
+        calibration["threshold"] = round(float(least), 3)
+        if (wrong & (confidence >= least)).sum() <= 0.06 * known.sum() and (confidence[~known] >= least).mean() <= 0.1:
+            break
+    return calibration
+
+
+QUANTILES = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
+
+
+def quantiles(samples: Samples) -> dict[str, Any]:
+    """What the training gestures looked like, to compare a deployment with."""
+    known = samples.take(samples.labels != "none")
+    pressed = [known.window(i) for i in range(len(known))]
+    active = [w[w.max(axis=(1, 2)) >= 0.15] for w in pressed]
+    values = {
+        "strength": known.strength,  # peak over the sensor's noise
+        "duration_s": np.array([len(w) for w in active]) / WINDOW.rate_hz,
+        "area": np.array([(w >= 0.2).mean() if len(w) else 0.0 for w in active]),  # share of the grid
+    }
+    return {"at": list(QUANTILES)} | {n: np.quantile(v, QUANTILES).round(4).tolist() for n, v in values.items()}
+
+
+def train(plan: Plan, out: Path, cache: Path, real: Path | None, jobs: int) -> Data:
+    """Make the three models in `out`, with an empty manifest; the figures come from `evaluate`."""
+    torch.set_num_threads(max(jobs, 1))
+    data = load(plan, cache, real, jobs)
+    trained = learn(plan, data, cache)
+    calibrated = calibration_set(trained, data, plan)
+    digest = hashlib.sha256((data.teach.digest() + (data.real.digest() if data.real else "")).encode()).hexdigest()
+    common: dict[str, Any] = {
+        "version": gestured.__version__, "gestures": list(GESTURES), "window": WINDOW,
+        "training_data": digest, "quantiles": quantiles(data.teach),
+    }  # fmt: skip
+    out.mkdir(parents=True, exist_ok=True)
+    for name in ("cnn_lstm", "lstm"):
+        module, calibration = judged(trained, name, calibrated)
+        export_net(module, out / f"{name}.onnx", kind=name, calibration=calibration, **common)
+    forest, calibration = grow_forest(data, plan)
+    features: Sequence[str] = feature_names(WINDOW.rows, WINDOW.columns)
+    export_forest(
+        forest, out / "touch_pattern_rf.onnx", kind="touch_pattern_rf", calibration=calibration, features=features, **common
+    )  # fmt: skip
+    write_manifest(out, {})
+    return data
+
