@@ -74,7 +74,7 @@ class FrontEnd:
         self.segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
         self._mounted = self.mounting != Mounting()
         self._kept: deque[Kept] = deque()
-        self._id = 0
+        self.segments = 0  # so far; their ids
         self._last: float | None = None
         self._interval = 0.0
         self._shifted: float | None = None  # s, since when the frames lie far below the baseline
@@ -180,32 +180,32 @@ class FrontEnd:
     def _act(self, action: Action, t: float) -> list[Contact]:
         offset = self.segmenter.last_touched
         if action is Action.OPEN:
-            self._id += 1
-            return [Onset(self.sensor, self._id, t)]
+            self.segments += 1
+            return [Onset(self.sensor, self.segments, t)]
         if action is Action.HELD:
-            return [Cancelled(self.sensor, self._id, "held")]
+            return [Cancelled(self.sensor, self.segments, "held")]
         if action is Action.LEFT:
-            return [Release(self.sensor, self._id, offset)]
+            return [Release(self.sensor, self.segments, offset)]
         if action is Action.SPLIT:
             first = self._closed(t, self.segmenter.split_onset, self.segmenter.earlier)
-            self._id += 1
-            return [*first, Onset(self.sensor, self._id, self.segmenter.onset)]
+            self.segments += 1
+            return [*first, Onset(self.sensor, self.segments, self.segmenter.onset)]
         return self._closed(t, self.segmenter.onset, offset)
 
     def _closed(self, t: float, onset: float, offset: float) -> list[Contact]:
-        release = Release(self.sensor, self._id, offset)
+        release = Release(self.sensor, self.segments, offset)
         if self.segmenter.contact_s() < self.timing.glitch_s:
-            return [Cancelled(self.sensor, self._id, "glitch"), release]
+            return [Cancelled(self.sensor, self.segments, "glitch"), release]
         segment = self._segment(onset, offset)
         if float(segment.frames.max()) < self.segmenter.off * segment.noise:  # nothing is left without its bad taxels
-            return [Cancelled(self.sensor, self._id, "stuck"), release]
-        return [Cut(self._id, segment, t), release]
+            return [Cancelled(self.sensor, self.segments, "stuck"), release]
+        return [Cut(self.segments, segment, t), release]
 
     def _cancel(self, reason: str) -> list[Contact]:
-        release = Release(self.sensor, self._id, self.segmenter.last_touched)
+        release = Release(self.sensor, self.segments, self.segmenter.last_touched)
         if self.segmenter.phase is Phase.SPENT:  # has been cancelled already
             return [release]
-        return [Cancelled(self.sensor, self._id, reason), release]
+        return [Cancelled(self.sensor, self.segments, reason), release]
 
     def _segment(self, onset: float, offset: float) -> Segment:
         times = np.array([k[0] for k in self._kept])

@@ -142,7 +142,7 @@ class Pipeline:
             another_clock = _clock(old, name) != _clock(settings, name)
             if another_clock or waits != (DOUBLE_TAP in self.gestures) or not _alike(front_end, fresh):
                 self._publish(sensor, sensor.recognizer.reset())
-                fresh._id = front_end._id  # its segments are numbered on
+                fresh.segments = front_end.segments  # its segments are numbered on
                 front_end = fresh
             if another_clock:
                 sensor.stamper = Stamper(_clock(settings, name))

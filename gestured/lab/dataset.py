@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 NONE = "none"
-COMPOSED = ("tap_then_swipe", "tap_then_hold", "triple_tap")  # gestures one after the other, and cut as such
 COVERED = 0.5  # of a performed gesture must lie in a segment for it to carry its label
 
 
@@ -161,7 +160,7 @@ def from_take(take: Take) -> list[Sample]:
 
 
 TRIALS = tuple(cohort_plan())  # 34 participants x 10 gestures x 3 speeds x 3 inclinations = 3060
-OTHERS = tuple((p, k, s) for p in range(34) for k in NON_GESTURES if k not in COMPOSED for s in SPEEDS)  # the same people do something else
+OTHERS = tuple((p, k, s) for p in range(34) for k in NON_GESTURES for s in SPEEDS)  # the same people do something else
 
 
 def _wide(seed: int, index: int) -> list[Sample]:

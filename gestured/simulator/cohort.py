@@ -16,7 +16,8 @@ from .sensor import Sensor, Take
 from .strokes import Scene
 
 GESTURES: tuple[str, ...] = tuple(TEN)
-NON_GESTURES: tuple[str, ...] = tuple(OTHERS)
+SEQUENCES = ("tap_then_swipe", "tap_then_hold", "triple_tap")  # gestures one right after the other: read as such, not as none
+NON_GESTURES: tuple[str, ...] = tuple(kind for kind in OTHERS if kind not in SEQUENCES)
 NONE = "none"
 
 
@@ -33,7 +34,7 @@ def perform(
     Raises ValueError for an unknown kind, speed or inclination.
     """
     if kind not in TEN and kind not in OTHERS:
-        raise ValueError(f"kind: {kind!r} is none of {', '.join(GESTURES + NON_GESTURES)}")
+        raise ValueError(f"kind: {kind!r} is none of {', '.join(GESTURES + NON_GESTURES + SEQUENCES)}")
     if speed not in SPEEDS:
         raise ValueError(f"speed: {speed!r} is none of {', '.join(SPEEDS)}")
     if inclination not in INCLINATIONS:
