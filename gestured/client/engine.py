@@ -1,4 +1,4 @@
-"""A real daemon of one's own for the demo: a process, free ports, a socket in a temporary folder."""
+"""A real daemon of one's own: a process, free ports, a socket in a temporary folder."""
 
 import json
 import os
@@ -16,12 +16,13 @@ STOP_S = 5.0
 class Engine:
     """`gestured` as a child process; a context manager. Raises GesturedError where it does not start."""
 
-    def __init__(self, model: str, rows: int, columns: int) -> None:
+    def __init__(self, model: str, rows: int, columns: int, *more: str) -> None:
+        """Start it, with `more` of its flags."""
         self._folder = tempfile.TemporaryDirectory(prefix="gestured-demo-")
         folder = Path(self._folder.name)
         self._log = folder / "log"
         command = [sys.executable, "-m", "gestured.daemon", "--model", model, "--listen", "127.0.0.1:0"]
-        command += ["--socket", str(folder / "events.sock"), "--grid", f"{rows}x{columns}"]
+        command += ["--socket", str(folder / "events.sock"), "--grid", f"{rows}x{columns}", *more]
         environment = {name: value for name, value in os.environ.items() if not name.startswith("GESTURED_")}
         with self._log.open("wb") as log:
             # A session of its own: Ctrl-C is for us, and we end it in our own time.
@@ -61,8 +62,13 @@ class Engine:
         """Where it gives events."""
         return Path(self.ready["socket"])
 
+    def resident(self) -> int:
+        """Bytes of memory that it holds now (Linux)."""
+        pages = Path(f"/proc/{self._process.pid}/statm").read_text().split()[1]
+        return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
     def close(self) -> None:
-        """End it as an operator would."""
+        """End it as an operator would; again is nothing."""
         self._process.terminate()
         try:
             self._process.wait(STOP_S)
