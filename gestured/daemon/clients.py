@@ -13,9 +13,10 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from gestured.core import wire
+from gestured.core import messages
 from gestured.core.errors import ProtocolError
 from gestured.core.events import Event
+from gestured.core.subscription import MAX_LINE, Subscription, parse_subscription
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 
@@ -30,7 +31,7 @@ class Client:
 
     def __init__(self, server: "EventServer", sock: socket.socket) -> None:
         self._server, self.sock = server, sock
-        self.subscription = wire.Subscription()
+        self.subscription = Subscription()
         self.blocked_since: float | None = None
         self.half_closed = False
         self._begun = b""  # rest of a line of which the client already has a part
@@ -61,7 +62,7 @@ class Client:
             if self._begun:
                 line, self._begun = self._begun, b""
             elif self._lost:
-                line, self._lost = wire.lost_json(self._lost), 0
+                line, self._lost = messages.lost_json(self._lost), 0
             elif self._waiting:
                 line = self._waiting.popleft()
                 self._size -= len(line)
@@ -94,14 +95,14 @@ class Client:
             self._answer(bytes(self._request))
             self._request.clear()
         self._request += rest
-        del self._request[wire.MAX_LINE + 1 :]  # one byte too many is enough to refuse it
+        del self._request[MAX_LINE + 1 :]  # one byte too many is enough to refuse it
 
     def _answer(self, line: bytes) -> None:
         try:
             if line.strip():
-                self._server.subscribe(self, wire.parse_subscription(line))
+                self._server.subscribe(self, parse_subscription(line))
         except ProtocolError as error:
-            self.send(wire.error_json(str(error)))
+            self.send(messages.error_json(str(error)))
 
     def _write(self, line: bytes) -> bytes | None:
         """What the socket did not take, or None if it took everything (or is gone)."""
@@ -133,7 +134,7 @@ class EventServer:
         self.loop = asyncio.get_running_loop()
         self.metrics = metrics
         self._listener, self._hello, self._throttle = listener, hello, Throttle()
-        self._classes: dict[wire.Subscription, set[Client]] = {}
+        self._classes: dict[Subscription, set[Client]] = {}
         self._clients: set[Client] = set()
         self.loop.add_reader(listener, self._accept)
 
@@ -152,11 +153,11 @@ class EventServer:
         line = None
         for subscription, clients in tuple(self._classes.items()):
             if subscription.matches(event):
-                line = line or wire.to_json(event, epoch)
+                line = line or messages.to_json(event, epoch)
                 for client in tuple(clients):
                     client.send(line)
 
-    def subscribe(self, client: Client, subscription: wire.Subscription) -> None:
+    def subscribe(self, client: Client, subscription: Subscription) -> None:
         """Change what a client wants."""
         if client not in self._clients:
             return  # it went while it was being answered
@@ -224,7 +225,7 @@ class EventServer:
                 self._throttle.warn("client turned away", "too many clients", limit=CLIENTS)
                 with sock:
                     try:
-                        sock.send(wire.error_json(f"more than {CLIENTS} clients"))
+                        sock.send(messages.error_json(f"more than {CLIENTS} clients"))
                     except OSError:
                         pass
                 continue

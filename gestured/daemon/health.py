@@ -4,7 +4,7 @@ import secrets
 import time
 
 from gestured import __version__
-from gestured.core import wire
+from gestured.core import messages
 from gestured.core.events import Cancelled, Event, Gesture, Status, Unknown
 from gestured.daemon.pipeline import Pipeline
 from gestured.models import Ladder
@@ -41,7 +41,7 @@ class Health:
     def hello(self) -> bytes:
         """The first line to a client."""
         sequences = {name: sensor.recognizer.sequence for name, sensor in self.pipeline.sensors.items()}
-        return wire.hello_json(__version__, self.instance, self.ladder.active, self.pipeline.gestures, sequences)
+        return messages.hello_json(__version__, self.instance, self.ladder.active, self.pipeline.gestures, sequences)
 
     def healthz(self) -> tuple[int, dict[str, object]]:
         """Whether the loop turns."""

@@ -16,7 +16,8 @@ from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unkn
 from gestured.core.frames import Frame
 from gestured.core.recognizer import FrontEnd, Recognizer
 from gestured.core.segmentation import Timing
-from gestured.core.wire import Arrival, Stamper
+from gestured.core.stamping import Stamper
+from gestured.core.wire import Arrival
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.settings import SensorSettings, Settings

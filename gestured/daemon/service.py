@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from gestured.core import wire
+from gestured.core import messages, wire
 from gestured.core.errors import GesturedError
 from gestured.core.events import Event, Status
 from gestured.daemon import log as logging
@@ -169,7 +169,7 @@ class Service:
         self._health.note(event)
         if not isinstance(event, Status):
             name = getattr(event, "gesture", None)
-            log.debug(wire.event_type(event), sensor=event.sensor, id=event.id, gesture=name)
+            log.debug(messages.event_type(event), sensor=event.sensor, id=event.id, gesture=name)
         epoch = time.time() - time.monotonic()
         sinks: tuple[Sink, ...] = (self._clients, *self._osc)
         for sink in sinks:

@@ -3,7 +3,7 @@
 import socket
 from typing import Protocol
 
-from gestured.core import wire
+from gestured.core import messages
 from gestured.core.events import Event, Gesture, Status
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
@@ -40,10 +40,10 @@ class OscSink:
     def publish(self, event: Event, epoch: float) -> None:
         """Send a gesture or the status; other events do not travel by OSC."""
         if isinstance(event, Gesture):
-            self._send(wire.gesture_osc(event, epoch))
+            self._send(messages.gesture_osc(event, epoch))
         elif isinstance(event, Status):
             heard = sum(state != "stale" for state in event.sensors.values())
-            self._send(wire.status_osc(event.state, heard))
+            self._send(messages.status_osc(event.state, heard))
 
     def close(self) -> None:
         """Close the socket."""

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from gestured.core import wire
+from gestured.core import messages
 from gestured.core.events import Onset
+from gestured.core.subscription import Subscription
 from gestured.daemon import clients
 from gestured.daemon.clients import EventServer
 from gestured.daemon.metrics import Metrics
@@ -107,7 +108,7 @@ def test_the_backlog_is_bounded_and_drops_the_oldest(listener) -> None:
         with connect(listener) as sock:
             await turn()
             (client,) = server._clients
-            client.subscription = wire.Subscription()
+            client.subscription = Subscription()
             for i in range(5000):
                 client.send(b"%06d" % i + b"." * 493 + b"\n")
                 assert client.backlog <= clients.BACKLOG_BYTES + 500
@@ -145,8 +146,8 @@ def test_more_clients_than_there_is_room_for_are_told_so(listener, monkeypatch) 
 
 def test_an_event_is_encoded_once_for_all(listener, monkeypatch) -> None:
     calls = []
-    encode = wire.to_json
-    monkeypatch.setattr(wire, "to_json", lambda event, epoch: calls.append(event) or encode(event, epoch))
+    encode = messages.to_json
+    monkeypatch.setattr(messages, "to_json", lambda event, epoch: calls.append(event) or encode(event, epoch))
 
     async def main() -> None:
         server = EventServer(listener, lambda: b"", Metrics())

@@ -1,0 +1,78 @@
+"""What goes out: events as OSC messages and as JSON lines, and the other lines that a client is told."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any, get_args
+
+from gestured.core import osc
+from gestured.core.events import Event, Gesture
+
+
+def gesture_osc(event: Gesture, epoch: float) -> bytes:
+    """The OSC message of a gesture; stream time + `epoch` s = time since the Unix epoch."""
+    return osc.encode_message(
+        f"/gestured/{event.sensor}/gesture",
+        "sfidd",
+        (event.gesture, event.confidence, event.sequence, event.onset + epoch, event.offset + epoch),
+    )
+
+
+def status_osc(state: str, sensors: int) -> bytes:
+    """The OSC sign of life: "ok", "degraded" or "no_data", and how many sensors there are."""
+    return osc.encode_message("/gestured/status", "si", (state, sensors))
+
+
+def event_type(event: Event) -> str:
+    """What an event is called on the wire: "gesture", "onset" ..."""
+    return type(event).__name__.lower()
+
+
+EVENT_TYPES = tuple(cls.__name__.lower() for cls in get_args(Event))
+_STREAM_TIMES = frozenset(("onset", "offset", "decided"))
+
+
+def to_json(event: Event, epoch: float) -> bytes:
+    """One JSON line; stream time + `epoch` s = time since the Unix epoch.
+
+    Raises ValueError for a NaN or an infinity, which no event may hold.
+    """
+    line: dict[str, Any] = {"type": event_type(event)}
+    for field in fields(event):
+        value = getattr(event, field.name)
+        line[field.name] = value + epoch if field.name in _STREAM_TIMES else value
+    return _line(line)
+
+
+def hello_json(version: str, instance: str, model: str, gestures: Sequence[str], sensors: Mapping[str, int]) -> bytes:
+    """The first line to a client; `sensors` has the last sequence of each."""
+    return _line(
+        {
+            "type": "hello",
+            "protocol": 1,
+            "version": version,
+            "instance": instance,
+            "model": model,
+            "gestures": list(gestures),
+            "sensors": dict(sensors),
+        }
+    )
+
+
+def lost_json(count: int) -> bytes:
+    """Tells a client how many lines it was too slow for."""
+    return _line({"type": "lost", "count": count})
+
+
+def error_json(reason: str) -> bytes:
+    """Tells a client what was wrong with its request."""
+    return _line({"type": "error", "reason": reason})
+
+
+def _line(value: dict[str, Any]) -> bytes:
+    return json.dumps(value, separators=(",", ":"), allow_nan=False, default=_plain_value).encode() + b"\n"
+
+
+def _plain_value(value: Any) -> Any:
+    """Mappings of any kind, and numpy's numbers."""
+    return dict(value) if isinstance(value, Mapping) else value.item()

@@ -1,0 +1,121 @@
+"""When the frames of a sensor were felt: stamps for what arrives bunched, late, twice or out of order."""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+from gestured.core.wire import Arrival
+
+
+class Stamp(NamedTuple):
+    """When a frame was felt, and what its counter says."""
+
+    t: float  # s on the stream's clock, strictly increasing; NaN for a dropped frame
+    lost: int  # frames that went missing just before this one
+    dropped: Literal["", "duplicate", "late"]  # why the frame must not be used
+    restarted: bool  # the sensor began anew: what was learned of it no longer holds
+    implausible: bool  # clock "sensor": the time tag was missing or impossible, the arrival counts
+
+
+class Stamper:
+    """When the frames of one sensor were felt.
+
+    `clock` "arrival": when they arrived. "sensor": by the increments of the time tags, as long as these go
+    forward by at most `MAX_STEP_S`; else by the arrival. Frames of one call that have one time are spaced
+    backwards from it, by the counter or evenly, at the rate seen so far (`rate_hz` until it is known), and
+    after the frame before. So read all waiting packets before you stamp: a stall then does no harm.
+    """
+
+    MAX_STEP_S = 10.0
+    MIN_STEP_S = 1e-6  # where the clock did not move; a double still tells this after 30 years
+    REORDER = 16  # a frame that is so many back may have been overtaken ...
+    REORDER_S = 0.5  # ... but not after such a pause
+    STREAK = 3  # and so many in a row, in order, are a new start
+    LEAP = 10_000  # a counter that jumps further has lost nothing, it began anew: ten seconds at 1000 Hz
+
+    def __init__(self, clock: Literal["arrival", "sensor"] = "arrival", rate_hz: float = 15.0) -> None:
+        self._by_tag = clock == "sensor"
+        self._period = 1.0 / rate_hz
+        self._intervals: deque[float] = deque(maxlen=15)
+        self._last: float | None = None  # the last stamp
+        self._arrived = 0.0  # and the arrival of its frame
+        self._tag: float | None = None
+        self._counter: int | None = None
+        self._late: tuple[int, int] = (0, 0)  # counter of the last late frame, and how many came in a row
+
+    def at(self, t: float) -> float:
+        """The stream's time at the arrival time `t` s, for `flush`: the last stamp plus what passed since."""
+        return t if self._last is None else self._last + max(0.0, t - self._arrived)
+
+    def stamp(self, arrivals: Sequence[Arrival], t: float) -> list[Stamp]:
+        """One stamp for each of this sensor's frames that were waiting at the arrival time `t` s."""
+        stamps: list[Stamp] = []
+        run: list[tuple[int, int]] = []  # frames with one time: index, periods since the frame before
+        for i, arrival in enumerate(arrivals):
+            pause = 0.0 if run else t - self._arrived
+            steps, dropped, restarted = self._count(arrival.counter, pause)
+            stamps.append(Stamp(math.nan, max(0, steps - 1), dropped, restarted, False))
+            if dropped:
+                continue
+            if self._by_tag and run and arrival.timetag != arrivals[run[-1][0]].timetag:
+                self._place(arrivals, stamps, run, t)
+                run = []
+            run.append((i, steps))
+        if run:
+            self._place(arrivals, stamps, run, t)
+        return stamps
+
+    def _count(self, counter: int | None, pause: float) -> tuple[int, Literal["", "duplicate", "late"], bool]:
+        """(periods since the frame before, why it is dropped, whether the sensor restarted)."""
+        before, self._counter = self._counter, counter
+        if counter is None or before is None:
+            return 1, "", False
+        step = (counter - before + 2**31) % 2**32 - 2**31  # an int32 that wraps
+        if 0 < step <= self.LEAP:
+            self._late = (0, 0)
+            return step, "", False
+        if step == 0:
+            return 0, "duplicate", False
+        late, streak = self._late
+        streak = streak + 1 if streak and counter == late + 1 else 1
+        if -step <= self.REORDER and step < 0 and pause <= self.REORDER_S and streak < self.STREAK:
+            self._counter, self._late = before, (counter, streak)
+            return 0, "late", False
+        self._late = (0, 0)
+        return 1, "", True
+
+    def _place(self, arrivals: Sequence[Arrival], stamps: list[Stamp], run: list[tuple[int, int]], t: float) -> None:
+        """Stamp frames that share one time."""
+        tag = arrivals[run[-1][0]].timetag
+        total = sum(steps for _, steps in run)
+        implausible = False
+        if self._last is None:
+            end, spacing = t, self._typical()
+            implausible = self._by_tag and tag is None
+        else:
+            step = t - self._arrived
+            if self._by_tag:
+                by_tag = tag - self._tag if tag is not None and self._tag is not None else 0.0
+                if 0 < by_tag <= self.MAX_STEP_S:
+                    step = by_tag
+                else:
+                    implausible = tag is None or self._tag is not None
+            end = self._last + step if self._by_tag else t
+            share = (end - self._last) / total
+            spacing = min(self._typical(), share) if len(run) > 1 else share
+            if share > 0:
+                self._intervals.append(share)
+        last = self._last
+        for i, steps in run:
+            total -= steps
+            at = end - total * spacing
+            if last is not None and at < last + self.MIN_STEP_S:
+                at = last + self.MIN_STEP_S
+            last = at
+            stamps[i] = stamps[i]._replace(t=at, implausible=implausible)
+        self._last, self._arrived, self._tag = last, t, tag
+
+    def _typical(self) -> float:
+        """Seconds between two frames: the median, since a late frame must not count."""
+        return sorted(self._intervals)[len(self._intervals) // 2] if self._intervals else self._period

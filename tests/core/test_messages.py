@@ -1,0 +1,87 @@
+"""What goes out: events as JSON lines and OSC, and the other lines that a client is told."""
+
+import json
+import math
+import typing
+from collections.abc import Mapping
+from dataclasses import fields
+from types import MappingProxyType
+from typing import get_args
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pythonosc.osc_message import OscMessage
+
+from gestured.core import events, messages
+from gestured.core.events import Event, Gesture, Onset, Status
+
+word = st.text(min_size=1, max_size=12)
+number = st.floats(-1e6, 1e6)
+BY_TYPE: dict[object, st.SearchStrategy] = {
+    str: word,
+    int: st.integers(0, 2**31 - 1),
+    float: number,
+    bool: st.booleans(),
+    Mapping[str, float]: st.dictionaries(word, number),
+    Mapping[str, str]: st.dictionaries(word, word),
+}
+
+
+def any_event(cls: type) -> st.SearchStrategy:
+    hints = typing.get_type_hints(cls)
+    return st.builds(cls, **{f.name: BY_TYPE[hints[f.name]] for f in fields(cls)})
+
+
+@given(st.one_of([any_event(cls) for cls in get_args(Event)]), st.floats(0, 2e9))
+def test_every_event_survives_its_json_line(event: Event, epoch: float) -> None:
+    line = messages.to_json(event, epoch)
+    assert line.endswith(b"\n") and line.count(b"\n") == 1
+    got = json.loads(line)
+    assert getattr(events, got.pop("type").capitalize()) is type(event)
+    for key in ("onset", "offset", "decided"):
+        if key in got:
+            assert got[key] == getattr(event, key) + epoch
+            got[key] = getattr(event, key)
+    assert type(event)(**got) == event
+
+
+GESTURE = Gesture(
+    "armrest", 41, "swipe_up", 0.98, 17, 10.0, 10.5, 10.6, 12, 0, "cnn_lstm", False,
+    MappingProxyType({"swipe_up": np.float32(0.5), "circle": 0.5}),
+)  # fmt: skip
+
+
+def test_a_gesture_looks_as_the_contract_says() -> None:
+    assert messages.to_json(GESTURE, 1000.0) == (
+        b'{"type":"gesture","sensor":"armrest","id":41,"gesture":"swipe_up","confidence":0.98,"sequence":17,'
+        b'"onset":1010.0,"offset":1010.5,"decided":1010.6,"frames":12,"lost":0,"model":"cnn_lstm",'
+        b'"degraded":false,"scores":{"swipe_up":0.5,"circle":0.5}}\n'
+    )
+    status = Status("ok", {"armrest": "ok"}, "cnn_lstm", 1234.5)
+    assert messages.to_json(status, 1000.0) == (
+        b'{"type":"status","state":"ok","sensors":{"armrest":"ok"},"model":"cnn_lstm","time":1234.5}\n'
+    )
+    assert messages.hello_json("0.1", "x", "m", ("a", "b"), {"armrest": 17}) == (
+        b'{"type":"hello","protocol":1,"version":"0.1","instance":"x","model":"m","gestures":["a","b"],'
+        b'"sensors":{"armrest":17}}\n'
+    )
+    assert messages.lost_json(3) == b'{"type":"lost","count":3}\n'
+    assert json.loads(messages.error_json('odd "ä"\n')) == {"type": "error", "reason": 'odd "ä"\n'}
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, np.float32("nan")])
+def test_no_nan_leaves_the_house(value: float) -> None:
+    with pytest.raises(ValueError):
+        messages.to_json(Onset("s", 1, value), 0.0)
+    with pytest.raises(ValueError):
+        messages.to_json(Status("ok", {"s": value}, "m", 1.0), 0.0)  # type: ignore[dict-item]
+
+
+def test_osc_out_is_read_by_python_osc() -> None:
+    message = OscMessage(messages.gesture_osc(GESTURE, 1_700_000_000.0))
+    assert message.address == "/gestured/armrest/gesture"
+    assert message.params == ["swipe_up", pytest.approx(0.98), 17, 1_700_000_010.0, 1_700_000_010.5]
+    status = OscMessage(messages.status_osc("no_data", 2))
+    assert (status.address, status.params) == ("/gestured/status", ["no_data", 2])

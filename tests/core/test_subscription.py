@@ -1,0 +1,82 @@
+"""What a client asks to hear: a filter, or an error that says what was expected."""
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gestured.core.errors import ProtocolError
+from gestured.core.events import Gesture, Onset, Release, Status
+from gestured.core.messages import error_json
+from gestured.core.subscription import Subscription, parse_subscription
+
+GESTURE = Gesture("armrest", 41, "swipe_up", 0.98, 17, 10.0, 10.5, 10.6, 12, 0, "cnn_lstm", False, {"swipe_up": 1.0})
+
+
+def request(**wanted: object) -> bytes:
+    return json.dumps({"subscribe": wanted}).encode()
+
+
+def test_what_is_left_out_is_no_filter() -> None:
+    default = parse_subscription(request())
+    assert default == Subscription()
+    assert default.matches(GESTURE) and not default.matches(Onset("armrest", 1, 0.0))
+
+
+def test_subscriptions_filter() -> None:
+    chosen = parse_subscription(
+        request(types=["gesture", "onset", "status"], sensors=["armrest"], gestures=["swipe_up"]) + b"\r\n"
+    )
+    assert chosen.matches(GESTURE) and chosen.matches(Onset("armrest", 1, 0.0))
+    assert chosen.matches(Status("ok", {}, "m", 1.0))
+    assert not chosen.matches(Onset("door", 1, 0.0))
+    assert not chosen.matches(Release("armrest", 1, 0.0))
+    assert not parse_subscription(request(gestures=["circle"])).matches(GESTURE)
+    assert not parse_subscription(request(types=[])).matches(GESTURE)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        (b"", "JSON"),
+        (b"hello", "JSON"),
+        (b"\xff", "UTF-8"),
+        (b"[" * 4000, "JSON"),
+        (b'{"a":' * 800, "JSON"),
+        (b" " * 5000, "4096"),
+        (b"[]", '"subscribe"'),
+        (b"NaN", '"subscribe"'),
+        (b"{}", '"subscribe"'),
+        (b'{"subscribe":[]}', '"subscribe"'),
+        (b'{"subscribe":{},"x":1}', '"subscribe"'),
+        (request(type=["gesture"]), '"type", expected types, sensors or gestures'),
+        (request(types="gesture"), "subscribe.types: expected a list of strings"),
+        (request(gestures=[1]), "subscribe.gestures: expected a list of strings"),
+        (request(sensors=None), "subscribe.sensors: expected a list of strings"),
+        (request(types=["tap"]), '"tap", expected any of onset, gesture'),
+        (request(sensors=["a b"]), '"a b" cannot be a sensor'),
+        (
+            b'{"subscribe":{"types":' + b"[" * 300 + b"]" * 300 + b"}}",
+            "subscribe.types: expected a list of strings",
+        ),
+    ],
+)
+def test_requests_that_are_none_are_answered_with_what_was_expected(line: bytes, says: str) -> None:
+    with pytest.raises(ProtocolError) as caught:
+        parse_subscription(line)
+    assert caught.value.reason == "subscription" and says in str(caught.value)
+    json.loads(error_json(str(caught.value)))
+
+
+keys = st.sampled_from(["subscribe", "types", "sensors", "x"])
+leaves = st.none() | st.booleans() | st.floats() | st.text(max_size=5) | st.just("gesture")
+trees = st.recursive(leaves, lambda x: st.lists(x, max_size=3) | st.dictionaries(keys, x, max_size=3))
+
+
+@given(st.binary(max_size=60) | trees.map(lambda x: json.dumps(x).encode()))
+def test_any_line_is_a_subscription_or_a_protocol_error(line: bytes) -> None:
+    try:
+        assert isinstance(parse_subscription(line), Subscription)
+    except ProtocolError as error:
+        assert error.reason == "subscription"
