@@ -30,12 +30,11 @@ Argument = int | float | str | bytes | NDArray[np.generic]
 
 _BUNDLE = b"#bundle\0"
 _TIMETAG = Struct(">II").unpack_from  # seconds and their fraction
-_NTP_EPOCH = (
-    2_208_988_800  # s, 1970 counted from 1900; the count begins anew in 2036, so we tell 1970 to 2106
-)
+_NTP_EPOCH = 2_208_988_800  # s, 1970 counted from 1900; the count begins anew in 2036, so we tell 1970 to 2106
 _SCALARS = {"i": "i", "f": "f", "d": "d", "h": "q", "t": "Q"}
 _ARRAYS = {"i": np.dtype(">i4"), "f": np.dtype(">f4")}
 _RUNS = tuple(tag * RUN for tag in _ARRAYS)
+_PLACED = ("", "s", "r", "sr", "b", "sb")  # what has a place in a layout: scalars, a run, a blob that is not empty
 _MAX_LAYOUTS = 256
 
 
@@ -54,7 +53,7 @@ class Message(NamedTuple):
     bundle: int = -1  # the bundle's number in the packet; -1 is none
 
 
-# Where a packet of a known layout has one message: scalars, then a run; both may be missing.
+# Where a packet of a known layout has one message: scalars, then a run or a blob; all may be missing.
 _Place = tuple[
     int,  # where it starts
     bytes,  # its head there: address and type tags, padded; in a bundle the size before them
@@ -62,9 +61,9 @@ _Place = tuple[
     str,  # types
     Callable[[bytes, int], tuple[Any, ...]] | None,  # unpacks the scalars
     int,  # where the scalars are
-    Any,  # the run's dtype
-    int,  # its length, 0 for none
-    int,  # where the run is
+    Any,  # the run's dtype; None for a blob
+    int,  # its length (a blob's in bytes), 0 for none
+    int,  # where it is
 ]
 _new = tuple.__new__  # Message(...) takes twice the time
 _frombuffer = np.frombuffer
@@ -100,7 +99,7 @@ def decode(data: bytes, errors: list[ProtocolError] | None = None) -> list[Messa
         if errors is None:
             raise
         errors.append(error)
-    if 0 < len(places) == len(messages) and not errors:  # nothing else is in it: no blob, no inner bundle
+    if 0 < len(places) == len(messages) and not errors:  # nothing else is in it: no string, no inner bundle
         if len(_layouts) >= _MAX_LAYOUTS:
             _layouts.clear()
         _layouts[key] = (len(data), places)
@@ -113,19 +112,18 @@ def _read_places(data: bytes, places: list[_Place], bundled: bool) -> list[Messa
     for start, head, address, types, unpack, scalars, dtype, count, run in places:
         if not data.startswith(head, start):
             return None
-        if unpack is None:
-            args: tuple[Argument, ...] = (_frombuffer(data, dtype, count, run),) if count else ()
-        else:
-            args = unpack(data, scalars)
-            if count:
-                args += (_frombuffer(data, dtype, count, run),)
+        args: tuple[Argument, ...] = () if unpack is None else unpack(data, scalars)
+        if dtype is not None:
+            args += (_frombuffer(data, dtype, count, run),)
+        elif count:
+            if int.from_bytes(data[run - 4 : run], "big") != count:
+                return None
+            args += (data[run : run + count],)
         messages.append(_new(Message, (address, types, args, timetag, bundle)))
     return messages
 
 
-def _bundle(
-    data: bytes, messages: list[Message], places: list[_Place], errors: list[ProtocolError] | None
-) -> None:
+def _bundle(data: bytes, messages: list[Message], places: list[_Place], errors: list[ProtocolError] | None) -> None:
     end = len(data)
     timetag = _timetag(data, 8, end)
     number = bundles = seen = 0
@@ -177,7 +175,7 @@ def _message(
 ) -> Message:
     """The message at `start`; its size, where it has one, is at `begin`. Raises ProtocolError.
 
-    Where it has only scalars and a run after them, its place is added to `places`.
+    Where it has only scalars and a run or a blob after them, its place is added to `places`.
     """
     address, types, at = _head(data, start, end)
     head = data[begin:at]
@@ -204,13 +202,15 @@ def _message(
             scalars, at = at, _after(at, layout.size, end)
             args += layout.unpack_from(data, scalars)
         else:
-            kinds += "?"
+            run = at + 4
             value, at = _sized(data, tag, at, end)
+            count = len(value)
+            kinds += "b" if tag == "b" and count else "?"
             args += (value,)
         i = stop
     if at != end:
         raise ProtocolError("trailing", f"{end - at} bytes more than the type tags say")
-    if kinds in ("", "s", "r", "sr"):
+    if kinds in _PLACED:
         unpack = layout.unpack_from if "s" in kinds else None
         places.append((begin, head, address, types, unpack, scalars, dtype, count, run))
     return Message(address, types, args, timetag, bundle)
@@ -242,7 +242,7 @@ def _after(at: int, size: int, end: int) -> int:
     return at + size
 
 
-def _sized(data: bytes, tag: str, at: int, end: int) -> tuple[Argument, int]:
+def _sized(data: bytes, tag: str, at: int, end: int) -> tuple[bytes | str, int]:
     """A blob or a string, and where the next argument begins. Raises ProtocolError."""
     if tag == "b":
         at = _after(at, 4, end)
