@@ -1,0 +1,140 @@
+"""Augmentation: a turned window carries the name of what it shows, and variation invents nothing."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="needs the extra [lab]")
+
+from gestured.lab.augment import symmetry_table, turned, varied  # noqa: E402
+from gestured.lab.dataset import from_take  # noqa: E402
+from gestured.lab.fit import CLASSES  # noqa: E402
+from gestured.lab.nets import ACTIVE  # noqa: E402
+from gestured.simulator import Participant, Sensor, generator, gesture_take  # noqa: E402
+from tests.lab.made import direction, direction_of, gestures  # noqa: E402
+
+TABLE = symmetry_table(CLASSES)
+SYMMETRIES = range(8)
+
+
+def after(label: str, symmetry: int) -> str:
+    return CLASSES[int(TABLE[symmetry, CLASSES.index(label)])]
+
+
+def turn(frames: np.ndarray, symmetry: int) -> np.ndarray:
+    return turned(torch.from_numpy(np.asarray(frames, np.float32))[None], symmetry)[0].numpy()
+
+
+@pytest.mark.parametrize("symmetry", SYMMETRIES)
+@pytest.mark.parametrize("label", sorted(gestures()))
+def test_a_turned_window_shows_what_the_table_calls_it(label: str, symmetry: int) -> None:
+    frames = gestures()[label]
+    assert direction(frames) == direction_of(label)
+    assert direction(turn(frames, symmetry)) == direction_of(after(label, symmetry))
+
+
+@pytest.mark.parametrize("label", ["swipe_up", "swipe_left", "circle_clockwise", "swipe_down_two_fingers"])
+def test_simulated_gestures_turn_as_made_ones_do(label: str) -> None:
+    seen = 0
+    for person in range(50, 56):
+        take = gesture_take(label, Participant(person), Sensor.nominal(day=person), generator(person, 5))
+        for frames, found, *_ in from_take(take):
+            if direction(frames) != direction_of(found):  # a person's hand can be too crooked for this eye
+                continue
+            seen += 1
+            for symmetry in SYMMETRIES:
+                assert direction(turn(frames, symmetry)) == direction_of(after(found, symmetry)), (person, symmetry)
+    assert seen >= 4
+
+
+def test_the_number_of_fingers_survives_every_symmetry() -> None:
+    for label, symmetry in itertools.product(CLASSES, SYMMETRIES):
+        assert ("two_finger" in after(label, symmetry)) == ("two_finger" in label)
+
+
+def test_names_compose_as_the_turns_do() -> None:
+    x = torch.rand(1, 2, 5, 5, generator=torch.Generator().manual_seed(3))
+    shown = [turned(x, s) for s in SYMMETRIES]
+    for first, second in itertools.product(SYMMETRIES, SYMMETRIES):
+        both = turned(turned(x, first), second)
+        (single,) = [s for s in SYMMETRIES if torch.equal(both, shown[s])]
+        assert torch.equal(TABLE[second][TABLE[first]], TABLE[single])
+    assert torch.equal(TABLE[0], torch.arange(len(CLASSES)))
+
+
+def test_each_symmetry_can_be_undone() -> None:
+    x = torch.rand(1, 2, 5, 5, generator=torch.Generator().manual_seed(4))
+    for symmetry in SYMMETRIES:
+        back = [s for s in SYMMETRIES if torch.equal(turned(turned(x, symmetry), s), x)]
+        assert len(back) == 1
+        assert torch.equal(TABLE[back[0]][TABLE[symmetry]], torch.arange(len(CLASSES)))
+
+
+def padded_batch(tail: int = 6) -> "torch.Tensor":
+    made = list(gestures().values())
+    time = max(map(len, made)) + tail
+    x = torch.zeros(len(made), time, 9, 9)
+    for row, frames in enumerate(made):
+        x[row, : len(frames)] = torch.from_numpy(frames)
+        x[row, len(frames) - 1] = 0.02  # a quiet frame is not a silent one
+    return x
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_variation_keeps_the_scale_and_leaves_padding_alone(seed: int) -> None:
+    x = padded_batch()
+    y = varied(x, torch.Generator().manual_seed(seed))
+    assert y.shape == x.shape
+    assert bool(torch.isfinite(y).all())
+    assert float(y.min()) >= 0
+    assert torch.allclose(y.amax((1, 2, 3)), torch.ones(len(y)))
+    for row, frames in enumerate(gestures().values()):
+        padding = y[row, len(frames) :]
+        assert float(padding[1:].max()) == 0.0
+        assert float(padding[0].max()) < ACTIVE  # "bridged" from the last frame at most
+
+
+@pytest.mark.xfail(strict=True, reason="a lost frame is also looked for in the padding: proposed for the next training")
+def test_variation_leaves_the_first_padded_frame_silent() -> None:
+    x = padded_batch()
+    for seed in range(40):
+        y = varied(x, torch.Generator().manual_seed(seed))
+        for row, frames in enumerate(gestures().values()):
+            assert float(y[row, len(frames) :].max()) == 0.0
+
+
+def test_variation_is_the_generators_alone() -> None:
+    x = padded_batch()
+    torch.manual_seed(1)
+    first = varied(x, torch.Generator().manual_seed(9))
+    torch.manual_seed(2)
+    assert torch.equal(first, varied(x, torch.Generator().manual_seed(9)))
+    assert not torch.equal(first, varied(x, torch.Generator().manual_seed(10)))
+
+
+@pytest.mark.parametrize("time", [1, 2, 3, 4])
+def test_variation_takes_short_and_silent_windows(time: int) -> None:
+    x = torch.zeros(3, time, 9, 9)
+    x[0, 0, 4, 4] = 1.0
+    for seed in range(10):
+        y = varied(x, torch.Generator().manual_seed(seed))
+        assert bool(torch.isfinite(y).all())
+        assert float(y[0].max()) == pytest.approx(1.0)
+
+
+def test_variation_does_not_change_its_input() -> None:
+    x = padded_batch()
+    kept = x.clone()
+    for seed in range(5):
+        varied(x, torch.Generator().manual_seed(seed))
+    assert torch.equal(x, kept)
+
+
+def test_variation_keeps_the_direction() -> None:
+    names = list(gestures())
+    for seed in range(10):
+        y = varied(padded_batch(), torch.Generator().manual_seed(seed))
+        for row, label in enumerate(names):
+            if "swipe" in label:
+                assert direction(y[row].numpy()) == direction_of(label), (label, seed)
