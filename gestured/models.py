@@ -1,4 +1,4 @@
-"""Open, verify and self-test an .onnx file -> Classifier; and the ladder of fallbacks.
+"""Open, verify and self-test an .onnx file -> Classifier.
 
 A file is read once, checked against the manifest (where it is a shipped one), inspected without onnxruntime,
 opened from those bytes, held against its own metadata and made to reproduce its self-test. Whatever is wrong
@@ -7,14 +7,12 @@ is one `ModelError`: the file, what is wrong, what was expected.
 
 import hashlib
 import json
-import math
 import os
 import re
 import threading
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +23,12 @@ import gestured
 from gestured.core.errors import ModelError
 from gestured.core.features import feature_names, touch_pattern
 from gestured.core.frames import Segment
-from gestured.core.recognizer import Classifier, Scores
+from gestured.core.recognizer import Scores
 from gestured.model_file import Metadata, inspect, read_bytes
 
 LADDER = ("cnn_lstm", "lstm", "touch_pattern_rf")  # the shipped models, best first
 TOLERANCE = 1e-3  # of the self-test: other processors round differently, another model is further off
-OPENING_BYTES = (
-    512 << 20
-)  # of address space that opening and self-testing may take; a shipped one needs 30 MiB
+OPENING_BYTES = 512 << 20  # of address space that opening and self-testing may take; a shipped one needs 30 MiB
 
 
 class Model:
@@ -47,7 +43,6 @@ class Model:
         self.gestures = self.metadata.gestures
         self.rows = self.metadata.rows
         self.columns = self.metadata.columns
-        self.quantiles = self.metadata.quantiles
         self.threshold = _threshold(self.metadata.calibration)
         if self.metadata.features is not None:
             expected = feature_names(self.rows, self.columns)
@@ -142,9 +137,7 @@ class Model:
             raise ValueError(f"self-test: {error}") from None
         difference = float(max(np.abs(scores - test.scores).max(), np.abs(unknown - test.unknown).max()))
         if not difference <= TOLERANCE:
-            raise ValueError(
-                f"self-test: {difference:.3g} from the stored outputs, expected {TOLERANCE} at most"
-            )
+            raise ValueError(f"self-test: {difference:.3g} from the stored outputs, expected {TOLERANCE} at most")
         return difference
 
 
@@ -168,9 +161,7 @@ def _open_session(data: bytes) -> Any:
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idling burns cores otherwise
     options.log_severity_level = 4
     try:
-        return onnxruntime.InferenceSession(
-            data, options, providers=["CPUExecutionProvider"], enable_fallback=0
-        )
+        return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"], enable_fallback=0)
     except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
         raise ValueError(f"onnxruntime cannot open it: {_brief(error)}") from None
 
@@ -227,6 +218,14 @@ def _shipped_directory() -> Path:
         return Path(gestured.__file__).resolve().parent.parent / "models"
 
 
+def shipped_name(source: str | Path) -> str | None:
+    """The shipped model's name where `source` is one, by path or by name."""
+    try:
+        return _locate(source)[1]
+    except ModelError:
+        return None  # opening it says why
+
+
 def _locate(source: str | Path) -> tuple[Path, str | None]:
     """(path, the shipped model's name where it is one)."""
     path = Path(source)
@@ -280,6 +279,15 @@ def open_model(source: str | Path) -> Model:
         raise ModelError(f"{path}: {error}") from None
 
 
+def gestures_of(source: str | Path) -> tuple[str, ...]:
+    """What a model says it knows, without opening it: its metadata alone. Raises ModelError."""
+    path, data = _read(source)
+    try:
+        return Metadata.parse(inspect(data)).gestures
+    except ValueError as error:
+        raise ModelError(f"{path}: {error}") from None
+
+
 def check(source: str | Path) -> dict[str, Any]:
     """What `gesturectl check` reports of a good model, as JSON values; raises ModelError for any other."""
     path, name = _locate(source)
@@ -300,172 +308,3 @@ def check(source: str | Path) -> dict[str, Any]:
         "training_data": known.training_data,
         "self_test": {"largest_difference": model.self_test_error, "tolerance": TOLERANCE},
     }
-
-
-class Rung:
-    """One model of a ladder: opened when it is first needed."""
-
-    def __init__(self, source: str | Path | Classifier) -> None:
-        self.source = source
-        self.model: Classifier | None = None if isinstance(source, str | Path) else source
-        self.name = str(getattr(source, "name", None) or Path(str(source)).stem)
-        self.slow = 0  # runs in a row
-        self.aside_until = -math.inf
-
-    def open(self) -> Classifier:
-        if self.model is None:
-            assert isinstance(self.source, str | Path)
-            self.model = open_model(self.source)
-        return self.model
-
-    def gestures(self) -> tuple[str, ...]:
-        """Of a file without opening it: its metadata alone."""
-        if self.model is None:
-            assert isinstance(self.source, str | Path)
-            path, data = _read(self.source)
-            try:
-                return Metadata.parse(inspect(data)).gestures
-            except ValueError as error:
-                raise ModelError(f"{path}: {error}") from None
-        return tuple(self.model.gestures)
-
-
-class Ladder:
-    """Models, best first, as one `Classifier`: a rung that fails hands the same segment to the next.
-
-    A rung that cannot be opened, raises or gives scores that are not finite is put aside for `retry_after`
-    seconds of `clock`, as is one that took more than `slow_s` seconds `slow_runs` times in a row; then it is
-    tried again. Rungs that are aside still come last, before giving up. What another rung than the
-    first says is `degraded`.
-    """
-
-    def __init__(
-        self,
-        rungs: Sequence[str | Path | Classifier],
-        *,
-        slow_s: float = 0.05,
-        slow_runs: int = 3,
-        retry_after: float = 30.0,
-        clock: Callable[[], float] = time.perf_counter,
-        report: Callable[[str], None] | None = None,
-    ) -> None:
-        """Opens the first rung that can be; ModelError where none can, or one knows other gestures.
-
-        `report` is told in one sentence what happened to a rung.
-        """
-        if not rungs:
-            raise ModelError("a ladder needs at least one model")
-        self.rungs = tuple(Rung(source) for source in rungs)
-        self.slow_s, self.slow_runs, self.retry_after = slow_s, slow_runs, retry_after
-        self._clock = clock
-        self._report = report or (lambda sentence: None)
-        self.failures = 0  # of rungs: to open, to run
-        self.last_run_s = 0.0  # of the rung that answered
-        self._active, opened = self._first_open()
-        self.gestures: tuple[str, ...] = tuple(opened.gestures)
-        self.rows = int(getattr(opened, "rows", 0))
-        self.columns = int(getattr(opened, "columns", 0))
-        for rung in self.rungs:
-            self._check_gestures(rung)
-
-    @property
-    def name(self) -> str:
-        """The best rung's name, whether or not it can be used."""
-        return self.rungs[0].name
-
-    @property
-    def active(self) -> str:
-        """The name of the rung that answered last, or that would answer first."""
-        return self._active.name
-
-    @property
-    def degraded(self) -> bool:
-        """Whether `active` is a fallback."""
-        return self._active is not self.rungs[0]
-
-    @property
-    def model(self) -> Classifier:
-        """The active rung's model."""
-        return self._active.open()
-
-    def classify(self, segment: Segment) -> Scores:
-        """Scores of the best rung that can give them; raises ModelError where none can."""
-        now = self._clock()
-        ready = [rung for rung in self.rungs if now >= rung.aside_until]
-        aside = [rung for rung in self.rungs if now < rung.aside_until]
-        for rung in ready + aside:
-            try:
-                model = rung.open()
-                if tuple(model.gestures) != self.gestures:
-                    raise ModelError(f"{rung.name}: knows other gestures than {self.name}")
-                start = self._clock()
-                scores = model.classify(segment)
-                took = self._clock() - start
-                if not (np.isfinite(scores.values).all() and math.isfinite(scores.unknown)):
-                    raise ModelError(f"{rung.name}: gave scores that are not finite")
-            except Exception as error:  # whatever a rung dies of, the next one answers
-                self._put_aside(rung, str(error) or type(error).__name__)
-                continue
-            self._timed(rung, took)
-            if rung is not self._active:
-                self._report(f"{rung.name} answers now")
-                self._active = rung
-            self.last_run_s = took
-            return replace(scores, degraded=scores.degraded or self.degraded)
-        raise ModelError(f"no model could classify: {', '.join(rung.name for rung in self.rungs)}")
-
-    def _first_open(self) -> tuple[Rung, Classifier]:
-        reasons = []
-        for rung in self.rungs:
-            try:
-                return rung, rung.open()
-            except ModelError as error:
-                reasons.append(str(error))
-                self._put_aside(rung, str(error))
-        raise ModelError("; ".join(reasons))
-
-    def _check_gestures(self, rung: Rung) -> None:
-        """A fallback that cannot be read now may come back; one that knows other gestures is a mistake."""
-        try:
-            gestures = rung.gestures()
-        except ModelError as error:
-            if rung.aside_until == -math.inf:
-                self._report(f"{rung.name} could not be used: {error}")
-            return
-        if gestures != self.gestures:
-            raise ModelError(
-                f"{rung.name}: cannot stand in for {self._active.name}, expected the same gestures in the "
-                f"same order ({', '.join(self.gestures)}), found {', '.join(gestures)}"
-            )
-
-    def _put_aside(self, rung: Rung, reason: str) -> None:
-        self.failures += 1
-        rung.slow = 0
-        rung.aside_until = self._clock() + self.retry_after
-        self._report(f"{rung.name} is put aside for {self.retry_after:g} s: {reason}")
-
-    def _timed(self, rung: Rung, took: float) -> None:
-        rung.slow = rung.slow + 1 if took > self.slow_s else 0
-        if rung.slow >= self.slow_runs:
-            rung.slow = 0
-            rung.aside_until = self._clock() + self.retry_after
-            self._report(
-                f"{rung.name} is put aside for {self.retry_after:g} s: "
-                f"{self.slow_runs} runs in a row took more than {self.slow_s:g} s"
-            )
-
-
-def ladder_for(source: str | Path, fallbacks: Sequence[str | Path] | None = None, **settings: Any) -> Ladder:
-    """The contract's rule: named fallbacks, else the shipped rungs below a shipped model, else none.
-
-    `settings` go to `Ladder`. Raises ModelError.
-    """
-    if fallbacks is None:
-        try:
-            name = _locate(source)[1]
-        except ModelError:
-            name = None  # Ladder says it
-        fallbacks = LADDER[LADDER.index(name) + 1 :] if name is not None else ()
-        # By path: a file of that name in the working directory is not the shipped one.
-        fallbacks = [shipped()[rung] for rung in fallbacks]
-    return Ladder([source, *fallbacks], **settings)

@@ -1,4 +1,4 @@
-"""Opening models: what is good is used as trained, what is not is refused in one sentence; and the ladder."""
+"""Opening models: what is good is used as trained, what is not is refused in one sentence."""
 
 import hashlib
 import json
@@ -7,7 +7,6 @@ import resource
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,144 +16,9 @@ from hypothesis import strategies as st
 
 from gestured import model_file, models
 from gestured.core.errors import ModelError
-from gestured.core.features import feature_names, touch_pattern
-from gestured.core.frames import Segment
-from gestured.core.recognizer import Scores
-from gestured.core.window import Window
-from gestured.models import LADDER, Ladder, ladder_for, open_model
-
-WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=0.1, tail_s=0.1, floor=4.0)
-GESTURES = ("one_tap", "swipe_up")
-
-
-def segment(frames: int = 6, level: float = 100.0) -> Segment:
-    """A finger that moves along a row."""
-    values = np.zeros((frames, 9, 9), np.float32)
-    for t in range(frames):
-        values[t, 4, min(t, 8)] = level
-    return Segment(values, np.arange(frames) / 15.0, 0, frames - 1, 1.0)
-
-
-def softmax(x: np.ndarray) -> np.ndarray:
-    e = np.exp(x - x.max(axis=1, keepdims=True))
-    return e / e.sum(axis=1, keepdims=True)
-
-
-def oracle(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What the test's model computes: scores from the mean of its input, unknown from the largest value."""
-    axes = tuple(range(1, inputs.ndim))
-    mean = inputs.mean(axis=axes)
-    return softmax(np.stack([40 * mean, 0 * mean], 1)), 1 / (1 + np.exp(2 * inputs.max(axis=axes)))
-
-
-def build(
-    path: Path,
-    *,
-    takes: str = "frames",
-    shape: tuple | None = None,
-    number: str = "float",
-    outputs: tuple[str, ...] = ("scores", "unknown"),
-    gain: float = 40.0,
-    classes: int = 2,
-    extra: str = "",
-    drop: tuple[str, ...] = (),
-    keep_graph: bool = True,
-    twice: str = "",
-    **metadata: str,
-) -> Path:
-    """A small real ONNX model with everything that the contract asks for; the arguments break it."""
-    pytest.importorskip("onnx", reason="building test models needs the extra [lab]")
-    import onnx
-    from onnx import TensorProto, helper, numpy_helper
-
-    features = takes == "features"
-    names = feature_names(9, 9)
-    if shape is None:
-        shape = ("B", len(names)) if features else ("B", "T", 9, 9)
-    dtype = {"float": TensorProto.FLOAT, "double": TensorProto.DOUBLE}[number]
-    scalar = {"float": np.float32, "double": np.float64}[number]
-    axes = list(range(1, len(shape)))
-    weights = np.zeros((1, classes), scalar)
-    weights[0, 0] = gain
-    nodes = [
-        helper.make_node("ReduceMean", [takes], ["mean"], axes=axes, keepdims=0),
-        helper.make_node("ReduceMax", [takes], ["max"], axes=axes, keepdims=0),
-        helper.make_node("Unsqueeze", ["mean", "one"], ["column"]),
-        helper.make_node("MatMul", ["column", "weights"], ["logits"]),
-        helper.make_node("Softmax", ["logits"], [outputs[0]], axis=1),
-        helper.make_node("Mul", ["max", "minus_two"], ["negative"]),
-        helper.make_node("Sigmoid", ["negative"], [outputs[1]]),
-    ]
-    tensors = [
-        numpy_helper.from_array(np.array([1], np.int64), "one"),
-        numpy_helper.from_array(weights, "weights"),
-        numpy_helper.from_array(scalar(-2), "minus_two"),
-    ]
-    if extra == "no probabilities":
-        nodes[4] = helper.make_node("Identity", ["logits"], [outputs[0]])
-    if extra == "bomb":  # 16 GiB, asked for in a few bytes
-        tensors.append(numpy_helper.from_array(np.array([1 << 32], np.int64), "huge"))
-        nodes += [
-            helper.make_node("ConstantOfShape", ["huge"], ["big"]),
-            helper.make_node("ReduceSum", ["big"], ["nothing"], keepdims=0),
-            helper.make_node("Add", ["negative", "nothing"], ["boom"]),
-        ]
-        nodes = nodes[:6] + nodes[7:] + [helper.make_node("Sigmoid", ["boom"], [outputs[1]])]
-    if extra == "external":
-        tensors[2].ClearField("raw_data")
-        tensors[2].data_location = TensorProto.EXTERNAL
-        tensors[2].external_data.add(key="location", value="/etc/hostname")
-    if extra == "lying dims":
-        tensors[1].dims[0] = 1 << 32
-    if extra == "sparse":
-        tensors.pop()
-    inputs = [helper.make_tensor_value_info(takes, dtype, shape)]
-    if extra == "two inputs":
-        inputs.append(helper.make_tensor_value_info("more", dtype, shape))
-        nodes.append(helper.make_node("Identity", ["more"], ["unused"]))
-    graph = helper.make_graph(
-        nodes,
-        "test",
-        inputs,
-        [
-            helper.make_tensor_value_info(outputs[0], dtype, ["B", classes]),
-            helper.make_tensor_value_info(outputs[1], dtype, ["B"]),
-        ],
-        tensors,
-    )
-    if extra == "sparse":
-        graph.sparse_initializer.add(
-            values=numpy_helper.from_array(np.array([-2], np.float32), "minus_two"),
-            indices=numpy_helper.from_array(np.array([0], np.int64), "at"),
-            dims=[1],
-        )
-    proto = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
-    random = np.random.default_rng(1)
-    example = 0.05 * random.random((2, len(names)) if features else (2, 5, 9, 9), np.float32)
-    props = {
-        "gestures": json.dumps(GESTURES),
-        "kind": "test_net",
-        "version": "3",
-        "rows": "9",
-        "columns": "9",
-        "rate_hz": "15.0",
-        "window": WINDOW.to_json(),
-        "calibration": '{"temperature": 1.5}',
-        "self_test": model_file.SelfTest(example, *oracle(example)).to_json(),
-        "training_data": "0" * 64,
-        "quantiles": '{"duration_s": [0.1, 0.5]}',
-    }
-    if features:
-        props["features"] = json.dumps(names)
-    props |= metadata
-    helper.set_model_props(proto, {k: v for k, v in props.items() if k not in drop})
-    if twice:
-        proto.metadata_props.add(key=twice, value=props[twice])
-    if not keep_graph:
-        proto.ClearField("graph")
-    path.write_bytes(proto.SerializeToString())
-    assert onnx is not None
-    return path
+from gestured.core.features import touch_pattern
+from gestured.models import LADDER, open_model
+from tests.small_model import GESTURES, WINDOW, build, oracle, segment
 
 
 def refusal(path: Path | str) -> str:
@@ -178,7 +42,7 @@ def test_frames_model_scores_the_window_that_its_metadata_describe(tmp_path: Pat
     assert scores.model == model.name == "mine"
     assert model.gestures == GESTURES
     assert (model.rows, model.columns) == (9, 9)
-    assert model.quantiles == {"duration_s": [0.1, 0.5]}
+    assert model.metadata.quantiles == {"duration_s": [0.1, 0.5]}
     assert model.sha256 == hashlib.sha256((tmp_path / "mine.onnx").read_bytes()).hexdigest()
 
 
@@ -405,22 +269,6 @@ def test_altered_bytes_open_or_are_refused(good_bytes: bytes, changes: list[tupl
 # --- shipped models ---
 
 
-@pytest.fixture
-def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A directory of shipped models with a manifest, in place of the package's own."""
-    directory = tmp_path / "shelf"
-    directory.mkdir()
-    for name in LADDER:
-        build(directory / f"{name}.onnx", takes="features" if name == "touch_pattern_rf" else "frames")
-    files = {p.name: {"sha256": hashlib.sha256(p.read_bytes()).hexdigest()} for p in directory.iterdir()}
-    (directory / "manifest.json").write_text(json.dumps({"models": files}))
-    monkeypatch.setattr(models, "_shipped_directory", lambda: directory)
-    empty = tmp_path / "empty"
-    empty.mkdir()
-    monkeypatch.chdir(empty)
-    return directory
-
-
 @pytest.mark.parametrize("source", ["lstm", "lstm.onnx"])
 def test_bare_name_is_the_shipped_model(shelf: Path, source: str) -> None:
     assert open_model(source).name == "lstm"
@@ -466,190 +314,3 @@ def test_models_that_ship(name: str) -> None:
     )  # fmt: skip
     assert (model.rows, model.columns) == (9, 9)
     assert np.isfinite(model.classify(segment()).values).all()
-
-
-# --- the ladder ---
-
-
-@dataclass
-class Clock:
-    now: float = 0.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
-@dataclass
-class Fake:
-    """A rung that does what its test says, and remembers what it was given."""
-
-    name: str
-    clock: Clock
-    answer: float = 0.9
-    takes_s: float = 0.0
-    error: Exception | None = None
-    gestures: tuple[str, ...] = GESTURES
-    seen: list[Segment] = field(default_factory=list)
-
-    def classify(self, one: Segment) -> Scores:
-        self.seen.append(one)
-        self.clock.now += self.takes_s
-        if self.error is not None:
-            raise self.error
-        return Scores(np.array([self.answer, 1 - self.answer], np.float32), 0.0, self.name)
-
-
-@pytest.fixture
-def clock() -> Clock:
-    return Clock(1000.0)
-
-
-@pytest.fixture
-def three(clock: Clock) -> list[Fake]:
-    return [Fake(name, clock) for name in ("best", "second", "third")]
-
-
-def test_best_rung_answers_alone(three: list[Fake], clock: Clock) -> None:
-    ladder = Ladder(three, clock=clock)
-    scores = ladder.classify(segment())
-    assert (scores.model, scores.degraded) == ("best", False)
-    assert [len(rung.seen) for rung in three] == [1, 0, 0]
-    assert (ladder.active, ladder.degraded, ladder.failures) == ("best", False, 0)
-
-
-@pytest.mark.parametrize("how", [ModelError("broken"), RuntimeError("worse"), None])
-def test_failing_rung_hands_the_same_segment_on(
-    three: list[Fake], clock: Clock, how: Exception | None
-) -> None:
-    three[0].error = how
-    if how is None:
-        three[0].answer = np.nan
-    said: list[str] = []
-    ladder = Ladder(three, clock=clock, report=said.append)
-    one = segment()
-    scores = ladder.classify(one)
-    assert (scores.model, scores.degraded) == ("second", True)
-    assert three[0].seen[0] is one and three[1].seen[0] is one
-    assert (ladder.active, ladder.degraded, ladder.failures) == ("second", True, 1)
-    assert any("best" in sentence for sentence in said)
-
-
-def test_better_rung_is_tried_again_after_a_while(three: list[Fake], clock: Clock) -> None:
-    ladder = Ladder(three, clock=clock, retry_after=30.0)
-    three[0].error = ModelError("broken")
-    ladder.classify(segment())
-    three[0].error = None
-    clock.now += 29.0
-    assert ladder.classify(segment()).model == "second"
-    clock.now += 2.0
-    scores = ladder.classify(segment())
-    assert (scores.model, scores.degraded) == ("best", False)
-    assert not ladder.degraded
-
-
-def test_slow_rung_is_put_aside_after_several_slow_runs_and_comes_back(
-    three: list[Fake], clock: Clock
-) -> None:
-    ladder = Ladder(three, clock=clock, slow_s=0.05, slow_runs=3, retry_after=30.0)
-    three[0].takes_s = 0.06
-    assert [ladder.classify(segment()).model for _ in range(4)] == ["best"] * 3 + ["second"]
-    three[0].takes_s = 0.0
-    clock.now += 31.0
-    assert ladder.classify(segment()).model == "best"
-    assert ladder.last_run_s == 0.0
-
-
-def test_slow_runs_that_are_not_in_a_row_change_nothing(three: list[Fake], clock: Clock) -> None:
-    ladder = Ladder(three, clock=clock, slow_s=0.05, slow_runs=3)
-    for takes_s in (0.06, 0.06, 0.01) * 3:
-        three[0].takes_s = takes_s
-        assert ladder.classify(segment()).model == "best"
-        assert ladder.last_run_s == pytest.approx(takes_s)
-
-
-def test_slow_rung_answers_where_nothing_else_does(three: list[Fake], clock: Clock) -> None:
-    ladder = Ladder(three, clock=clock, slow_runs=1)
-    three[0].takes_s = 1.0
-    ladder.classify(segment())
-    three[1].error = three[2].error = ModelError("broken")
-    assert ladder.classify(segment()).model == "best"
-
-
-def test_all_rungs_failing_is_one_model_error(three: list[Fake], clock: Clock) -> None:
-    for rung in three:
-        rung.error = ModelError("broken")
-    ladder = Ladder(three, clock=clock)
-    with pytest.raises(ModelError, match="best, second, third"):
-        ladder.classify(segment())
-    assert ladder.failures == 3
-
-
-@pytest.mark.parametrize("others", [("one_tap",), ("swipe_up", "one_tap"), (*GESTURES, "double_tap")])
-def test_fallback_must_know_the_same_gestures(clock: Clock, others: tuple[str, ...]) -> None:
-    with pytest.raises(ModelError, match=r"second: .*swipe_up.*found"):
-        Ladder([Fake("best", clock), Fake("second", clock, gestures=others)], clock=clock)
-
-
-@given(st.lists(st.tuples(st.lists(st.booleans(), min_size=3, max_size=3), st.floats(0, 40)), max_size=30))
-def test_some_rung_answers_whenever_one_can(story: list[tuple[list[bool], float]]) -> None:
-    clock = Clock()
-    rungs = [Fake(name, clock) for name in ("best", "second", "third")]
-    ladder = Ladder(rungs, clock=clock)
-    for broken, pause in story:
-        clock.now += pause
-        for rung, is_broken in zip(rungs, broken, strict=True):
-            rung.error = ModelError("broken") if is_broken else None
-        if all(broken):
-            with pytest.raises(ModelError):
-                ladder.classify(segment())
-            continue
-        scores = ladder.classify(segment())
-        assert scores.degraded == (scores.model != "best")
-        assert ladder.active == scores.model
-        assert not broken[["best", "second", "third"].index(scores.model)]
-
-
-def test_fallback_is_opened_only_when_it_is_needed(shelf: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    opened: list[str] = []
-    real = models.open_model
-    monkeypatch.setattr(models, "open_model", lambda source: opened.append(str(source)) or real(source))
-    ladder = ladder_for("cnn_lstm")
-    ladder.classify(segment())
-    assert opened == ["cnn_lstm"]
-    assert ladder.model.gestures == GESTURES
-
-
-def test_shipped_model_has_the_shipped_rungs_below_it(shelf: Path) -> None:
-    (shelf / "lstm.onnx").write_bytes(b"damaged")
-    (shelf / "cnn_lstm.onnx").unlink()
-    ladder = ladder_for("cnn_lstm")
-    scores = ladder.classify(segment())
-    assert (scores.model, scores.degraded, ladder.name) == ("touch_pattern_rf", True, "cnn_lstm")
-    assert ladder_for("touch_pattern_rf").classify(segment()).degraded is False
-
-
-def test_shipped_rungs_are_not_files_of_that_name_nearby(shelf: Path) -> None:
-    build(Path("lstm"), version="mine", gestures='["a", "b"]')
-    ladder_for("cnn_lstm")  # would refuse a fallback with other gestures
-
-
-def test_own_model_has_no_fallback_but_those_that_are_named(shelf: Path, tmp_path: Path) -> None:
-    path = tmp_path / "mine.onnx"
-    path.write_bytes(b"damaged")
-    with pytest.raises(ModelError, match=r"mine\.onnx"):
-        ladder_for(path)
-    assert ladder_for(path, ["lstm"]).classify(segment()).model == "lstm"
-
-
-def test_shipped_model_with_no_fallbacks_named(shelf: Path) -> None:
-    (shelf / "cnn_lstm.onnx").unlink()
-    with pytest.raises(ModelError, match=r"cnn_lstm\.onnx"):
-        ladder_for("cnn_lstm", [])
-
-
-def test_all_rungs_that_cannot_be_opened_are_named(shelf: Path) -> None:
-    for name in LADDER:
-        (shelf / f"{name}.onnx").write_bytes(b"damaged")
-    with pytest.raises(ModelError) as caught:
-        ladder_for("cnn_lstm")
-    assert all(f"{name}.onnx" in str(caught.value) for name in LADDER)

@@ -7,7 +7,7 @@ from gestured import __version__
 from gestured.core import messages
 from gestured.core.events import Cancelled, Event, Gesture, Status, Unknown
 from gestured.daemon.pipeline import Pipeline
-from gestured.models import Ladder
+from gestured.ladder import Ladder
 
 HANG_S = 2.0  # the loop counts as hanging after so long without a beat
 

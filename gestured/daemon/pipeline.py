@@ -22,7 +22,7 @@ from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.settings import SensorSettings, Settings
 from gestured.daemon.values import Grid
-from gestured.models import Ladder
+from gestured.ladder import Ladder
 
 FORGET_S = 60.0  # a sensor that never made a gesture and is silent for this long gives its place to a new one
 DOUBLE_TAP = "double_tap"

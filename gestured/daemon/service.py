@@ -34,7 +34,7 @@ from gestured.daemon.sockets import (
     name_of,
 )
 from gestured.daemon.udp import Receiver
-from gestured.models import Ladder
+from gestured.ladder import Ladder
 
 TICK_S = 0.25
 STATUS_S = 1.0

@@ -23,7 +23,7 @@ from gestured.daemon.settings import FLAGS, Settings
 from gestured.daemon.sockets import bind_udp
 from gestured.daemon.udp import Receiver, allowed
 from gestured.daemon.values import Address
-from gestured.models import ladder_for
+from gestured.ladder import ladder_for
 from tests.daemon import harness
 from tests.daemon.harness import DEADLINE_S, Hand
 

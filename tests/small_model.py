@@ -1,0 +1,145 @@
+"""A small real model file of two gestures, and what can be wrong with one."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gestured.core.features import feature_names
+from gestured.core.frames import Segment
+from gestured.core.window import Window
+from gestured.model_file import SelfTest
+
+WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=0.1, tail_s=0.1, floor=4.0)
+GESTURES = ("one_tap", "swipe_up")
+
+
+def segment(frames: int = 6, level: float = 100.0) -> Segment:
+    """A finger that moves along a row."""
+    values = np.zeros((frames, 9, 9), np.float32)
+    for t in range(frames):
+        values[t, 4, min(t, 8)] = level
+    return Segment(values, np.arange(frames) / 15.0, 0, frames - 1, 1.0)
+
+
+def softmax(x: np.ndarray) -> np.ndarray:
+    e = np.exp(x - x.max(axis=1, keepdims=True))
+    return e / e.sum(axis=1, keepdims=True)
+
+
+def oracle(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What the test's model computes: scores from the mean of its input, unknown from the largest value."""
+    axes = tuple(range(1, inputs.ndim))
+    mean = inputs.mean(axis=axes)
+    return softmax(np.stack([40 * mean, 0 * mean], 1)), 1 / (1 + np.exp(2 * inputs.max(axis=axes)))
+
+
+def build(
+    path: Path,
+    *,
+    takes: str = "frames",
+    shape: tuple | None = None,
+    number: str = "float",
+    outputs: tuple[str, ...] = ("scores", "unknown"),
+    gain: float = 40.0,
+    classes: int = 2,
+    extra: str = "",
+    drop: tuple[str, ...] = (),
+    keep_graph: bool = True,
+    twice: str = "",
+    **metadata: str,
+) -> Path:
+    """A small real ONNX model with everything that the contract asks for; the arguments break it."""
+    pytest.importorskip("onnx", reason="building test models needs the extra [lab]")
+    import onnx
+    from onnx import TensorProto, helper, numpy_helper
+
+    features = takes == "features"
+    names = feature_names(9, 9)
+    if shape is None:
+        shape = ("B", len(names)) if features else ("B", "T", 9, 9)
+    dtype = {"float": TensorProto.FLOAT, "double": TensorProto.DOUBLE}[number]
+    scalar = {"float": np.float32, "double": np.float64}[number]
+    axes = list(range(1, len(shape)))
+    weights = np.zeros((1, classes), scalar)
+    weights[0, 0] = gain
+    nodes = [
+        helper.make_node("ReduceMean", [takes], ["mean"], axes=axes, keepdims=0),
+        helper.make_node("ReduceMax", [takes], ["max"], axes=axes, keepdims=0),
+        helper.make_node("Unsqueeze", ["mean", "one"], ["column"]),
+        helper.make_node("MatMul", ["column", "weights"], ["logits"]),
+        helper.make_node("Softmax", ["logits"], [outputs[0]], axis=1),
+        helper.make_node("Mul", ["max", "minus_two"], ["negative"]),
+        helper.make_node("Sigmoid", ["negative"], [outputs[1]]),
+    ]
+    tensors = [
+        numpy_helper.from_array(np.array([1], np.int64), "one"),
+        numpy_helper.from_array(weights, "weights"),
+        numpy_helper.from_array(scalar(-2), "minus_two"),
+    ]
+    if extra == "no probabilities":
+        nodes[4] = helper.make_node("Identity", ["logits"], [outputs[0]])
+    if extra == "bomb":  # 16 GiB, asked for in a few bytes
+        tensors.append(numpy_helper.from_array(np.array([1 << 32], np.int64), "huge"))
+        nodes += [
+            helper.make_node("ConstantOfShape", ["huge"], ["big"]),
+            helper.make_node("ReduceSum", ["big"], ["nothing"], keepdims=0),
+            helper.make_node("Add", ["negative", "nothing"], ["boom"]),
+        ]
+        nodes = nodes[:6] + nodes[7:] + [helper.make_node("Sigmoid", ["boom"], [outputs[1]])]
+    if extra == "external":
+        tensors[2].ClearField("raw_data")
+        tensors[2].data_location = TensorProto.EXTERNAL
+        tensors[2].external_data.add(key="location", value="/etc/hostname")
+    if extra == "lying dims":
+        tensors[1].dims[0] = 1 << 32
+    if extra == "sparse":
+        tensors.pop()
+    inputs = [helper.make_tensor_value_info(takes, dtype, shape)]
+    if extra == "two inputs":
+        inputs.append(helper.make_tensor_value_info("more", dtype, shape))
+        nodes.append(helper.make_node("Identity", ["more"], ["unused"]))
+    graph = helper.make_graph(
+        nodes,
+        "test",
+        inputs,
+        [
+            helper.make_tensor_value_info(outputs[0], dtype, ["B", classes]),
+            helper.make_tensor_value_info(outputs[1], dtype, ["B"]),
+        ],
+        tensors,
+    )
+    if extra == "sparse":
+        graph.sparse_initializer.add(
+            values=numpy_helper.from_array(np.array([-2], np.float32), "minus_two"),
+            indices=numpy_helper.from_array(np.array([0], np.int64), "at"),
+            dims=[1],
+        )
+    proto = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    random = np.random.default_rng(1)
+    example = 0.05 * random.random((2, len(names)) if features else (2, 5, 9, 9), np.float32)
+    props = {
+        "gestures": json.dumps(GESTURES),
+        "kind": "test_net",
+        "version": "3",
+        "rows": "9",
+        "columns": "9",
+        "rate_hz": "15.0",
+        "window": WINDOW.to_json(),
+        "calibration": '{"temperature": 1.5}',
+        "self_test": SelfTest(example, *oracle(example)).to_json(),
+        "training_data": "0" * 64,
+        "quantiles": '{"duration_s": [0.1, 0.5]}',
+    }
+    if features:
+        props["features"] = json.dumps(names)
+    props |= metadata
+    helper.set_model_props(proto, {k: v for k, v in props.items() if k not in drop})
+    if twice:
+        proto.metadata_props.add(key=twice, value=props[twice])
+    if not keep_graph:
+        proto.ClearField("graph")
+    path.write_bytes(proto.SerializeToString())
+    assert onnx is not None
+    return path

@@ -1,0 +1,194 @@
+"""The ladder: a rung that fails hands the same segment on, and a better one comes back."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gestured.core.errors import ModelError
+from gestured.core.frames import Segment
+from gestured.core.recognizer import Scores
+from gestured.ladder import Ladder, ladder_for
+from gestured.models import LADDER, open_model
+from tests.small_model import GESTURES, build, segment
+
+
+@dataclass
+class Clock:
+    now: float = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@dataclass
+class Fake:
+    """A rung that does what its test says, and remembers what it was given."""
+
+    name: str
+    clock: Clock
+    answer: float = 0.9
+    takes_s: float = 0.0
+    error: Exception | None = None
+    gestures: tuple[str, ...] = GESTURES
+    seen: list[Segment] = field(default_factory=list)
+
+    def classify(self, one: Segment) -> Scores:
+        self.seen.append(one)
+        self.clock.now += self.takes_s
+        if self.error is not None:
+            raise self.error
+        return Scores(np.array([self.answer, 1 - self.answer], np.float32), 0.0, self.name)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock(1000.0)
+
+
+@pytest.fixture
+def three(clock: Clock) -> list[Fake]:
+    return [Fake(name, clock) for name in ("best", "second", "third")]
+
+
+def test_best_rung_answers_alone(three: list[Fake], clock: Clock) -> None:
+    ladder = Ladder(three, clock=clock)
+    scores = ladder.classify(segment())
+    assert (scores.model, scores.degraded) == ("best", False)
+    assert [len(rung.seen) for rung in three] == [1, 0, 0]
+    assert (ladder.active, ladder.degraded) == ("best", False)
+
+
+@pytest.mark.parametrize("how", [ModelError("broken"), RuntimeError("worse"), None])
+def test_failing_rung_hands_the_same_segment_on(three: list[Fake], clock: Clock, how: Exception | None) -> None:
+    three[0].error = how
+    if how is None:
+        three[0].answer = np.nan
+    said: list[str] = []
+    ladder = Ladder(three, clock=clock, report=said.append)
+    one = segment()
+    scores = ladder.classify(one)
+    assert (scores.model, scores.degraded) == ("second", True)
+    assert three[0].seen[0] is one and three[1].seen[0] is one
+    assert (ladder.active, ladder.degraded) == ("second", True)
+    assert said[0].startswith("best is put aside") and len(said) == 2
+
+
+def test_better_rung_is_tried_again_after_a_while(three: list[Fake], clock: Clock) -> None:
+    ladder = Ladder(three, clock=clock, retry_after=30.0)
+    three[0].error = ModelError("broken")
+    ladder.classify(segment())
+    three[0].error = None
+    clock.now += 29.0
+    assert ladder.classify(segment()).model == "second"
+    clock.now += 2.0
+    scores = ladder.classify(segment())
+    assert (scores.model, scores.degraded) == ("best", False)
+    assert not ladder.degraded
+
+
+def test_slow_rung_is_put_aside_after_several_slow_runs_and_comes_back(three: list[Fake], clock: Clock) -> None:
+    ladder = Ladder(three, clock=clock, slow_s=0.05, slow_runs=3, retry_after=30.0)
+    three[0].takes_s = 0.06
+    assert [ladder.classify(segment()).model for _ in range(4)] == ["best"] * 3 + ["second"]
+    three[0].takes_s = 0.0
+    clock.now += 31.0
+    assert ladder.classify(segment()).model == "best"
+    assert ladder.last_run_s == 0.0
+
+
+def test_slow_runs_that_are_not_in_a_row_change_nothing(three: list[Fake], clock: Clock) -> None:
+    ladder = Ladder(three, clock=clock, slow_s=0.05, slow_runs=3)
+    for takes_s in (0.06, 0.06, 0.01) * 3:
+        three[0].takes_s = takes_s
+        assert ladder.classify(segment()).model == "best"
+        assert ladder.last_run_s == pytest.approx(takes_s)
+
+
+def test_slow_rung_answers_where_nothing_else_does(three: list[Fake], clock: Clock) -> None:
+    ladder = Ladder(three, clock=clock, slow_runs=1)
+    three[0].takes_s = 1.0
+    ladder.classify(segment())
+    three[1].error = three[2].error = ModelError("broken")
+    assert ladder.classify(segment()).model == "best"
+
+
+def test_all_rungs_failing_is_one_model_error(three: list[Fake], clock: Clock) -> None:
+    for rung in three:
+        rung.error = ModelError("broken")
+    ladder = Ladder(three, clock=clock)
+    with pytest.raises(ModelError, match="best, second, third"):
+        ladder.classify(segment())
+
+
+@pytest.mark.parametrize("others", [("one_tap",), ("swipe_up", "one_tap"), (*GESTURES, "double_tap")])
+def test_fallback_must_know_the_same_gestures(clock: Clock, others: tuple[str, ...]) -> None:
+    with pytest.raises(ModelError, match=r"second: .*swipe_up.*found"):
+        Ladder([Fake("best", clock), Fake("second", clock, gestures=others)], clock=clock)
+
+
+@given(st.lists(st.tuples(st.lists(st.booleans(), min_size=3, max_size=3), st.floats(0, 40)), max_size=30))
+def test_some_rung_answers_whenever_one_can(story: list[tuple[list[bool], float]]) -> None:
+    clock = Clock()
+    rungs = [Fake(name, clock) for name in ("best", "second", "third")]
+    ladder = Ladder(rungs, clock=clock)
+    for broken, pause in story:
+        clock.now += pause
+        for rung, is_broken in zip(rungs, broken, strict=True):
+            rung.error = ModelError("broken") if is_broken else None
+        if all(broken):
+            with pytest.raises(ModelError):
+                ladder.classify(segment())
+            continue
+        scores = ladder.classify(segment())
+        assert scores.degraded == (scores.model != "best")
+        assert ladder.active == scores.model
+        assert not broken[["best", "second", "third"].index(scores.model)]
+
+
+def test_fallback_is_opened_only_when_it_is_needed(shelf: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("gestured.ladder.open_model", lambda source: opened.append(str(source)) or open_model(source))
+    ladder = ladder_for("cnn_lstm")
+    ladder.classify(segment())
+    assert opened == ["cnn_lstm"]
+    assert ladder.model.gestures == GESTURES
+
+
+def test_shipped_model_has_the_shipped_rungs_below_it(shelf: Path) -> None:
+    (shelf / "lstm.onnx").write_bytes(b"damaged")
+    (shelf / "cnn_lstm.onnx").unlink()
+    ladder = ladder_for("cnn_lstm")
+    scores = ladder.classify(segment())
+    assert (scores.model, scores.degraded, ladder.name) == ("touch_pattern_rf", True, "cnn_lstm")
+    assert ladder_for("touch_pattern_rf").classify(segment()).degraded is False
+
+
+def test_shipped_rungs_are_not_files_of_that_name_nearby(shelf: Path) -> None:
+    build(Path("lstm"), version="mine", gestures='["a", "b"]')
+    ladder_for("cnn_lstm")  # would refuse a fallback with other gestures
+
+
+def test_own_model_has_no_fallback_but_those_that_are_named(shelf: Path, tmp_path: Path) -> None:
+    path = tmp_path / "mine.onnx"
+    path.write_bytes(b"damaged")
+    with pytest.raises(ModelError, match=r"mine\.onnx"):
+        ladder_for(path)
+    assert ladder_for(path, ["lstm"]).classify(segment()).model == "lstm"
+
+
+def test_shipped_model_with_no_fallbacks_named(shelf: Path) -> None:
+    (shelf / "cnn_lstm.onnx").unlink()
+    with pytest.raises(ModelError, match=r"cnn_lstm\.onnx"):
+        ladder_for("cnn_lstm", [])
+
+
+def test_all_rungs_that_cannot_be_opened_are_named(shelf: Path) -> None:
+    for name in LADDER:
+        (shelf / f"{name}.onnx").write_bytes(b"damaged")
+    with pytest.raises(ModelError) as caught:
+        ladder_for("cnn_lstm")
+    assert all(f"{name}.onnx" in str(caught.value) for name in LADDER)
