@@ -1,0 +1,145 @@
+"""What the contract says of a recording's fields, held against them."""
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from gestured.recording import Recordings
+
+FINGERS = 3
+LABEL = re.compile(r"[a-z0-9_]{1,64}")
+EVENTS = ("event_recording", "event_labels", "event_kinds", "event_onsets", "event_offsets")
+
+
+class Wrong(Exception):
+    """What is wrong with a field; the file's name is added outside."""
+
+
+def check(r: "Recordings") -> None:
+    """Everything the contract says of the fields; raises Wrong."""
+    _shape("frames", r.frames, "iuf", (None, None, None))
+    n, rows, columns = r.frames.shape
+    if not (rows and columns):
+        raise Wrong(f"frames: expected (N, R, C), found {r.frames.shape}")
+    _shape("offsets", r.offsets, "i", (None,))
+    ends = r.offsets
+    if r.offsets.dtype != np.int64 or not len(ends) or ends[0] != 0 or ends[-1] != n:
+        raise Wrong(f"offsets: expected int64 from 0 to {n} (the number of frames), found {r.offsets.dtype}")
+    _first("offsets", ends[1:] > ends[:-1], "at least one frame")
+    g = len(ends) - 1
+    owner = np.repeat(np.arange(g), np.diff(ends))
+
+    _shape("times", r.times, "f", (n,))
+    if r.times.dtype != np.float64:
+        raise Wrong(f"times: expected float64, found {r.times.dtype}")
+    _first("times", np.isfinite(r.times), "finite seconds", owner)
+    later = (np.diff(r.times) > 0) | (np.diff(owner) > 0)
+    _first("times", later, "strictly increasing seconds", owner[1:])
+    if r.frames.dtype.kind == "f":
+        _first("frames", np.isfinite(r.frames).all(axis=(1, 2)), "finite values", owner)
+
+    _labels("labels", r.labels, g)
+    for field in ("subjects", "speeds", "inclinations", "kinds"):
+        value = getattr(r, field)
+        if value is not None:
+            _shape(field, value, "U" if field == "kinds" else "iufU", (g,))
+            _text(field, value)
+    for field in ("onsets", "releases"):
+        value = getattr(r, field)
+        if value is not None:
+            _shape(field, value, "iu", (g,))
+            _first(field, (value >= 0) & (value < np.diff(ends)), "a frame within the recording")
+    if r.onsets is not None and r.releases is not None:
+        _first("releases", r.releases >= r.onsets, "no frame before the onset")
+    _check_touches(r, n, owner)
+    _check_events(r, g)
+
+
+def _check_touches(r: "Recordings", n: int, owner: NDArray[np.int64]) -> None:
+    if r.touches is None and r.touch_ids is None:
+        return
+    if r.touches is None or r.touch_ids is None:
+        raise Wrong("touches: expected together with touch_ids")
+    _shape("touches", r.touches, "f", (n, FINGERS, 2))
+    _shape("touch_ids", r.touch_ids, "i", (n, FINGERS))
+    if r.touches.dtype != np.float32 or r.touch_ids.dtype != np.int32:
+        raise Wrong("touches: expected float32, and int32 for touch_ids")
+    absent = r.touch_ids == -1
+    _first("touch_ids", (absent | (r.touch_ids >= 0)).all(axis=1), "-1 for no finger, else 0 and up", owner)
+    known = np.isfinite(r.touches).all(axis=2)
+    nothing = np.isnan(r.touches).all(axis=2)
+    _first(
+        "touches",
+        np.all(np.where(absent, nothing, known), axis=1),
+        "NaN where the id is -1, else finite positions",
+        owner,
+    )
+
+
+def _check_events(r: "Recordings", g: int) -> None:
+    present = [field for field in EVENTS if getattr(r, field) is not None]
+    if not present:
+        return
+    if len(present) < len(EVENTS):
+        raise Wrong(f"{present[0]}: expected together with all of {', '.join(EVENTS)}")
+    assert r.event_recording is not None and r.event_labels is not None and r.event_kinds is not None
+    assert r.event_onsets is not None and r.event_offsets is not None
+    e = len(r.event_recording)
+    _shape("event_recording", r.event_recording, "iu", (e,))
+    _first("event_recording", (r.event_recording >= 0) & (r.event_recording < g), f"0 to {g - 1}", of="event")
+    _labels("event_labels", r.event_labels, e, of="event")
+    _shape("event_kinds", r.event_kinds, "U", (e,))
+    _text("event_kinds", r.event_kinds)
+    for field, value in (("event_onsets", r.event_onsets), ("event_offsets", r.event_offsets)):
+        _shape(field, value, "f", (e,))
+        if value.dtype != np.float64:
+            raise Wrong(f"{field}: expected float64, found {value.dtype}")
+    start = r.times[r.offsets[:-1]][r.event_recording]
+    end = r.times[r.offsets[1:] - 1][r.event_recording]
+    inside = (r.event_onsets >= start) & (r.event_onsets <= end)
+    _first("event_onsets", inside, "a time within the recording", of="event")
+    ordered = (r.event_offsets >= r.event_onsets) & (r.event_offsets <= end)
+    _first("event_offsets", ordered, "a time from the onset to the recording's end", of="event")
+
+
+def _shape(field: str, value: NDArray[Any], kinds: str, shape: tuple[int | None, ...]) -> None:
+    names = {"i": "integers", "u": "unsigned integers", "f": "floats", "U": "text"}
+    if value.dtype.kind not in kinds:
+        raise Wrong(f"{field}: expected {' or '.join(names[k] for k in kinds)}, found {value.dtype}")
+    if len(value.shape) != len(shape) or any(
+        want is not None and want != have for want, have in zip(shape, value.shape, strict=True)
+    ):
+        expected = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+        raise Wrong(f"{field}: expected the shape {expected}, found {value.shape}")
+
+
+def _first(
+    field: str,
+    right: NDArray[Any],
+    expected: str,
+    owner: NDArray[np.int64] | None = None,
+    *,
+    of: str = "recording",
+) -> None:
+    """Raises for the first that is not right; `owner` leads from frames to recordings."""
+    if not right.all():
+        wrong = int(np.argmin(right))
+        raise Wrong(f"{field} of {of} {wrong if owner is None else owner[wrong]}: expected {expected}")
+
+
+def _labels(field: str, value: NDArray[np.str_], count: int, *, of: str = "recording") -> None:
+    _shape(field, value, "U", (count,))
+    _text(field, value)
+    right = np.array([LABEL.fullmatch(label) is not None for label in value.tolist()], bool)
+    _first(field, right, "1 to 64 of a-z, 0-9 and _", of=of)
+
+
+def _text(field: str, value: NDArray[Any]) -> None:
+    """Python would make broken strings of numbers that are no characters."""
+    if value.dtype.kind == "U" and value.size:
+        codes = np.ascontiguousarray(value).view(np.uint32)
+        if ((codes > 0x10FFFF) | ((codes >= 0xD800) & (codes < 0xE000))).any():
+            raise Wrong(f"{field}: holds what is no text")

@@ -1,0 +1,221 @@
+"""What is no recording is refused, with its field named."""
+
+import io
+import os
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gestured import recording
+from gestured.core.errors import RecordingError
+from gestured.recording import read, write
+from tests.small_recording import FIELDS, example, refusal, save, session
+
+
+def changed(name: str, index: object, value: object) -> np.ndarray:
+    array = np.array(getattr(session(), name))
+    if array.dtype.kind == "U":
+        array = array.astype("U80")
+    array[index] = value
+    return array
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("frames", np.zeros((10, 6), np.uint8), "(any, any, any)"),
+        ("frames", np.zeros((9, 2, 3), np.uint8), "9 (the number of frames)"),
+        ("frames", np.zeros((10, 0, 3), np.uint8), "(N, R, C)"),
+        ("frames", np.zeros((10, 2, 3), complex), "complex128"),
+        ("frames", np.zeros((10, 2, 3), bool), "bool"),
+        ("frames", np.full((10, 2, 3), np.nan), "recording 0: expected finite"),
+        (
+            "frames",
+            np.where(np.arange(10)[:, None, None] == 6, np.inf, np.zeros((10, 2, 3))),
+            "recording 1: expected",
+        ),
+        ("times", np.zeros(9), "(10)"),
+        ("times", np.arange(10, dtype=np.float32), "float64"),
+        ("times", np.arange(10), "floats"),
+        ("times", changed("times", 5, 0.0), "recording 1: expected strictly increasing"),
+        ("times", changed("times", 2, np.nan), "recording 0: expected finite"),
+        ("times", changed("times", 9, np.inf), "recording 1: expected finite"),
+        ("offsets", np.array([0, 4, 10], np.int32), "int64"),
+        ("offsets", np.array([0.0, 4.0, 10.0]), "integers"),
+        ("offsets", np.array([1, 4, 10]), "from 0 to 10"),
+        ("offsets", np.array([0, 4, 11]), "from 0 to 10"),
+        ("offsets", np.array([0, 11, 10]), "recording 1: expected at least one frame"),
+        ("offsets", np.array([0, 0, 10]), "recording 0: expected at least one frame"),
+        ("offsets", np.array([], np.int64), "from 0 to 10"),
+        ("labels", np.array(["one_tap"]), "(2)"),
+        ("labels", np.array([1, 2]), "text"),
+        ("labels", changed("labels", 1, "One Tap"), "recording 1: expected 1 to 64"),
+        ("labels", changed("labels", 0, ""), "recording 0"),
+        ("labels", changed("labels", 0, "a" * 65), "recording 0"),
+        ("labels", np.array(["\x7fffffff" * 3, "x"]), "recording 0"),
+        ("subjects", np.array([[3], [4]]), "(2)"),
+        ("kinds", np.array([1, 2]), "text"),
+        ("onsets", np.array([0.5, 1.0]), "integers"),
+        ("onsets", np.array([-1, 0]), "recording 0: expected a frame within"),
+        ("releases", np.array([3, 6]), "recording 1: expected a frame within"),
+        ("releases", np.array([0, 5]), "recording 0: expected no frame before"),
+        ("touches", None, "together with touch_ids"),
+        ("touch_ids", None, "together with touch_ids"),
+        ("touches", np.full((10, 3, 2), np.nan), "float32"),
+        ("touches", np.full((10, 2, 2), np.nan, np.float32), "(10, 3, 2)"),
+        ("touches", np.full((10, 3, 2), np.nan, np.float32), "recording 1: expected NaN where"),
+        ("touches", changed("touches", (5, 1, 0), np.inf), "recording 1: expected NaN where"),
+        ("touches", changed("touches", (0, 0, 0), 1.0), "recording 0: expected NaN where"),
+        ("touch_ids", changed("touch_ids", (0, 0), -2), "recording 0: expected -1"),
+        ("event_kinds", None, "together with all of"),
+        ("event_recording", np.array([0, 2, 1]), "event 1: expected 0 to 1"),
+        ("event_labels", changed("event_labels", 2, "Swipe!"), "event 2: expected 1 to 64"),
+        ("event_onsets", changed("event_onsets", 0, -0.1), "event 0: expected a time within"),
+        ("event_onsets", changed("event_onsets", 1, np.nan), "event 1: expected a time within"),
+        ("event_offsets", changed("event_offsets", 2, 0.2), "event 2: expected a time from"),
+        ("event_offsets", changed("event_offsets", 1, 0.4), "event 1: expected a time from"),
+    ],
+)
+def test_wrong_field_is_named(tmp_path: Path, name: str, value: np.ndarray | None, expected: str) -> None:
+    message = refusal(save(tmp_path / "r.npz", session(), **{name: value}))
+    assert expected in message
+    assert message.split(": ")[1].split(" of ")[0] in (
+        name,
+        "touches",
+        "offsets",
+        "event_recording",
+        "releases",
+    )
+
+
+@pytest.mark.parametrize("name", FIELDS[:5])
+def test_missing_field_is_named(tmp_path: Path, name: str) -> None:
+    assert f": {name}: is missing" in refusal(save(tmp_path / "r.npz", session(), **{name: None}))
+
+
+def test_wrong_recordings_are_not_written(tmp_path: Path) -> None:
+    path = tmp_path / "r.npz"
+    write(path, example())
+    before = path.read_bytes()
+    with pytest.raises(RecordingError, match=r"r\.npz: not written: labels"):
+        write(path, replace(example(), labels=np.array(["A", "B"])))
+    assert path.read_bytes() == before
+    assert os.listdir(tmp_path) == ["r.npz"]
+
+
+def test_place_that_cannot_be_written(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"nowhere.r\.npz: cannot be written"):
+        write(tmp_path / "nowhere" / "r.npz", example())
+
+
+def test_members_that_are_not_known_are_left_alone(tmp_path: Path) -> None:
+    same(read(save(tmp_path / "r.npz", example(), temperature=np.array([20.5]))), example())
+
+
+def test_fortran_order_and_other_byte_order(tmp_path: Path) -> None:
+    frames = np.asfortranarray(example().frames.astype(">i4"))
+    found = read(save(tmp_path / "r.npz", example(), frames=frames, times=example().times.astype(">f8")))
+    same(found, example())
+
+
+class Surprise:
+    """What a pickle would run."""
+
+    def __reduce__(self) -> tuple:
+        return (pytest.fail, ("unpickled",))
+
+
+@pytest.mark.parametrize("name", ["frames", "labels", "kinds"])
+def test_objects_are_never_unpickled(tmp_path: Path, name: str) -> None:
+    objects = np.array([Surprise(), Surprise()], dtype=object)
+    message = refusal(save(tmp_path / "r.npz", example(), **{name: objects}))
+    assert f": {name}: " in message
+
+
+def test_archive_that_unpacks_to_too_much(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recording, "MAX_BYTES", 10_000)
+    path = tmp_path / "r.npz"
+    big = replace(example(), frames=np.zeros((10, 40, 40), np.uint8))
+    np.savez_compressed(path, **{k: getattr(big, k) for k in FIELDS if getattr(big, k) is not None})
+    assert path.stat().st_size < 10_000
+    assert "expected at most 10000" in refusal(path)
+
+
+def swap(path: Path, member: str, data: bytes) -> Path:
+    """The example with one member's bytes replaced."""
+    write(path, example())
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, old in members.items():
+            archive.writestr(name, data if name == member else old)
+    return path
+
+
+@pytest.mark.parametrize("shape", [(1 << 40, 2, 3), (10, 2, 4), (-10, -2, 3), (10, 2, 2), (1 << 62, 1 << 62, 0)])
+def test_header_that_lies_about_the_shape(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    buffer = io.BytesIO()
+    np.lib.format.write_array_header_1_0(buffer, {"descr": "|u1", "fortran_order": False, "shape": shape})
+    assert ": frames: " in refusal(swap(tmp_path / "r.npz", "frames.npy", buffer.getvalue() + bytes(60)))
+
+
+@pytest.mark.parametrize("data", [b"", b"\x93NUMPY", b"\x93NUMPY\x03\x00" + bytes(100), b"x" * 1000])
+def test_member_that_is_no_array(tmp_path: Path, data: bytes) -> None:
+    assert ": times: " in refusal(swap(tmp_path / "r.npz", "times.npy", data))
+
+
+def test_text_that_is_no_text(tmp_path: Path) -> None:
+    buffer = io.BytesIO()
+    np.save(buffer, np.array(["tap", "pal"]))
+    data = buffer.getvalue()[:-4] + b"\xff\xff\xff\x7f"
+    assert ": kinds: " in refusal(swap(tmp_path / "r.npz", "kinds.npy", data))
+
+
+def test_field_that_is_there_twice(tmp_path: Path) -> None:
+    path = tmp_path / "r.npz"
+    write(path, example())
+    with pytest.warns(UserWarning, match="Duplicate"), zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("times.npy", archive.read("times.npy"))
+    assert ": times: is there twice" in refusal(path)
+
+
+@pytest.mark.parametrize("kind", ["missing", "directory", "fifo", "zero", "empty", "text", "npy", "nul"])
+def test_what_is_no_recording_file(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "r.npz"
+    if kind == "directory":
+        path.mkdir()
+    elif kind == "fifo":
+        os.mkfifo(path)
+    elif kind == "zero":
+        path = Path("/dev/zero")
+    elif kind == "empty":
+        path.touch()
+    elif kind == "text":
+        path.write_text("no recording\n" * 100)
+    elif kind == "npy":
+        with path.open("wb") as file:
+            np.save(file, np.zeros(3))
+    elif kind == "nul":
+        path = Path("a\0b.npz")
+    refusal(path)
+
+
+@given(st.data())
+def test_damaged_files_are_read_or_refused(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+    path = tmp_path_factory.getbasetemp() / "damaged.npz"
+    write(path, session())
+    content = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(0, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(content[: data.draw(st.integers(len(content) // 2, len(content)))])
+    try:
+        found = read(path)
+    except RecordingError as error:
+        assert str(error).startswith(f"{path}: ")
+    else:
+        assert len(found) == 2
