@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from gestured import recording
 from gestured.core.errors import RecordingError
 from gestured.recording import read, write
-from tests.small_recording import FIELDS, example, refusal, save, session
+from tests.small_recording import FIELDS, example, refusal, same, save, session
 
 
 def changed(name: str, index: object, value: object) -> np.ndarray:
