@@ -1,8 +1,9 @@
 """Touch-pattern features of a window: what was pressed and for how long, without the order of the frames.
 
-Source: the paper's touch-pattern set (mean and maximum pressure, variability, row-wise and column-wise means,
-maximum and mean contact area, duration). Pressures are shares of the segment's own peak, so that they do not
-depend on the sensor's gain.
+Source: the paper's touch-pattern set (mean and maximum pressure, variability, row-wise and column-wise means, maximum
+and mean contact area, duration). Variability is taken of the frames, of the taxels, and of each row and column; the
+contact area also of the whole gesture. Pressures are shares of the segment's own peak, so that they do not depend on
+the sensor's gain.
 """
 
 import numpy as np
@@ -13,10 +14,11 @@ PRESSED = 0.2  # of the peak: a taxel in contact
 
 def feature_names(rows: int, columns: int) -> tuple[str, ...]:
     """Names of what `touch_pattern` returns for windows of rows x columns."""
+    lines = [f"row_{r}" for r in range(rows)] + [f"column_{c}" for c in range(columns)]
     return (
-        "mean_pressure", "maximum_pressure", "variability",
-        *(f"row_{r}_mean" for r in range(rows)), *(f"column_{c}_mean" for c in range(columns)),
-        "maximum_area", "mean_area", "duration_s",
+        "mean_pressure", "maximum_pressure", "variability", "mean_taxel_variability", "maximum_taxel_variability",
+        *(f"{line}_mean" for line in lines), *(f"{line}_variability" for line in lines),
+        *(f"{line}_maximum" for line in lines), "maximum_area", "mean_area", "whole_area", "duration_s",
     )  # fmt: skip
 
 
@@ -25,16 +27,19 @@ def touch_pattern(window: NDArray[np.float32], rate_hz: float) -> NDArray[np.flo
 
     Frames without contact count for nothing, so idle frames around the gesture change nothing.
     """
-    peaks = window.max(axis=(1, 2))
-    touched = window[peaks >= PRESSED]
+    touched = window[window.max(axis=(1, 2)) >= PRESSED].astype(np.float64)
     if not len(touched):
-        touched = window[:1]
-    per_frame = touched.mean(axis=(1, 2), dtype=np.float64)
+        touched = window[:1].astype(np.float64)
+    lines = np.concatenate([touched.mean(axis=2), touched.mean(axis=1)], axis=1)  # (T, R + C)
+    per_frame = touched.mean(axis=(1, 2))
+    per_taxel = touched.std(axis=0)
     area = (touched >= PRESSED).mean(axis=(1, 2))
+    whole = (touched.max(axis=0) >= PRESSED).mean()
     values = [
-        [per_frame.mean(), touched.max(axis=(1, 2)).mean(), per_frame.std()],
-        touched.mean(axis=(0, 2), dtype=np.float64),
-        touched.mean(axis=(0, 1), dtype=np.float64),
-        [area.max(), area.mean(), len(touched) / rate_hz],
+        [per_frame.mean(), touched.max(axis=(1, 2)).mean(), per_frame.std(), per_taxel.mean(), per_taxel.max()],
+        lines.mean(axis=0),
+        lines.std(axis=0),
+        lines.max(axis=0),
+        [area.max(), area.mean(), whole, len(touched) / rate_hz],
     ]
     return np.concatenate(values).astype(np.float32)

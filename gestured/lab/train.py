@@ -40,7 +40,7 @@ class Plan:
     wide_check: int = 4_000  # takes to calibrate, and as many to test
     cohort: int = len(TRIALS)
     others: int = len(OTHERS)
-    forest: int = 14_000  # simulated samples for the forest
+    forest: int = 9_000  # simulated samples for the forest
     fit: FitConfig = field(default_factory=FitConfig)
 
     @classmethod
@@ -53,7 +53,8 @@ class Plan:
 class Data:
     """Everything that is learned from or judged on, split by participant."""
 
-    teach: Samples
+    teach: Samples  # the wide stream, then the cohort
+    nominal: int  # how many of them are the cohort's
     calibrate: Samples
     tests: dict[str, Samples]  # by name
     performed: dict[str, int]  # gestures that were performed in each test, cut out or not
@@ -71,8 +72,10 @@ def load(plan: Plan, cache: Path, real: Path | None, jobs: int) -> Data:
     both = join([cohort, others])
     person = both.people % 1000
     plans = np.array([trial.participant for trial in TRIALS[: plan.cohort]])
+    own = both.take(person < 24)
     return Data(
-        join([teach, both.take(person < 24)]),
+        join([teach, own]),
+        len(own),
         join([check, both.take((person >= 24) & (person < 28))]),
         {"nominal": both.take(person >= 28), "wide": test},
         {"nominal": int((plans >= 28).sum()), "wide": int((test.labels != "none").sum())},
@@ -170,14 +173,14 @@ def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged,
 
 def grow_forest(data: Data, plan: Plan) -> tuple[RandomForestClassifier, dict[str, Any]]:
     """The touch-pattern forest of the paper's Table IV (200 trees, depth 9), with a class for what is no gesture."""
-    rng = np.random.default_rng(plan.fit.seed)
-    count = min(plan.forest, len(data.teach))
-    parts = [data.teach.take(rng.choice(len(data.teach), count, replace=False))]
+    wide = len(data.teach) - data.nominal  # the cohort stands at the end
+    chosen = np.random.default_rng(plan.fit.seed).choice(wide, min(plan.forest, wide), replace=False)
+    parts = [data.teach.take(np.concatenate([chosen, np.arange(wide, len(data.teach))]))]
     if data.real is not None:
         parts.append(data.real)
     samples = join(parts)
     forest = RandomForestClassifier(
-        200, max_depth=9, min_samples_leaf=4, n_jobs=2, random_state=plan.fit.seed, class_weight="balanced"
+        200, max_depth=9, min_samples_leaf=2, n_jobs=2, random_state=plan.fit.seed
     )
     forest.fit(samples.features(), np.minimum(_classes(samples), len(GESTURES)))
     labels = np.minimum(_classes(data.calibrate), len(GESTURES))
