@@ -1,0 +1,228 @@
+"""What is learned from: cut as the daemon cuts, kept once made, and nobody on two sides of a split."""
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gestured.core.frames import Frame, Segment
+from gestured.core.recognizer import FrontEnd, Recognizer, Scores
+from gestured.lab import dataset
+from gestured.lab.dataset import (
+    OTHERS, STREAMS, TRIALS, WINDOW, Performed, Samples, collect, cuts, from_take, join, matched, recorded, simulated, with_idle,
+)  # fmt: skip
+from gestured.recording import Recordings
+from gestured.simulator import GESTURES, NON_GESTURES, Participant, Sensor, Take, generator, gesture_take, session
+
+
+def take_of(kind: str, person: int = 70) -> Take:
+    return gesture_take(kind, Participant(person), Sensor.nominal(day=person), generator(person, 3))
+
+
+class Listening:
+    """A classifier that keeps what the recogniser hands to it."""
+
+    gestures = ("one_tap",)
+
+    def __init__(self) -> None:
+        self.heard: list[Segment] = []
+
+    def classify(self, segment: Segment) -> Scores:
+        self.heard.append(segment)
+        return Scores(np.ones(1, np.float32), 0.0, "listening")
+
+
+def test_what_is_learned_from_is_what_the_daemon_would_have_classified() -> None:
+    take = session(Participant(71), Sensor.nominal(day=71), generator(71, 4), 40.0)
+    listening = Listening()
+    recognizer = Recognizer(FrontEnd("armrest", *take.frames.shape[1:]), listening)
+    for t, values in zip(take.times, take.frames, strict=True):
+        recognizer.push(Frame(float(t), values))
+    recognizer.flush(float(take.times[-1]) + 2)
+    found = cuts(take.frames, take.times)
+    assert len(found) == len(listening.heard) > 5
+    for ours, theirs in zip(found, listening.heard, strict=True):
+        assert np.array_equal(WINDOW.apply(ours), WINDOW.apply(theirs))
+        assert (ours.onset, ours.offset, ours.noise) == (theirs.onset, theirs.offset, theirs.noise)
+
+
+def test_a_session_gives_each_performance_its_own_name() -> None:
+    kinds = ["swipe_up", "one_tap", "long_press", "circle_clockwise", "double_tap"]
+    take = session(Participant(72), Sensor.nominal(day=72), generator(72, 4), 40.0, kinds=kinds)
+    assert [kind for _, _, kind, *_ in from_take(take)] == kinds
+    labels = [label for _, label, *_ in from_take(take)]
+    assert labels == ["swipe_up", "one_tap", "none", "circle_clockwise", "double_tap"]
+
+
+def segment(onset: float, offset: float) -> Segment:
+    """Touched from onset to offset, at 15 Hz."""
+    count = round((offset - onset) * 15) + 1
+    frames = np.zeros((count + 2, 9, 9), np.float32)
+    frames[1:-1, 4, 4] = 100
+    return Segment(frames, onset + (np.arange(count + 2) - 1) / 15, 1, count, 2.0)
+
+
+def named(found: Segment, *performed: Performed) -> list[str]:
+    return [label for _, label, *_ in matched([found], performed)]
+
+
+def test_a_segment_is_named_after_what_it_holds() -> None:
+    swipe = Performed("swipe_up", "swipe_up", 1, 10.0, 11.0)
+    palm = Performed("none", "palm", 1, 12.0, 13.0)
+    assert named(segment(10.0, 11.0), swipe, palm) == ["swipe_up"]
+    assert named(segment(12.2, 12.8), swipe, palm) == ["none"]
+    assert named(segment(10.0, 10.2), swipe) == []  # a piece of a gesture is no example of it
+    assert named(segment(20.0, 21.0), swipe, palm) == []  # nobody knows what that was
+    assert named(segment(12.0, 12.1), palm) == ["none"]  # a piece of a non-gesture is none as well
+    ((*_, strength),) = matched([segment(10.0, 11.0)], [swipe])
+    assert strength == pytest.approx(50)
+
+
+# --- the streams ---
+
+
+@pytest.mark.parametrize(("stream", "plan"), [("cohort", TRIALS), ("others", OTHERS)])
+def test_a_sample_carries_the_participant_of_its_plan(stream: str, plan: tuple) -> None:
+    for index in range(0, len(plan), 331):
+        trial = plan[index]
+        number, kind = (trial.participant, trial.gesture) if stream == "cohort" else trial[:2]
+        for _, label, found, person, _ in STREAMS[stream](0, index):
+            assert (person % 1000, found) == (number, kind)
+            assert label == (kind if kind in GESTURES else "none")
+
+
+def test_the_plans_are_complete() -> None:
+    assert len(TRIALS) == 34 * 10 * 3 * 3
+    assert set(Counter((t.participant, t.gesture) for t in TRIALS).values()) == {9}
+    assert set(Counter((p, k) for p, k, _ in OTHERS).values()) == {3}
+    assert {k for _, k, _ in OTHERS} == set(NON_GESTURES)
+
+
+def same(a: Samples, b: Samples) -> None:
+    for name in Samples.__slots__:
+        x, y = getattr(a, name), getattr(b, name)
+        assert (x.dtype, x.shape, x.tobytes()) == (y.dtype, y.shape, y.tobytes()), name
+
+
+def test_what_is_simulated_once_is_not_simulated_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = simulated(tmp_path / "cache", "wide", 9, 6, jobs=1)
+    same(made, collect(s for i in range(6) for s in STREAMS["wide"](9, i)))  # whoever makes them
+    assert len(list((tmp_path / "cache").iterdir())) == 1
+
+    def refuse(*_: object) -> None:
+        raise InterruptedError("simulates")
+
+    monkeypatch.setattr(dataset.multiprocessing, "get_context", refuse)
+    again = simulated(tmp_path / "cache", "wide", 9, 6)
+    same(made, again)
+    assert again.digest() == made.digest()
+    for stream, seed, count in (("wide", 8, 6), ("wide", 9, 7), ("others", 9, 6)):
+        with pytest.raises(InterruptedError):
+            simulated(tmp_path / "cache", stream, seed, count)
+
+
+class Broken:
+    """A pool whose work is interrupted half-way."""
+
+    def __enter__(self) -> "Broken":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def imap(self, make: object, todo: range, chunksize: int) -> object:
+        yield STREAMS["wide"](9, 0)
+        raise KeyboardInterrupt
+
+
+def test_an_interrupted_simulation_is_not_taken_for_a_whole_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(dataset.multiprocessing.get_context("spawn").__class__, "Pool", lambda *_: Broken())
+        with pytest.raises(KeyboardInterrupt):
+            simulated(tmp_path, "wide", 9, 3)
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- putting sets together ---
+
+
+@pytest.fixture(scope="module")
+def samples() -> Samples:
+    return collect(s for kind in ("one_tap", "swipe_left", "palm", "circle_clockwise") for s in from_take(take_of(kind)))
+
+
+def test_taking_and_joining_lose_nothing(samples: Samples) -> None:
+    n = len(samples)
+    same(join([samples.take(np.arange(2)), samples.take(np.arange(2, n))]), samples)
+    backwards = samples.take(np.arange(n)[::-1].copy())
+    for i in range(n):
+        assert np.array_equal(backwards.window(n - 1 - i), samples.window(i))
+        assert backwards.labels[n - 1 - i] == samples.labels[i]
+    assert len(samples.take(np.zeros(n, bool))) == 0
+
+
+def test_the_digest_sees_every_change(samples: Samples) -> None:
+    other = samples.take(np.arange(len(samples)))
+    assert other.digest() == samples.digest()
+    other.frames[0, 0, 0] += 1
+    assert other.digest() != samples.digest()
+    assert samples.take(np.arange(len(samples))[::-1].copy()).digest() != samples.digest()
+
+
+# --- recordings ---
+
+
+def test_idle_frames_are_put_around_a_cut_recording() -> None:
+    take = take_of("swipe_up")
+    cut, at = take.frames[15:35], take.times[15:35]
+    frames, times, lead = with_idle(cut, at, 5, 15, 1)
+    assert np.array_equal(frames[lead : lead + len(cut)], cut)
+    assert np.array_equal(times[lead : lead + len(cut)], at)
+    assert len(frames) == len(times) == len(cut) + 2 * lead
+    assert lead / 15 > 1  # the front end needs a second to know the sensor
+    assert bool((np.diff(times) > 0).all())
+    quiet = {frame.tobytes() for frame in [*cut[:4], *cut[18:]]}
+    assert {frame.tobytes() for frame in [*frames[:lead], *frames[lead + len(cut) :]]} <= quiet
+
+
+def recordings() -> Recordings:
+    """Gestures cut out of takes with hardly anything around them, and a session."""
+    frames, times, offsets, onsets, releases = [], [], [0], [], []
+    kinds = ["swipe_up", "one_tap", "circle_clockwise", "long_press"]
+    for kind in kinds:
+        take = take_of(kind)
+        (event,) = take.events
+        inside = np.flatnonzero((take.times >= event.onset_s) & (take.times <= event.offset_s))
+        chosen = slice(inside[0] - 5, inside[-1] + 6)
+        frames.append(take.frames[chosen])
+        times.append(take.times[chosen])
+        offsets.append(offsets[-1] + len(frames[-1]))
+        onsets.append(5)
+        releases.append(5 + len(inside) - 1)
+    return Recordings(
+        np.concatenate(frames), np.concatenate(times), np.array(offsets), np.array([*kinds[:3], "none"]),
+        np.arange(4), kinds=np.array(kinds), onsets=np.array(onsets), releases=np.array(releases),
+    )  # fmt: skip
+
+
+def test_cut_recordings_are_learned_under_their_own_names() -> None:
+    found = recorded(recordings())
+    assert found.labels.tolist() == ["swipe_up", "one_tap", "circle_clockwise", "none"]
+    assert found.kinds.tolist() == ["swipe_up", "one_tap", "circle_clockwise", "long_press"]
+    assert found.people.tolist() == [0, 1, 2, 3]
+    for i in range(len(found)):
+        assert found.window(i).max() == pytest.approx(1.0, abs=1e-3)
+
+
+def test_recorded_sessions_leave_out_what_nobody_named() -> None:
+    kinds = ["swipe_up", "one_tap", "swipe_left", "circle_clockwise"]
+    take = session(Participant(73), Sensor.nominal(day=73), generator(73, 4), 40.0, kinds=kinds)
+    labels = ["swipe_up", "other", "swipe_left", "circle_clockwise"]
+    found = recorded(Recordings(
+        take.frames, take.times, np.array([0, len(take.frames)]), np.array(["session"]), np.array([3]),
+        event_recording=np.zeros(4, int), event_labels=np.array(labels), event_kinds=np.array(kinds),
+        event_onsets=np.array([e.onset_s for e in take.events]), event_offsets=np.array([e.offset_s for e in take.events]),
+    ))  # fmt: skip
+    assert found.labels.tolist() == ["swipe_up", "swipe_left", "circle_clockwise"]
+    assert set(found.people.tolist()) == {3}
