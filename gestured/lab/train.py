@@ -109,7 +109,7 @@ class Trained:
 
 def learn(plan: Plan, data: Data, cache: Path) -> Trained:
     """Both stages and the folds; what is done already is read from the cache."""
-    key = hashlib.sha256(json.dumps([asdict(plan), data.teach.digest(), CLASSES, _code()]).encode()).hexdigest()[:12]
+    key = hashlib.sha256(json.dumps([asdict(plan.fit), data.teach.digest(), CLASSES, _code()]).encode()).hexdigest()[:12]
     first = cache / f"simulated-{key}.npz"
     if not first.exists():
         save_nets(first, pretrain(data.teach, plan.fit, cache / f"checkpoint-{key}.npz"))
