@@ -22,8 +22,9 @@ import gestured
 from gestured.core.features import feature_names
 from gestured.lab.dataset import OTHERS, TRIALS, WINDOW, Samples, join, recorded, simulated
 from gestured.lab.decide import fit_decision, threshold
-from gestured.lab.export import export_forest, export_net, forest_outputs, write_manifest
+from gestured.lab.export import export_forest, export_net, write_manifest
 from gestured.lab.fit import CLASSES, FitConfig, finetune, load_nets, logits, pretrain, save_nets, targets
+from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.nets import Judged
 from gestured.recording import read
 from gestured.simulator import GESTURES

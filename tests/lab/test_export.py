@@ -24,7 +24,8 @@ from gestured.core.errors import ModelError  # noqa: E402
 from gestured.core.features import feature_names  # noqa: E402
 from gestured.core.frames import Segment  # noqa: E402
 from gestured.core.window import Window  # noqa: E402
-from gestured.lab.export import export_forest, export_net, forest_outputs, write_manifest  # noqa: E402
+from gestured.lab.export import export_forest, export_net, write_manifest  # noqa: E402
+from gestured.lab.forest_graph import forest_outputs  # noqa: E402
 from gestured.models import open_model  # noqa: E402
 
 GESTURES = ("one_tap", "swipe_up", "swipe_left")
@@ -182,14 +183,10 @@ def forest(classes: int, trees: int = 12, depth: int | None = 5, seed: int = 0) 
     random = np.random.default_rng(seed)
     labels = np.arange(400) % classes
     values = random.normal(size=(400, len(FEATURES))) + 0.4 * labels[:, None] * (np.arange(len(FEATURES)) % 3)
-    return RandomForestClassifier(trees, max_depth=depth, random_state=seed).fit(
-        values.astype(np.float32), labels
-    )
+    return RandomForestClassifier(trees, max_depth=depth, random_state=seed).fit(values.astype(np.float32), labels)
 
 
-@pytest.mark.parametrize(
-    ("classes", "trees", "depth"), [(3, 1, 1), (3, 12, 5), (5, 12, 5), (4, 3, None), (6, 40, 9)]
-)
+@pytest.mark.parametrize(("classes", "trees", "depth"), [(3, 1, 1), (3, 12, 5), (5, 12, 5), (4, 3, None), (6, 40, 9)])
 def test_forest_equals_scikit_learn(classes: int, trees: int, depth: int | None, tmp_path: Path) -> None:
     trained = forest(classes, trees, depth)
     report = export_forest(trained, tmp_path / "rf.onnx", **CARD, features=FEATURES)
@@ -227,9 +224,7 @@ def test_uncalibrated_outputs_are_the_forests_own() -> None:
 
 def test_temperature_sharpens_and_flattens() -> None:
     probabilities = np.array([[0.6, 0.3, 0.1]])
-    sharp, own, flat = (
-        forest_outputs(probabilities, 3, {"temperature": t})[0][0, 0] for t in (0.5, 1.0, 2.0)
-    )
+    sharp, own, flat = (forest_outputs(probabilities, 3, {"temperature": t})[0][0, 0] for t in (0.5, 1.0, 2.0))
     assert sharp > own > flat > 1 / 3
 
 

@@ -1,0 +1,175 @@
+"""A random forest as an ONNX graph, and the same in numpy.
+
+A forest's classes are 0 .. G-1 for the gestures, the others for none. Its outputs are calibrated: a temperature over
+the gestures, a logistic curve over what they leave.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import onnx
+from numpy.typing import NDArray
+from onnx import TensorProto, helper, numpy_helper
+from sklearn.ensemble import RandomForestClassifier
+
+from gestured.core.errors import ModelError
+
+OPSET = 17
+LEAST = 1e-3  # a forest's probabilities are not trusted below this, nor above 1 - this
+
+Outputs = tuple[NDArray[np.float32], NDArray[np.float32]]  # scores (B, G), unknown (B,)
+
+
+def forest_outputs(probabilities: NDArray[Any], gestures: int, calibration: Mapping[str, Any]) -> Outputs:
+    """(B, classes) probabilities of a forest -> calibrated scores (B, G) and unknown (B,), as in the file.
+
+    scores = softmax(log p / `temperature`) over the gestures; unknown = sigmoid(`unknown_scale` * logit(none)
+    + `unknown_offset`), none being what the gestures leave. Without these keys: 1, 1 and 0.
+    """
+    temperature, scale, offset = _calibration(calibration)
+    named = np.asarray(probabilities, np.float64)[:, :gestures]
+    logits = np.log(np.maximum(named, LEAST)) / temperature
+    powers = np.exp(logits - logits.max(axis=1, keepdims=True))
+    none = np.clip(1.0 - named.sum(axis=1), LEAST, 1.0 - LEAST)
+    unknown = 1.0 / (1.0 + np.exp(-(scale * np.log(none / (1.0 - none)) + offset)))
+    scores = powers / powers.sum(axis=1, keepdims=True)
+    return scores.astype(np.float32), unknown.astype(np.float32)
+
+
+def forest_graph(forest: RandomForestClassifier, gestures: int, calibration: Mapping[str, Any]) -> onnx.ModelProto:
+    """The forest as tables that all trees walk at once, a level of depth at a time.
+
+    Not ONNX's tree ensemble: that is four times as large on disk, takes 200 MiB and more when it is opened
+    and a third of a second (173,000 nodes), and this is walked as exactly.
+    """
+    temperature, scale, offset = _calibration(calibration)
+    tables = _flatten(forest)
+    constants = {
+        **tables,
+        "gesture_start": np.array([0], np.int64),
+        "gesture_end": np.array([gestures], np.int64),
+        "axis_one": np.array([1], np.int64),
+        "zero": np.array([0], np.int64),
+        "least": np.float32(LEAST),
+        "most": np.float32(1.0 - LEAST),
+        "one": np.float32(1.0),
+        "temperature": np.float32(temperature),
+        "scale": np.float32(scale),
+        "offset": np.float32(offset),
+    }
+    nodes: list[onnx.NodeProto] = []
+
+    def add(operator: str, inputs: Sequence[str], output: str, **attributes: Any) -> str:
+        nodes.append(helper.make_node(operator, list(inputs), [output], name=output, **attributes))
+        return output
+
+    add("Shape", ["features"], "shape")
+    add("Gather", ["shape", "zero"], "batch")
+    add("Concat", ["batch", "trees"], "walks", axis=0)
+    at = add("Expand", ["root", "walks"], "at_0")  # (B, trees): the node at which each tree stands
+    for level in range(max(tree.get_depth() for tree in forest.estimators_)):
+        add("Gather", ["feature", at], f"feature_{level}")
+        add("GatherElements", ["features", f"feature_{level}"], f"value_{level}", axis=1)
+        add("Gather", ["threshold", at], f"threshold_{level}")
+        add("Greater", [f"value_{level}", f"threshold_{level}"], f"greater_{level}")
+        add("Cast", [f"greater_{level}"], f"right_{level}", to=TensorProto.INT32)
+        add("Gather", ["left", at], f"left_{level}")
+        at = add("Add", [f"left_{level}", f"right_{level}"], f"at_{level + 1}")
+    add("Gather", ["leaf", at], "row")
+    add("Gather", ["leaf_values", "row"], "votes")  # (B, trees, classes)
+    add("ReduceMean", ["votes"], "probabilities", axes=[1], keepdims=0)
+    add("Slice", ["probabilities", "gesture_start", "gesture_end", "axis_one"], "named")
+    add("Max", ["named", "least"], "named_least")
+    add("Log", ["named_least"], "named_log")
+    add("Div", ["named_log", "temperature"], "logits")
+    add("Softmax", ["logits"], "scores", axis=1)
+    add("ReduceSum", ["named", "axis_one"], "named_sum", keepdims=0)
+    add("Sub", ["one", "named_sum"], "none_all")
+    add("Clip", ["none_all", "least", "most"], "none")
+    add("Sub", ["one", "none"], "some")
+    add("Div", ["none", "some"], "odds")
+    add("Log", ["odds"], "logit")
+    add("Mul", ["logit", "scale"], "scaled")
+    add("Add", ["scaled", "offset"], "moved")
+    add("Sigmoid", ["moved"], "unknown")
+    floats = TensorProto.FLOAT
+    graph = helper.make_graph(
+        nodes,
+        "forest",
+        [helper.make_tensor_value_info("features", floats, ["B", forest.n_features_in_])],
+        [
+            helper.make_tensor_value_info("scores", floats, ["B", gestures]),
+            helper.make_tensor_value_info("unknown", floats, ["B"]),
+        ],
+        [numpy_helper.from_array(np.asarray(value), name) for name, value in constants.items()],
+    )
+    return helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8)
+
+
+def around_thresholds(forest: RandomForestClassifier, count: int) -> NDArray[np.float32]:
+    """(count, F) features that reach every corner of the forest: on, just below and above its thresholds."""
+    random = np.random.default_rng(0)
+    used = np.concatenate([tree.tree_.feature for tree in forest.estimators_])
+    thresholds = np.concatenate([tree.tree_.threshold for tree in forest.estimators_])
+    out = np.zeros((count, forest.n_features_in_), np.float32)
+    for feature in range(forest.n_features_in_):
+        known = thresholds[used == feature]
+        if len(known):
+            out[:, feature] = random.choice(known, count)
+    aside = random.integers(-1, 2, out.shape)
+    return np.where(aside == 0, out, np.nextafter(out, np.where(aside > 0, np.inf, -np.inf).astype(np.float32)))
+
+
+def _calibration(calibration: Mapping[str, Any]) -> tuple[float, float, float]:
+    values = (
+        float(calibration.get("temperature", 1.0)),
+        float(calibration.get("unknown_scale", 1.0)),
+        float(calibration.get("unknown_offset", 0.0)),
+    )
+    if not all(map(math.isfinite, values)) or values[0] <= 0:
+        raise ModelError(f"calibration: expected finite numbers and a temperature above 0, found {values}")
+    return values
+
+
+def _flatten(forest: RandomForestClassifier) -> dict[str, NDArray[Any]]:
+    """All trees in one set of tables. A right child stands behind its left one; a leaf leads to itself.
+
+    Thresholds are rounded down to float32, so that a float32 value goes the way it goes in scikit-learn,
+    which compares with the float64.
+    """
+    features, thresholds, lefts, leaves, values, roots = [], [], [], [], [], []
+    base = rows = 0
+    for estimator in forest.estimators_:
+        tree = estimator.tree_
+        count = tree.node_count
+        order = [0]  # new number -> old
+        left = np.arange(count)
+        for new in range(count):
+            old = order[new]
+            if tree.children_left[old] >= 0:
+                left[new] = len(order)
+                order += [tree.children_left[old], tree.children_right[old]]
+        leaf = tree.children_left[order] < 0
+        exact = tree.threshold[order]
+        rounded = exact.astype(np.float32)
+        rounded = np.where(rounded > exact, np.nextafter(rounded, np.float32(-np.inf)), rounded)
+        features.append(np.where(leaf, 0, tree.feature[order]))
+        thresholds.append(np.where(leaf, np.float32(np.inf), rounded))
+        lefts.append(left + base)
+        leaves.append(np.where(leaf, np.cumsum(leaf) - 1 + rows, 0))
+        shares = tree.value[order, 0][leaf]
+        values.append(shares / shares.sum(axis=1, keepdims=True))
+        roots.append(base)
+        base += count
+        rows += int(leaf.sum())
+    return {
+        "feature": np.concatenate(features).astype(np.int32),
+        "threshold": np.concatenate(thresholds).astype(np.float32),
+        "left": np.concatenate(lefts).astype(np.int32),
+        "leaf": np.concatenate(leaves).astype(np.int32),
+        "leaf_values": np.concatenate(values).astype(np.float32),
+        "root": np.array([roots], np.int32),
+        "trees": np.array([len(roots)], np.int64),
+    }
