@@ -13,7 +13,7 @@ PACKAGE = ROOT / "gestured"
 
 CORE_MAY = {"numpy", "dataclasses", "enum", "math", "struct", "json", "typing", "collections"}
 LAYERS = {"core": 0, "daemon": 2, "control": 2, "lab": 2}  # everything else is between them
-LAB_ONLY = {"torch", "sklearn", "pywt", "onnx", "onnxscript", "skl2onnx", "matplotlib", "joblib", "scipy"}
+LAB_ONLY = {"torch", "sklearn", "onnx", "joblib", "scipy"}
 ONLY_IN = {
     "onnxruntime": {"gestured/models.py"},
     "prometheus_client": {"gestured/daemon/metrics.py", "gestured/daemon/http.py"},

@@ -19,11 +19,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 EXTRAS = (
     "torch",
     "sklearn",
-    "pywt",
     "onnx",
-    "onnxscript",
-    "skl2onnx",
-    "matplotlib",
     "pytest",
     "hypothesis",
     "setuptools",
