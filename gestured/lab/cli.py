@@ -41,7 +41,7 @@ def parser() -> argparse.ArgumentParser:
                 "gestured-lab train --out models --jobs 2")  # fmt: skip
     train.add_argument("--out", type=Path, default=MODELS, help=f"folder for the models ({MODELS})")
     add_data(train)
-    evaluate = add("evaluate", "print what the models are worth on people they have never seen; writes cards and manifest",
+    evaluate = add("evaluate", "print what the models are worth on people never seen; writes cards and manifest",
                    "gestured-lab evaluate --models models")  # fmt: skip
     evaluate.add_argument("--models", type=Path, default=MODELS, help=f"folder of the models ({MODELS})")
     add_data(evaluate)
@@ -72,9 +72,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             from gestured.lab import commands
         except ModuleNotFoundError as error:
-            if (error.name or "").split(".")[0] not in NEEDED:
+            package = (error.name or "").split(".")[0]
+            if package not in NEEDED:
                 raise
-            raise GesturedError(f"{error.name} is missing: pip install 'gestured[lab]', or make lab") from None
+            raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from None
         return commands.train_models(args) if args.command == "train" else commands.evaluate_models(args)
     except GesturedError as error:
         print(f"gestured-lab: {error}", file=sys.stderr)

@@ -10,8 +10,21 @@ from gestured.core.frames import Frame, Segment
 from gestured.core.recognizer import FrontEnd, Recognizer, Scores
 from gestured.lab import dataset
 from gestured.lab.dataset import (
-    OTHERS, STREAMS, TRIALS, WINDOW, Performed, Samples, collect, cuts, from_take, join, matched, recorded, simulated, with_idle,
-)  # fmt: skip
+    OTHERS,
+    STREAMS,
+    TRIALS,
+    WINDOW,
+    Performed,
+    Samples,
+    collect,
+    cuts,
+    from_take,
+    join,
+    matched,
+    recorded,
+    simulated,
+    with_idle,
+)
 from gestured.recording import Recordings
 from gestured.simulator import GESTURES, NON_GESTURES, Participant, Sensor, Take, generator, gesture_take, session
 
@@ -136,7 +149,7 @@ class Broken:
         raise KeyboardInterrupt
 
 
-def test_an_interrupted_simulation_is_not_taken_for_a_whole_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_simulation_is_not_taken_for_a_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(dataset.multiprocessing.get_context("spawn").__class__, "Pool", lambda *_: Broken())
         with pytest.raises(KeyboardInterrupt):
@@ -149,7 +162,8 @@ def test_an_interrupted_simulation_is_not_taken_for_a_whole_one(tmp_path: Path, 
 
 @pytest.fixture(scope="module")
 def samples() -> Samples:
-    return collect(s for kind in ("one_tap", "swipe_left", "palm", "circle_clockwise") for s in from_take(take_of(kind)))
+    kinds = ("one_tap", "swipe_left", "palm", "circle_clockwise")
+    return collect(s for kind in kinds for s in from_take(take_of(kind)))
 
 
 def test_taking_and_joining_lose_nothing(samples: Samples) -> None:
@@ -222,7 +236,8 @@ def test_recorded_sessions_leave_out_what_nobody_named() -> None:
     found = recorded(Recordings(
         take.frames, take.times, np.array([0, len(take.frames)]), np.array(["session"]), np.array([3]),
         event_recording=np.zeros(4, int), event_labels=np.array(labels), event_kinds=np.array(kinds),
-        event_onsets=np.array([e.onset_s for e in take.events]), event_offsets=np.array([e.offset_s for e in take.events]),
+        event_onsets=np.array([e.onset_s for e in take.events]),
+        event_offsets=np.array([e.offset_s for e in take.events]),
     ))  # fmt: skip
     assert found.labels.tolist() == ["swipe_up", "swipe_left", "circle_clockwise"]
     assert set(found.people.tolist()) == {3}

@@ -1,5 +1,6 @@
 """Training goes on where it stopped, comes out the same, and tells people apart."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,19 @@ from torch import nn  # noqa: E402
 from gestured.lab import fit, train  # noqa: E402
 from gestured.lab.dataset import OTHERS, STREAMS, TRIALS, Samples, collect  # noqa: E402
 from gestured.lab.fit import (  # noqa: E402
-    CLASSES, REAL_KINDS, FitConfig, balanced, build, finetune, load_nets, logits, padded, pretrain, save_nets, targets,
-)  # fmt: skip
+    CLASSES,
+    REAL_KINDS,
+    FitConfig,
+    balanced,
+    build,
+    finetune,
+    load_nets,
+    logits,
+    padded,
+    pretrain,
+    save_nets,
+    targets,
+)
 from gestured.simulator import GESTURES  # noqa: E402
 
 SMALL = FitConfig(epochs=3, batch=16, real_epochs=1, real_samples=32)
@@ -102,10 +114,9 @@ def test_training_changes_every_net_and_lowers_the_loss(
     losses: list[float] = []
     real = fit.one_epoch
     monkeypatch.setattr(fit, "one_epoch", lambda *a: losses.append(real(*a)) or losses[-1])
-    start = tmp_path / "start.npz"
     torch.manual_seed(SMALL.seed)
     before = weights(build())
-    after = weights(pretrain(samples, SMALL, start))
+    after = weights(pretrain(samples, SMALL, tmp_path / "checkpoint.npz"))
     assert losses[-1] < losses[0]
     for name, value in before.items():
         assert not np.array_equal(value, after[name]), name
@@ -213,8 +224,7 @@ def test_no_real_subject_is_judged_by_a_net_that_has_seen_it(
     tmp_path: Path, samples: Samples, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     real = named_people(samples, np.arange(len(samples)) % 7)
-    everything = train.load(train.Plan(), tmp_path, None, 1)
-    data = train.Data(everything.teach, everything.calibrate, everything.tests, everything.performed, real)
+    data = replace(train.load(train.Plan(), tmp_path, None, 1), real=real)
     taught: list[set[int]] = []
     judged: list[set[int]] = []
 

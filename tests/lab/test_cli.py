@@ -1,0 +1,158 @@
+"""`gestured-lab` at the command line: help, what is missing, what is wrong; and a whole run, smaller than --quick."""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gestured.lab import cli, progress
+from gestured.lab.cli import main, parser
+from gestured.models import LADDER, open_model
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMANDS = next(action.choices for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+
+
+def without(package: str, *arguments: str, cwd: Path) -> "subprocess.CompletedProcess[str]":
+    """gestured-lab in a process where `package` cannot be imported."""
+    code = "import sys; sys.modules[sys.argv.pop(1)] = None; from gestured.lab.cli import main; sys.exit(main())"
+    command = [sys.executable, "-c", code, package, *arguments]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=60)
+
+
+@pytest.mark.parametrize("command", sorted(COMMANDS))
+def test_help_shows_an_example_that_is_valid(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([command, "--help"])
+    assert ended.value.code == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    example = shown.split("example: gestured-lab ")[1].split()
+    assert example[0] == command
+    assert parser().parse_args(example).command == command
+
+
+@pytest.mark.parametrize(
+    ("command", "package"), [("train", "torch"), ("evaluate", "torch"), ("train", "sklearn"), ("train", "onnx")]
+)
+def test_what_is_missing_is_said_in_one_sentence(command: str, package: str, tmp_path: Path) -> None:
+    if package != "torch":
+        pytest.importorskip("torch", reason="needs the extra [lab]")
+    done = without(package, command, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"gestured-lab: {package} is missing")
+    assert "pip install 'gestured[lab]'" in line
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", sorted(COMMANDS))
+def test_help_needs_no_torch(command: str, tmp_path: Path) -> None:
+    done = without("torch", command, "--help", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    "line", ["", "fly", "train --jobs many", "train --epochs 3", "online --minutes long", "bench --quick"]
+)
+def test_arguments_that_mean_nothing_are_usage_errors(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(line.split())
+    assert ended.value.code == 2
+    assert "usage: gestured-lab" in capsys.readouterr().err
+
+
+def test_no_jobs_is_a_mistake_that_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("torch", reason="needs the extra [lab]")
+    pytest.importorskip("sklearn", reason="needs the extra [lab]")
+    pytest.importorskip("onnx", reason="needs the extra [lab]")
+    assert main(["train", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"), "--jobs", "0"]) == 1
+    assert capsys.readouterr().err == "gestured-lab: --jobs: expected 1 or more, found 0\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", ["online", "bench"])
+def test_a_model_that_is_not_there_is_named(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(tmp_path / "nowhere.onnx")
+    assert main([command, "--model", path]) == 1
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("gestured-lab:")]
+    assert "nowhere.onnx" in line
+
+
+def test_an_interrupted_run_says_that_nothing_finished_is_lost(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from gestured.lab import bench
+
+    def interrupt(_: object) -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(bench, "run", interrupt)
+    assert main(["bench"]) == 130
+    assert "what is finished is kept" in capsys.readouterr().err
+
+
+def test_progress_passes_everything_on_and_ends_with_all_of_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert list(progress.progress(iter("abc"), 3, "letters")) == ["a", "b", "c"]
+    out, err = capsys.readouterr()
+    assert out == ""  # standard output is for figures
+    assert err.splitlines()[-1].startswith("letters")
+    assert "3/3" in err
+
+
+@pytest.mark.slow
+def test_train_makes_three_models_and_evaluate_their_figures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Everything that `train` does, with a plan much smaller than --quick, in one process."""
+    for package in cli.NEEDED:
+        pytest.importorskip(package, reason="needs the extra [lab]")
+    from gestured.lab import train
+    from gestured.lab.dataset import OTHERS, STREAMS, TRIALS, Samples, collect
+    from gestured.lab.fit import FitConfig
+
+    spread = {"wide": range(80), "cohort": range(0, len(TRIALS), 9), "others": range(0, len(OTHERS), 9)}
+    made: dict[tuple[str, int], Samples] = {}
+
+    def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
+        if (stream, seed) not in made:
+            made[stream, seed] = collect(s for i in spread[stream] for s in STREAMS[stream](seed, i))
+        return made[stream, seed]
+
+    def real(cache: Path, folder: Path | None) -> Samples:
+        taken = collect(s for i in range(120) for s in STREAMS["wide"](4, i))
+        subjects = np.arange(len(taken)) % 6
+        return Samples(taken.frames, taken.offsets, taken.labels, taken.kinds, subjects, taken.strength)
+
+    plan = train.Plan(80, 80, len(TRIALS), 300, 200, FitConfig(epochs=2, real_epochs=1, real_samples=64))
+    monkeypatch.setattr(train, "simulated", simulated)
+    monkeypatch.setattr(train, "_real", real)
+    monkeypatch.setattr(train.Plan, "quick", classmethod(lambda cls: plan))
+    out, cache = tmp_path / "models", tmp_path / "cache"
+    arguments = ["--cache", str(cache), "--jobs", "1", "--quick"]
+
+    assert main(["train", "--out", str(out), *arguments]) == 0
+    assert "trained in" in capsys.readouterr().out
+    manifest = json.loads((out / "manifest.json").read_text())["models"]
+    assert sorted(manifest) == sorted(f"{name}.onnx" for name in LADDER)
+    for name in LADDER:
+        model = open_model(out / f"{name}.onnx")
+        assert model.metadata.training_data == open_model(out / f"{LADDER[0]}.onnx").metadata.training_data
+        assert manifest[f"{name}.onnx"]["figures"]["simulated"]
+        assert name in "".join(card.read_text() for card in out.glob("*.md"))
+
+    before = {path.name: path.read_bytes() for path in sorted(out.glob("*.onnx"))}
+    for step in ("pretrain", "finetune"):
+        monkeypatch.setattr(train, step, lambda *_: pytest.fail("what is done is not done again"))
+    assert main(["evaluate", "--models", str(out), *arguments, "--json"]) == 0
+    text = capsys.readouterr().out
+    figures = json.loads(text[text.index("\n{\n") :])
+    assert figures.keys() == set(LADDER)
+    assert set(figures["cnn_lstm"]["real"]) >= {"taps and swipes", "with non-gestures"}
+    assert np.isfinite(figures["cnn_lstm"]["held_out_kinds"]["rejected"])
+    assert {path.name: path.read_bytes() for path in sorted(out.glob("*.onnx"))} == before
