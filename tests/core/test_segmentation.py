@@ -1,0 +1,85 @@
+"""The segmenter's table: complete, without rows for nothing, and the same in ARCHITECTURE.md."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gestured.core import segmentation
+from gestured.core.segmentation import TRANSITIONS, Action, Phase, Segmenter, Signal
+
+PAGE = Path(__file__).parents[2] / "ARCHITECTURE.md"
+Stream = list[tuple[float, float, tuple[float, float]]]  # s since the frame before, activity in noise, centroid
+
+waits = st.sampled_from([0.001, 1 / 15, 0.11, 0.3, 0.6, 2.0, 6.0])
+activities = st.sampled_from([0.0, 2.0, 5.0, 8.0, 50.0, 1000.0])
+places = st.sampled_from([(4.0, 4.0), (4.0, 4.5), (0.0, 8.0)])
+
+
+def play(stream: Stream, wait: bool = True) -> list[Action]:
+    """What a segmenter says of a stream, asked as the front end asks it."""
+    segmenter = Segmenter(81, 0.15 * 9, wait_for_double_tap=wait)
+    t, said = 0.0, []
+    for pause, activity, place in stream:
+        t += pause
+        said += segmenter.flush(t)
+        said += segmenter.push(t, activity, place if activity >= segmenter.off else None)
+    return said
+
+
+def table() -> dict[tuple[Phase, Signal], tuple[Phase, Action | None]]:
+    """The table of ARCHITECTURE.md."""
+    lines = PAGE.read_text().splitlines()
+    start = next(n for n, line in enumerate(lines) if line.startswith("| phase |"))
+    head, _, *rows = (line.strip("| ").split(" | ") for line in lines[start : lines.index("", start)])
+    signals = [Signal[name.replace(" ", "_").upper()] for name in head[1:]]
+    found = {}
+    for phase, *cells in rows:
+        for signal, cell in zip(signals, cells, strict=True):
+            if cell != "-":
+                target, _, action = cell.partition(", ")
+                found[Phase[phase], signal] = Phase[target], Action[action.upper()] if action else None
+    return found
+
+
+def test_the_page_shows_the_table() -> None:
+    assert table() == TRANSITIONS
+
+
+@given(st.lists(st.tuples(waits, activities, places), max_size=60), st.booleans())
+def test_whatever_comes_has_its_row_and_each_onset_its_end(stream: Stream, wait: bool) -> None:
+    said = play(stream, wait)
+    after = dict.fromkeys((Action.OPEN, Action.SPLIT), (Action.CLOSE, Action.SPLIT, Action.HELD))
+    after[Action.HELD] = (Action.LEFT,)
+    assert all(other in after.get(one, (Action.OPEN,)) for one, other in pairwise([Action.LEFT, *said]))
+    assert wait or Action.SPLIT not in said  # nothing waits for a second contact, so none is split off
+
+
+def test_no_row_is_there_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = set()
+
+    class Watched(dict):  # type: ignore[type-arg]
+        def __getitem__(self, key: tuple[Phase, Signal]) -> object:
+            seen.add(key)
+            return super().__getitem__(key)
+
+    monkeypatch.setattr(segmentation, "TRANSITIONS", Watched(TRANSITIONS))
+
+    def frames(count: int, activity: float, step: float = 1 / 15) -> Stream:
+        return [(step, activity, (4.0, 4.0))] * count
+
+    idle, tap, weak, quiet, held = frames(1, 5.0), frames(3, 50.0), frames(1, 8.0), frames(3, 0.0), frames(90, 50.0)
+    for stream in (
+        idle + tap + weak + frames(1, 0.0) + tap + frames(1, 0.0) + weak + quiet,  # a flicker
+        tap + quiet + weak + frames(12, 0.0),  # a tap
+        tap + quiet + tap + quiet,  # a double tap
+        tap + quiet + [(1 / 15, 50.0, (4.0, float(n))) for n in range(6)] + quiet,  # a tap, then a swipe
+        held + frames(1, 0.0) + held + quiet,  # held too long
+        frames(51, 50.0, 0.1) + frames(3, 0.0, 0.02),  # let go just before that
+        tap + quiet + frames(1, 0.0, 6.0),  # no frame for so long
+    ):
+        play(stream)
+    # What lies there after a contact was given up counts as touched down to `off`: it is never weak.
+    assert seen == set(TRANSITIONS) - {(Phase.SPENT, Signal.WEAK)}
