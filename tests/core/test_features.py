@@ -38,9 +38,14 @@ def test_a_window_worked_out_by_hand() -> None:
     )
     expected = {
         "mean_pressure": 0.2, "maximum_pressure": 0.7, "variability": 0.1,
+        "mean_taxel_variability": 0.7 / 6, "maximum_taxel_variability": 0.3,
         "row_0_mean": 1.9 / 6, "row_1_mean": 0.5 / 6,
         "column_0_mean": 1.7 / 4, "column_1_mean": 0.5 / 4, "column_2_mean": 0.2 / 4,
-        "maximum_area": 3 / 6, "mean_area": 2.5 / 6, "duration_s": 2 / 20,
+        "row_0_variability": 1.1 / 6, "row_1_variability": 0.1 / 6,
+        "column_0_variability": 0.125, "column_1_variability": 0.125, "column_2_variability": 0.05,
+        "row_0_maximum": 0.5, "row_1_maximum": 0.1,
+        "column_0_maximum": 0.55, "column_1_maximum": 0.25, "column_2_maximum": 0.1,
+        "maximum_area": 3 / 6, "mean_area": 2.5 / 6, "whole_area": 4 / 6, "duration_s": 2 / 20,
     }  # fmt: skip
     assert named(window, 20.0) == pytest.approx(expected, rel=1e-5)
 
@@ -64,15 +69,16 @@ def test_idle_frames_change_nothing(
 
 @given(sizes, seeds)
 def test_a_mirrored_window_has_mirrored_features(size: tuple[int, int, int], seed: int) -> None:
+    """What is said of a row or column follows it; the rest stays."""
     window = pressed(size, seed)
-    rows, columns = size[1:]
-    found, mirrored = named(window), named(window[:, ::-1, ::-1])
-    for name in ("mean_pressure", "maximum_pressure", "variability", "maximum_area", "mean_area", "duration_s"):
-        assert mirrored[name] == pytest.approx(found[name], rel=1e-5, abs=1e-6)
-    for r in range(rows):
-        assert mirrored[f"row_{r}_mean"] == pytest.approx(found[f"row_{rows - 1 - r}_mean"], rel=1e-5)
-    for c in range(columns):
-        assert mirrored[f"column_{c}_mean"] == pytest.approx(found[f"column_{columns - 1 - c}_mean"], rel=1e-5)
+    mirrored = named(window[:, ::-1, ::-1])
+    for name, value in named(window).items():
+        line, _, what = name.partition("_")
+        number, _, what = what.partition("_")
+        if line in ("row", "column"):
+            count = size[1] if line == "row" else size[2]
+            name = f"{line}_{count - 1 - int(number)}_{what}"
+        assert mirrored[name] == pytest.approx(value, rel=1e-5, abs=1e-6)
 
 
 @given(sizes, st.sampled_from([0.0, 0.1, PRESSED, 1.0]), st.floats(0.1, 1000))
@@ -85,6 +91,7 @@ def test_a_constant_window_has_finite_features(size: tuple[int, int, int], value
     assert found["duration_s"] == pytest.approx(touched / rate_hz)
 
 
-def test_names_tell_features_apart() -> None:
-    names = feature_names(9, 9)
-    assert len(names) == len(set(names)) == 24
+@given(sizes)
+def test_names_tell_features_apart(size: tuple[int, int, int]) -> None:
+    names = feature_names(*size[1:])
+    assert len(names) == len(set(names)) == len(touch_pattern(np.zeros(size, np.float32), 15.0))
