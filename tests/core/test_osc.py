@@ -171,10 +171,9 @@ def test_the_same_head_with_other_sizes_is_read_anew() -> None:
     for size in (0, 3, 4, 8, 1):
         (message,) = osc.decode(osc.encode_message("/s", "ib", (1, bytes(size))))
         assert message.args == (1, bytes(size))
-    two = [osc.encode_message("/s", "b", (bytes([n]) * size,)) for n, size in enumerate((8, 3, 7, 4))]
-    for pair in (two[:2], two[2:]) * 2:  # the packet is as long, its blobs are not
-        got = osc.decode(osc.encode_bundle(pair))
-        assert [osc.encode_message(m.address, m.types, m.args) for m in got] == pair
+    for size in (5, 8, 7, 5):  # packets of one length, and a head so long that it alone is looked up
+        (message,) = osc.decode(osc.encode_message("/a-sensor-with-a-long-name/pressure", "ib", (1, bytes(size))))
+        assert message.args == (1, bytes(size))
     long = osc.encode_message("/s/pressure", "ffff", (np.arange(4.0),))
     osc.decode(long)
     for packet, reason in ((long[:-4], "truncated"), (long + bytes(4), "trailing")):
