@@ -1,0 +1,344 @@
+"""From frames to events: decisions with a classifier that says what it is told to, and the front end's grammar.
+
+Streams are written as in tests/scenarios; times are written down.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gestured.core.errors import ModelError
+from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
+from gestured.core.frames import Frame, Segment
+from gestured.core.recognizer import Contact, Cut, FrontEnd, Recognizer, Scores
+from gestured.core.segmentation import Timing
+from tests.scenario import Player, parse
+
+GESTURES = ("tap", "left", "right")
+TAP = "press 4,4 0.8 for 130ms"
+SWIPE = "move 4,1 to 4,7 0.8 in 400ms"
+
+
+def frames(*lines: str, seed: int = 0) -> list[Frame]:
+    """What a sensor sends while the lines of a scenario last."""
+    player = Player(parse("stream", "\n".join(lines)), seed)
+    return [frame for step in player.scenario.steps for frame in player.frames(step)]
+
+
+def says(*values: float, unknown: float = 0.0, threshold: float = 0.5) -> Scores:
+    return Scores(np.array(values, dtype=np.float32), unknown, "fake", threshold=threshold)
+
+
+SURE = says(0.9, 0.06, 0.04)
+
+
+@dataclass
+class Fake:
+    """Gives one answer after the other, the last one for ever; an exception is raised."""
+
+    answers: Sequence[Scores | Exception] = (SURE,)
+    gestures: tuple[str, ...] = GESTURES
+    seen: list[Segment] = field(default_factory=list)
+
+    def classify(self, segment: Segment) -> Scores:
+        answer = self.answers[min(len(self.seen), len(self.answers) - 1)]
+        self.seen.append(segment)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+
+def recognizer(classifier: Fake, **settings: object) -> Recognizer:
+    return Recognizer(FrontEnd("armrest", 9, 9), classifier, **settings)  # type: ignore[arg-type]
+
+
+def run(subject: Recognizer, stream: Sequence[Frame]) -> list[Event]:
+    return [event for frame in stream for event in subject.push(frame)]
+
+
+def answers(events: Sequence[Event]) -> list[Event]:
+    return [event for event in events if isinstance(event, Gesture | Unknown | Cancelled)]
+
+
+def swipes(count: int, pause: str = "600ms") -> list[Frame]:
+    return frames("quiet for 1500ms", *[SWIPE, f"quiet for {pause}"] * count)
+
+
+# --- what is decided
+
+
+def test_a_gesture_says_all_that_is_known_of_it() -> None:
+    classifier = Fake([replace(says(0.1, 0.7, 0.2, unknown=0.1), model="rung", degraded=True)])
+    subject = recognizer(classifier, sequence=41)
+    stream = [replace(frame, lost=2 if 1.6 < frame.t < 1.68 else 0) for frame in swipes(1)]
+    onset, gesture, release = run(subject, stream)
+    (segment,) = classifier.seen
+    assert onset == Onset("armrest", 1, segment.onset) and release == Release("armrest", 1, segment.offset)
+    assert isinstance(gesture, Gesture)
+    assert (gesture.sensor, gesture.id, gesture.gesture, gesture.sequence) == ("armrest", 1, "left", 42)
+    assert gesture.confidence == pytest.approx(0.7 * 0.9)
+    assert gesture.scores == pytest.approx(dict(zip(GESTURES, (0.1, 0.7, 0.2), strict=True)))
+    assert (gesture.onset, gesture.offset) == (segment.onset, segment.offset)
+    assert gesture.frames == segment.last - segment.first + 1 == 6 and gesture.lost == 2
+    assert (gesture.model, gesture.degraded) == ("rung", True)
+    assert gesture.decided in [frame.t for frame in stream] and 0.1 <= gesture.decided - gesture.offset < 0.2
+    assert subject.sequence == 42
+
+
+@given(
+    st.lists(st.floats(0.0, 1.0, width=32), min_size=3, max_size=3), st.floats(0, 1), st.floats(0, 1),
+    st.dictionaries(st.sampled_from(GESTURES), st.floats(0, 1)),
+)  # fmt: skip
+def test_the_best_gesture_counts_if_it_is_sure_enough(
+    values: list[float], unknown: float, threshold: float, own: dict[str, float]
+) -> None:
+    subject = recognizer(Fake([says(*values, unknown=unknown, threshold=threshold)]), thresholds=own)
+    (answer,) = answers(run(subject, SWIPED))
+    best = GESTURES[int(np.argmax(values))]
+    assert isinstance(answer, Gesture | Unknown)
+    assert answer.confidence == pytest.approx(max(values) * (1 - unknown))
+    assert isinstance(answer, Gesture) == (answer.confidence >= own.get(best, threshold))
+    if isinstance(answer, Gesture):
+        assert answer.gesture == best
+    assert set(answer.scores) == set(GESTURES)
+
+
+SWIPED = swipes(1)
+
+
+@pytest.mark.parametrize("confidence", [math.nan, -math.nan])
+def test_a_confidence_that_is_no_number_is_no_gesture(confidence: float) -> None:
+    (answer,) = answers(run(recognizer(Fake([says(confidence, confidence, confidence)])), SWIPED))
+    assert isinstance(answer, Unknown)
+
+
+def test_a_subset_is_not_given_what_falls_to_the_others() -> None:
+    classifier = Fake([says(0.6, 0.3, 0.1)])
+    (answer,) = answers(run(recognizer(classifier, gestures=["left", "right"]), SWIPED))
+    assert isinstance(answer, Unknown)
+    assert answer.confidence == pytest.approx(0.3) and answer.scores == pytest.approx({"left": 0.3, "right": 0.1})
+    (answer,) = answers(run(recognizer(classifier, gestures=["right", "tap"]), SWIPED))
+    assert isinstance(answer, Gesture) and answer.gesture == "tap" and answer.confidence == pytest.approx(0.6)
+
+
+def test_a_gesture_is_not_repeated_within_its_refractory_time() -> None:
+    """The time counts from the end of the last one that was published; the others are free."""
+    tap, left = SURE, says(0, 1, 0)
+    classifier = Fake([tap, tap, left, left, tap])
+    events = run(recognizer(classifier, refractory={"tap": 2.5}), swipes(5))
+    found = [(type(e), getattr(e, "reason", None) or e.gesture) for e in answers(events)]
+    assert found == [
+        (Gesture, "tap"), (Cancelled, "refractory"), (Gesture, "left"), (Gesture, "left"), (Gesture, "tap"),
+    ]  # fmt: skip
+    ends = [e.offset for e in events if isinstance(e, Release)]
+    begins = [e.onset for e in events if isinstance(e, Onset)]
+    assert begins[1] - ends[0] < 2.5 <= begins[4] - ends[0]  # a cancelled one does not prolong it
+
+
+def test_what_is_unknown_has_no_refractory_time() -> None:
+    classifier = Fake([says(0.2, 0.1, 0.1), SURE])
+    events = answers(run(recognizer(classifier, refractory={"tap": 60}), swipes(2)))
+    assert [type(event) for event in events] == [Unknown, Gesture]
+
+
+def test_a_model_that_fails_costs_one_segment() -> None:
+    subject = recognizer(Fake([ModelError("broken"), SURE]))
+    events = run(subject, swipes(2))
+    assert [type(event) for event in events] == [Onset, Cancelled, Release, Onset, Gesture, Release]
+    assert events[1] == Cancelled("armrest", 1, "model")
+    assert events[4].sequence == 1  # type: ignore[union-attr]
+
+
+def test_what_is_no_failure_of_a_model_is_a_bug_and_loud() -> None:
+    with pytest.raises(ZeroDivisionError):
+        run(recognizer(Fake([ZeroDivisionError()])), SWIPED)
+
+
+outcomes = st.sampled_from([SURE, says(0, 1, 0), says(0.3, 0.3, 0.3), ModelError("x")])
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(outcomes, min_size=1, max_size=8), st.integers(0, 1000))
+def test_the_sequence_counts_gestures_only_and_has_no_gaps(given_: list[Scores | Exception], start: int) -> None:
+    subject = recognizer(Fake(given_), sequence=start, refractory={"left": 1.0})
+    events = run(subject, swipes(len(given_)))
+    assert len(answers(events)) == len(given_)
+    gestures = [event for event in events if isinstance(event, Gesture)]
+    assert [event.sequence for event in gestures] == list(range(start + 1, start + 1 + len(gestures)))
+    assert subject.sequence == start + len(gestures)
+    for number, (onset, answer, release) in enumerate(zip(events[::3], events[1::3], events[2::3], strict=True), 1):
+        assert isinstance(onset, Onset) and isinstance(release, Release)
+        assert onset.id == answer.id == release.id == number  # type: ignore[union-attr]
+
+
+def test_the_classifier_may_be_replaced_between_frames() -> None:
+    subject = recognizer(Fake())
+    stream = swipes(1)
+    middle = next(n for n, frame in enumerate(stream) if frame.t > 1.7)
+    assert [type(event) for event in run(subject, stream[:middle])] == [Onset]
+    subject.classifier = Fake([says(0, 0, 1)])
+    (answer,) = answers(run(subject, stream[middle:]))
+    assert isinstance(answer, Gesture) and answer.gesture == "right" and answer.sequence == 1
+
+
+@pytest.mark.xfail(strict=True, raises=ValueError, reason="the first classifier's gestures are kept as if a subset")
+def test_another_classifier_may_know_other_gestures() -> None:
+    subject = recognizer(Fake())
+    subject.classifier = Fake([says(0.2, 0.8)], gestures=("pinch", "zigzag"))
+    (answer,) = answers(run(subject, SWIPED))
+    assert isinstance(answer, Gesture) and answer.gesture == "zigzag"
+
+
+# --- flush and reset
+
+OPEN = {
+    "nothing": ["quiet for 2s"],
+    "finger": ["quiet for 1500ms", "move 4,1 to 4,7 0.8 in 400ms"],
+    "lifted": ["quiet for 1500ms", "move 4,1 to 4,7 0.8 in 400ms", "quiet for 1 frame"],
+    "tapped": ["quiet for 1500ms", TAP, "quiet for 300ms"],
+    "held": ["quiet for 1500ms", "press 4,4 0.8 for 5500ms"],
+}
+
+
+@pytest.mark.parametrize("wait", [0.01, 2.0])
+@pytest.mark.parametrize(
+    ("what", "expected"),
+    [("nothing", []), ("finger", ["silence"]), ("lifted", ["tap"]), ("tapped", ["tap"]), ("held", [])],
+)
+def test_a_flush_ends_what_is_open(what: str, expected: list[str], wait: float) -> None:
+    stream = frames(*OPEN[what])
+    subject = recognizer(Fake())
+    before = run(subject, stream)
+    t = stream[-1].t + wait
+    events = subject.flush(t)
+    assert [getattr(e, "reason", None) or e.gesture for e in answers(events)] == expected  # type: ignore[union-attr]
+    onsets = [e.id for e in before if isinstance(e, Onset)]
+    assert [e.id for e in before + events if isinstance(e, Release)] == onsets
+    assert [e.id for e in answers(before + events)] == onsets  # type: ignore[union-attr]
+    assert not subject.front_end.touched and subject.flush(t + 1) == [] and subject.reset() == []
+
+
+@pytest.mark.parametrize("what", sorted(OPEN))
+def test_a_reset_cancels_what_is_open_and_starts_clean(what: str) -> None:
+    subject = recognizer(Fake())
+    before = run(subject, frames(*OPEN[what]))
+    events = before + subject.reset()
+    reasons = [e.reason for e in events if isinstance(e, Cancelled)]
+    assert reasons == {"nothing": [], "held": ["held"]}.get(what, ["restart"])
+    ids = {kind: [e.id for e in events if isinstance(e, kind)] for kind in (Onset, Cancelled, Release)}
+    assert ids[Onset] == ids[Cancelled] == ids[Release]
+    assert not subject.front_end.ready and not subject.front_end.touched
+    later = [replace(frame, t=frame.t + 20) for frame in SWIPED]
+    onset, gesture, release = run(subject, later)
+    assert isinstance(gesture, Gesture) and gesture.sequence == 1
+    assert onset.id == gesture.id == release.id == len(ids[Onset]) + 1  # type: ignore[union-attr]
+
+
+def test_a_stream_that_was_flushed_goes_on() -> None:
+    """Ids and sequence go on, and the sensor need not be learned again."""
+    subject = recognizer(Fake())
+    stream = swipes(1)
+    run(subject, stream)
+    assert subject.flush(stream[-1].t + 1) == []
+    again = [replace(frame, t=frame.t + 60) for frame in stream if frame.t > 1.3]
+    onset, gesture, release = run(subject, again)
+    assert isinstance(gesture, Gesture) and (gesture.id, gesture.sequence) == (2, 2)
+
+
+# --- waits
+
+
+def decided_after(stream: Sequence[Frame], **settings: object) -> list[tuple[float, float]]:
+    """Seconds from offset to decision of each segment, and its length."""
+    front_end = FrontEnd("s", 9, 9, **settings)  # type: ignore[arg-type]
+    cuts = [event for frame in stream for event in front_end.push(frame) if isinstance(event, Cut)]
+    return [(cut.decided - cut.segment.offset, cut.segment.offset - cut.segment.onset) for cut in cuts]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_only_a_tap_waits_and_only_for_a_second_one(seed: int) -> None:
+    frame, margin = 1 / 15, 1e-6
+    tapped = frames("quiet for 1500ms", TAP, "quiet for 1s", seed=seed)
+    ((waited, _),) = decided_after(tapped)
+    assert 0.5 <= waited <= 0.5 + 2 * frame + margin
+    ((waited, _),) = decided_after(tapped, wait_for_double_tap=False)
+    assert 0.1 <= waited <= 0.1 + 2 * frame + margin
+    twice = frames("quiet for 1500ms", TAP, "quiet for 250ms", TAP, "quiet for 1s", seed=seed)
+    ((waited, length),) = decided_after(twice)
+    assert 0.1 <= waited <= 0.1 + 2 * frame + margin and 0.37 < length < 0.52
+    assert len(decided_after(twice, wait_for_double_tap=False)) == 2
+    ((waited, _),) = decided_after(frames("quiet for 1500ms", SWIPE, "quiet for 1s", seed=seed))
+    assert 0.1 <= waited <= 0.1 + 2 * frame + margin
+
+
+def test_the_times_are_settings() -> None:
+    tapped = frames("quiet for 1500ms", TAP, "quiet for 1500ms")
+    ((waited, _),) = decided_after(tapped, timing=Timing(tap_gap_s=1.0))
+    assert 1.0 <= waited < 1.14
+    ((waited, _),) = decided_after(tapped, timing=Timing(tap_gap_s=0.3, release_s=0.2))
+    assert 0.3 <= waited < 0.44
+    held = frames("quiet for 1500ms", "press 4,4 0.8 for 2s", "quiet for 1s")
+    front_end = FrontEnd("s", 9, 9, timing=Timing(limit_s=1.0))
+    events = [event for frame in held for event in front_end.push(frame)]
+    assert [type(event) for event in events] == [Onset, Cancelled, Release]
+    assert events[1].reason == "held"  # type: ignore[union-attr]
+
+
+# --- silences
+
+
+def kinds(events: Sequence[Contact]) -> list[str]:
+    return [event.reason if isinstance(event, Cancelled) else type(event).__name__ for event in events]
+
+
+@pytest.mark.parametrize("silence", [1.5, 3.0, *(pytest.param(s, marks=pytest.mark.xfail(
+    strict=True, reason="told to be held, or cancelled after a tap, by the time that passed in silence",
+)) for s in (5.5, 60.0))])  # fmt: skip
+@pytest.mark.parametrize(("what", "answer"), [("finger", "silence"), ("lifted", "Cut"), ("tapped", "Cut")])
+def test_a_silence_means_the_same_however_long_it_was(what: str, answer: str, silence: float) -> None:
+    """A daemon asks after `stale_s`, replay when the next frame comes: both hear the same."""
+    stream = frames(*OPEN[what])
+    idle = stream[5].values
+    front_end = FrontEnd("s", 9, 9)
+    for frame in stream:
+        front_end.push(frame)
+    assert kinds(front_end.push(Frame(stream[-1].t + silence, idle))) == [answer, "Release"]
+
+
+def fast(rate: float) -> list[Frame]:
+    """A tap, and shortly after it a swipe of two fingers that land 15 ms apart."""
+    shape = (np.arange(9)[:, None], np.arange(9))
+    rng = np.random.default_rng(0)
+
+    def blob(row: float, column: float) -> np.ndarray:
+        return 600 * np.exp(-((shape[0] - row) ** 2 + (shape[1] - column) ** 2) / 1.6)
+
+    found = []
+    for n in range(int(3.5 * rate)):
+        t = n / rate
+        values = 300 + rng.normal(0, 2, (9, 9))
+        if 1.5 <= t < 1.63:
+            values += blob(4, 4)
+        elif 1.83 <= t < 1.845:
+            values += blob(7, 2)
+        elif 1.845 <= t < 2.145:
+            row = 7 - 5 * (t - 1.845) / 0.3
+            values += np.maximum(blob(row, 2), blob(row, 6))
+        found.append(Frame(t, np.rint(values)))
+    return found
+
+
+@pytest.mark.parametrize("rate", [15.0, 30.0, *(pytest.param(rate, marks=pytest.mark.xfail(
+    strict=True, reason="the tap is a 'glitch' where the second contact moves within glitch_s"
+)) for rate in (200.0, 1000.0))])  # fmt: skip
+def test_a_tap_before_a_swipe_is_a_segment_of_its_own(rate: float) -> None:
+    front_end = FrontEnd("s", 9, 9)
+    events = [event for frame in fast(rate) for event in front_end.push(frame)]
+    assert kinds(events) == ["Onset", "Cut", "Release"] * 2
+    tap, swipe = (event.segment for event in events if isinstance(event, Cut))
+    assert 1.5 <= tap.onset <= tap.offset < 1.63 and 1.83 <= swipe.onset <= swipe.offset < 2.145
