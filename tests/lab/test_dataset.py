@@ -68,6 +68,15 @@ def test_a_session_gives_each_performance_its_own_name() -> None:
     assert labels == ["swipe_up", "one_tap", "none", "circle_clockwise", "double_tap"]
 
 
+def test_a_recording_that_ends_with_a_tap_gives_it_up_to_the_end() -> None:
+    take = take_of("one_tap")
+    (event,) = take.events
+    end = int(np.searchsorted(take.times, event.offset_s)) + 3
+    whole, short = cuts(take.frames, take.times), cuts(take.frames[:end], take.times[:end])
+    assert [(s.onset, s.offset) for s in short] == [(s.onset, s.offset) for s in whole]
+    assert len(short) == 1
+
+
 def segment(onset: float, offset: float) -> Segment:
     """Touched from onset to offset, at 15 Hz."""
     count = round((offset - onset) * 15) + 1

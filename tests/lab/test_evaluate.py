@@ -1,0 +1,57 @@
+"""Figures are counted as a user would count them."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch", reason="needs the extra [lab]")
+pytest.importorskip("sklearn", reason="needs the extra [lab]")
+pytest.importorskip("onnx", reason="needs the extra [lab]")
+
+from gestured.lab.evaluate import Outcome, outcome  # noqa: E402
+
+THREE = np.eye(3, dtype=np.float32)
+
+
+def answer(*said: tuple[int, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Scores (N, 3) and unknown (N,): which gesture, and how likely none, of each answer."""
+    return THREE[[gesture for gesture, _ in said]], np.array([unknown for _, unknown in said], np.float32)
+
+
+def test_each_answer_counts_once() -> None:
+    said = answer((0, 0.0), (1, 0.1), (2, 0.9), (0, 0.0), (1, 0.2), (1, 0.9))
+    found = outcome(said, np.array([0, 1, 2, 1, 5, -1]), 0.5)
+    assert (found.gestures, found.others) == (4, 2)  # a kind that nobody knows is none as well
+    assert found.right == pytest.approx(2 / 4)
+    assert found.wrong == pytest.approx(1 / 4)  # 0 was said of a 1
+    assert found.lost == pytest.approx(1 / 4)  # the 2 was held to be none
+    assert found.right_before == pytest.approx(3 / 4)
+    assert found.rejected == pytest.approx(1 / 2)
+
+
+def test_what_was_performed_and_never_cut_out_is_lost() -> None:
+    said = answer((0, 0.0), (1, 0.0))
+    found = outcome(said, np.array([0, 1]), 0.5, performed=4)
+    assert (found.gestures, found.right, found.wrong, found.lost) == (4, 0.5, 0.0, 0.5)
+    assert found.right_before == 0.5
+
+
+def test_one_gesture_cut_in_two_does_not_make_more_right_than_there_were() -> None:
+    found = outcome(answer((0, 0.0), (0, 0.0)), np.array([0, 0]), 0.5, performed=1)
+    assert found.right <= 1
+
+
+@pytest.mark.parametrize("least", [0.0, 0.3, 0.6, 0.95])
+def test_the_shares_of_the_gestures_add_up(least: float) -> None:
+    rng = np.random.default_rng(3)
+    said = rng.dirichlet(np.ones(3), 200).astype(np.float32), rng.random(200).astype(np.float32)
+    labels = rng.integers(0, 5, 200)
+    found, stricter = outcome(said, labels, least), outcome(said, labels, least + 0.04)
+    assert found.right + found.wrong + found.lost == pytest.approx(1)
+    assert stricter.right <= found.right <= found.right_before
+    assert stricter.wrong <= found.wrong
+    assert stricter.rejected >= found.rejected
+
+
+def test_a_row_stands_under_its_heading() -> None:
+    found = outcome(answer((0, 0.0), (1, 0.0)), np.array([0, 4]), 0.5)
+    assert len(found.row("a set")) == len(Outcome.HEAD)
