@@ -76,8 +76,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if package not in NEEDED:
                 raise
             raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from None
-        return commands.train_models(args) if args.command == "train" else commands.evaluate_models(args)
-    except GesturedError as error:
+        args.cache.mkdir(parents=True, exist_ok=True)
+        if args.command == "evaluate":
+            return commands.evaluate_models(args)
+        args.out.mkdir(parents=True, exist_ok=True)  # now, and not after half an hour
+        return commands.train_models(args)
+    except (GesturedError, OSError) as error:
         print(f"gestured-lab: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

@@ -68,12 +68,24 @@ def test_arguments_that_mean_nothing_are_usage_errors(line: str, capsys: pytest.
 
 
 def test_no_jobs_is_a_mistake_that_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("torch", reason="needs the extra [lab]")
-    pytest.importorskip("sklearn", reason="needs the extra [lab]")
-    pytest.importorskip("onnx", reason="needs the extra [lab]")
+    for package in cli.NEEDED:
+        pytest.importorskip(package, reason="needs the extra [lab]")
     assert main(["train", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"), "--jobs", "0"]) == 1
     assert capsys.readouterr().err == "gestured-lab: --jobs: expected 1 or more, found 0\n"
-    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("flag", ["--out", "--cache"])
+def test_a_folder_that_cannot_be_made_is_named_before_anything_is_simulated(
+    flag: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for package in cli.NEEDED:
+        pytest.importorskip(package, reason="needs the extra [lab]")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").write_text("a file")
+    assert main(["train", flag, "taken"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("gestured-lab: ")
+    assert "taken" in line
 
 
 @pytest.mark.parametrize("command", ["online", "bench"])
