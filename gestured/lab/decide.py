@@ -3,6 +3,8 @@
 All of it is fitted on people that the networks have not learned from.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -14,7 +16,7 @@ LOST = 0.025  # share of the validation gestures that the threshold may cost
 
 
 def fit_decision(first: Tensor, second: Tensor, labels: NDArray[np.int64], gestures: int) -> Decision:
-    """Fit the shares (temperatures) and the rejection on logits (N, K) of both and classes (N,); >= gestures is none."""
+    """Fit the shares (temperatures) and the rejection on logits (N, K) of both, classes (N,); >= gestures is none."""
     decision = Decision(gestures)
     y = torch.from_numpy(labels)
     known = (y >= 0) & (y < gestures)
@@ -31,8 +33,9 @@ def fit_decision(first: Tensor, second: Tensor, labels: NDArray[np.int64], gestu
     _, cues = decision.cues(first, second)
     none = (~known).float()
     # Every kind of non-gesture counts the same, and gestures as much as all of them together.
-    counts = torch.bincount(y.clamp(min=0), minlength=int(y.max()) + 1).float().clamp(min=1)
-    weight = torch.where(known, 1.0 / known.sum(), 1.0 / counts[y.clamp(min=0)] / max(int((counts[gestures:] > 1).sum()), 1))
+    counts = torch.bincount(y.clamp(min=0), minlength=int(y.max()) + 1).float()
+    kinds = max(int((counts[gestures:] > 0).sum()), 1)
+    weight = torch.where(known, 1.0 / known.sum(), 1.0 / counts.clamp(min=1)[y.clamp(min=0)] / kinds)
     slope, bias = torch.zeros(decision.CUES, requires_grad=True), torch.zeros((), requires_grad=True)
 
     def unknown_loss() -> Tensor:
@@ -46,19 +49,21 @@ def fit_decision(first: Tensor, second: Tensor, labels: NDArray[np.int64], gestu
     return decision
 
 
-def _minimise(parameters: list[Tensor], loss: "object") -> None:
+def _minimise(parameters: list[Tensor], loss: Callable[[], Tensor]) -> None:
     optimiser = torch.optim.LBFGS(parameters, max_iter=200, line_search_fn="strong_wolfe")
 
     def closure() -> Tensor:
         optimiser.zero_grad()
-        value: Tensor = loss()  # type: ignore[operator]
+        value = loss()
         value.backward()
         return value
 
     optimiser.step(closure)
 
 
-def threshold(scores: NDArray[np.float32], unknown: NDArray[np.float32], known: NDArray[np.bool_], lost: float = LOST) -> float:
+def threshold(
+    scores: NDArray[np.float32], unknown: NDArray[np.float32], known: NDArray[np.bool_], lost: float = LOST
+) -> float:
     """The confidence that `lost` of the known gestures do not reach."""
     confidence = scores.max(axis=1) * (1 - unknown)
     return float(np.clip(np.quantile(confidence[known], lost), 0.05, 0.95))

@@ -119,6 +119,17 @@ def test_a_kind_that_is_recorded_often_counts_no_more_than_another() -> None:
     assert float((a - b).abs().max()) < 0.02
 
 
+def test_the_same_set_twice_is_calibrated_alike() -> None:
+    """Also where a kind of non-gesture was recorded only once."""
+    one, two, labels = two_opinions(400, 9)
+    firsts = [np.flatnonzero(labels == k)[0] for k in range(GESTURES, GESTURES + KINDS)]
+    chosen = np.concatenate([np.flatnonzero(labels < GESTURES), firsts])
+    once = fit_decision(one[chosen], two[chosen], labels[chosen], GESTURES)
+    chosen = np.repeat(chosen, 2)
+    twice = fit_decision(one[chosen], two[chosen], labels[chosen], GESTURES)
+    torch.testing.assert_close(said(twice, one, two), said(once, one, two), atol=0.02, rtol=0)
+
+
 @pytest.mark.parametrize("kinds", [0, 1])
 def test_calibration_without_many_non_gestures_is_finite(kinds: int) -> None:
     logits, labels = honest(800, seed=6, kinds=1)
