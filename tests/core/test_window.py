@@ -139,7 +139,7 @@ def centroid(frame: Array) -> tuple[float, float]:
     return float(down @ np.arange(len(down)) / down.sum()), float(right @ np.arange(len(right)) / right.sum())
 
 
-@given(st.integers(9, 20), st.floats(1.5, 3), st.booleans(), st.integers(4, 6), st.data())
+@given(st.integers(9, 20), st.floats(1.5, 3), st.booleans(), st.integers(5, 6), st.data())
 def test_a_long_sensor_is_not_squeezed(short: int, ratio: float, tall: bool, length: int, data: st.DataObject) -> None:
     """A corner with two legs of the same length in taxels has two legs of the same length in the window."""
     long = round(short * ratio)
@@ -151,8 +151,8 @@ def test_a_long_sensor_is_not_squeezed(short: int, ratio: float, tall: bool, len
         frame[r - 1 : r + 2, c - 1 : c + 2] = FULL / 2
     found = scaled(TEXYZ, frames, np.arange(len(path)) / 15)
     begin, corner, end = (centroid(found[k]) for k in (0, length, 2 * length))
-    # A centroid is known to a fraction of a cell; squeezed to 9 x 9 the legs would differ by 0.6 cells and more.
-    assert corner[0] - begin[0] == pytest.approx(end[1] - corner[1], abs=0.25)
+    # A centroid is known to a fraction of a cell; squeezed to 9 x 9 the legs would differ by 0.75 cells and more.
+    assert corner[0] - begin[0] == pytest.approx(end[1] - corner[1], abs=0.45)
     assert corner[1] == pytest.approx(begin[1], abs=0.01) and end[0] == pytest.approx(corner[0], abs=0.01)
     assert corner[0] - begin[0] > 0.4 * length
 
@@ -237,9 +237,9 @@ def test_a_rate_near_the_models_is_taken_as_it_is(rate: float, n: int, seed: int
     assert scaled(TEXYZ, frames, np.arange(n) / rate) == pytest.approx(frames, abs=1e-3)
 
 
-@given(st.floats(13.5, 16.8) | rates, st.integers(8, 40), st.sets(st.integers(1, 38), max_size=3), seeds)
+@given(st.floats(13.5, 16.8) | rates, st.integers(12, 40), st.sets(st.integers(1, 38), max_size=3), seeds)
 def test_lost_frames_are_filled_in(rate: float, n: int, lost: set[int], seed: int) -> None:
-    kept = [k for k in range(n) if k not in lost or k >= n - 1]
+    kept = [k for k in range(n) if k not in lost or k == n - 1]
     times = np.arange(n) / rate
     frames = linear(times, seed)
     full, filled = (scaled(TEXYZ, frames[which], times[which]) for which in (range(n), kept))
