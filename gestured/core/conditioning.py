@@ -6,23 +6,19 @@ any time between frames: `-expm1(-dt / tau)`, never `dt / tau`.
 """
 
 import math
-from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.settling import Settling
+
 Array = NDArray[np.float64]
 
-SETTLE_S = 0.93  # a stable second at 15 Hz: half-way between its last two frames, so jitter cannot miss it
-LOOK_S = 0.06  # how often it is looked whether the last second was stable
-SETTLE_FRAMES = 64  # frames kept of that second; faster sensors are thinned out
-PATIENCE_S = 5.0  # a sensor that never settles (hum, a hand that never rests) is used all the same after this
 BASELINE_TAU_S = 2.0
 RECOVERY_TAU_S = 0.4  # just after a contact: textile comes back slowly, and what is left of it is no touch
 NOISE_TAU_S = 30.0
 REVIEW_S = 0.5  # noise moves slowly: it is looked at twice a second
-RESTLESS = 5.0  # a taxel that moves more than this many times the sensor's noise was touched, or is bad
 NOISY = 8.0  # a taxel with more than this many times the sensor's noise is bad
 FROZEN_S = 0.4  # a pressed taxel that does not change by its noise for so long is no finger
 COMMON = 4.0  # noise units of what all taxels share that are taken off; a palm must not cancel itself
@@ -63,81 +59,6 @@ class Mounting:
         if self.rotate == 270:
             return rows - 1 - y, x
         return x, y
-
-
-Learned = tuple[Array, Array, NDArray[np.bool_], bool, bool, Array]  # baseline, noise, constant, stable, fine, frames
-
-
-class Settling:
-    """Collects frames until one second of them shows no movement, and says what the idle sensor looks like."""
-
-    def __init__(self) -> None:
-        self._frames: deque[tuple[float, Array]] = deque()
-        self._since: float | None = None
-
-    @property
-    def started(self) -> bool:
-        """Whether anything is collected."""
-        return self._since is not None
-
-    def clear(self) -> None:
-        """Forget what was collected: the sensor was touched."""
-        self._frames.clear()
-        self._since = None
-
-    def push(self, t: float, raw: Array, *, patience: bool) -> Learned | None:
-        """Take one frame of (N,) counts; returns what was learned or nothing yet.
-
-        `patience` allows an answer that is not stable after `PATIENCE_S`.
-        """
-        frames = self._frames
-        if self._since is None:
-            self._since = t
-        if not frames or t - frames[-1][0] >= SETTLE_S / SETTLE_FRAMES:
-            frames.append((t, raw))
-        if t - frames[0][0] < SETTLE_S or len(frames) < 4:
-            return None
-        stack = np.array([f for _, f in frames])  # (n, N)
-        baseline, noise, constant, restless, fine = _idle(stack)
-        stable = restless <= min(3, raw.size // 20)
-        if not stable and not (patience and t - self._since >= PATIENCE_S):
-            while t - frames[0][0] >= SETTLE_S - LOOK_S:  # look again soon: movement may just have ended
-                frames.popleft()
-            return None
-        self.clear()
-        return baseline, noise, constant, stable, fine, stack
-
-
-def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int, bool]:
-    """(n, N) counts -> baseline (N,), noise (N,), taxels that never changed (N,), how many moved, does noise show?"""
-    n = len(stack)
-    baseline = np.median(stack, axis=0)
-    # Successive differences see noise and not slow movement; mean absolute values, since one outlier must not rule.
-    jumps = np.abs(np.diff(stack, axis=0))
-    rough = jumps.mean(axis=0) / 1.128
-    # Where idle taxels are clipped at zero, most of them seem quieter than they are: the upper quartile knows better.
-    clipped = np.count_nonzero((stack == stack.min()).sum(axis=0) >= 2) * 4 >= rough.size
-    pooled = float(np.quantile(rough[rough > 0], 0.75 if clipped else 0.5)) if rough.any() else 0.0
-    step = quantum(stack, jumps)
-    floor = max(pooled, step)  # below one step noise cannot be known: one step stands for it
-    spread = np.abs(stack - baseline).mean(axis=0) * 1.2533
-    shift = np.abs(np.median(stack[: n // 2], axis=0) - np.median(stack[n // 2 :], axis=0))
-    moved = int(np.count_nonzero((spread > RESTLESS * floor) | (shift > RESTLESS * floor)))
-    # A second of frames knows a taxel's own noise badly: lean on all taxels together.
-    noise = np.maximum(np.sqrt((n * spread**2 + 16 * floor**2) / (n + 16)), floor / 2)
-    constant = ~jumps.any(axis=0)
-    if clipped or pooled < step or np.count_nonzero(constant) > stack.shape[1] // 4:
-        constant[:] = False  # a clipped or coarse sensor stands still when idle: that proves nothing
-    return baseline, noise, constant, moved, pooled >= 0.35 * step
-
-
-def quantum(stack: Array, jumps: Array) -> float:
-    """One quantisation step of the sensor in counts: 1 for integers, else the smallest change seen, never 0."""
-    if np.array_equal(stack, np.rint(stack)) and np.abs(stack).max() < 2**52:
-        return 1.0
-    seen = jumps[jumps > 0]
-    top = float(np.abs(stack).max())
-    return max(float(seen.min()) if seen.size else 0.0, top * 1e-6, 1e-35)
 
 
 class Conditioner:
@@ -249,7 +170,9 @@ class Conditioner:
             self._settling.clear()
         if self._frozen.any():
             self._freeze(t, raw, d)
-        if self._tracked is not None:
+        if self._tracked is None:
+            self._reviewed = t  # the time that passed unseen says nothing of the noise
+        else:
             tau = RECOVERY_TAU_S if recovering else BASELINE_TAU_S
             self._usual += (min(activity, 2 * self._typical) * self._scale - self._usual) * -math.expm1(
                 (self._tracked - t) / NOISE_TAU_S
@@ -270,7 +193,7 @@ class Conditioner:
         self._freeze(t, raw, d)
 
     def _freeze(self, t: float, raw: Array, d: Array) -> None:
-        """A finger trembles; what stays pressed to the last digit, below the sensor's limit, is a fault of the sensor."""
+        """A finger trembles; what stays pressed to the last digit, below the sensor's limit, is a fault."""
         changed = raw != self._previous
         self._previous = raw
         self._still_since = np.where(changed, t, np.minimum(self._still_since, t))
@@ -317,7 +240,7 @@ class Conditioner:
         self.bad = self._stuck | self._frozen | (self._sigma > NOISY * self.noise)
         if self.bad.all():
             self.bad = np.zeros_like(self.bad)
-        # Clipping, hum and bursts make idle maxima larger than normal deviates': activity is told in what is usual here.
+        # Clipping, hum and bursts make idle maxima larger than normal deviates': activity is told in what is usual.
         self._scale = min(max(self._usual / self._typical, 1.0), 5.0)
         self._weight = np.where(self.bad, 0.0, 1.0 / (self._scale * np.maximum(self._sigma, 0.2 * self.noise)))
 

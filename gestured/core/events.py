@@ -59,7 +59,7 @@ class Cancelled:
 
     sensor: str
     id: int
-    reason: str  # "held", "silence", "restart", "glitch", "refractory", "model"
+    reason: str  # held, silence, restart, glitch, stuck, refractory, model, internal_error
 
 
 @dataclass(frozen=True, slots=True)

@@ -229,8 +229,8 @@ class Recognizer:
     """Frames of one sensor in, events out. `classifier` may be replaced between two frames.
 
     `gestures` restricts the answer to a subset; what falls to the others is not given to those that are left.
-    `thresholds` are the confidences below which a gesture is unknown, where not the model's own is to hold; `refractory` seconds in which the same
-    gesture is not published again.
+    `thresholds` are the confidences below which a gesture is unknown, where not the model's own is to hold.
+    `refractory` are the seconds in which the same gesture is not published again.
     """
 
     def __init__(

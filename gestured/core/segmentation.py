@@ -130,7 +130,7 @@ class Segmenter:
         self._widest = 0.0
 
     def push(self, t: float, activity: float, place: tuple[float, float] | None) -> list[Action]:
-        """One frame at `t` s, after `flush(t)`; `place` is the centroid (row, column) where activity is at least `off`."""
+        """One frame at `t` s, after `flush(t)`; `place`: the centroid (row, column), if activity is at least `off`."""
         actions: list[Action] = []
         level = self._level(t, activity)
         before = self.phase
@@ -165,17 +165,17 @@ class Segmenter:
         return actions
 
     def flush(self, t: float) -> list[Action]:
-        """What the time alone decides until `t` s. Comes before `push`, so that a late frame cannot join what is over."""
+        """What the time alone decides until `t` s. Comes before `push`: a late frame cannot join what is over."""
         actions: list[Action] = []
         timing = self.timing
-        if self.phase in TOUCHED and t - self.onset >= timing.limit_s:
-            self._step(t, Signal.LIMIT, actions)
         if self._quiet_since is not None:
             quiet = t - self._quiet_since
             if self.phase in (Phase.RELEASING, Phase.SPENT) and quiet >= timing.release_s:
                 self._step(t, Signal.TAPPED if self._is_tap() else Signal.RELEASED, actions)
             if self.phase is Phase.GAP and quiet >= timing.tap_gap_s:
                 self._step(t, Signal.GAP_OVER, actions)
+        if self.phase in TOUCHED and t - self.onset >= timing.limit_s:
+            self._step(t, Signal.LIMIT, actions)
         return actions
 
     def recovering(self, t: float) -> bool:
