@@ -1,0 +1,88 @@
+"""What the idle sensor looks like: learned from one second in which nothing moved."""
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SETTLE_S = 0.93  # a stable second at 15 Hz: half-way between its last two frames, so jitter cannot miss it
+LOOK_S = 0.06  # how often it is looked whether the last second was stable
+SETTLE_FRAMES = 64  # frames kept of that second; faster sensors are thinned out
+PATIENCE_S = 5.0  # a sensor that never settles (hum, a hand that never rests) is used all the same after this
+RESTLESS = 5.0  # a taxel that moves more than this many times the sensor's noise was touched, or is bad
+
+Learned = tuple[Array, Array, NDArray[np.bool_], bool, bool, Array]  # baseline, noise, constant, stable, fine, frames
+
+
+class Settling:
+    """Collects frames until one second of them shows no movement, and says what the idle sensor looks like."""
+
+    def __init__(self) -> None:
+        self._frames: deque[tuple[float, Array]] = deque()
+        self._since: float | None = None
+
+    @property
+    def started(self) -> bool:
+        """Whether anything is collected."""
+        return self._since is not None
+
+    def clear(self) -> None:
+        """Forget what was collected: the sensor was touched."""
+        self._frames.clear()
+        self._since = None
+
+    def push(self, t: float, raw: Array, *, patience: bool) -> Learned | None:
+        """Take one frame of (N,) counts; returns what was learned or nothing yet.
+
+        `patience` allows an answer that is not stable after `PATIENCE_S`.
+        """
+        frames = self._frames
+        if self._since is None:
+            self._since = t
+        if not frames or t - frames[-1][0] >= SETTLE_S / SETTLE_FRAMES:
+            frames.append((t, raw))
+        if t - frames[0][0] < SETTLE_S or len(frames) < 4:
+            return None
+        stack = np.array([f for _, f in frames])  # (n, N)
+        baseline, noise, constant, restless, fine = _idle(stack)
+        stable = restless <= min(3, raw.size // 20)
+        if not stable and not (patience and t - self._since >= PATIENCE_S):
+            while t - frames[0][0] >= SETTLE_S - LOOK_S:  # look again soon: movement may just have ended
+                frames.popleft()
+            return None
+        self.clear()
+        return baseline, noise, constant, stable, fine, stack
+
+
+def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int, bool]:
+    """(n, N) counts -> baseline (N,), noise (N,), taxels that never changed (N,), how many moved, does noise show?"""
+    n = len(stack)
+    baseline = np.median(stack, axis=0)
+    # Successive differences see noise and not slow movement; mean absolute values, since one outlier must not rule.
+    jumps = np.abs(np.diff(stack, axis=0))
+    rough = jumps.mean(axis=0) / 1.128
+    # Where idle taxels are clipped at zero, most of them seem quieter than they are: the upper quartile knows better.
+    clipped = np.count_nonzero((stack == stack.min()).sum(axis=0) >= 2) * 4 >= rough.size
+    pooled = float(np.quantile(rough[rough > 0], 0.75 if clipped else 0.5)) if rough.any() else 0.0
+    step = quantum(stack, jumps)
+    floor = max(pooled, step)  # below one step noise cannot be known: one step stands for it
+    spread = np.abs(stack - baseline).mean(axis=0) * 1.2533
+    shift = np.abs(np.median(stack[: n // 2], axis=0) - np.median(stack[n // 2 :], axis=0))
+    moved = int(np.count_nonzero((spread > RESTLESS * floor) | (shift > RESTLESS * floor)))
+    # A second of frames knows a taxel's own noise badly: lean on all taxels together.
+    noise = np.maximum(np.sqrt((n * spread**2 + 16 * floor**2) / (n + 16)), floor / 2)
+    constant = ~jumps.any(axis=0)
+    if clipped or pooled < step or np.count_nonzero(constant) > stack.shape[1] // 4:
+        constant[:] = False  # a clipped or coarse sensor stands still when idle: that proves nothing
+    return baseline, noise, constant, moved, pooled >= 0.35 * step
+
+
+def quantum(stack: Array, jumps: Array) -> float:
+    """One quantisation step of the sensor in counts: 1 for integers, else the smallest change seen, never 0."""
+    if np.array_equal(stack, np.rint(stack)) and np.abs(stack).max() < 2**52:
+        return 1.0
+    seen = jumps[jumps > 0]
+    top = float(np.abs(stack).max())
+    return max(float(seen.min()) if seen.size else 0.0, top * 1e-6, 1e-35)
