@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 BASELINE_TAU_S = 2.0
 RECOVERY_TAU_S = 0.4  # just after a contact: textile comes back slowly, and what is left of it is no touch
 NOISE_TAU_S = 30.0
+UNSEEN_S = 4.0  # at most so much of what passed under a contact or in silence counts as seen in one look
 REVIEW_S = 0.5  # noise moves slowly: it is looked at twice a second
 NOISY = 8.0  # a taxel with more than this many times the sensor's noise is bad
 FROZEN_S = 0.4  # a pressed taxel that does not change by its noise for so long is no finger
@@ -159,10 +160,13 @@ class Conditioner:
         below = scaled < -max(level, 0.3 * float(scaled.max()))
         return int(np.count_nonzero(below)) * 20 >= 3 * d.size
 
-    def idle(self, t: float, raw: Array, d: Array, activity: float, *, sunken: bool, recovering: bool) -> None:
+    def idle(
+        self, t: float, raw: Array, d: Array, activity: float, *, sunken: bool, burst: bool, recovering: bool
+    ) -> None:
         """Follow the idle sensor: baseline with `BASELINE_TAU_S` (`RECOVERY_TAU_S`), noise with `NOISE_TAU_S`.
 
         `sunken`: some taxel lies clearly below its baseline, as after a hand that rested there when it was learned.
+        `burst`: deeper than textile swings after a contact; one such reading must not pull the baseline down.
         """
         if self._provisional or sunken:
             self.settle(t, raw)
@@ -170,14 +174,14 @@ class Conditioner:
             self._settling.clear()
         if self._frozen.any():
             self._freeze(t, raw, d)
-        if self._tracked is None:
-            self._reviewed = t  # the time that passed unseen says nothing of the noise
-        else:
+        if self._tracked is not None:
+            self._reviewed = max(self._reviewed, t - UNSEEN_S)
             tau = RECOVERY_TAU_S if recovering else BASELINE_TAU_S
             self._usual += (min(activity, 2 * self._typical) * self._scale - self._usual) * -math.expm1(
                 (self._tracked - t) / NOISE_TAU_S
             )
-            self._baseline = self._baseline + d * -math.expm1((self._tracked - t) / tau)
+            if not burst:
+                self._baseline = self._baseline + d * -math.expm1((self._tracked - t) / tau)
             if t - self._reviewed >= REVIEW_S:
                 seen = np.minimum(np.abs(d), 4 * self._sigma) * 1.2533
                 self._sigma = self._sigma + (seen - self._sigma) * -math.expm1((self._reviewed - t) / NOISE_TAU_S)

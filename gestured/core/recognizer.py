@@ -125,7 +125,9 @@ class FrontEnd:
             return out
         d, activity, lowest = conditioner.deviation(raw)
         sunken = lowest < -segmenter.on
-        if sunken and conditioner.shifted(d, max(segmenter.on, segmenter.after_effect(t))):
+        level = max(segmenter.on, segmenter.after_effect(t)) if sunken else segmenter.on
+        burst = lowest < -level
+        if burst and conditioner.shifted(d, level):
             # Interference passes and its frames are lost; a sensor that restarted, or a hand that left, stays so.
             self._shifted = t if self._shifted is None else self._shifted
             if t - self._shifted >= self.timing.shift_s:
@@ -147,7 +149,7 @@ class FrontEnd:
         while kept[0][0] < t - LEAD_S:
             kept.popleft()
         if segmenter.phase is Phase.IDLE:
-            conditioner.idle(t, raw, d, activity, sunken=sunken, recovering=segmenter.recovering(t))
+            conditioner.idle(t, raw, d, activity, sunken=sunken, burst=burst, recovering=segmenter.recovering(t))
         else:
             conditioner.settle(t, raw)  # what stays on the sensor becomes part of its baseline
         return out
@@ -155,6 +157,8 @@ class FrontEnd:
     def flush(self, t: float) -> list[Contact]:
         """The stream paused or ended at `t` s: close what is open."""
         out: list[Contact] = []
+        if self._last is not None:
+            t = min(t, self._last + self.timing.stale_s)  # it was over then, whenever one asks
         if self.touched:
             for action in self.segmenter.flush(t):
                 out += self._act(action, t)
@@ -194,7 +198,7 @@ class FrontEnd:
 
     def _closed(self, t: float, onset: float, offset: float) -> list[Contact]:
         release = Release(self.sensor, self.segments, offset)
-        if self.segmenter.contact_s() < self.timing.glitch_s:
+        if offset - onset + self._interval < self.timing.glitch_s:  # the longest that it can have lasted
             return [Cancelled(self.sensor, self.segments, "glitch"), release]
         segment = self._segment(onset, offset)
         if float(segment.frames.max()) < self.segmenter.off * segment.noise:  # nothing is left without its bad taxels
@@ -246,7 +250,7 @@ class Recognizer:
         self.front_end = front_end
         self.classifier = classifier
         self.sequence = sequence
-        self._gestures = tuple(gestures) if gestures is not None else classifier.gestures
+        self._gestures = None if gestures is None else frozenset(gestures)
         self._thresholds = dict(thresholds or {})
         self._refractory = dict(refractory or {})
         self._last_offset: dict[str, float] = {}
@@ -276,7 +280,7 @@ class Recognizer:
         scores = {
             gesture: float(value)
             for gesture, value in zip(self.classifier.gestures, answer.values, strict=True)
-            if gesture in self._gestures
+            if self._gestures is None or gesture in self._gestures
         }
         best = max(scores, key=scores.__getitem__)
         confidence = scores[best] * (1.0 - answer.unknown)

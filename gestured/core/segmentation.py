@@ -92,7 +92,6 @@ TRANSITIONS: dict[tuple[Phase, Signal], tuple[Phase, Action | None]] = {
     (P.GAP, S.WEAK): (P.GAP, None),
     (P.GAP, S.STRONG): (P.CONTACT, None),
     (P.GAP, S.GAP_OVER): (P.IDLE, A.CLOSE),
-    (P.GAP, S.LIMIT): (P.SPENT, A.HELD),
     (P.SPENT, S.QUIET): (P.SPENT, None),
     (P.SPENT, S.WEAK): (P.SPENT, None),
     (P.SPENT, S.STRONG): (P.SPENT, None),
@@ -190,10 +189,6 @@ class Segmenter:
     def let_go(self) -> bool:
         """Whether a finger was already off when the stream ended: what is open may then be decided."""
         return self.phase in (Phase.RELEASING, Phase.GAP)
-
-    def contact_s(self) -> float:
-        """Longest that the contact can have lasted: to its first quiet frame."""
-        return (self.last_touched if self._quiet_since is None else self._quiet_since) - self.onset
 
     def _step(self, t: float, signal: Signal, actions: list[Action]) -> None:
         self.phase, action = TRANSITIONS[self.phase, signal]

@@ -51,7 +51,7 @@ class Window:
         """(T, R, C) segment -> (T', rows, columns) float32, 0..1 of the segment's own peak."""
         frames, times = self._span(segment)
         frames = self._regrid(frames, segment)
-        frames = self._retime(frames, times)
+        frames = self._retime(frames, times, float(np.median(np.diff(segment.times))) if len(times) > 1 else 0.0)
         if self.smooth_frames > 1:
             frames = _running_mean(frames, self.smooth_frames)
         frames = np.maximum(frames, 0.0)
@@ -80,7 +80,7 @@ class Window:
         if rows != columns:
             axis = 1 if rows > columns else 2  # the longer one
             touched = segment.frames[segment.first : segment.last + 1]
-            profile = touched.max(axis=(0, 3 - axis))
+            profile = np.maximum(touched.max(axis=(0, 3 - axis)), 0.0)
             used = np.flatnonzero(profile >= 0.3 * profile.max())
             length = frames.shape[axis]
             low, high = float(used[0]), float(used[-1] + 1)
@@ -91,13 +91,17 @@ class Window:
         horizontal = _resize(columns, left, side, self.columns)
         return np.asarray(vertical @ frames @ horizontal.T)
 
-    def _retime(self, frames: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """To `rate_hz` by time stamps: averaged where the sensor is faster, interpolated where it is slower."""
+    def _retime(
+        self, frames: NDArray[np.float64], times: NDArray[np.float64], usual: float
+    ) -> NDArray[np.float64]:
+        """To `rate_hz` by time stamps: averaged where the sensor is faster, interpolated where it is slower.
+
+        `usual` is the sensor's own step in seconds, of all frames that are at hand: a tap alone has too few.
+        """
         if len(times) < 2:
             return frames
         step = 1.0 / self.rate_hz
         steps = np.diff(times)
-        usual = float(np.median(steps))
         flat = frames.reshape(len(frames), -1)
         if abs(usual - step) <= SAME_RATE * step:
             missing = np.maximum(np.rint(steps / step).astype(int), 1)
@@ -124,7 +128,7 @@ def _resize(size: int, start: float, side: float, cells: int) -> NDArray[np.floa
         overlap = np.minimum(low + width, taxel + 1.0) - np.maximum(low, taxel)
         return np.maximum(overlap, 0.0) / width
     centre = start + width * (np.arange(cells)[:, None] + 0.5) - 0.5
-    centre = np.clip(centre, max(start, 0.0), min(start + side, size) - 1.0)
+    centre = np.clip(centre, start, start + side - 1.0)
     return np.maximum(1.0 - np.abs(centre - taxel), 0.0)
 
 

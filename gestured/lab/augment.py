@@ -79,7 +79,8 @@ def varied(x: Tensor, generator: torch.Generator) -> Tensor:
         lost = torch.randint(1, time - 1, (batch,), generator=generator)
         index = torch.arange(batch)
         bridged = (x[index, lost - 1] + x[index, lost + 1]) / 2
-        keep = (draw(batch, 1, 1) < 0.8).float()
+        inside = lost < _last(x)
+        keep = ((draw(batch, 1, 1) < 0.8) | ~inside[:, None, None]).float()
         x = x.clone()
         x[index, lost] = keep * x[index, lost] + (1 - keep) * bridged
     noise = torch.randn(x.shape, generator=generator) * (0.08 * draw(batch, 1, 1, 1) ** 2) * some(0.5)

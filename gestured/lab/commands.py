@@ -10,10 +10,11 @@ import torch
 
 from gestured.core.errors import GesturedError
 from gestured.lab.cards import write_cards
+from gestured.lab.cli import REAL
 from gestured.lab.evaluate import Outcome, held_out_kinds, real_figures, simulated_figures
 from gestured.lab.export import write_manifest
 from gestured.lab.train import Plan, calibration_set, learn, load, train
-from gestured.models import LADDER
+from gestured.models import LADDER, open_model
 
 
 def _plan(args: argparse.Namespace) -> tuple[Plan, Path | None]:
@@ -21,6 +22,8 @@ def _plan(args: argparse.Namespace) -> tuple[Plan, Path | None]:
         raise GesturedError(f"--jobs: expected 1 or more, found {args.jobs}")
     torch.set_num_threads(args.jobs)
     real = args.real if args.real.is_dir() else None
+    if real is None and args.real != REAL:
+        raise GesturedError(f"--real: {args.real} is no folder")
     return (Plan.quick() if args.quick else Plan()), real
 
 
@@ -38,6 +41,8 @@ def evaluate_models(args: argparse.Namespace) -> int:
     """Print the figures, and keep them in the manifest and the cards."""
     plan, real = _plan(args)
     paths = {name: args.models / f"{name}.onnx" for name in LADDER}
+    for path in paths.values():
+        open_model(path)  # says what is wrong before anything is simulated
     data = load(plan, args.cache, real, args.jobs)
     print(Outcome.HEAD, flush=True)
     figures: dict[str, dict[str, Any]] = {

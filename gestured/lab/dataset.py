@@ -6,6 +6,7 @@ matched with what was performed. Simulated sets are cached, keyed by everything 
 
 import hashlib
 import multiprocessing
+import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -194,7 +195,7 @@ def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) ->
         with np.load(path, allow_pickle=False) as stored:
             return Samples(*(stored[name] for name in Samples.__slots__))
     make: Callable[[int], list[Sample]] = partial(STREAMS[stream], seed)
-    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
+    with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
         made = pool.imap(make, range(count), chunksize=50)
         samples = collect(s for found in progress(made, count, f"simulating {stream}") for s in found)
     cache.mkdir(parents=True, exist_ok=True)

@@ -136,8 +136,15 @@ def write_manifest(directory: str | Path, figures: Mapping[str, Any]) -> Path:
         except (ValueError, KeyError) as error:
             raise ModelError(f"{path}: {error}") from None
     target = Path(directory) / "manifest.json"
-    _write(target, (json.dumps({"models": models}, indent=2) + "\n").encode())
+    _write(target, (json.dumps({"models": _plain(models)}, indent=2, allow_nan=False) + "\n").encode())
     return target
+
+
+def _plain(value: Any) -> Any:
+    """The same with null for what is not a finite number: JSON has no NaN."""
+    if isinstance(value, Mapping):
+        return {key: _plain(of) for key, of in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _metadata(

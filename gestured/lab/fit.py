@@ -5,6 +5,7 @@ simulated ones; it is short, so that folds over real subjects can each have thei
 the split (`augment`). Nothing is padded with meaning: answers are read at the last active frame.
 """
 
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,6 +82,7 @@ def one_epoch(
     """Go once over `sets` of (samples, labels, chosen); returns the mean loss."""
     rng = np.random.default_rng([config.seed, epoch])
     generator = torch.Generator().manual_seed(config.seed * 1000 + epoch)
+    torch.manual_seed(config.seed * 1000 + epoch)  # dropout, so that a resumed run is the same
     table = symmetry_table(CLASSES)
     criterion = nn.CrossEntropyLoss(label_smoothing=config.smoothing)
     nets.train()
@@ -172,7 +174,7 @@ def _optimiser(
     groups = [{"params": list(nets[name].parameters()), "lr": rate} for name, rate in zip(NETS, rates, strict=True)]
     optimiser = torch.optim.AdamW(groups, weight_decay=config.decay)
     return optimiser, torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, rates, total_steps=max(steps, 2), pct_start=0.1, div_factor=10, cycle_momentum=False
+        optimiser, rates, total_steps=max(steps, 11), pct_start=0.1, div_factor=10, cycle_momentum=False
     )
 
 
@@ -227,8 +229,10 @@ def _restore(
     whole = optimiser.state_dict()
     optimiser.load_state_dict({**whole, "state": state})
     steps = int(next(iter(state.values()))["step"]) if state else 0
-    for _ in range(steps):
-        schedule.step()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of a step before the optimiser's
+        for _ in range(steps):
+            schedule.step()
     return epochs
 
 

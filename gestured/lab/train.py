@@ -27,7 +27,7 @@ from gestured.lab.fit import CLASSES, FitConfig, finetune, load_nets, logits, pr
 from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.nets import Judged
 from gestured.recording import read
-from gestured.simulator import GESTURES
+from gestured.simulator import GESTURES, NONE, wide
 
 REAL = ("capfingerid_gestures_dev.npz", "capfingerid_sessions_dev.npz")
 FOLDS = 3
@@ -47,7 +47,7 @@ class Plan:
     @classmethod
     def quick(cls) -> "Plan":
         """A run of some minutes, to try the pipeline; its models are worth nothing."""
-        return cls(1_500, 400, len(TRIALS), 1_000, 2_000, FitConfig(epochs=3, real_epochs=1, real_samples=1_000))
+        return cls(1_500, 400, len(TRIALS), len(OTHERS), 2_000, FitConfig(epochs=3, real_epochs=1, real_samples=1_000))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def load(plan: Plan, cache: Path, real: Path | None, jobs: int) -> Data:
         len(own),
         join([check, both.take((person >= 24) & (person < 28))]),
         {"nominal": both.take(person >= 28), "wide": test},
-        {"nominal": int((plans >= 28).sum()), "wide": int((test.labels != "none").sum())},
+        {"nominal": int((plans >= 28).sum()), "wide": sum(wide(3, index).label != NONE for index in range(plan.wide_check))},
         _real(cache, real),
     )
 
@@ -172,7 +172,7 @@ def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged,
     return Judged(trained.nets[name], trained.nets["trajectory"], decision).eval(), calibration
 
 
-def grow_forest(data: Data, plan: Plan) -> tuple[RandomForestClassifier, dict[str, Any]]:
+def grow_forest(data: Data, plan: Plan, jobs: int) -> tuple[RandomForestClassifier, dict[str, Any]]:
     """The touch-pattern forest of the paper's Table IV (200 trees, depth 9), with a class for what is no gesture."""
     wide = len(data.teach) - data.nominal  # the cohort stands at the end
     chosen = np.random.default_rng(plan.fit.seed).choice(wide, min(plan.forest, wide), replace=False)
@@ -181,7 +181,7 @@ def grow_forest(data: Data, plan: Plan) -> tuple[RandomForestClassifier, dict[st
         parts.append(data.real)
     samples = join(parts)
     forest = RandomForestClassifier(
-        200, max_depth=9, min_samples_leaf=2, n_jobs=2, random_state=plan.fit.seed
+        200, max_depth=9, min_samples_leaf=2, n_jobs=jobs, random_state=plan.fit.seed
     )
     forest.fit(samples.features(), np.minimum(_classes(samples), len(GESTURES)))
     labels = np.minimum(_classes(data.calibrate), len(GESTURES))
@@ -247,7 +247,7 @@ def train(plan: Plan, out: Path, cache: Path, real: Path | None, jobs: int) -> D
     for name in ("cnn_lstm", "lstm"):
         module, calibration = judged(trained, name, calibrated)
         export_net(module, out / f"{name}.onnx", kind=name, calibration=calibration, **common)
-    forest, calibration = grow_forest(data, plan)
+    forest, calibration = grow_forest(data, plan, jobs)
     features: Sequence[str] = feature_names(WINDOW.rows, WINDOW.columns)
     export_forest(
         forest, out / "touch_pattern_rf.onnx", kind="touch_pattern_rf", calibration=calibration, features=features, **common
