@@ -8,8 +8,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from gestured.control.address import default_socket
 from gestured.client.stream import Refused, Stream, Unreachable
+from gestured.control.address import default_socket
 
 TYPES = ("gesture", "unknown", "cancelled", "onset", "release", "status")
 RETRY_S = 0.5

@@ -87,10 +87,14 @@ def frames(start: float, take: Take) -> Iterator[tuple[int, Frame]]:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The flags of a play."""
-    parser.add_argument("--participant", type=int, default=900, metavar="N", help="who performs (default: 900; the models learned from 0 to 33)")
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="another order of things (default: 0)"
+        "--participant",
+        type=int,
+        default=900,
+        metavar="N",
+        help="who performs (default: 900; the models learned from 0 to 33)",
     )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="another order of things (default: 0)")
     parser.add_argument(
         "--kinds", type=_kinds, default=(), metavar="A,B", help="perform these in turn (default: at random)"
     )
@@ -102,20 +106,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="share of what is no gesture (default: 0.2)",
     )
     parser.add_argument("--speed", choices=tuple(SPEEDS), help="how fast the person moves (default: mixed)")
-    parser.add_argument(
-        "--rate", type=_rate, default=15.0, metavar="HZ", help="frames a second (default: 15)"
-    )
-    parser.add_argument(
-        "--grid", type=_grid, default=(9, 9), metavar="RxC", help="rows and columns (default: 9x9)"
-    )
+    parser.add_argument("--rate", type=_rate, default=15.0, metavar="HZ", help="frames a second (default: 15)")
+    parser.add_argument("--grid", type=_grid, default=(9, 9), metavar="RxC", help="rows and columns (default: 9x9)")
 
 
 def play_from(args: argparse.Namespace) -> Play:
     """The play that the flags ask for."""
     rows, columns = args.grid
-    return Play(
-        args.seed, args.participant, args.rate, rows, columns, args.kinds, args.non_gestures, args.speed
-    )
+    return Play(args.seed, args.participant, args.rate, rows, columns, args.kinds, args.non_gestures, args.speed)
 
 
 def _kinds(text: str) -> tuple[str, ...]:

@@ -73,7 +73,7 @@ def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int, bool]:
     moved = int(np.count_nonzero((spread > RESTLESS * floor) | (shift > RESTLESS * floor)))
     # A second of frames knows a taxel's own noise badly: lean on all taxels together.
     noise = np.maximum(np.sqrt((n * spread**2 + 16 * floor**2) / (n + 16)), floor / 2)
-    constant = ~jumps.any(axis=0)
+    constant = np.all(jumps == 0, axis=0)
     if clipped or pooled < step or np.count_nonzero(constant) > stack.shape[1] // 4:
         constant[:] = False  # a clipped or coarse sensor stands still when idle: that proves nothing
     return baseline, noise, constant, moved, pooled >= 0.35 * step

@@ -126,10 +126,10 @@ def _resize(size: int, start: float, side: float, cells: int) -> NDArray[np.floa
     if width >= 1.0:
         low = start + width * np.arange(cells)[:, None]
         overlap = np.minimum(low + width, taxel + 1.0) - np.maximum(low, taxel)
-        return np.maximum(overlap, 0.0) / width
+        return np.asarray(np.maximum(overlap, 0.0) / width)
     centre = start + width * (np.arange(cells)[:, None] + 0.5) - 0.5
     centre = np.clip(centre, start, start + side - 1.0)
-    return np.maximum(1.0 - np.abs(centre - taxel), 0.0)
+    return np.asarray(np.maximum(1.0 - np.abs(centre - taxel), 0.0))
 
 
 def _interpolate(

@@ -41,7 +41,9 @@ def replay_speed(model: str, take: Take) -> list[float]:
 def _answers(model: str, take: Take) -> int:
     """How many segments a replay in the process answers."""
     recognizer = Recognizer(FrontEnd("bench", *take.frames.shape[1:]), open_model(model))
-    events = [e for t, f in zip(take.sensor_times, take.frames, strict=True) for e in recognizer.push(Frame(float(t), f))]
+    events = [
+        e for t, f in zip(take.sensor_times, take.frames, strict=True) for e in recognizer.push(Frame(float(t), f))
+    ]
     events += recognizer.flush(float(take.sensor_times[-1]) + 2)
     return sum(isinstance(e, Gesture | Unknown) for e in events)
 

@@ -28,6 +28,32 @@ def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: Pl
         (folder / f"{name}.md").write_text(_card(folder / f"{name}.onnx", name, found, plan))
 
 
+BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
+
+
+def write_block(readme: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
+    """Renew the table of figures between the marks in a README; ValueError where they are missing."""
+    text = readme.read_text()
+    if text.count(BEGIN) != 1 or text.count(END) != 1:
+        raise ValueError(f"{readme}: expected the marks {BEGIN} and {END} once each")
+    rows = [
+        _row(f"`{name}`, {title}", values)
+        for name, found in figures.items()
+        for title, values in [
+            *((f"simulated, {test}", values) for test, values in found["simulated"].items()),
+            *((f"real, {k}", v) for k, v in found.get("real", {}).items() if k != "kinds"),
+        ]
+    ]
+    block = "\n".join([BEGIN, *HEAD, *rows, END])
+    readme.write_text(text[: text.index(BEGIN)] + block + text[text.index(END) + len(END) :])
+
+
+HEAD = (
+    "| set | gestures | right\\* | right | wrong | lost | non-gestures | rejected |",
+    "|---|---|---|---|---|---|---|---|",
+)
+
+
 def _card(path: Path, name: str, found: Mapping[str, Any], plan: Plan) -> str:
     model = open_model(path)
     real = "real" in found
@@ -68,8 +94,8 @@ nominal 9 x 9 sensor, *wide* other people on randomised sensors of every quality
 each subject judged by networks that have not seen them (three folds). Shares of the gestures that were performed; *right\\** is
 before rejection, *lost* is unknown or never cut out; *rejected* is of the non-gestures.
 
-| set | gestures | right\\* | right | wrong | lost | non-gestures | rejected |
-|---|---|---|---|---|---|---|---|
+{HEAD[0]}
+{HEAD[1]}
 {table}
 {extra}
 ## Limits
@@ -83,5 +109,3 @@ def _row(title: str, values: Mapping[str, Any]) -> str:
     shares = " | ".join(f"{n:.3f}" for n in numbers)
     rejected = f"{values['rejected']:.3f}" if values["others"] else "-"
     return f"| {title} | {values['gestures']} | {shares} | {values['others']} | {rejected} |"
-
-

@@ -44,6 +44,7 @@ def parser() -> argparse.ArgumentParser:
     evaluate = add("evaluate", "print what the models are worth on people never seen; writes cards and manifest",
                    "gestured-lab evaluate --models models")  # fmt: skip
     evaluate.add_argument("--models", type=Path, default=MODELS, help=f"folder of the models ({MODELS})")
+    evaluate.add_argument("--readme", type=Path, help="a README whose table of figures is renewed")
     add_data(evaluate)
     online = add("online", "send continuous simulated sessions to a running daemon over UDP and score its events",
                  "gestured-lab online --model cnn_lstm --minutes 10")  # fmt: skip

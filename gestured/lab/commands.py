@@ -9,7 +9,7 @@ from typing import Any
 import torch
 
 from gestured.core.errors import GesturedError
-from gestured.lab.cards import write_cards
+from gestured.lab.cards import write_block, write_cards
 from gestured.lab.cli import REAL
 from gestured.lab.evaluate import Outcome, held_out_kinds, real_figures, simulated_figures
 from gestured.lab.export import write_manifest
@@ -32,8 +32,11 @@ def train_models(args: argparse.Namespace) -> int:
     plan, real = _plan(args)
     start = time.monotonic()
     train(plan, args.out, args.cache, real, args.jobs)
-    print(f"trained in {(time.monotonic() - start) / 60:.1f} minutes (finished steps are taken from {args.cache})", flush=True)
-    args.models = args.out
+    print(
+        f"trained in {(time.monotonic() - start) / 60:.1f} minutes (finished steps are taken from {args.cache})",
+        flush=True,
+    )
+    args.models, args.readme = args.out, None
     return evaluate_models(args)
 
 
@@ -54,6 +57,11 @@ def evaluate_models(args: argparse.Namespace) -> int:
     figures["cnn_lstm"]["held_out_kinds"] = held_out_kinds(trained, data, plan)
     write_manifest(args.models, figures)
     write_cards(args.models, figures, plan)
+    if args.readme:
+        try:
+            write_block(args.readme, figures)
+        except ValueError as error:
+            raise GesturedError(str(error)) from None
     if args.json:
         print(json.dumps(figures, indent=2))
     return 0

@@ -11,20 +11,30 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import gestured.core
 import gestured.simulator
+from gestured.core.errors import RecordingError
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment
 from gestured.core.recognizer import Cut, FrontEnd
 from gestured.core.window import Window
 from gestured.lab.progress import progress
 from gestured.simulator import (
-    NON_GESTURES, SPEEDS, Participant, Sensor, Take, cohort_plan, cohort_take, generator, gesture_take, wide,
+    NON_GESTURES,
+    SPEEDS,
+    Participant,
+    Sensor,
+    Take,
+    cohort_plan,
+    cohort_take,
+    generator,
+    gesture_take,
+    wide,
 )  # fmt: skip
 
 if TYPE_CHECKING:
@@ -214,27 +224,29 @@ def _recorded(recordings: "Recordings", i: int, seed: int) -> Iterator[Sample]:
     frames, times = recordings.frames_of(i), recordings.times_of(i)
     person = int(recordings.subjects[i])
     if recordings.labels[i] == "session":
-        mine = np.flatnonzero(recordings.event_recording == i)
+        of, labels, kinds, onsets, offsets = (
+            _needed(recordings, f"event_{name}") for name in ("recording", "labels", "kinds", "onsets", "offsets")
+        )
         performed = [
-            Performed(
-                str(recordings.event_labels[k]), str(recordings.event_kinds[k]), person,
-                float(recordings.event_onsets[k]), float(recordings.event_offsets[k]),
-            )
-            for k in mine
-        ]  # fmt: skip
+            Performed(str(labels[k]), str(kinds[k]), person, float(onsets[k]), float(offsets[k]))
+            for k in np.flatnonzero(of == i)
+        ]
         known = [p for p in performed if p.label != "other"]
         for segment in cuts(frames, times):
-            if all(
-                segment.offset < p.onset or segment.onset > p.offset for p in performed if p.label == "other"
-            ):
+            if all(segment.offset < p.onset or segment.onset > p.offset for p in performed if p.label == "other"):
                 yield from matched([segment], known)
         return
-    frames, times, lead = with_idle(
-        frames, times, int(recordings.onsets[i]), int(recordings.releases[i]), seed + i
-    )
-    first, last = int(recordings.onsets[i]) + lead, int(recordings.releases[i]) + lead
-    label, kind = str(recordings.labels[i]), str(recordings.kinds[i])
-    yield from matched(cuts(frames, times), [Performed(label, kind, person, times[first], times[last])])
+    first, last = int(_needed(recordings, "onsets")[i]), int(_needed(recordings, "releases")[i])
+    frames, times, lead = with_idle(frames, times, first, last, seed + i)
+    label, kind = str(recordings.labels[i]), str(_needed(recordings, "kinds")[i])
+    yield from matched(cuts(frames, times), [Performed(label, kind, person, times[first + lead], times[last + lead])])
+
+
+def _needed(recordings: "Recordings", field: str) -> NDArray[Any]:
+    found: NDArray[Any] | None = getattr(recordings, field)
+    if found is None:
+        raise RecordingError(f"{field}: missing; without it nobody knows what was performed when")
+    return found
 
 
 def with_idle(

@@ -120,7 +120,9 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: Data) -> dict[s
         levels = []
         for held in folds(real):
             keep = np.concatenate([np.ones(simulated_rows, bool), ~held[labels >= 0]])
-            part = Calibrated({n: x[torch.from_numpy(keep)] for n, x in calibrated.logits.items()}, calibrated.labels[keep])
+            part = Calibrated(
+                {n: x[torch.from_numpy(keep)] for n, x in calibrated.logits.items()}, calibrated.labels[keep]
+            )
             module, calibration = judged(trained, name, part)
             with torch.no_grad():
                 out = module.decision(*(trained.held_out[n][torch.from_numpy(held)] for n in (name, "trajectory")))
@@ -211,7 +213,7 @@ def _refit(cues: Cues, which: int, hidden: list[int], plan: Plan) -> nn.Module:
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 4e-3, total_steps=steps, pct_start=0.1)
     criterion = nn.CrossEntropyLoss(label_smoothing=plan.fit.smoothing)
     for _ in range(epochs):
-        for part in torch.randperm(len(x)).split(256):
+        for part in torch.split(torch.randperm(len(x)), 256):
             loss = criterion(head(x[part]), y[part])
             optimiser.zero_grad()
             loss.backward()

@@ -96,7 +96,7 @@ def one_epoch(
         y = table[symmetry][torch.from_numpy(labels[index])]
         loss = torch.stack([criterion(net(x), y) for net in nets.values()]).sum()
         optimiser.zero_grad()
-        loss.backward()
+        loss.backward()  # type: ignore[no-untyped-call]
         nn.utils.clip_grad_norm_(nets.parameters(), config.clip)
         optimiser.step()
         schedule.step()
@@ -127,13 +127,20 @@ def pretrain(samples: Samples, config: FitConfig, checkpoint: Path) -> nn.Module
     with torch.no_grad():
         some = np.random.default_rng(config.seed).choice(chosen, min(4000, len(chosen)), replace=False)
         net.perceptron.fit_scale(
-            torch.cat([trajectory_features(padded(samples, some[i : i + 256], config.longest)) for i in range(0, len(some), 256)])
+            torch.cat(
+                [
+                    trajectory_features(padded(samples, some[i : i + 256], config.longest))
+                    for i in range(0, len(some), 256)
+                ]
+            )
         )
     steps = config.epochs * len(list(_plan(samples, labels, config, np.random.default_rng(0), chosen)))
     optimiser, schedule = _optimiser(nets, config, 1.0, steps)
     done = _restore(checkpoint, nets, optimiser, schedule)
     for epoch in range(done, config.epochs):
-        one_epoch(nets, optimiser, schedule, [(samples, labels, chosen)], config, epoch, f"epoch {epoch + 1}/{config.epochs}")
+        one_epoch(
+            nets, optimiser, schedule, [(samples, labels, chosen)], config, epoch, f"epoch {epoch + 1}/{config.epochs}"
+        )
         _store(checkpoint, nets, optimiser, epoch + 1)
     return nets
 
@@ -155,7 +162,9 @@ def finetune(start: nn.ModuleDict, simulated: Samples, real: Samples, config: Fi
             (simulated, labels, rng.choice(usable, count, replace=False)),
             (real, real_labels, balanced(real_labels, real_usable, real_count, rng)),
         ]
-        one_epoch(nets, optimiser, schedule, sets, config, 1000 + epoch, f"{title}, real {epoch + 1}/{config.real_epochs}")
+        one_epoch(
+            nets, optimiser, schedule, sets, config, 1000 + epoch, f"{title}, real {epoch + 1}/{config.real_epochs}"
+        )
     return nets
 
 
@@ -240,5 +249,5 @@ def _write(path: Path, arrays: dict[str, NDArray[np.generic]]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
     with part.open("wb") as file:
-        np.savez(file, **arrays)
+        np.savez(file, **arrays)  # type: ignore[arg-type]
     part.replace(path)

@@ -29,7 +29,7 @@ class Recurrent(nn.Module):
         super().__init__()
         self.lstm = nn.LSTM(inputs, units, batch_first=True)
         with torch.no_grad():  # remember by default (Jozefowicz et al. 2015): a gesture's beginning decides its name
-            self.lstm.bias_hh_l0[units : 2 * units] += 1.0
+            dict(self.lstm.named_parameters())["bias_hh_l0"][units : 2 * units] += 1.0
         self.head = nn.Linear(units, classes)
 
     def features(self, x: Tensor) -> Tensor:
@@ -38,13 +38,14 @@ class Recurrent(nn.Module):
 
     def embed(self, x: Tensor) -> Tensor:
         """(B, T, R, C) -> (B, units): the state at the last active frame."""
-        states, _ = self.lstm(self.features(x))
+        states: Tensor = self.lstm(self.features(x))[0]
         index = last_active(x)[:, None, None].expand(-1, 1, states.shape[2])
         return states.gather(1, index)[:, 0]
 
     def forward(self, x: Tensor) -> Tensor:
         """(B, T, R, C) -> (B, classes) logits."""
-        return self.head(self.embed(x))
+        logits: Tensor = self.head(self.embed(x))
+        return logits
 
 
 class Lstm(Recurrent):
@@ -72,12 +73,15 @@ class CnnLstm(Recurrent):
     def features(self, x: Tensor) -> Tensor:
         """(B, T, R, C) -> (B, T, 32 * cells left after pooling)."""
         batch, time = x.shape[0], x.shape[1]
-        y = self.convolutions(SCALE * x.reshape(-1, 1, x.shape[2], x.shape[3]))
+        y: Tensor = self.convolutions(SCALE * x.reshape(-1, 1, x.shape[2], x.shape[3]))
         return y.reshape(batch, time, -1)
 
 
 class Perceptron(nn.Module):
     """A small feed-forward net on standardised features; the scaling is part of it."""
+
+    mean: Tensor
+    scale: Tensor
 
     def __init__(self, inputs: int, classes: int, units: int = 160) -> None:
         super().__init__()
@@ -100,7 +104,8 @@ class Perceptron(nn.Module):
 
     def forward(self, features: Tensor) -> Tensor:
         """(B, inputs) -> (B, classes) logits."""
-        return self.layers(((features - self.mean) / self.scale).clamp(-6, 6))
+        logits: Tensor = self.layers(((features - self.mean) / self.scale).clamp(-6, 6))
+        return logits
 
 
 class Decision(nn.Module):
@@ -112,6 +117,9 @@ class Decision(nn.Module):
     """
 
     CUES = 6
+    share: Tensor
+    weight: Tensor
+    bias: Tensor
 
     def __init__(self, gestures: int) -> None:
         super().__init__()

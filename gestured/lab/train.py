@@ -79,7 +79,10 @@ def load(plan: Plan, cache: Path, real: Path | None, jobs: int) -> Data:
         len(own),
         join([check, both.take((person >= 24) & (person < 28))]),
         {"nominal": both.take(person >= 28), "wide": test},
-        {"nominal": int((plans >= 28).sum()), "wide": sum(wide(3, index).label != NONE for index in range(plan.wide_check))},
+        {
+            "nominal": int((plans >= 28).sum()),
+            "wide": sum(wide(3, index).label != NONE for index in range(plan.wide_check)),
+        },
         _real(cache, real),
     )
 
@@ -110,7 +113,9 @@ class Trained:
 
 def learn(plan: Plan, data: Data, cache: Path) -> Trained:
     """Both stages and the folds; what is done already is read from the cache."""
-    key = hashlib.sha256(json.dumps([asdict(plan.fit), data.teach.digest(), CLASSES, _code()]).encode()).hexdigest()[:12]
+    key = hashlib.sha256(json.dumps([asdict(plan.fit), data.teach.digest(), CLASSES, _code()]).encode()).hexdigest()[
+        :12
+    ]
     first = cache / f"simulated-{key}.npz"
     if not first.exists():
         save_nets(first, pretrain(data.teach, plan.fit, cache / f"checkpoint-{key}.npz"))
@@ -135,7 +140,9 @@ def _kept(path: Path, start: nn.ModuleDict, data: Data, real: Samples, plan: Pla
 def _code() -> str:
     """A digest of what shapes training besides the data and the plan."""
     here = Path(__file__).parent
-    return hashlib.sha256(b"".join((here / f"{n}.py").read_bytes() for n in ("fit", "nets", "trajectory", "augment"))).hexdigest()
+    return hashlib.sha256(
+        b"".join((here / f"{n}.py").read_bytes() for n in ("fit", "nets", "trajectory", "augment"))
+    ).hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,9 +187,7 @@ def grow_forest(data: Data, plan: Plan, jobs: int) -> tuple[RandomForestClassifi
     if data.real is not None:
         parts.append(data.real)
     samples = join(parts)
-    forest = RandomForestClassifier(
-        200, max_depth=9, min_samples_leaf=2, n_jobs=jobs, random_state=plan.fit.seed
-    )
+    forest = RandomForestClassifier(200, max_depth=9, min_samples_leaf=2, n_jobs=jobs, random_state=plan.fit.seed)
     forest.fit(samples.features(), np.minimum(_classes(samples), len(GESTURES)))
     labels = np.minimum(_classes(data.calibrate), len(GESTURES))
     chances = forest.predict_proba(data.calibrate.features())
@@ -254,4 +259,3 @@ def train(plan: Plan, out: Path, cache: Path, real: Path | None, jobs: int) -> D
     )  # fmt: skip
     write_manifest(out, {})
     return data
-

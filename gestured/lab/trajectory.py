@@ -194,4 +194,5 @@ class TrajectoryNet(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """(B, T, R, C) -> (B, classes) logits."""
-        return self.perceptron(trajectory_features(x))
+        logits: Tensor = self.perceptron(trajectory_features(x))
+        return logits
