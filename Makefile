@@ -33,6 +33,7 @@ test: .venv-dev/.dev  ## run the tests: ARGS="tests/core -k tap"
 
 lint: .venv-dev/.dev  ## ruff and mypy
 	@.venv-dev/bin/ruff check .
+	@.venv-dev/bin/ruff format --check .
 	@.venv-dev/bin/mypy
 
 lab: .venv-dev/.dev .venv-dev/.lab  ## what training needs (torch), and how to train

@@ -27,9 +27,7 @@ def blocks(language: str) -> list[str]:
 
 
 def flags(parser: argparse.ArgumentParser) -> set[str]:
-    found = {
-        option for action in parser._actions for option in action.option_strings if option.startswith("--")
-    }
+    found = {option for action in parser._actions for option in action.option_strings if option.startswith("--")}
     return found - {"--help"}
 
 
@@ -175,9 +173,7 @@ def test_the_first_steps_in_the_readme_lead_to_a_gesture(tmp_path: Path):
         program, *arguments = shlex.split(line.replace("/tmp/gestured.sock", path))
         module = {"gestured": "gestured.daemon", "gesturectl": "gestured.control"}[program]
         command = [sys.executable, "-m", module, *arguments, *more]
-        process = subprocess.Popen(
-            command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-        )
+        process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         running.append(process)
         return process
 

@@ -49,9 +49,7 @@ def faults(path: Path) -> list[str]:
         top = name.split(".")[0]
         if top == "gestured":
             other = (name.split(".") + [""])[1]
-            above = LAYERS.get(
-                other, 1 if (PACKAGE / other).is_dir() or (PACKAGE / f"{other}.py").exists() else 0
-            )
+            above = LAYERS.get(other, 1 if (PACKAGE / other).is_dir() or (PACKAGE / f"{other}.py").exists() else 0)
             beside = above == LAYERS.get(room, 1) == 2 and other != room
             if beside or above > LAYERS.get(room, 1):
                 found.append(f"{where}: {room} must not import {name}")
@@ -106,9 +104,7 @@ def test_the_rule_notices(where: str, line: str, tmp_path: Path, monkeypatch: py
 
 
 def test_the_core_runs_where_only_numpy_is_installed() -> None:
-    modules = [
-        f"gestured.core.{path.stem}" for path in (PACKAGE / "core").glob("*.py") if path.stem != "__init__"
-    ]
+    modules = [f"gestured.core.{path.stem}" for path in (PACKAGE / "core").glob("*.py") if path.stem != "__init__"]
     script = f"""
 import sys
 import numpy
@@ -117,9 +113,7 @@ for name in {modules}:
     __import__(name)
 print(*sorted({{name.split(".")[0] for name in set(sys.modules) - before}}))
 """
-    shown = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
-    )
+    shown = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
     new = set(shown.stdout.split())
     assert new >= {"gestured"}
     assert new - {"gestured", "numpy"} <= sys.stdlib_module_names

@@ -45,9 +45,7 @@ def python_without(
     absent: tuple[str, ...], code: str, path: Path, tmp_path: Path
 ) -> "subprocess.CompletedProcess[str]":
     """Runs code with gestured from `path`, as if the packages named in `absent` were not installed."""
-    blocked = (
-        f"import sys\nfor name in {absent!r}: sys.modules[name] = None\nsys.path.insert(0, {str(path)!r})\n"
-    )
+    blocked = f"import sys\nfor name in {absent!r}: sys.modules[name] = None\nsys.path.insert(0, {str(path)!r})\n"
     command = [sys.executable, "-c", blocked + code]
     return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
 
@@ -63,9 +61,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("gestured", "models"):
         shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
     build = f"import setuptools.build_meta as backend; backend.build_wheel({str(out)!r})"
-    done = subprocess.run(
-        [sys.executable, "-c", build], cwd=source, capture_output=True, text=True, timeout=120
-    )
+    done = subprocess.run([sys.executable, "-c", build], cwd=source, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     (wheel,) = out.glob("gestured-*-py3-none-any.whl")
     zipfile.ZipFile(wheel).extractall(out / "installed")

@@ -135,9 +135,7 @@ def test_frames_from_python_osc(daemon: Daemon):
     from pythonosc.udp_client import SimpleUDPClient
 
     client = SimpleUDPClient("127.0.0.1", daemon.port)
-    check_tap(
-        daemon, lambda values: client.send_message("/armrest/pressure", [float(value) for value in values])
-    )
+    check_tap(daemon, lambda values: client.send_message("/armrest/pressure", [float(value) for value in values]))
 
 
 @pytest.mark.parametrize("daemon", [("--grid", "27x15", "--clock", "sensor")], indirect=True)
@@ -160,9 +158,7 @@ def test_real_fingers(daemon: Daemon):
             if not label.startswith("swipe"):
                 continue
             performed += 1
-            answers = {
-                e["gesture"] for e in heard if overlap(e, begun[number] + onset, begun[number] + offset)
-            }
+            answers = {e["gesture"] for e in heard if overlap(e, begun[number] + onset, begun[number] + offset)}
             right += label in answers
             wrong += bool(answers) and label not in answers
     assert performed > 50

@@ -25,9 +25,7 @@ def test_scenario(path: Path) -> None:
         assert Player(scenario, seed).play() == []
 
 
-@pytest.mark.parametrize(
-    "line", ["tap 4,4", "press 4 0.8 for 1s", "press 4,4 0.8 for long", "sensor colour red"]
-)
+@pytest.mark.parametrize("line", ["tap 4,4", "press 4 0.8 for 1s", "press 4,4 0.8 for long", "sensor colour red"])
 def test_a_line_that_is_none_is_named(line: str) -> None:
     with pytest.raises(ScenarioError, match=r"^x\.txt:2: "):
         parse("x", f"quiet for 1s\n{line}\n")
@@ -41,15 +39,11 @@ forces = st.sampled_from(["0.004", "0.01", "0.02", "0.1", "0.5", "1.0", "5"])
 lines = st.one_of(
     seconds.map("quiet for {}".format),
     st.tuples(places, forces, seconds).map(lambda x: "press {} {} for {}".format(*x)),
-    st.tuples(places, forces, places, forces, seconds).map(
-        lambda x: "press {} {} and {} {} for {}".format(*x)
-    ),
+    st.tuples(places, forces, places, forces, seconds).map(lambda x: "press {} {} and {} {} for {}".format(*x)),
     st.tuples(places, places, forces, seconds).map(lambda x: "move {} to {} {} in {}".format(*x)),
     st.tuples(places, forces).map(lambda x: "object {} {}".format(*x)),
     seconds.map("silence for {}".format),
-    st.sampled_from(
-        ["clear", "lose 2", "lose 9", "dead 1,1", "shift 200", "shift 400", "restart 500", "end"]
-    ),
+    st.sampled_from(["clear", "lose 2", "lose 9", "dead 1,1", "shift 200", "shift 400", "restart 500", "end"]),
 )
 sensors = st.tuples(
     st.sampled_from(["9x9", "2x2", "3x12"]),
@@ -77,9 +71,7 @@ def test_every_onset_has_one_answer_and_one_release(scenario: Scenario, seed: in
     before = -np.inf
     for number, at in enumerate(range(0, len(events), 3), 1):
         onset, answer, release = events[at : at + 3]
-        assert (
-            isinstance(onset, Onset) and isinstance(answer, Cut | Cancelled) and isinstance(release, Release)
-        )
+        assert isinstance(onset, Onset) and isinstance(answer, Cut | Cancelled) and isinstance(release, Release)
         assert onset.id == answer.id == release.id == number
         assert before < onset.onset <= release.offset
         before = release.offset

@@ -340,9 +340,7 @@ def test_a_hand_may_rest_on_the_pad_from_the_start() -> None:
 
 def test_slow_takes_longer_than_fast() -> None:
     for kind in ("swipe_left", "circle_clockwise", "zigzag"):
-        slow, fast = (
-            np.mean([performed(kind, s, speed).duration_s for s in range(30)]) for speed in ("slow", "fast")
-        )
+        slow, fast = (np.mean([performed(kind, s, speed).duration_s for s in range(30)]) for speed in ("slow", "fast"))
         assert slow > 1.5 * fast
 
 

@@ -33,9 +33,7 @@ class Stream:
         except OSError as error:
             self.socket.close()
             reason = error.strerror or error
-            raise Unreachable(
-                f"no daemon on {path}: {reason}; start gestured, or name its --socket"
-            ) from None
+            raise Unreachable(f"no daemon on {path}: {reason}; start gestured, or name its --socket") from None
         self.hello = _parsed(first, path)
         if self.hello.get("type") != "hello" or self.hello.get("protocol") != PROTOCOL:
             self.close()

@@ -37,12 +37,9 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         description="Start a daemon with a shipped model and a simulated sensor that sends to it\n"
         "over UDP, and show what was performed beside what was recognised.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="examples:\n  gesturectl demo --seconds 20 --speed fast\n"
-        "  gesturectl demo --json --kinds double_tap",
+        epilog="examples:\n  gesturectl demo --seconds 20 --speed fast\n  gesturectl demo --json --kinds double_tap",
     )
-    parser.add_argument(
-        "--model", default="cnn_lstm", help="a path, or a shipped one's name (default: cnn_lstm)"
-    )
+    parser.add_argument("--model", default="cnn_lstm", help="a path, or a shipped one's name (default: cnn_lstm)")
     parser.add_argument("--seconds", type=float, default=60.0, metavar="S", help="how long (default: 60)")
     add_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print outcomes and summary as JSON lines")

@@ -25,23 +25,13 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         epilog="examples:\n  gesturectl listen --types gesture,unknown\n"
         "  gesturectl listen --json --gesture swipe_left --count 1",
     )
-    parser.add_argument(
-        "--socket", type=Path, help="the daemon's event socket (default: the daemon's own default)"
-    )
-    parser.add_argument(
-        "--types", type=_types, help=f"comma-separated, of {', '.join(TYPES)} (default: gesture)"
-    )
+    parser.add_argument("--socket", type=Path, help="the daemon's event socket (default: the daemon's own default)")
+    parser.add_argument("--types", type=_types, help=f"comma-separated, of {', '.join(TYPES)} (default: gesture)")
     parser.add_argument("--sensor", action="append", metavar="NAME", help="only this sensor; may be repeated")
-    parser.add_argument(
-        "--gesture", action="append", metavar="NAME", help="only this gesture; may be repeated"
-    )
+    parser.add_argument("--gesture", action="append", metavar="NAME", help="only this gesture; may be repeated")
     parser.add_argument("--count", type=int, metavar="N", help="end after N events")
-    parser.add_argument(
-        "--reconnect", action="store_true", help="wait for a daemon that is not there (any more)"
-    )
-    parser.add_argument(
-        "--json", action="store_true", help="print the daemon's own lines, the hello among them"
-    )
+    parser.add_argument("--reconnect", action="store_true", help="wait for a daemon that is not there (any more)")
+    parser.add_argument("--json", action="store_true", help="print the daemon's own lines, the hello among them")
     parser.set_defaults(run=run)
 
 
@@ -107,7 +97,5 @@ def _types(text: str) -> list[str]:
     types = [word.strip() for word in text.split(",") if word.strip()]
     unknown = [word for word in types if word not in TYPES]
     if unknown or not types:
-        raise argparse.ArgumentTypeError(
-            f"{', '.join(unknown) or text!r}: expected some of {', '.join(TYPES)}"
-        )
+        raise argparse.ArgumentTypeError(f"{', '.join(unknown) or text!r}: expected some of {', '.join(TYPES)}")
     return types

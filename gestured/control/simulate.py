@@ -38,9 +38,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
     add_arguments(parser)
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--ints", action="store_true", help="send integers instead of floats")
-    form.add_argument(
-        "--blob", nargs="?", const="uint16", choices=tuple(BLOBS), help="send a blob (default: uint16)"
-    )
+    form.add_argument("--blob", nargs="?", const="uint16", choices=tuple(BLOBS), help="send a blob (default: uint16)")
     parser.add_argument(
         "--plain", action="store_true", help="the matrix alone: no bundle, no counter, no finger positions"
     )

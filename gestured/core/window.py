@@ -1,6 +1,7 @@
 """From a segment to a net's input: the model's grid, rate and scale. Part of the model, stored in its metadata."""
 
 import json
+import math
 from dataclasses import asdict, dataclass, fields
 
 import numpy as np
@@ -36,7 +37,10 @@ class Window:
             raise ValueError(f"window: expected a JSON object, {error}") from None
         names = {f.name: f.type for f in fields(cls)}
         if not isinstance(found, dict) or set(found) != set(names):
-            raise ValueError(f"window: expected exactly the keys {', '.join(names)}")
+            odd = sorted(set(found) ^ set(names)) if isinstance(found, dict) else []
+            raise ValueError(
+                f"window: expected exactly the keys {', '.join(names)}; at fault: {', '.join(odd) or found!r}"
+            )
         for name, kind in names.items():
             value = found[name]
             whole = kind is int
@@ -91,9 +95,7 @@ class Window:
         horizontal = _resize(columns, left, side, self.columns)
         return np.asarray(vertical @ frames @ horizontal.T)
 
-    def _retime(
-        self, frames: NDArray[np.float64], times: NDArray[np.float64], usual: float
-    ) -> NDArray[np.float64]:
+    def _retime(self, frames: NDArray[np.float64], times: NDArray[np.float64], usual: float) -> NDArray[np.float64]:
         """To `rate_hz` by time stamps: averaged where the sensor is faster, interpolated where it is slower.
 
         `usual` is the sensor's own step in seconds, of all frames that are at hand: a tap alone has too few.
@@ -111,7 +113,9 @@ class Window:
             grid = np.arange(at[-1] + 1)
             out = _interpolate(grid.astype(float), at.astype(float), flat)
         else:
-            grid = np.arange(max(int(np.rint((times[-1] - times[0]) * self.rate_hz)), 0) + 1) * step + times[0]
+            # Half a step beyond the end there is nothing left to average: rounding must not decide whether that counts.
+            whole = max(math.ceil((times[-1] - times[0]) * self.rate_hz - 0.5 - 1e-6), 0)
+            grid = np.arange(whole + 1) * step + times[0]
             if usual > step:
                 out = _interpolate(grid, times, flat)
             else:

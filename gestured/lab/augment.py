@@ -84,9 +84,7 @@ def varied(x: Tensor, generator: torch.Generator) -> Tensor:
         x = x.clone()
         x[index, lost] = keep * x[index, lost] + (1 - keep) * bridged
     noise = torch.randn(x.shape, generator=generator) * (0.08 * draw(batch, 1, 1, 1) ** 2) * some(0.5)
-    covered = (torch.arange(time)[None, :] <= _last(x)[:, None]).float()[
-        :, :, None, None
-    ]  # padding stays silent
+    covered = (torch.arange(time)[None, :] <= _last(x)[:, None]).float()[:, :, None, None]  # padding stays silent
     x = (x + noise * covered).clamp(min=0)
     return x / x.amax((1, 2, 3), keepdim=True).clamp(min=1e-3)
 

@@ -1,4 +1,4 @@
-"""Continuous sessions over UDP to a real daemon, and its events from the Unix socket, scored against what was performed."""
+"""Continuous sessions over UDP to a real daemon; its events from the Unix socket, scored against what was performed."""
 
 import argparse
 import json

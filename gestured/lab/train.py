@@ -200,7 +200,7 @@ def _classes(samples: Samples) -> NDArray[np.int64]:
 
 
 def _forest_calibration(chances: NDArray[np.float64], labels: NDArray[np.int64]) -> dict[str, Any]:
-    """Temperature by likelihood; a threshold from which at most 6 % of the calibration gestures are answered wrongly."""
+    """Temperature by likelihood; a threshold from which at most 6 % of the calibration gestures are wrong."""
     known = labels < len(GESTURES)
     best: tuple[float, dict[str, Any]] | None = None
     for temperature in np.geomspace(0.2, 2.0, 24):
@@ -254,8 +254,7 @@ def train(plan: Plan, out: Path, cache: Path, real: Path | None, jobs: int) -> D
         export_net(module, out / f"{name}.onnx", kind=name, calibration=calibration, **common)
     forest, calibration = grow_forest(data, plan, jobs)
     features: Sequence[str] = feature_names(WINDOW.rows, WINDOW.columns)
-    export_forest(
-        forest, out / "touch_pattern_rf.onnx", kind="touch_pattern_rf", calibration=calibration, features=features, **common
-    )  # fmt: skip
+    path = out / "touch_pattern_rf.onnx"
+    export_forest(forest, path, kind="touch_pattern_rf", calibration=calibration, features=features, **common)
     write_manifest(out, {})
     return data

@@ -63,7 +63,7 @@ def per_frame(x: Tensor) -> dict[str, Tensor]:
 
 
 def mean_blob(x: Tensor, s: dict[str, Tensor], weight: Tensor) -> Tensor:
-    """(B, T, R, C) -> (B, BLOB * BLOB): the contact, each frame moved to its centroid, averaged: one finger, two, a palm."""
+    """(B, T, R, C) -> (B, BLOB * BLOB): the contact, each frame moved to its centroid, averaged: finger, two, palm."""
     rows, columns = x.shape[2], x.shape[3]
     offset = torch.arange(BLOB, dtype=x.dtype) - BLOB // 2
     row = (1 - s["y"]) / 2 * (rows - 1)

@@ -16,7 +16,8 @@ from .sensor import Sensor, Take
 from .strokes import Scene
 
 GESTURES: tuple[str, ...] = tuple(TEN)
-SEQUENCES = ("tap_then_swipe", "tap_then_hold", "triple_tap")  # gestures one right after the other: read as such, not as none
+# Gestures one right after the other: read as such, not as none.
+SEQUENCES = ("tap_then_swipe", "tap_then_hold", "triple_tap")
 NON_GESTURES: tuple[str, ...] = tuple(kind for kind in OTHERS if kind not in SEQUENCES)
 NONE = "none"
 

@@ -27,9 +27,7 @@ def _turned(points: list[tuple[float, float]], angle: float) -> list[tuple[float
 
 def _leg_s(scene: Scene, length: float) -> float:
     """A duration for one leg of that many millimetres, in seconds."""
-    return float(
-        np.clip(0.3 * (length / 40.0) ** 0.4 / scene.rate * scene.rng.lognormal(0.0, 0.15), 0.11, 0.9)
-    )
+    return float(np.clip(0.3 * (length / 40.0) ** 0.4 / scene.rate * scene.rng.lognormal(0.0, 0.15), 0.11, 0.9))
 
 
 def _legs(
@@ -102,9 +100,7 @@ def wave(scene: Scene) -> list[Contact]:
     x = length * s
     y = scene.small * rng.uniform(0.12, 0.25) * np.sin(2.0 * math.pi * periods * s + rng.uniform(0.0, 6.3))
     angle = rng.uniform(-math.pi, math.pi)
-    return drawn(
-        scene, t, x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle) + y * math.cos(angle)
-    )
+    return drawn(scene, t, x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle) + y * math.cos(angle))
 
 
 def arc_stroke(scene: Scene) -> list[Contact]:
@@ -123,12 +119,7 @@ def figure_eight(scene: Scene) -> list[Contact]:
     rng = scene.rng
     move = float(np.clip(1.5 / scene.rate * rng.lognormal(0.0, 0.15), 0.8, 4.0))
     t = grid(move)
-    phase = (
-        2.0
-        * math.pi
-        * (rng.random() + rng.uniform(0.9, 1.5) * turning(t / move, rng))
-        * rng.choice([-1.0, 1.0])
-    )
+    phase = 2.0 * math.pi * (rng.random() + rng.uniform(0.9, 1.5) * turning(t / move, rng)) * rng.choice([-1.0, 1.0])
     size = scene.small * rng.uniform(0.22, 0.42)
     x, y = size * np.sin(phase), size * rng.uniform(0.35, 0.6) * np.sin(2.0 * phase)
     angle = rng.choice([0.0, math.pi / 2]) + rng.normal(0.0, 0.3)
@@ -147,9 +138,7 @@ def spiral(scene: Scene) -> list[Contact]:
     if rng.random() < 0.5:
         radius = radius[::-1]
     sense = rng.choice([-1.0, 1.0])
-    x, y = ellipse(
-        rng.uniform(0.0, 6.3) + sense * 2.0 * math.pi * turns * u, radius, rng.uniform(1.0, 1.25), 0.5
-    )
+    x, y = ellipse(rng.uniform(0.0, 6.3) + sense * 2.0 * math.pi * turns * u, radius, rng.uniform(1.0, 1.25), 0.5)
     return drawn(scene, t, x, y)
 
 

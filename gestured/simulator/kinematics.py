@@ -105,13 +105,7 @@ def turning(tau: Array, rng: np.random.Generator) -> Array:
     ease = rng.uniform(0.0, 0.25)
     even, smooth = np.clip(tau, 0.0, 1.0), minimum_jerk(tau)
     share = rng.uniform(0.1, 0.7)
-    bumps = (
-        ease
-        * 0.12
-        * np.sin(2.0 * math.pi * (even * rng.uniform(1.0, 3.0) + rng.random()))
-        * even
-        * (1.0 - even)
-    )
+    bumps = ease * 0.12 * np.sin(2.0 * math.pi * (even * rng.uniform(1.0, 3.0) + rng.random())) * even * (1.0 - even)
     return (1.0 - share) * even + share * smooth + bumps
 
 

@@ -19,9 +19,7 @@ INCLINATIONS = (0, 1, 2)
 
 def generator(*key: int) -> np.random.Generator:
     """A random stream of its own for an integer key: the same on every run and machine."""
-    return np.random.Generator(
-        np.random.PCG64(np.random.SeedSequence([int(k) & 0xFFFFFFFFFFFFFFFF for k in key]))
-    )
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([int(k) & 0xFFFFFFFFFFFFFFFF for k in key])))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,9 +136,7 @@ class Participant:
         """The arm pose at one of three inclinations: (turn in radians, extent factor, force factor)."""
         rng = generator(self.seed, 0x905E, inclination)
         step = inclination - 1
-        turn = float(rng.normal(0.0, math.radians(3.0))) + step * math.radians(2.0) * (
-            1 if self.right_handed else -1
-        )
+        turn = float(rng.normal(0.0, math.radians(3.0))) + step * math.radians(2.0) * (1 if self.right_handed else -1)
         return (
             turn,
             float(rng.uniform(0.85, 1.1)) - 0.04 * step,

@@ -14,9 +14,7 @@ if TYPE_CHECKING:
     from .sensor import Sensor
 
 
-def amplify(
-    sensor: "Sensor", field: Array, times: Array, inclination: int, rng: np.random.Generator
-) -> Array:
+def amplify(sensor: "Sensor", field: Array, times: Array, inclination: int, rng: np.random.Generator) -> Array:
     """Signal (N, R, C) in touches: this sensor's own gains and offsets, drift and noise put on the field."""
     own = generator(sensor.seed, 0x5E5)
     rows, columns, n = sensor.rows, sensor.columns, times.size
@@ -32,9 +30,7 @@ def amplify(
     if sensor.signal_noise > 0.0:
         out += sensor.signal_noise * out * rng.standard_normal(out.shape)
     if sensor.drift > 0.0:
-        pattern = (
-            1.0 + 0.3 * rng.standard_normal((rows, columns)) + 0.4 * (rng.normal() * u + rng.normal() * v)
-        )
+        pattern = 1.0 + 0.3 * rng.standard_normal((rows, columns)) + 0.4 * (rng.normal() * u + rng.normal() * v)
         way = wander(times, rng, 0.002, 0.05, 3)
         out += (sensor.drift * (way - way[0]))[:, None, None] * pattern
     out += sensor.noise * rng.standard_normal(out.shape)
@@ -47,9 +43,7 @@ def amplify(
         out += sensor.slow_noise / math.sqrt(8.0) * (walk[8:] - walk[:-8])
     if sensor.hum > 0.0:
         # The mains beats with the scan: a wave over time, shifted from row to row.
-        phase = (
-            2.0 * math.pi * (rng.uniform(0.1, 7.0) * times[:, None] + rng.uniform(0.0, 1.0) * np.arange(rows))
-        )
+        phase = 2.0 * math.pi * (rng.uniform(0.1, 7.0) * times[:, None] + rng.uniform(0.0, 1.0) * np.arange(rows))
         out += (sensor.hum * np.sin(phase))[:, :, None]
     return out if sensor.clipped else out + offset
 
@@ -65,9 +59,7 @@ def disturb(
     todo = list(artefacts)
     for start in rng.uniform(0.0, times[-1], int(rng.poisson(sensor.bursts_per_minute * times[-1] / 60.0))):
         form = str(rng.choice(["all", "row", "column", "taxel", "taxels"]))
-        todo.append(
-            (float(start), Artefact(0.0, float(rng.uniform(0.01, 0.15)), form, float(rng.normal(0.0, 0.4))))
-        )
+        todo.append((float(start), Artefact(0.0, float(rng.uniform(0.01, 0.15)), form, float(rng.normal(0.0, 0.4)))))
     dt = 1.0 / sensor.rate_hz
     for start, artefact in todo:
         first = int(np.searchsorted(times, start + artefact.start))

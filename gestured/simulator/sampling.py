@@ -27,18 +27,12 @@ class Fingers:
         self.ids: NDArray[np.int32] = np.full((frames, 3), -1, dtype=np.int32)
         self._number = 0
 
-    def track(
-        self, contact: Contact, at: Array, first: int, sensor: "Sensor", rng: np.random.Generator
-    ) -> None:
+    def track(self, contact: Contact, at: Array, first: int, sensor: "Sensor", rng: np.random.Generator) -> None:
         """Reports one finger at times `at` (its own clock) in the frames from `first` on."""
         force = np.interp(at, contact.t, contact.force, left=0.0, right=0.0)
         error = rng.normal(0.0, sensor.touch_noise, (2, at.size))
-        x = np.clip(
-            np.interp(at, contact.t, contact.x) / sensor.pitch_mm - 0.5 + error[0], 0.0, sensor.columns - 1
-        )
-        y = np.clip(
-            np.interp(at, contact.t, contact.y) / sensor.pitch_mm - 0.5 + error[1], 0.0, sensor.rows - 1
-        )
+        x = np.clip(np.interp(at, contact.t, contact.x) / sensor.pitch_mm - 0.5 + error[0], 0.0, sensor.columns - 1)
+        y = np.clip(np.interp(at, contact.t, contact.y) / sensor.pitch_mm - 0.5 + error[1], 0.0, sensor.rows - 1)
         for k in np.flatnonzero(force > TRACKED_FORCE):
             free = np.flatnonzero(self.ids[first + k] < 0)
             if free.size:

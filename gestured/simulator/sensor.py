@@ -150,9 +150,7 @@ class Sensor:
         times: Array = np.arange(1, max(1, int(duration_s * self.rate_hz)) + 1, dtype=np.float64) * dt
         field, fingers = sample(self, todo, times, rng)
         field = leak(field, self.row_crosstalk, self.column_crosstalk, self.ghost)
-        field = compress(
-            relax(field, dt, self.relaxation, self.taus_s, self.hysteresis), self.exponent, self.knee
-        )
+        field = compress(relax(field, dt, self.relaxation, self.taus_s, self.hysteresis), self.exponent, self.knee)
         signal = amplify(self, field, times, todo[0][1].inclination if todo else 1, rng)
         disturb(self, signal, times, [(start, a) for start, p in todo for a in p.artefacts], rng)
         frames = digitise(self, signal)

@@ -37,9 +37,7 @@ class Scene:
         """Size of this movement, 0..1: habit and chance."""
         return float(np.clip(self.person.reach + self.rng.normal(0.0, 0.22), 0.0, 1.0))
 
-    def spot(
-        self, half_width: float = 0.0, half_height: float = 0.0, beyond: float = 0.05
-    ) -> tuple[float, float]:
+    def spot(self, half_width: float = 0.0, half_height: float = 0.0, beyond: float = 0.05) -> tuple[float, float]:
         """Centre for something of that half size; in a share `beyond` of cases partly over the edge."""
         rng, (px, py), spread = self.rng, self.person.place, self.person.place_spread
         slack = 0.09 if rng.random() < beyond else -0.04
@@ -47,11 +45,7 @@ class Scene:
         for extent, half, habit in ((self.width, half_width, px), (self.height, half_height, py)):
             room = max(extent * (0.5 + slack) - half, 0.0)
             # A third of the places are anywhere; the rest cluster where this person likes to be.
-            offset = (
-                rng.uniform(-room, room)
-                if rng.random() < 0.35
-                else (habit + rng.normal(0.0, spread)) * extent / 2
-            )
+            offset = rng.uniform(-room, room) if rng.random() < 0.35 else (habit + rng.normal(0.0, spread)) * extent / 2
             out.append(extent / 2 + float(np.clip(offset, -room, room)))
         return out[0], out[1]
 
@@ -107,11 +101,7 @@ class Scene:
     def rests(self) -> tuple[float, float]:
         """Seconds at rest before and after a stroke: none, or up to 0.3 and 0.6, in a few cases 1.1."""
         rng, person, hurry = self.rng, self.person, math.sqrt(self.rate)
-        before = (
-            rng.uniform(0.02, 0.3) * person.rest_start
-            if rng.random() < 0.15 + 0.6 * person.rest_start
-            else 0.0
-        )
+        before = rng.uniform(0.02, 0.3) * person.rest_start if rng.random() < 0.15 + 0.6 * person.rest_start else 0.0
         after = 0.6 * rng.beta(1.5, 1.8) if rng.random() < 0.1 + 0.8 * person.rest_end else 0.0
         if rng.random() < 0.15 * person.rest_end:
             after += rng.uniform(0.0, 0.5)
@@ -187,9 +177,7 @@ def stroke(scene: Scene, heading: float, length: float, *, limit: float = 0.36) 
     soft = min(1.0, move / 0.3)
     fade_in = soft * rng.uniform(0.05, 0.35) * move if glides else rng.uniform(0.02, 0.08)
     fade_out = soft * rng.uniform(0.05, 0.4) * move if glides else rng.uniform(0.02, 0.1)
-    return Stroke(
-        t, x - half * math.cos(heading), y - half * math.sin(heading), float(fade_in), float(fade_out)
-    )
+    return Stroke(t, x - half * math.cos(heading), y - half * math.sin(heading), float(fade_in), float(fade_out))
 
 
 def swipe_length(scene: Scene, heading: float) -> float:
@@ -200,9 +188,7 @@ def swipe_length(scene: Scene, heading: float) -> float:
     return float(np.clip(length, max(12.0, 0.2 * across), min(150.0, 0.97 * across)))
 
 
-def fingers_on(
-    scene: Scene, path: Stroke, count: int, heading: float, delay_s: float = 0.08
-) -> list[Contact]:
+def fingers_on(scene: Scene, path: Stroke, count: int, heading: float, delay_s: float = 0.08) -> list[Contact]:
     """Several fingers side by side on one stroke: uneven in force, size, length, landing and lifting."""
     rng = scene.rng
     if count == 1:

@@ -15,9 +15,7 @@ from .kinematics import Array
 REMANENCE_S = 1.5  # after a touch, what hysteresis has left behind fades that fast
 
 
-def relax(
-    field: Array, dt_s: float, amplitudes: Sequence[float], taus_s: Sequence[float], hysteresis: float
-) -> Array:
+def relax(field: Array, dt_s: float, amplitudes: Sequence[float], taus_s: Sequence[float], hysteresis: float) -> Array:
     """The lagging answer (N, R, C) to a pressure field (N, R, C) with frames dt_s apart.
 
     Each branch follows the input with its own tau and makes up its amplitude of the answer; a negative
@@ -47,11 +45,7 @@ def relax(
             play = np.minimum(np.maximum(play * fade, p - hysteresis), p + hysteresis)
             answer = 0.5 * (answer + play) + 0.5 * hysteresis * (p > 0.0) * np.minimum(p, 1.0)
         out[k] = answer
-        resting = (
-            not pressed[k]
-            and float(np.abs(state).max(initial=0.0)) < 1e-5
-            and float(np.abs(play).max()) < 1e-5
-        )
+        resting = not pressed[k] and float(np.abs(state).max(initial=0.0)) < 1e-5 and float(np.abs(play).max()) < 1e-5
     return out
 
 

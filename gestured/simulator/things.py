@@ -49,9 +49,7 @@ def resting_hand(scene: Scene, duration_s: float) -> Contact:
     x = scene.width * (0.5 + side * rng.uniform(0.3, 0.55))
     y = scene.height * rng.uniform(-0.08, 0.12)
     if rng.random() < 0.5:
-        return blob(
-            scene, t, x, y, rng.uniform(0.2, 0.6), between(scene, (8.0, 14.0), (5.0, 9.0)), (0.08, 0.1)
-        )
+        return blob(scene, t, x, y, rng.uniform(0.2, 0.6), between(scene, (8.0, 14.0), (5.0, 9.0)), (0.08, 0.1))
     return blob(scene, t, x, y, rng.uniform(0.1, 0.3), (4.0, 3.5), (0.08, 0.1))
 
 
@@ -120,9 +118,7 @@ def wipe(scene: Scene) -> list[Contact]:
     for _ in range(int(rng.integers(1, 4))):
         dx, dy = rng.normal(0.0, 10.0, 2)
         size, fades = between(scene, (9.0, 20.0), (6.0, 12.0)), between(scene, (0.03, 0.3), (0.03, 0.3))
-        made.append(
-            blob(scene, t, x + dx, y + dy, rng.uniform(0.8, 4.0), size, fades, unrest=rng.uniform(0.05, 0.3))
-        )
+        made.append(blob(scene, t, x + dx, y + dy, rng.uniform(0.8, 4.0), size, fades, unrest=rng.uniform(0.05, 0.3)))
     return made
 
 
@@ -163,11 +159,7 @@ def sleeve_brush(scene: Scene) -> list[Contact]:
         t = grid(total - first)
         along = across * (t / t[-1] - 0.5)
         x = scene.width * rng.uniform(0.25, 0.75) + along * math.cos(heading) + 4.0 * wander(t, rng, 0.5, 3.0)
-        y = (
-            scene.height * rng.uniform(0.25, 0.75)
-            + along * math.sin(heading)
-            + 4.0 * wander(t, rng, 0.5, 3.0)
-        )
+        y = scene.height * rng.uniform(0.25, 0.75) + along * math.sin(heading) + 4.0 * wander(t, rng, 0.5, 3.0)
         size, fades = between(scene, (7.0, 24.0), (3.5, 10.0)), between(scene, (0.05, 0.5), (0.05, 0.5))
         unrest = rng.uniform(0.2, 0.8)
         made.append(blob(scene, t, x, y, rng.uniform(0.3, 2.2), size, fades, start=first, unrest=unrest))

@@ -85,9 +85,7 @@ def any_sensor(rng: np.random.Generator, hardness: float) -> Sensor:
         signal_noise=float(rng.uniform(0.0, 0.08)) * hard,
         hum=noise * float(rng.uniform(0.3, 1.5)) if trouble(0.25) else 0.0,
         drift=0.0 if clipped else float(rng.exponential(0.08)) * hard,
-        spread=float(rng.uniform(0.05, 0.35))
-        if screen
-        else float(rng.uniform(0.1, 0.6 + 0.8 * rng.random())),
+        spread=float(rng.uniform(0.05, 0.35)) if screen else float(rng.uniform(0.1, 0.6 + 0.8 * rng.random())),
         tail=float(rng.uniform(0.0, 0.14)) * hard * (0.3 if screen else 1.0),
         tail_taxels=float(rng.uniform(0.6, 2.0)),
         row_crosstalk=float(rng.uniform(-0.012, 0.04)) * hard,

@@ -82,9 +82,7 @@ class FakeDaemon:
 
     def say(self, *messages: object) -> None:
         for message in messages:
-            self.client.sendall(
-                message if isinstance(message, bytes) else json.dumps(message).encode() + b"\n"
-            )
+            self.client.sendall(message if isinstance(message, bytes) else json.dumps(message).encode() + b"\n")
 
     def request(self) -> Any:
         return json.loads(self.client.makefile("rb").readline())

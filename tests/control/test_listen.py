@@ -22,9 +22,7 @@ GESTURE = {
     "degraded": False,
     "scores": {"swipe_left": 0.98},
 }
-UNKNOWN = {key: value for key, value in GESTURE.items() if key not in ("gesture", "sequence")} | {
-    "type": "unknown"
-}
+UNKNOWN = {key: value for key, value in GESTURE.items() if key not in ("gesture", "sequence")} | {"type": "unknown"}
 
 
 def test_prints_a_gesture_for_a_person(start, fake):
@@ -43,8 +41,7 @@ def test_prints_a_gesture_for_a_person(start, fake):
     [
         (GESTURE | {"degraded": True, "model": "lstm"}, "by lstm, degraded"),
         (
-            {key: value for key, value in GESTURE.items() if key not in ("gesture", "sequence")}
-            | {"type": "unknown"},
+            {key: value for key, value in GESTURE.items() if key not in ("gesture", "sequence")} | {"type": "unknown"},
             "unknown",
         ),
         ({"type": "onset", "sensor": "armrest", "id": 4, "onset": 1000.0}, "onset"),

@@ -80,9 +80,7 @@ spans = st.tuples(st.floats(0, 60), st.floats(0, 3)).map(lambda span: (span[0], 
 labels = st.sampled_from(["one_tap", "swipe_up", NONE])
 
 
-@given(
-    st.lists(st.tuples(labels, spans)), st.lists(st.tuples(st.sampled_from(["one_tap", "swipe_up"]), spans))
-)
+@given(st.lists(st.tuples(labels, spans)), st.lists(st.tuples(st.sampled_from(["one_tap", "swipe_up"]), spans)))
 def test_everything_is_counted_once(performances, events):
     tally = Tally()
     for label, (onset, offset) in performances:

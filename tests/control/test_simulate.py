@@ -23,9 +23,7 @@ def to(udp: socket.socket) -> str:
 
 def test_a_bundle_of_pressure_and_trajectory(start, udp):
     begun = time.time()
-    process = start(
-        "simulate", "--to", to(udp), "--sensor", "seat-2", "--seconds", 4, "--kinds", "one_tap", "--json"
-    )
+    process = start("simulate", "--to", to(udp), "--sensor", "seat-2", "--seconds", 4, "--kinds", "one_tap", "--json")
     bundles = [OscBundle(data) for data in received(udp, FRAMES)]
     out, _ = process.communicate(timeout=30)
     assert process.returncode == 0

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -214,7 +214,7 @@ def test_time_is_kept_at_any_rate(rate: float, duration: float, seed: int) -> No
     n = max(round(duration * rate), 1) + 1
     times = 7.0 + np.arange(n) / rate
     found = scaled(TEXYZ, linear(times, seed), times)
-    assert len(found) == round((times[-1] - times[0]) * 15) + 1
+    assert abs(len(found) - 1 - (times[-1] - times[0]) * 15) <= 0.5 + 1e-5
 
 
 @given(rates, st.integers(3, 60), st.floats(0, 0.4), seeds)
@@ -260,6 +260,7 @@ def test_idle_frames_around_the_gesture_change_nothing(rate: float, before: int,
     assert np.allclose(TEXYZ.apply(more), TEXYZ.apply(less), atol=1e-6)
 
 
+@example(38.0, 0, 0.5)  # 7.5 steps long
 @given(rates | st.floats(13.5, 16.8), seeds, st.sampled_from([0.5, 1.0, 1 << 20]))
 def test_only_differences_of_time_matter(rate: float, seed: int, start: float) -> None:
     frames = np.random.default_rng(seed).uniform(0, FULL, (20, 9, 9))

@@ -78,9 +78,7 @@ def session(
             break
         performances.append((t, performed))
         release = t + performed.duration
-        events.append(
-            {"label": _label(performed.kind), "kind": performed.kind, "onset": t, "release": release}
-        )
+        events.append({"label": _label(performed.kind), "kind": performed.kind, "onset": t, "release": release})
         t = release + float(rng.uniform(0.7, 3.0))
     frames, times, seen = record(sensor, rng, performances, seconds)
     return {"frames": frames, "times": times, "seen": seen, "events": events}

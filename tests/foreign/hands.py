@@ -119,9 +119,7 @@ def _spline(control: Array) -> Array:
     u = np.linspace(0.0, 1.0, 24, endpoint=False)[:, None]
     pieces = []
     for p0, p1, p2, p3 in zip(ends[:-3], ends[1:-2], ends[2:-1], ends[3:], strict=True):
-        pieces.append(
-            p1 + 0.5 * u * (p2 - p0 + u * (2 * p0 - 5 * p1 + 4 * p2 - p3 + u * (3 * (p1 - p2) + p3 - p0)))
-        )
+        pieces.append(p1 + 0.5 * u * (p2 - p0 + u * (2 * p0 - 5 * p1 + 4 * p2 - p3 + u * (3 * (p1 - p2) + p3 - p0))))
     return np.concatenate([*pieces, control[-1:]])
 
 
@@ -148,9 +146,7 @@ def _force(rng: Rng, person: Person, t: Array, duration: float, attack: float, d
     return level * _ramp(t / attack) * _ramp((duration - t) / decay) * np.clip(waver, 0.5, 1.6)
 
 
-def _walk(
-    rng: Rng, path: Array, t: Array, begin: float, end: float, power: float = 0.0
-) -> tuple[Array, Array]:
+def _walk(rng: Rng, path: Array, t: Array, begin: float, end: float, power: float = 0.0) -> tuple[Array, Array]:
     """Run along a path from `begin` to `end` (s) with a trapezoid speed that wavers."""
     step = np.hypot(*np.diff(path, axis=0).T)
     arc = np.concatenate([[0.0], np.cumsum(step)])
@@ -172,9 +168,7 @@ def _place(rng: Rng, path: Array, over: float) -> Array:
     return path + middle + half * rng.uniform(-1.0, 1.0, 2) * 0.9
 
 
-def _stroke(
-    rng: Rng, person: Person, path: Array, move: float, *, rest: float = 0.0, power: float = 0.0
-) -> Pad:
+def _stroke(rng: Rng, person: Person, path: Array, move: float, *, rest: float = 0.0, power: float = 0.0) -> Pad:
     """One finger along one path: lands, perhaps waits, moves, perhaps rests, lifts (often while moving)."""
     wait = float(rng.uniform(0.0, 0.06))
     lift = float(rng.uniform(0.02, 0.08))
@@ -258,11 +252,7 @@ def _circle(rng: Rng, person: Person, kind: str, turn: int) -> Performance:
     radius = float(rng.uniform(1.3, 3.4) if person.light else rng.uniform(1.7, 3.4))
     number = 13
     angle = np.radians(rng.uniform(0.0, 360.0) + turn * np.linspace(0.0, sweep, number))
-    r = (
-        radius
-        * (1 + rng.normal(0, 0.03 * person.sloppy, number))
-        * np.linspace(1, rng.uniform(0.85, 1.15), number)
-    )
+    r = radius * (1 + rng.normal(0, 0.03 * person.sloppy, number)) * np.linspace(1, rng.uniform(0.85, 1.15), number)
     flat = rng.uniform(0.8, 1.0)
     a = rng.uniform(0.0, np.pi)
     u, v = r * np.cos(angle - a), flat * r * np.sin(angle - a)
@@ -306,9 +296,7 @@ def _palm(rng: Rng, person: Person) -> Performance:
     roll = rng.normal(0.0, 0.5, 2)
     force = _force(rng, person, t, duration, 0.12, 0.15) * rng.uniform(3.0, 6.0)
     u = t / duration
-    pads = [
-        Pad(t, centre[0] + roll[0] * u, centre[1] + roll[1] * u, force, points, weights / weights.sum(), 0.45)
-    ]
+    pads = [Pad(t, centre[0] + roll[0] * u, centre[1] + roll[1] * u, force, points, weights / weights.sum(), 0.45)]
     for _ in range(int(rng.integers(0, 4))):
         at = centre + rng.uniform(2.0, 4.0) * np.array([np.cos(c := rng.uniform(0, 2 * np.pi)), np.sin(c)])
         pad = _press(rng, person, at, duration * rng.uniform(0.5, 0.85), 0.2)
@@ -410,9 +398,7 @@ def _sleeve(rng: Rng, person: Person) -> Performance:
         waver[(t < 0.02) | (t > move - 0.02)] = 0.0
         s = np.interp(t, np.linspace(0, move, 6), np.sort(np.r_[0, rng.random(4), 1])) * travel
         place = start + s[:, None] * way
-        pads.append(
-            Pad(t, place[:, 0], place[:, 1], person.press * waver * 1.6, points, np.full(16, 1 / 16), 0.4)
-        )
+        pads.append(Pad(t, place[:, 0], place[:, 1], person.press * waver * 1.6, points, np.full(16, 1 / 16), 0.4))
     return _performed("sleeve", pads)
 
 
@@ -447,9 +433,7 @@ def perform(kind: str, rng: Rng, person: Person) -> Performance:
     if kind == "two_finger_sideways":
         return _two_fingers(rng, person, kind, HEADINGS[str(rng.choice(["left", "right"]))])
     if kind == "diagonal_swipe":
-        upright = Person(
-            person.sloppy, person.press, person.width, person.long, 0.0, person.haste, person.light
-        )
+        upright = Person(person.sloppy, person.press, person.width, person.long, 0.0, person.haste, person.light)
         return _swipe(rng, upright, kind, float(rng.choice([45.0, 135.0, 225.0, 315.0])), 11.0)
     if kind.endswith("_two_fingers"):
         return _two_fingers(rng, person, kind, HEADINGS[kind.split("_")[1]])

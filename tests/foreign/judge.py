@@ -148,8 +148,7 @@ def _batch(task: tuple[str | None, str, str, int, bool, int, bool]) -> tuple[lis
     for seed in range(first, first + count):
         if grids:
             outcomes += [
-                judge(r, seed, "{}x{}".format(*r["frames"].shape[1:]), classifier)
-                for r in other_grids(kind, seed)
+                judge(r, seed, "{}x{}".format(*r["frames"].shape[1:]), classifier) for r in other_grids(kind, seed)
             ]
             continue
         recording = take(kind, seed, level)
@@ -201,9 +200,7 @@ def summary(outcomes: list[Outcome], unseen: dict[str, int]) -> dict[str, Any]:
             "confusions": Counter(
                 f"{o.kind} -> {o.before}" for o in gestures if o.before and o.before != o.kind
             ).most_common(10),
-            "taken_for": Counter(
-                f"{o.kind} -> {o.answer}" for o in others if o.answer in GESTURES
-            ).most_common(12),
+            "taken_for": Counter(f"{o.kind} -> {o.answer}" for o in others if o.answer in GESTURES).most_common(12),
             "kinds": kinds,
         }
     return result
@@ -230,15 +227,11 @@ def _show(result: dict[str, Any], front_end: bool) -> None:
             answers = ", ".join(f"{a} {c}" for a, c in k["answers"].items() if a != kind)
             rejected = sum(c for a, c in k["answers"].items() if a not in GESTURES)
             if front_end:
-                share = (
-                    "one " + _percent(k["answers"].get("segment", 0), k["n"]) + f"  partial {k['partial']}"
-                )
+                share = "one " + _percent(k["answers"].get("segment", 0), k["n"]) + f"  partial {k['partial']}"
                 if kind == "double_tap":
                     answers += f"; contacts in it {k['pieces']}"
             elif kind in GESTURES:
-                share = (
-                    f"before {100 * k['before']:5.1f}  right {_percent(k['answers'].get(kind, 0), k['n'])}"
-                )
+                share = f"before {100 * k['before']:5.1f}  right {_percent(k['answers'].get(kind, 0), k['n'])}"
             else:
                 share = f"rejected {_percent(rejected, k['n'])}"
             print(
@@ -304,9 +297,7 @@ def sessions(source: str, level: str, count: int, first: int, seconds: float = 1
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--model", help="a shipped model's name or a path")
     what.add_argument("--front-end", action="store_true", help="segmentation alone; needs no model")
@@ -315,20 +306,14 @@ def main() -> None:
     parser.add_argument("--level", nargs="+", choices=LEVELS, default=list(LEVELS))
     parser.add_argument("--kinds", nargs="+", default=[*GESTURES, *NON_GESTURES])
     parser.add_argument("--grids", action="store_true", help=f"other grids instead of levels: {GRIDS}")
-    parser.add_argument(
-        "--sessions", type=int, default=0, help="also this many sessions of two minutes a level"
-    )
-    parser.add_argument(
-        "--list", action="store_true", help="print each gesture that went wrong, with its seed"
-    )
+    parser.add_argument("--sessions", type=int, default=0, help="also this many sessions of two minutes a level")
+    parser.add_argument("--list", action="store_true", help="print each gesture that went wrong, with its seed")
     parser.add_argument("--whole", action="store_true", help="keep takes that nobody can recognise")
     parser.add_argument("--jobs", type=int, default=1, help="processes (%(default)s)")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
     levels = ["grids"] if args.grids else args.level
-    tasks = [
-        (args.model, k, lv, args.n, args.grids, args.first, args.whole) for lv in levels for k in args.kinds
-    ]
+    tasks = [(args.model, k, lv, args.n, args.grids, args.first, args.whole) for lv in levels for k in args.kinds]
     outcomes: list[Outcome] = []
     unseen: dict[str, int] = defaultdict(int)
     with ProcessPoolExecutor(args.jobs) as pool:

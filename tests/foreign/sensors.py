@@ -56,9 +56,7 @@ def draw_sensor(rng: Rng, level: str, rows: int = 9, columns: int = 9, rate_hz: 
     shape = (rows, columns)
     uneven = 0.22 if hard else 0.06
     gain = np.exp(rng.normal(0.0, uneven, shape) * 0.6)
-    gain *= np.exp(rng.normal(0.0, uneven * 0.6, (rows, 1))) * np.exp(
-        rng.normal(0.0, uneven * 0.6, (1, columns))
-    )
+    gain *= np.exp(rng.normal(0.0, uneven * 0.6, (rows, 1))) * np.exp(rng.normal(0.0, uneven * 0.6, (1, columns)))
     dead, stuck = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
     if hard:
         spoiled = rng.choice(rows * columns, int(rng.integers(0, 4)), replace=False)
@@ -119,9 +117,7 @@ def _load(sensor: Sensor, pad: Pad, start: float, times: Array) -> tuple[slice, 
     first = int(np.searchsorted(times, start + pad.t[0] - 1.0 / sensor.rate_hz))
     last = int(np.searchsorted(times, start + pad.t[-1] + 1.0 / sensor.rate_hz))
     rows, columns = np.arange(sensor.rows), np.arange(sensor.columns, dtype=np.float64)
-    when = (
-        times[first:last, None] + sensor.scan / sensor.rate_hz * (rows / sensor.rows - 0.5) - start
-    )  # (n, R)
+    when = times[first:last, None] + sensor.scan / sensor.rate_hz * (rows / sensor.rows - 0.5) - start  # (n, R)
     force = np.interp(when, pad.t, pad.force, left=0.0, right=0.0) * sensor.pitch**2
     # A harder press makes a larger contact.
     grow = np.cbrt(np.clip(force / sensor.pitch**2, 0.2, 6.0))[..., None] if len(pad.points) < 25 else 1.0
@@ -147,21 +143,15 @@ def _times(sensor: Sensor, rng: Rng, length: float) -> Array:
     """Arrival times: jittered, some frames lost, strictly increasing."""
     times = np.arange(int(length * sensor.rate_hz) + 1) / sensor.rate_hz
     keep = rng.random(len(times)) >= sensor.lost
-    times = times + rng.normal(0.0, sensor.jitter, len(times)).clip(
-        -0.3 / sensor.rate_hz, 0.3 / sensor.rate_hz
-    )
+    times = times + rng.normal(0.0, sensor.jitter, len(times)).clip(-0.3 / sensor.rate_hz, 0.3 / sensor.rate_hz)
     return times[keep]
 
 
-def _disturb(
-    sensor: Sensor, rng: Rng, capacitance: Array, performed: Performance, start: float, times: Array
-) -> None:
+def _disturb(sensor: Sensor, rng: Rng, capacitance: Array, performed: Performance, start: float, times: Array) -> None:
     """Add an electrical burst to the counts."""
     size = sensor.counts * float(_answer(np.array(0.45 / (0.45 + sensor.softness))))
     for begin, length, where in performed.burst:
-        hit = np.flatnonzero(
-            (times >= start + begin) & (times < start + begin + max(length, 1 / sensor.rate_hz))
-        )
+        hit = np.flatnonzero((times >= start + begin) & (times < start + begin + max(length, 1 / sensor.rate_hz)))
         pattern = rng.uniform(0.4, 1.2, (sensor.rows, sensor.columns))
         mask = np.zeros((sensor.rows, sensor.columns))
         if where == "all":

@@ -19,16 +19,11 @@ def _path(recording: dict[str, Any]) -> NDArray[np.float64]:
     above[above < 0.2 * above.max()] = 0.0
     total = above.sum(axis=(1, 2))
     inside = (
-        (times > recording["onset"] - 0.05)
-        & (times < recording["release"] + 0.05)
-        & (strength > 0.4 * strength.max())
+        (times > recording["onset"] - 0.05) & (times < recording["release"] + 0.05) & (strength > 0.4 * strength.max())
     )
     rows, columns = np.indices(frames.shape[1:])
     above, total = above[inside], total[inside]
-    return (
-        np.stack([(above * columns).sum(axis=(1, 2)), (above * rows).sum(axis=(1, 2))], axis=1)
-        / total[:, None]
-    )
+    return np.stack([(above * columns).sum(axis=(1, 2)), (above * rows).sum(axis=(1, 2))], axis=1) / total[:, None]
 
 
 def _wide(recording: dict[str, Any]) -> float:
@@ -48,9 +43,7 @@ def _wide(recording: dict[str, Any]) -> float:
 def test_the_same_seed_gives_the_same_take_and_another_seed_another(level: str) -> None:
     for kind in GESTURES + NON_GESTURES:
         first, again, other = take(kind, 3, level), take(kind, 3, level), take(kind, 4, level)
-        assert np.array_equal(first["frames"], again["frames"]) and np.array_equal(
-            first["times"], again["times"]
-        )
+        assert np.array_equal(first["frames"], again["frames"]) and np.array_equal(first["times"], again["times"])
         assert not np.array_equal(first["frames"][:10], other["frames"][:10])
 
 
@@ -104,6 +97,4 @@ def test_other_grids_have_their_shape_and_rate() -> None:
 def test_a_session_keeps_its_events_apart_and_inside() -> None:
     one = session(5, "nominal", 30.0)
     edges = [t for event in one["events"] for t in (event["onset"], event["release"])]
-    assert (
-        len(one["events"]) > 5 and edges == sorted(edges) and edges[0] > 1.3 and edges[-1] < one["times"][-1]
-    )
+    assert len(one["events"]) > 5 and edges == sorted(edges) and edges[0] > 1.3 and edges[-1] < one["times"][-1]
