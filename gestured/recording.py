@@ -9,7 +9,7 @@ import math
 import os
 import stat
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import IO, Any
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame, Touch
-from gestured.recording_check import Wrong, check
+from gestured.recording_check import EVENTS, Wrong, check
 
 MAX_BYTES = 2 << 30  # unpacked
 
@@ -45,6 +45,7 @@ class Recordings:
     event_kinds: NDArray[np.str_] | None = None  # (E,)
     event_onsets: NDArray[np.float64] | None = None  # (E,) s on the recording's times
     event_offsets: NDArray[np.float64] | None = None  # (E,) s
+    consents: NDArray[np.str_] | None = None  # (G,) day of the participant's consent, YYYY-MM-DD; "" is not known
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -70,6 +71,22 @@ class Recordings:
                 )
             yield Frame(float(self.times[n]), self.frames[n], touches)
 
+    def take(self, chosen: Sequence[int] | NDArray[np.integer[Any]]) -> "Recordings":
+        """The chosen recordings, each at most once, in that order, with their frames and events."""
+        index = np.asarray(chosen, np.int64)
+        lengths = np.diff(self.offsets)[index]
+        spans = [np.arange(self.offsets[i], self.offsets[i + 1]) for i in index]
+        of_frames = np.concatenate(spans) if spans else index
+        place = np.full(len(self), -1, np.int64)
+        place[index] = np.arange(len(index))
+        events = slice(0) if self.event_recording is None else place[self.event_recording] >= 0
+        rows = {"frames": of_frames, "times": of_frames, "touches": of_frames, "touch_ids": of_frames}
+        taken = {field: value[events if field in EVENTS else rows.get(field, index)] for field, value in _present(self)}
+        taken["offsets"] = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+        if self.event_recording is not None:
+            taken["event_recording"] = place[taken["event_recording"]]
+        return Recordings(**taken)
+
     def _span(self, i: int) -> slice:
         if not -len(self) <= i < len(self):
             raise IndexError(f"recording {i} of {len(self)}")
@@ -83,7 +100,7 @@ _REQUIRED = _FIELDS[:5]
 def read(path: str | Path) -> Recordings:
     """Read and check a file; RecordingError for what is no recording. It ignores unknown members."""
     try:
-        found = _load(path)
+        found = load(path)
         check(found)
     except Wrong as error:
         raise RecordingError(f"{path}: {error}") from None
@@ -118,34 +135,35 @@ def _present(recordings: Recordings) -> Iterator[tuple[str, NDArray[Any]]]:
     return ((f, value) for f in _FIELDS if (value := getattr(recordings, f)) is not None)
 
 
-def _load(path: str | Path) -> Recordings:
+def load(path: str | Path, without: Collection[str] = ()) -> Recordings:
+    """A file's fields as they stand there, not held against the contract, `without` some; raises Wrong."""
     try:
         # Non-blocking: opening a FIFO must not wait for a writer.
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise Wrong("is not a regular file")
             with zipfile.ZipFile(file) as archive:
-                return Recordings(**_unpack(archive))
+                return Recordings(**_unpack(archive, without))
     except Wrong:
         raise
     except Exception as error:  # of a damaged file zipfile and NumPy's header parser raise a dozen types
         raise Wrong(f"cannot be read as a recording (.npz): {_brief(error)}") from None
 
 
-def _unpack(archive: zipfile.ZipFile) -> dict[str, NDArray[Any]]:
+def _unpack(archive: zipfile.ZipFile, without: Collection[str]) -> dict[str, NDArray[Any]]:
     """The fields' arrays. Nothing is unpacked before all of it is known to fit."""
     members: dict[str, zipfile.ZipInfo] = {}
     for info in archive.infolist():
         field = info.filename.removesuffix(".npy")
-        if field in _FIELDS and info.filename.endswith(".npy"):
+        if field in _FIELDS and field not in without and info.filename.endswith(".npy"):
             if field in members:
-                raise Wrong(f"{field}: is there twice")
+                raise Wrong(f"{field}: is there twice", field)
             if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                raise Wrong(f"{field}: expected it stored or deflated")
+                raise Wrong(f"{field}: expected it stored or deflated", field)
             members[field] = info
     missing = [field for field in _REQUIRED if field not in members]
     if missing:
-        raise Wrong(f"{missing[0]}: is missing, expected the fields {', '.join(_REQUIRED)}")
+        raise Wrong(f"{missing[0]}: is missing, expected the fields {', '.join(_REQUIRED)}", missing[0])
     total = sum(info.file_size for info in members.values())
     if total > MAX_BYTES:
         raise Wrong(f"unpacks to {total} bytes, expected at most {MAX_BYTES}")
@@ -155,9 +173,9 @@ def _unpack(archive: zipfile.ZipFile) -> dict[str, NDArray[Any]]:
             with archive.open(info) as member:
                 arrays[field] = _array(member, info.file_size)
         except Wrong as error:
-            raise Wrong(f"{field}: {error}") from None
-        except Exception as error:  # see _load
-            raise Wrong(f"{field}: is damaged: {_brief(error)}") from None
+            raise Wrong(f"{field}: {error}", field) from None
+        except Exception as error:  # see `load`
+            raise Wrong(f"{field}: is damaged: {_brief(error)}", field) from None
     return arrays
 
 

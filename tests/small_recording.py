@@ -31,6 +31,7 @@ def example() -> Recordings:
         releases=np.array([2, 5]),
         touches=touches,
         touch_ids=ids,
+        consents=np.array(["2026-01-31", ""]),
     )
 
 

@@ -72,6 +72,7 @@ def changed(name: str, index: object, value: object) -> np.ndarray:
         ("touches", changed("touches", (5, 1, 0), np.inf), "recording 1: expected NaN where"),
         ("touches", changed("touches", (0, 0, 0), 1.0), "recording 0: expected NaN where"),
         ("touch_ids", changed("touch_ids", (0, 0), -2), "recording 0: expected -1"),
+        ("consents", np.array(["2026-01-31", "soon"]), "recording 1: expected a day"),
         ("event_kinds", None, "together with all of"),
         ("event_recording", np.array([0, 2, 1]), "event 1: expected 0 to 1"),
         ("event_labels", changed("event_labels", 2, "Swipe!"), "event 2: expected 1 to 64"),

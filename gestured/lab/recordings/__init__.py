@@ -1,0 +1,1 @@
+"""Recordings of one's own: collected at a terminal, imported, looked at, forgotten. Needs numpy alone."""
