@@ -11,7 +11,7 @@ from gestured.core.errors import GesturedError
 CACHE = Path(".cache/lab")
 MODELS = Path("models")
 REAL = Path("../shared/data")
-NEEDED = ("torch", "sklearn", "onnx")
+NEEDED = ("torch", "sklearn", "onnx", "mpmath")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -55,6 +55,10 @@ def parser() -> argparse.ArgumentParser:
     online.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (900)")
     bench = add("bench", "measure replay, start and memory on this machine", "gestured-lab bench")
     bench.add_argument("--model", default="cnn_lstm", help="the model to run (cnn_lstm)")
+    stability = add("stability", "measure filters, extreme inputs, models and symmetries of the whole path",
+                    "gestured-lab stability --quick")  # fmt: skip
+    stability.add_argument("--quick", action="store_true", help="some seconds instead of some minutes")
+    stability.add_argument("--out", type=Path, help="folder for stability.svg, error against run time")
     return top
 
 
@@ -72,11 +76,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return bench.run(args)
         try:
             from gestured.lab import commands
+            from gestured.lab.stability import command as stability
         except ModuleNotFoundError as error:
             package = (error.name or "").split(".")[0]
             if package not in NEEDED:
                 raise
             raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from None
+        if args.command == "stability":
+            return stability.run(args)
         args.cache.mkdir(parents=True, exist_ok=True)
         if args.command == "evaluate":
             return commands.evaluate_models(args)

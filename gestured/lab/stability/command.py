@@ -1,0 +1,43 @@
+"""`gestured-lab stability`: prints the tables, and with `--out` the figure."""
+
+import argparse
+import json
+import os
+import platform
+from collections.abc import Iterator
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from gestured.lab.stability.figure import svg
+from gestured.lab.stability.relaxation import filters_table
+from gestured.lab.stability.table import Table
+from gestured.lab.stability.textbook import RANGES, points, textbook_table
+
+
+def tables(quick: bool, out: Path | None) -> Iterator[Table]:
+    """One after the other, as they are done; `out` is the folder that gets stability.svg."""
+    yield filters_table(quick)
+    panels = {title: points(low, high, np.float64, quick) for title, (low, high) in RANGES.items()}
+    for title, found in panels.items():
+        yield textbook_table(title, found, points(*RANGES[title], np.float32, quick))
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "stability.svg").write_text(svg(panels))
+
+
+def run(args: argparse.Namespace) -> int:
+    """`gestured-lab stability`."""
+    where = f"{date.today()}, {platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+    where += f", numpy {np.__version__}"
+    if not args.json:
+        print(where + "\n")
+    done = []
+    for table in tables(args.quick, args.out):
+        done.append(table.plain())
+        if not args.json:
+            print(table, flush=True)
+    if args.json:
+        print(json.dumps({"measured": where, "tables": done}, indent=2))
+    return 0

@@ -1,0 +1,36 @@
+"""Tables of figures: printed as Markdown, so that a document can hold what a command has printed."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+Cell = str | int | float
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows under a head. A float is shown with two significant digits; `notes` stand below."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: list[tuple[Cell, ...]] = field(default_factory=list)
+    notes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        cells = [[_shown(cell) for cell in row] for row in (self.head, *self.rows)]
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        lines = [_line(row, widths) for row in cells]
+        rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
+        return "\n".join([f"### {self.title}", "", lines[0], rule, *lines[1:], "", *self.notes]).rstrip() + "\n"
+
+    def plain(self) -> dict[str, Any]:
+        """The same as JSON values."""
+        return asdict(self)
+
+
+def _shown(cell: Cell) -> str:
+    return f"{cell:.2g}" if isinstance(cell, float) else str(cell)
+
+
+def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
+    return "| " + " | ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)) + " |"
