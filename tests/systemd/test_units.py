@@ -1,0 +1,78 @@
+"""The units: how exposed they are, that systemd understands them, and where the two services differ."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+UNITS = Path(__file__).resolve().parents[2] / "systemd"
+FILES = sorted([*UNITS.glob("*.service"), *UNITS.glob("*.socket")])
+NETWORK = {
+    "Description", "Wants", "After", "Conflicts", "Sockets", "Also",
+    "PrivateNetwork", "RestrictAddressFamilies", "IPAddressAllow",
+}  # fmt: skip
+
+analyze = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed")
+
+
+def keys(unit: str) -> dict[str, list[str]]:
+    """Every value of every key of a unit file."""
+    found: dict[str, list[str]] = {}
+    for key, value in re.findall(r"^(\w+)=(.*)$", (UNITS / unit).read_text(), re.MULTILINE):
+        found.setdefault(key, []).append(value)
+    return found
+
+
+def exposure(folder: Path, unit: str) -> float:
+    """What `systemd-analyze security` says of a unit in a folder, with its drop-ins."""
+    command = ["systemd-analyze", "security", "--offline=yes", "--no-pager", unit]
+    done = subprocess.run(
+        command, env={"SYSTEMD_UNIT_PATH": f"{folder}:", "PATH": "/usr/bin:/bin"}, capture_output=True, text=True
+    )
+    match = re.search(r"Overall exposure level for \S+: (\d+\.\d)", done.stdout)
+    assert match, done.stdout + done.stderr
+    return float(match[1])
+
+
+@analyze
+@pytest.mark.parametrize(
+    ("unit", "dropin", "most"),
+    [
+        ("gestured.service", None, 0.3),
+        ("gestured.service", "osc-output.conf", 1.0),
+        ("gestured-standalone.service", None, 1.0),
+    ],
+)
+def test_exposure(tmp_path: Path, unit: str, dropin: str | None, most: float):
+    for path in FILES:
+        shutil.copy(path, tmp_path)
+    if dropin:
+        (tmp_path / f"{unit}.d").mkdir()
+        shutil.copy(UNITS / dropin, tmp_path / f"{unit}.d")
+    assert exposure(tmp_path, unit) <= most
+
+
+@analyze
+def test_systemd_finds_nothing_wrong(tmp_path: Path):
+    units = [tmp_path / path.name for path in FILES]
+    for path in units:  # the program is not installed here
+        path.write_text((UNITS / path.name).read_text().replace("/usr/bin/gestured", sys.executable))
+    done = subprocess.run(["systemd-analyze", "verify", "--man=no", *units], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, [line for line in done.stderr.splitlines() if str(tmp_path) in line]) == (0, [])
+
+
+def test_the_services_differ_in_the_network_alone():
+    activated, standalone = keys("gestured.service"), keys("gestured-standalone.service")
+    assert {key for key in activated | standalone if activated.get(key) != standalone.get(key)} <= NETWORK
+
+
+def test_each_socket_belongs_to_the_service_that_lists_it():
+    sockets = sorted(path.name for path in UNITS.glob("*.socket"))
+    service = keys("gestured.service")
+    assert sorted(service["Sockets"][0].split()) == sorted(service["Also"][0].split()) == sockets
+    for socket in sockets:
+        assert keys(socket)["Service"] == ["gestured.service"]
+        assert f"gestured-{keys(socket)['FileDescriptorName'][0]}.socket" == socket
