@@ -3,7 +3,7 @@
 # Two environments: .venv holds the runtime alone (what a vehicle gets), .venv-dev what tests and training need.
 # A stamp in each says that it is complete, so that the second run asks pip for nothing and works offline.
 
-.PHONY: help demo test lint lab clean
+.PHONY: help demo test lint lab hostile fuzz soak clean
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
 MAKEFLAGS += --no-builtin-rules
@@ -38,6 +38,19 @@ lint: .venv-dev/.dev  ## ruff and mypy
 
 lab: .venv-dev/.dev .venv-dev/.lab  ## what training needs (torch), and how to train
 	@.venv-dev/bin/gestured-lab --help
+
+hostile: .venv-dev/.dev .venv-dev/.lab  ## the slow fault tests, what damage does to gestures, a minute of each fuzzer
+	@.venv-dev/bin/python -m pytest -m hostile $(ARGS)
+	@.venv-dev/bin/python -m tests.hostile.damage
+	@$(MAKE) -s --no-print-directory fuzz
+
+fuzz: .venv-dev/.fuzz  ## fuzz the parsers and the model loader, each for: SECONDS=60
+	@for target in decoder request model; do \
+		.venv-dev/bin/python -m tests.fuzz.run $$target --seconds "$(SECONDS)" || exit 1; done
+
+soak: .venv-dev/.dev  ## a day compressed, then ten minutes of 20 sensors in real time
+	@.venv-dev/bin/python -m tests.hostile.soak --compressed
+	@.venv-dev/bin/python -m tests.hostile.soak
 
 clean:  ## remove the environments and what tools left behind
 	rm -rf .venv .venv-dev build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache
@@ -80,6 +93,10 @@ endef
 .venv-dev/.lab: .venv-dev/.dev
 	$(call install,.venv-dev,$(TORCH),--no-deps --retries 0 --extra-index-url $(TORCH_INDEX) $(TORCH))
 	$(call install,.venv-dev,the lab,-e '.[dev$(,)lab]')
+	@touch $@
+
+.venv-dev/.fuzz: .venv-dev/.dev
+	$(call install,.venv-dev,the fuzzer,-e '.[dev$(,)fuzz]')
 	@touch $@
 
 , := ,

@@ -1,0 +1,154 @@
+"""What is fuzzed: each target takes any bytes, and raises only where a promise is broken.
+
+Atheris drives them (`python -m tests.fuzz.run`), and so do Hypothesis and the kept corpus in `make test`.
+"""
+
+import json
+import math
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from gestured import models
+from gestured.core import osc
+from gestured.core.errors import ProtocolError
+from gestured.core.frames import Segment
+from gestured.core.stamping import Stamper
+from gestured.core.subscription import parse_subscription
+from gestured.core.wire import Addresses, Arrival, Decoder
+from gestured.daemon.clients import Client, EventServer
+
+CORPUS = Path(__file__).with_name("corpus")
+BIG = "big"  # the sensor with 9 x 9 taxels; the others have 2 x 2, which a fuzzer hits more easily
+
+
+def _decoder() -> Decoder:
+    return Decoder(Addresses(), lambda name: (9, 9) if name == BIG else (2, 2), keep_touches=True)
+
+
+_one = _decoder()
+_stampers = {clock: Stamper(cast(Any, clock)) for clock in ("arrival", "sensor")}
+_now = 0.0
+
+
+def decoder(data: bytes) -> None:
+    """A packet is frames and errors, the same whether or not its layout was seen before; frames get rising times."""
+    global _now
+    # The cache as other packets left it, against an empty one, against one that knows this packet alone.
+    found = [_read(_one, data)]
+    osc._layouts, kept = {}, osc._layouts
+    try:
+        found += [_read(_decoder(), data), _read(_decoder(), data)]
+    finally:
+        osc._layouts = kept
+    (arrivals, errors), *others = found
+    if _one._pending:  # touches that wait for a frame: what comes next depends on it
+        _one._pending.clear()
+    assert all(_plain(*other) == _plain(arrivals, errors) for other in others), "depends on what came before"
+    for arrival in arrivals:
+        assert arrival.values.shape == ((9, 9) if arrival.sensor == BIG else (2, 2))
+        assert np.isfinite(arrival.values).all()
+    _now += 0.05
+    for clock, stamper in _stampers.items():
+        before = stamper.at(_now - 0.05)
+        times = [before] + [stamp.t for stamp in stamper.stamp(arrivals, _now) if not stamp.dropped]
+        assert all(map(math.isfinite, times)), clock
+        assert all(a <= b for a, b in zip(times[1:], times[2:], strict=False)), clock
+
+
+def _read(one: Decoder, data: bytes) -> tuple[list[Arrival], list[ProtocolError]]:
+    return one.decode(data, "source")
+
+
+def _plain(arrivals: list[Arrival], errors: list[ProtocolError]) -> object:
+    frames = [(a.sensor, a.values.tobytes(), a.counter, a.timetag, a.touches) for a in arrivals]
+    return frames, [(error.reason, str(error)) for error in errors]
+
+
+class _Socket:
+    """A client's socket of which `recv` gives one chunk after the other."""
+
+    def __init__(self, chunks: list[bytes]) -> None:
+        self._chunks = chunks
+        self.sent: list[bytes] = []
+
+    def recv(self, size: int) -> bytes:
+        chunk = self._chunks.pop(0)
+        assert len(chunk) <= size
+        return chunk
+
+    def send(self, line: bytes) -> int:
+        self.sent.append(line)
+        return len(line)
+
+
+class _Server:
+    """Takes the place of EventServer: remembers what was asked for."""
+
+    def __init__(self) -> None:
+        self.subscribed: list[object] = []
+
+    def subscribe(self, client: object, subscription: object) -> None:
+        self.subscribed.append(subscription)
+
+
+def request(data: bytes) -> None:
+    """Lines of a client are answered one by one, however they are cut into chunks: the first bytes say how."""
+    cuts, text = data[:8], data[8:]
+    chunks, at = [], 0
+    while at < len(text):
+        size = 4 + 4 * cuts[len(chunks) % len(cuts)]  # at most what a reader asks for at once
+        chunks.append(text[at : at + size])
+        at += size
+    *lines, _ = text.split(b"\n")
+    wanted, refused = [], []
+    for line in lines:
+        try:
+            if line.strip():
+                wanted.append(parse_subscription(line))
+        except ProtocolError as error:
+            assert error.reason == "subscription"
+            refused.append(str(error))
+    sock, server = _Socket(chunks), _Server()
+    client = Client(cast(EventServer, server), cast(Any, sock))
+    while chunks:
+        client.read()
+        assert len(client._request) <= 4097
+    assert server.subscribed == wanted
+    answers = [json.loads(line) for line in sock.sent]
+    assert [answer["type"] for answer in answers] == ["error"] * len(refused)
+    long = ("a request has at most",)  # how many bytes it had is not known to a reader that keeps 4097
+    for answer, reason in zip(answers, refused, strict=True):
+        assert answer["reason"] == reason or (answer["reason"].startswith(long) and reason.startswith(long))
+
+
+@cache
+def _touch() -> Segment:
+    frames = np.zeros((6, 9, 9), np.float32)
+    frames[range(6), 4, range(6)] = 100.0
+    return Segment(frames, np.arange(6) / 15.0, 0, 5, 1.0)
+
+
+def model(data: bytes) -> None:
+    """A file opens, and then gives probabilities, or is refused with a reason."""
+    try:
+        opened = models.Model(data, "fuzzed")
+    except ValueError as error:
+        assert str(error)
+        return
+    try:
+        scores = opened.classify(_touch())
+    except models.ModelError:
+        return  # the ladder's next rung answers
+    assert abs(float(scores.values.sum()) - 1.0) <= 2e-3 and 0.0 <= scores.unknown <= 1.0
+
+
+TARGETS: dict[str, Callable[[bytes], None]] = {"decoder": decoder, "request": request, "model": model}
+
+
+def corpus(target: str) -> list[Path]:
+    """The kept inputs of a target."""
+    return sorted((CORPUS / target).iterdir())
