@@ -15,13 +15,15 @@ SECONDS = 60
 MODEL = cnn_lstm
 PYTHON =
 ARGS =
+DESTDIR =
+PREFIX = /usr
 # The same version everywhere; the extra index has the build without CUDA, which is a tenth of the size.
 TORCH = torch==2.13.0
 TORCH_INDEX = https://download.pytorch.org/whl/cpu
 
 help:  ## this list
 	@echo "usage: make TARGET [NAME=VALUE ...]"
-	@sed -n 's/^\([a-z]*\):.*## /  \1\t/p' Makefile | expand -t 10
+	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 10
 
 # At a terminal the demo is a job of its own, so that Ctrl-C is for it and not for make.
 demo: .venv/.runtime  ## recognise simulated gestures with the real daemon: SECONDS=20 MODEL=lstm SPEED=fast ARGS="--seed 7"
@@ -52,6 +54,13 @@ soak: .venv-dev/.dev  ## a day compressed, then ten minutes of 20 sensors in rea
 	@.venv-dev/bin/python -m tests.hostile.soak --compressed
 	@.venv-dev/bin/python -m tests.hostile.soak
 
+install: PYTHON := $(or $(PYTHON),/usr/bin/python3)
+install: build/install/.ready  ## into DESTDIR, below PREFIX=/usr, for PYTHON=/usr/bin/python3: programs, units, pages
+	@deploy/install.sh build/install "$(DESTDIR)" "$(PREFIX)"
+
+system-test: .venv-dev/.dev  ## install, boot a real systemd (root, systemd-nspawn), and treat the daemon badly
+	@.venv-dev/bin/python -m pytest -rs -s tests/systemd/system.py
+
 clean:  ## remove the environments and what tools left behind
 	rm -rf .venv .venv-dev build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
@@ -79,6 +88,11 @@ define install
 	else echo "pip could not install $(2): $$(grep -i error $(1)/pip.log | tail -n 1) (all of it: $(1)/pip.log)" >&2; fi; \
 	exit 1; }
 endef
+
+build/install/.ready: Makefile
+	@mkdir -p build
+	$(call venv,build/install)
+	@touch $@
 
 .venv/.runtime: pyproject.toml
 	$(call venv,.venv)

@@ -1,0 +1,32 @@
+"""`python -m deploy.generate configuration` prints the example, `... install SHARE` writes the rest."""
+
+import sys
+from pathlib import Path
+
+from deploy.generate import completion, configuration, man, programs
+
+
+def install(share: Path) -> None:
+    """Write man pages and completions below a `share` folder."""
+    found = programs.all_programs()
+    for name, text in man.pages(found).items():
+        put(share / "man" / f"man{name[-1]}" / name, text)
+    for program in found:
+        put(share / "bash-completion" / "completions" / program.name, completion.bash(program))
+        put(share / "fish" / "vendor_completions.d" / f"{program.name}.fish", completion.fish(program))
+
+
+def put(path: Path, text: str) -> None:
+    """Write a file and the folders above it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+
+
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case ["configuration"]:
+            print(configuration.example(), end="")
+        case ["install", share]:
+            install(Path(share))
+        case _:
+            sys.exit("usage: python -m deploy.generate configuration | install SHARE")

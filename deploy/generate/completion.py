@@ -1,0 +1,86 @@
+"""Completions for bash and fish."""
+
+from collections.abc import Iterator
+
+from deploy.generate.programs import Option, Program
+
+PATHS = ("FILE", "PATH", "FOLDER", "MODEL", "RECORDING")  # words in a metavar that mean something on disk
+
+
+def takes_path(option: Option) -> bool:
+    """Whether its value is a file."""
+    return any(word in option.metavar.upper() for word in PATHS)
+
+
+def words(program: Program) -> list[str]:
+    """What may come next, but for values."""
+    flags = [flag for option in program.options for flag in option.flags]
+    positional = [choice for option in program.options if not option.flags for choice in option.choices]
+    return [*(command.name.split()[-1] for command in program.commands), *positional, *flags]
+
+
+def bash(program: Program) -> str:
+    """A bash completion: subcommands, flags, choices, files."""
+    function = "_" + program.name
+    lines = [
+        f"# bash completion for {program.name}, made from its help",
+        f"{function}() {{",
+        "    local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]} words",
+        "    COMPREPLY=()",
+    ]
+    parts = [(command.name.split()[-1], command) for command in program.commands]
+    lines.append('    case "$command $before" in')
+    for name, part in [*parts, ("*", program)]:
+        lines += list(_values(name, part))
+    lines += ["    esac", '    case "$command" in']
+    for name, part in parts:
+        files = any(not option.flags and takes_path(option) for option in part.options)
+        lines.append(f'        {name}) words="{" ".join(words(part))}"{_files(files)} ;;')
+    lines += [
+        f'        *) words="{" ".join(words(program))}" ;;',
+        "    esac",
+        *(['    [ "$COMP_CWORD" -gt 1 ] || words="' + " ".join(words(program)) + '"'] if parts else []),
+        '    COMPREPLY+=($(compgen -W "$words" -- "$word"))',
+        "}",
+        f"complete -F {function} {program.name}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _files(wanted: bool) -> str:
+    return '; [[ $word == -* ]] || COMPREPLY=($(compgen -f -- "$word"))' if wanted else ""
+
+
+def _values(name: str, program: Program) -> Iterator[str]:
+    """What follows a flag that takes a value."""
+    for option in program.options:
+        if option.flags and option.metavar:
+            pattern = "|".join(f'"{name} {flag}"' if name != "*" else f'*" {flag}"' for flag in option.flags)
+            source = f'-W "{" ".join(option.choices)}"' if option.choices else "-f" if takes_path(option) else ""
+            reply = f'COMPREPLY=($(compgen {source} -- "$word")); return' if source else "return"
+            yield f"        {pattern}) {reply} ;;"
+
+
+def fish(program: Program) -> str:
+    """A fish completion with the words of the help."""
+    lines = [f"# fish completion for {program.name}, made from its help"]
+    for command in program.commands:
+        name = command.name.split()[-1]
+        lines.append(f"complete -c {program.name} -f -n __fish_use_subcommand -a {name} -d {_quoted(command.summary)}")
+        seen = f"-n '__fish_seen_subcommand_from {name}'"
+        lines += [f"complete -c {program.name} {seen} {flag}" for flag in _fish_flags(command)]
+    top = "-n __fish_use_subcommand " if program.commands else ""
+    lines += [f"complete -c {program.name} {top}{flag}" for flag in _fish_flags(program)]
+    return "\n".join(lines) + "\n"
+
+
+def _fish_flags(program: Program) -> Iterator[str]:
+    for option in program.options:
+        long = [flag[2:] for flag in option.flags if flag.startswith("--")]
+        if long:
+            value = f" -x -a {_quoted(' '.join(option.choices))}" if option.choices else " -r" if option.metavar else ""
+            yield f"-l {long[0]}{value} -d {_quoted(option.help)}"
+
+
+def _quoted(text: str) -> str:
+    return "'" + text.replace("\\", "\\\\").replace("'", "\\'") + "'"

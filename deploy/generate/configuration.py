@@ -1,0 +1,82 @@
+"""The example configuration: every key that the settings know, with its words and a value that is valid."""
+
+import json
+import textwrap
+from dataclasses import dataclass
+from typing import Any
+
+from gestured.daemon.settings import TABLES, AddressSettings, GestureSettings, Part, SensorSettings, Settings
+
+# Values to show for keys that have none unless set, or whose default explains nothing.
+SHOWN: dict[str, Any] = {
+    "fallback": ["lstm"],
+    "publish": ["osc://127.0.0.1:9001"],
+    "socket": "/run/gestured/events.sock",
+    "control": "/run/gestured/events.ctl",
+    "metrics": "127.0.0.1:9108",
+    "grid": "9x9",
+    "gestures": ["one_tap", "double_tap", "swipe_left", "swipe_right"],
+    "allow": ["127.0.0.1", "192.168.7.0/24"],
+    "sensors.grid": "27x15",
+    "sensors.rotate": 90,
+    "sensors.mirror": True,
+    "sensors.clock": "sensor",
+    "gestures.threshold": 0.8,
+    "gestures.refractory_s": 0.5,
+}
+HEAD = """\
+Configuration of gestured: every key there is, commented out, with its default or an example as its value.
+Made from the program's settings by `python -m deploy.generate configuration`.
+After a change: gestured --config FILE --explain, then systemctl reload gestured. Flags and GESTURED_* variables
+win over this file. An unknown key is an error; what is invalid changes nothing."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of the file."""
+
+    written: str  # as in the file: model = "cnn_lstm"
+    text: str
+
+
+def literal(value: object) -> str:
+    """A value in TOML."""
+    return json.dumps(value if isinstance(value, bool | int | float | str | list) else str(value))
+
+
+def keys(part: type[Part], prefix: str = "", leave_out: tuple[str, ...] = ()) -> list[Key]:
+    """The keys of one table. Raises KeyError for a key that has no default and nothing to show."""
+    found = []
+    for name, field in part.model_fields.items():
+        if name in leave_out:
+            continue
+        default = field.default
+        unset = default is None or default == ()
+        value = SHOWN[prefix + name] if unset else SHOWN.get(prefix + name, default)
+        text = field.description or ""
+        if not unset and value != default:
+            text += f" (default: {literal(default)})"
+        found.append(Key(f"{name} = {literal(value)}", text))
+    return found
+
+
+def tables() -> dict[str, list[Key]]:
+    """Heading of a table ("" for the keys above all tables) -> its keys."""
+    use = literal(SHOWN["gestures"])
+    return {
+        "": keys(Settings, leave_out=(*TABLES, "gestures")),
+        "[gestures]": [Key(f"use = {use}", Settings.model_fields["gestures"].description or "")],
+        "[sensors.armrest]": keys(SensorSettings, "sensors."),
+        "[gestures.one_tap]": keys(GestureSettings, "gestures."),
+        "[addresses]": keys(AddressSettings),
+    }
+
+
+def example() -> str:
+    """The whole file; without the mark before keys and tables it is valid, and says what the words say."""
+    lines = ["# " + line for line in HEAD.splitlines()]
+    for table, found in tables().items():
+        lines += ["", f"#{table}"] if table else []
+        for key in found:
+            lines += ["", *textwrap.wrap(key.text, 110, initial_indent="# ", subsequent_indent="# "), f"#{key.written}"]
+    return "\n".join(lines) + "\n"
