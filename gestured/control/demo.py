@@ -13,10 +13,10 @@ from contextlib import closing
 from typing import Any
 
 from gestured.client.engine import Engine
+from gestured.client.picture import trace
 from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form, Sensor
 from gestured.client.stream import Stream
-from gestured.control.picture import trace
 from gestured.control.play import add_arguments, frames, play_from
 from gestured.control.show import as_dict, block, summary
 from gestured.core.errors import GesturedError

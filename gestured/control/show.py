@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.client.picture import draw
 from gestured.client.score import NONE, Outcome, Performed
-from gestured.control.picture import draw
 
 COLOURS = {"right": 32, "rejected": 32, "wrong": 31, "false": 31, "missed": 33}
 BOLD, DIM = 1, 2

@@ -7,8 +7,8 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+from gestured.client.address import host_port
 from gestured.client.sensor import BLOBS, Form, Sensor
-from gestured.control.address import host_port
 from gestured.control.play import add_arguments, frames, play_from
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame

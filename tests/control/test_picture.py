@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from gestured.control.picture import draw, trace
+from gestured.client.picture import draw, trace
 
 
 def swipe_right(rows: int, columns: int) -> np.ndarray:
