@@ -1,0 +1,215 @@
+"""How often a damaged gesture is wrong, for each fault: `python -m tests.hostile.damage`.
+
+Simulated people (the project's own simulator, nominal sensor, people whom the models have not seen) perform
+gestures; a fault damages what the sensor sends; the daemon's own receiver and pipeline take it from a real UDP
+socket, with the clock written down, so that the same seed gives the same numbers at any speed. "Damaged" are the
+gestures during which a packet or frame was not what it should have been. An untouched sensor has the same fault
+for as long: any gesture there is one too many.
+"""
+
+import argparse
+import asyncio
+import heapq
+import itertools
+import json
+import math
+import socket
+import sys
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from gestured.client.score import Performed, Tally
+from gestured.client.sensor import Form
+from gestured.core import messages
+from gestured.core.events import Event
+from gestured.core.frames import Frame
+from gestured.daemon import log
+from gestured.daemon.merge import load
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.pipeline import Pipeline
+from gestured.daemon.service import TICK_S, make_decoder
+from gestured.daemon.sockets import bind_udp
+from gestured.daemon.udp import Receiver
+from gestured.daemon.values import Address
+from gestured.ladder import ladder_for
+from gestured.simulator import Participant, Sensor, Take, generator, session
+from tests.hostile.faults import FAULTS, Fault
+from tests.hostile.grammar import violations
+from tests.hostile.line import Line
+
+SESSION_S = 120.0
+FIRST = 2000  # the participant; nobody whom training, calibration or evaluation know
+BEFORE_S, AFTER_S = 0.1, 0.2  # frames around a contact that are part of its segment or of its end
+
+
+@dataclass
+class Row:
+    """The figures of one fault."""
+
+    fault: str
+    gestures: int = 0
+    damaged: Counter[str] = field(default_factory=Counter)  # by verdict
+    others: Counter[str] = field(default_factory=Counter)  # gestures that the fault left alone
+    more: int = 0  # gestures published where none was performed
+    untouched_minutes: float = 0.0
+    untouched: int = 0  # gestures of nobody
+    unended: int = 0  # violations of the events' grammar
+
+    def figures(self) -> dict[str, Any]:
+        """What is printed."""
+        damaged, others = self.damaged.total(), self.others.total()
+        return {
+            "fault": self.fault, "gestures": self.gestures, "damaged": damaged,
+            "right": _share(self.damaged["right"], damaged), "wrong": _share(self.damaged["wrong"], damaged),
+            "unknown or missed": _share(self.damaged["missed"], damaged),
+            "undamaged right": _share(self.others["right"], others),
+            "more": self.more, "untouched min": round(self.untouched_minutes), "of nobody": self.untouched,
+            "unended": self.unended,
+        }  # fmt: skip
+
+
+def _share(part: int, whole: int) -> float | None:
+    return round(100 * part / whole, 1) if whole else None
+
+
+def take(participant: int, seconds: float = SESSION_S, touched: bool = True) -> Take:
+    """What somebody, or nobody, does on a healthy sensor."""
+    sensor = replace(Sensor.nominal(day=participant), loss=0.0)
+    rng = generator(participant, 0xFA)
+    return session(Participant(participant), sensor, rng, seconds, 0.0, kinds=None if touched else [])
+
+
+class Bench:
+    """The daemon's receiver and pipeline behind a UDP socket, at times that are written down."""
+
+    def __init__(self, model: str) -> None:
+        # Nothing here may depend on how fast this machine is: no rung is ever too slow.
+        self._ladder = ladder_for(model, [], slow_s=math.inf)
+        self._settings = load({"model": model}, {})[0]
+
+    def events(self, arrivals: list[tuple[float, bytes]]) -> list[dict[str, Any]]:
+        """What the daemon says to (time in s, packet), in order of arrival, as a client's lines."""
+        return asyncio.run(self._events(arrivals))
+
+    async def _events(self, arrivals: list[tuple[float, bytes]]) -> list[dict[str, Any]]:
+        lines: list[dict[str, Any]] = []
+
+        def emit(event: Event) -> None:
+            lines.append(json.loads(messages.to_json(event, 0.0)))
+
+        now = 0.0
+        pipeline = Pipeline(self._settings, self._ladder, Metrics(), emit)
+        with (
+            bind_udp(Address("127.0.0.1", 0)) as sock,
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender,
+        ):
+            receiver = Receiver(sock, pipeline, make_decoder(self._settings, pipeline), (), lambda: now)
+            sender.connect(sock.getsockname())
+            tick = arrivals[0][0]
+            for t, together in itertools.groupby(arrivals, key=lambda arrival: arrival[0]):
+                while tick < t:
+                    pipeline.tick(tick)
+                    tick += TICK_S
+                for _, packet in together:
+                    sender.send(packet)
+                now = t
+                receiver.read_all()
+            receiver.close()
+        for one in pipeline.sensors.values():
+            pipeline.flush(one, now)
+        return lines
+
+
+@dataclass(frozen=True)
+class Damaged:
+    """What arrives of a take."""
+
+    arrivals: list[tuple[float, bytes]]  # (time in s, packet) in order
+    struck: np.ndarray  # times of the frames that are not what they should have been
+    felt: Callable[[float], float]  # when what happened at a time of the take happens now
+
+
+def damage(fault: Fault, healthy: Take, seed: int) -> Damaged:
+    """A take with a fault."""
+    rng = np.random.default_rng(seed)
+    line = Line(fault.line, seed)
+    form = Form("arm", plain=not fault.counted)
+    whole = {float(t): frame for t, frame in zip(healthy.sensor_times, healthy.frames, strict=True)}
+    sound = set()
+    waiting: list[tuple[float, int, bytes]] = []
+    order = itertools.count()
+    stream = fault.apply((healthy.frames, healthy.sensor_times, healthy.counter), rng)
+    for frame, t, count in zip(*stream, strict=True):
+        packet = form.packet(Frame(float(t), frame), int(count), 1.7e9 + t)
+        arrivals = line.push(float(t), packet)
+        for arrival, what in arrivals:
+            heapq.heappush(waiting, (arrival, next(order), what))
+        if arrivals == [(t, packet)] and np.array_equal(whole.get(float(t), ()), frame):
+            sound.add(float(t))
+    ordered = [heapq.heappop(waiting) for _ in range(len(waiting))]
+    moved = stream[1] if len(stream[1]) == len(whole) else healthy.sensor_times
+    return Damaged(
+        [(t, packet) for t, _, packet in ordered],
+        np.array(sorted(whole.keys() - sound)),
+        lambda t: float(np.interp(t, healthy.sensor_times, moved)) + fault.line.delay_s,
+    )
+
+
+def measure(name: str, takes: list[Take], idle: list[Take], bench: Bench) -> Row:
+    """One fault on all takes."""
+    row, fault = Row(name), FAULTS[name]
+    for seed, healthy in enumerate(takes):
+        damaged = damage(fault, healthy, seed)
+        lines = bench.events(damaged.arrivals)
+        row.unended += len(violations(lines))
+        tally, hit, struck, felt = Tally(), {}, damaged.struck, damaged.felt
+        for event in healthy.events:
+            performed = Performed(event.label, event.kind, felt(event.onset_s), felt(event.offset_s))
+            tally.begin(performed)
+            hit[performed] = ((struck > event.onset_s - BEFORE_S) & (struck < event.offset_s + AFTER_S)).any()
+        outcomes = [tally.hear(line, line["decided"]) for line in lines if line["type"] in ("gesture", "unknown")]
+        for outcome in [*outcomes, *tally.settle(math.inf)]:
+            if outcome is None:
+                continue
+            if outcome.verdict == "false" or outcome.performed is None:
+                row.more += 1
+                continue
+            row.gestures += 1
+            (row.damaged if hit[outcome.performed] else row.others)[outcome.verdict] += 1
+    for seed, healthy in enumerate(idle):
+        lines = bench.events(damage(fault, healthy, seed).arrivals)
+        row.unended += len(violations(lines))
+        row.untouched += sum(line["type"] == "gesture" for line in lines)
+        row.untouched_minutes += float(healthy.sensor_times[-1] - healthy.sensor_times[0]) / 60
+    return row
+
+
+def main() -> int:
+    """Print the table; 1 where nobody made a gesture, or an onset has no end."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--model", default="cnn_lstm", help="path or name (default: cnn_lstm)")
+    parser.add_argument("--people", type=int, default=10, help="two minutes each, touched and untouched (default: 10)")
+    parser.add_argument("--fault", action="append", choices=tuple(FAULTS), help="only this one; may be repeated")
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
+    log.configure("error")
+    bench = Bench(args.model)
+    people = range(FIRST, FIRST + args.people)
+    takes, idle = [take(person) for person in people], [take(person, touched=False) for person in people]
+    found = [measure(name, takes, idle, bench).figures() for name in args.fault or FAULTS]
+    if args.json:
+        print(json.dumps(found, indent=2))
+    else:
+        print("simulated people and sensor; shares in %")
+        print("| " + " | ".join(found[0]) + " |\n|" + "---|" * len(found[0]))
+        for figures in found:
+            print("| " + " | ".join("-" if value is None else str(value) for value in figures.values()) + " |")
+    return int(any(figures["of nobody"] or figures["unended"] for figures in found))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,157 @@
+"""The faults of a sensor and of the way from it, each as a change of what it sends; seeded."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.hostile.line import Impairment
+
+Frames = NDArray[np.generic]  # (N, R, C) raw counts
+Times = NDArray[np.float64]  # (N,) s
+Counts = NDArray[np.int64]  # (N,) the sensor's frame counter
+Stream = tuple[Frames, Times, Counts]
+Change = Callable[[Frames, Times, Counts, np.random.Generator], Stream]
+LEAD_S = 2.0  # untouched, and without a fault: what the daemon learns the sensor from
+EVERY_S = 10.0  # the faults that come and go come so often
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is wrong: with the way, or with the sensor. `counted`: frames carry the sensor's counter."""
+
+    line: Impairment = Impairment()
+    sensor: Change | None = None
+    counted: bool = True
+
+    def apply(self, stream: Stream, rng: np.random.Generator) -> Stream:
+        """What the sensor sends instead."""
+        frames, times, counts = (array.copy() for array in stream)
+        return self.sensor(frames, times, counts, rng) if self.sensor else (frames, times, counts)
+
+
+def _taxels(frames: Frames, rng: np.random.Generator, count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    at = rng.choice(frames.shape[1] * frames.shape[2], count, replace=False)
+    return at // frames.shape[2], at % frames.shape[2]
+
+
+def _stuck(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+    """Two taxels rise to the top of the range while they run, and stay."""
+    rows, columns = _taxels(frames, rng, 2)
+    for row, column in zip(rows, columns, strict=True):
+        frames[times > times[0] + LEAD_S + rng.uniform(0, 10), row, column] = 4095
+    return frames, times, counts
+
+
+def _dead(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+    """Four taxels fall to 0, and stay."""
+    rows, columns = _taxels(frames, rng, 4)
+    for row, column in zip(rows, columns, strict=True):
+        frames[times > times[0] + LEAD_S + rng.uniform(0, 10), row, column] = 0
+    return frames, times, counts
+
+
+def _dead_line(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+    """A whole row or column falls to 0: a broken conductor."""
+    later, at = times > times[0] + LEAD_S, int(rng.integers(frames.shape[1]))
+    if rng.random() < 0.5:
+        frames[later, at, :] = 0
+    else:
+        frames[later, :, at] = 0
+    return frames, times, counts
+
+
+def _saturated(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+    """Nothing above a third of a touch can be told apart."""
+    idle = np.median(frames, axis=0)
+    top = idle + (np.quantile(frames.max(axis=(1, 2)) - idle.max(), 0.95) / 3)
+    return np.minimum(frames, top.astype(frames.dtype)), times, counts
+
+
+def _noisy(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+    """Two taxels show anything at all."""
+    rows, columns = _taxels(frames, rng, 2)
+    later = times > times[0] + LEAD_S
+    for row, column in zip(rows, columns, strict=True):
+        frames[later, row, column] = rng.integers(0, 4096, later.sum())
+    return frames, times, counts
+
+
+def _frozen(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+    """For a second in ten it sends the same frame again and again."""
+    for begin in np.arange(times[0] + LEAD_S, times[-1], EVERY_S):
+        span = (times >= begin + rng.uniform(0, 8)) & (times < begin + 9)
+        at = np.flatnonzero(span)[:15]
+        frames[at] = frames[at[:1]]
+    return frames, times, counts
+
+
+def _garbage(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+    """One frame in a hundred is anything at all."""
+    hit = (rng.random(len(frames)) < 0.01) & (times > times[0] + LEAD_S)
+    frames[hit] = rng.integers(0, 4096, (hit.sum(), *frames.shape[1:]))
+    return frames, times, counts
+
+
+def _flashes(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+    """One frame in a hundred is all at the top of the range."""
+    hit = (rng.random(len(frames)) < 0.01) & (times > times[0] + LEAD_S)
+    frames[hit] = 4095
+    return frames, times, counts
+
+
+def _drift(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+    """Its rate wanders by a fifth, up and down within half a minute."""
+    phase = rng.uniform(0, 2 * np.pi)
+    return frames, times + 0.95 * (np.cos(phase) - np.cos(2 * np.pi * times / 30 + phase)), counts
+
+
+def _silence(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+    """For a second and a half in ten it sends nothing."""
+    heard = np.ones(len(times), bool)
+    for begin in np.arange(times[0] + LEAD_S, times[-1], EVERY_S):
+        start = begin + rng.uniform(0, 8)
+        heard &= (times < start) | (times >= start + 1.5)
+    return frames[heard], times[heard], counts[heard]
+
+
+def _restart(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+    """Every ten seconds it starts again: 0.3 s of nothing, and its counter begins at 0."""
+    heard = np.ones(len(times), bool)
+    for begin in np.arange(times[0] + LEAD_S, times[-1], EVERY_S):
+        start = begin + rng.uniform(0, 8)
+        heard &= (times < start) | (times >= start + 0.3)
+        later = np.flatnonzero(times >= start + 0.3)
+        counts[later] = np.arange(len(later))
+    return frames[heard], times[heard], counts[heard]
+
+
+FAULTS: dict[str, Fault] = {
+    "none": Fault(),
+    "loss of 1 %": Fault(Impairment(loss=0.01)),
+    "loss of 5 %": Fault(Impairment(loss=0.05)),
+    "loss of 20 %": Fault(Impairment(loss=0.2)),
+    "loss of 5 % in bursts of 5": Fault(Impairment(loss=0.05, burst=5)),
+    "loss of 5 %, no counter": Fault(Impairment(loss=0.05), counted=False),
+    "10 % doubled": Fault(Impairment(duplicate=0.1)),
+    "10 % doubled, no counter": Fault(Impairment(duplicate=0.1), counted=False),
+    "5 % overtaken": Fault(Impairment(late=0.05)),
+    "5 % overtaken, no counter": Fault(Impairment(late=0.05), counted=False),
+    "delay of 0.5 s, jitter of 0.05 s": Fault(Impairment(delay_s=0.5, jitter_s=0.05)),
+    "jitter of 0.2 s": Fault(Impairment(jitter_s=0.2)),
+    "the way stalls for 0.8 s": Fault(Impairment(stall_s=0.8)),
+    "5 % corrupted": Fault(Impairment(corrupt=0.05)),
+    "5 % cut short": Fault(Impairment(cut=0.05)),
+    "silence of 1.5 s": Fault(sensor=_silence),
+    "sensor restarts": Fault(sensor=_restart),
+    "rate drifts by 20 %": Fault(sensor=_drift),
+    "frozen for 1 s": Fault(sensor=_frozen),
+    "2 taxels stuck": Fault(sensor=_stuck),
+    "4 taxels dead": Fault(sensor=_dead),
+    "a row or column dead": Fault(sensor=_dead_line),
+    "2 taxels noisy": Fault(sensor=_noisy),
+    "saturated at a third": Fault(sensor=_saturated),
+    "1 % garbage frames": Fault(sensor=_garbage),
+    "1 % flashes": Fault(sensor=_flashes),
+}
