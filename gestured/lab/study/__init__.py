@@ -1,0 +1,13 @@
+"""Every method of the paper on one front end, under several protocols: `gestured-lab study`.
+
+The rooms, from the data to the figures:
+
+    cohort, material      what is learned from and judged on
+    shifting              the paper's Algorithm 1
+    wavelets, touch_patterns, motion_history, trajectory_boosting      what a classifier sees of a gesture
+    nets, training        the networks
+    methods               the registry: each method, its hyperparameters, the paper's figures
+    protocols             who learns and who is judged; one cell of a table
+    cells                 checkpoints and the schedule
+    everything else       one section of study.json each; `study` puts them together
+"""

@@ -1,0 +1,89 @@
+"""What the gestures are: their movements, their raw signals, and one double tap frame by frame."""
+
+from typing import Any
+
+from . import formats, icons
+from .chart import Plot, Scale, polyline, text
+from .layout import SIMULATED, figure
+from .markup import Markup, tag
+
+WIDTH = 720.0
+SIDE = 108.0  # of a snapshot
+
+
+def gestures(names: list[str], signals: dict[str, Any]) -> Markup:
+    """A card for each gesture: the movement, its name, and the signal of one performance."""
+    peak = max((value for signal in signals.values() for value in signal["sum"]), default=1.0)
+    longest = max((signal["times_s"][-1] for signal in signals.values() if signal["times_s"]), default=1.0)
+    cards = []
+    for name in names:
+        signal = signals.get(name)
+        drawn = _signal(name, signal, peak, longest) if signal and signal["times_s"] else Markup("")
+        cards.append(tag("li", icons.icon(name, 84), tag("span", formats.plain(name), class_="name"), drawn))
+    caption = "Dots are fingertips at the beginning; lines lead where they go."
+    if signals:
+        caption += f" Below, the raw signal of one performance, summed over the taxels, on one scale ({longest:.1f} s)."
+    return figure(
+        "The ten gestures", SIMULATED if signals else "", caption, tag("ul", *cards, class_="cards"), wide=False
+    )
+
+
+def _signal(name: str, signal: dict[str, Any], peak: float, longest: float) -> Markup:
+    low = min(0.0, *signal["sum"])
+    plot = Plot(148, 62, Scale(0.0, longest, 2, 146), Scale(low, peak, 46, 4))
+    points = list(zip(signal["times_s"], signal["sum"], strict=True))
+    around = [(points[0][0], low), *points, (points[-1][0], low)]
+    plot.add(tag("path", d=polyline(plot.at(around), "")[len('<path d="') :].split('"')[0] + "Z", class_="area"))
+    plot.line(points, "signal")
+    plot.add(tag("line", x1=2, x2=146, y1=46, y2=46, class_="axis"))
+    plot.add(text(2, 59, "0", class_="tick"), text(146, 59, f"{longest:.1f} s", "end", "tick"))
+    words = f"{formats.plain(name)}: raw signal summed over the taxels, simulated data"
+    return plot.svg(words, f"{len(points)} frames, {points[-1][0]:.2f} s, highest sum {max(signal['sum']):.0f}.")
+
+
+def double_tap(tap: dict[str, Any]) -> Markup:
+    """Pressure over time with moments marked, and the frame of each moment below."""
+    times, total, shots = tap["times_s"], tap["sum"], tap.get("snapshots") or []
+    plot = Plot(
+        WIDTH,
+        400 if shots else 250,
+        Scale(times[0], times[-1], 56, WIDTH - 20),
+        Scale(min(0.0, *total), max(total) * 1.08, 190, 32),
+    )
+    plot.y_axis(plot.y.ticks(4), lambda value: f"{value:.0f}", "summed signal, raw counts")
+    plot.x_axis(plot.x.ticks(7), lambda value: f"{value:.2g} s")
+    plot.line(list(zip(times, total, strict=True)), "signal")
+    for moment, value in zip(times, total, strict=True):
+        plot.add(tag("circle", cx=plot.x(moment), cy=plot.y(value), r=2.4, class_="sample"))
+    peak = max((value for shot in shots for row in shot["frame"] for value in row), default=1.0)
+    pitch = (WIDTH - 40) / max(len(shots), 1)
+    side = min(SIDE, pitch - 14)
+    for k, shot in enumerate(shots):
+        nearest = min(range(len(times)), key=lambda n: abs(times[n] - shot["t_s"]))
+        x, y, middle = plot.x(times[nearest]), plot.y(total[nearest]), 20 + pitch * (k + 0.5)
+        plot.add(tag("path", d=f"M{x:.1f} {y:.1f}V214L{middle:.1f} 244V256", class_="leader"))
+        plot.add(tag("circle", cx=x, cy=y, r=5, class_="moment"))
+        plot.add(snapshot(shot["frame"], middle - side / 2, 258, side, peak, f"the frame after {shot['t_s']:.2f} s"))
+        plot.add(text(middle, 258 + side + 18, f"{shot['t_s']:.2f} s", "middle", "tick"))
+    return figure(
+        "A double tap, frame by frame",
+        SIMULATED,
+        "Pressure over time, and the sensor's frame at the marked moments; deeper is more pressure.",
+        plot.svg(
+            "A double tap's pressure over time, simulated data", f"{len(shots)} frames as heat maps below the curve."
+        ),
+    )
+
+
+def snapshot(frame: list[list[float]], x: float, y: float, side: float, peak: float, title: str) -> Markup:
+    """One frame as a heat map on the scale of the whole gesture."""
+    step = side / max(len(frame), *(len(row) for row in frame), 1)
+    columns = max(len(row) for row in frame)
+    parts = [tag("rect", x=x, y=y, width=step * columns, height=step * len(frame), class_="ground")]
+    for j, row in enumerate(frame):
+        for k, value in enumerate(row):
+            depth = min(1.0, max(0.0, value / (peak or 1.0)))
+            place = {"x": x + step * k, "y": y + step * j, "width": step, "height": step}
+            if depth > 0.02:
+                parts.append(tag("rect", **place, class_="heat", fill_opacity=round(depth, 2)))
+    return tag("g", tag("title", title), *parts)

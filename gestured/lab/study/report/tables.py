@@ -1,0 +1,185 @@
+"""The tables of what was measured: the paper's figure beside ours, copies, run time, online sessions."""
+
+from . import formats, marks, reading
+from .layout import SIMULATED, cell, head, row_head, table
+from .markup import Markup, join, tag
+from .reading import Row, Study
+
+
+def share_cell(row: Row | None, classes: str = "f0 v0", published: float | None = None) -> Markup:
+    """A share in per cent with its interval, in figures and drawn."""
+    if row is None:
+        return cell(formats.NONE, class_="none")
+    words = join(
+        tag("span", formats.percent(row["right"]), class_="share"),
+        " ",
+        tag("span", formats.interval(row), class_="interval"),
+    )
+    return cell(words, marks.dot(row, classes, published), value=row["right"], class_="right")
+
+
+def published_cell(share: float | None) -> Markup:
+    return cell(formats.percent(share, 0), value=-1.0 if share is None else share, class_="number")
+
+
+def protocols(study: Study) -> Markup:
+    """A table for each augmentation: methods and settings down, protocols across."""
+    return join(*(_augmented(study, name) for name in reading.AUGMENTATIONS if reading.cells(study, augmentation=name)))
+
+
+def _augmented(study: Study, augmentation: str) -> Markup:
+    rows = reading.cells(study, augmentation=augmentation)
+    present = [name for name in reading.PROTOCOLS if any(row["protocol"] == name for row in rows)]
+    heads = [head("Method"), head("Settings"), head("Published")]
+    heads += [head(tag("span", name), tag("small", _on(rows, name))) for name in present]
+    lines = []
+    for method in reading.in_order(study, {row["method"] for row in rows}):
+        for settings in ("paper", "tuned"):
+            mine = {row["protocol"]: row for row in rows if row["method"] == method and row["settings"] == settings}
+            if mine:
+                lines.append(_line(study, method, settings, augmentation, [mine.get(name) for name in present]))
+    words = reading.AUGMENTATIONS[augmentation]
+    caption = "Right in per cent with its 95 % interval over participants; the stroke is the published figure."
+    title = f"{words[0].upper()}{words[1:]}"
+    source = "simulated data, but for “real”" if "real" in present else SIMULATED
+    return table(title, source, caption, heads, lines)
+
+
+def _on(rows: list[Row], protocol: str) -> str:
+    data = {row["data"] for row in rows if row["protocol"] == protocol}
+    return " and ".join(sorted(data)) + " data"
+
+
+def _line(study: Study, method: str, settings: str, augmentation: str, found: list[Row | None]) -> list[Markup]:
+    figure = reading.published(study, method, augmentation)
+    look = marks.look_of(study, method)
+    name = cell(reading.SETTINGS[settings])
+    shares = [share_cell(row, f"f{look.family} v0", figure) for row in found]
+    return [row_head(marks.named(study, method)), name, published_cell(figure), *shares]
+
+
+def copies(study: Study) -> Markup:
+    """How much of the gain from augmentation comes from copies of test gestures."""
+    heads = [head("Method"), head("Settings"), head("Test gestures"), head("With a copy in training")]
+    heads += [
+        head("Right with a copy"),
+        head("Right without"),
+        head("Gain, augmented before"),
+        head("Gain, after"),
+        head("From copies"),
+    ]
+    lines = []
+    for row in reading.part(study, "copies"):
+        owed = from_copies(row)
+        lines.append(
+            [
+                row_head(marks.named(study, row["method"])),
+                cell(reading.SETTINGS[row["settings"]]),
+                cell(formats.count(row["test"]), value=row["test"], class_="number"),
+                cell(
+                    f"{formats.count(row['with_copy'])} ({formats.with_unit(_part(row), 0)})",
+                    value=row["with_copy"],
+                    class_="number",
+                ),
+                _share(row["right_with_copy"]),
+                _share(row["right_without_copy"]),
+                _points(row["gain_leaky"]),
+                _points(row["gain_clean"]),
+                _share(owed),
+            ]
+        )
+    return table(
+        "How much of the gain from augmentation is copies",
+        SIMULATED,
+        "Shares in per cent, gains in percentage points against no augmentation. “Before” augments before the split, "
+        "as the published figures suggest; “after” only the training part. What is gained before but not after is "
+        "owed to copies.",
+        heads,
+        lines,
+    )
+
+
+def from_copies(row: Row) -> float | None:
+    """The share of the gain that is lost when only the training part is augmented; None where nothing is gained."""
+    before, after = row.get("gain_leaky"), row.get("gain_clean")
+    if before is None or after is None or before <= 0.005:
+        return None
+    return float(min(1.0, max(0.0, 1.0 - after / before)))
+
+
+def _part(row: Row) -> float | None:
+    return row["with_copy"] / row["test"] if row["test"] else None
+
+
+def _share(share: float | None) -> Markup:
+    return cell(formats.percent(share), value=-1.0 if share is None else share, class_="number")
+
+
+def _points(gain: float | None) -> Markup:
+    return cell(formats.NONE if gain is None else formats.points(gain), value=gain, class_="number")
+
+
+def run_time(study: Study) -> Markup:
+    heads = [
+        head("Method"),
+        head("Settings"),
+        head("Precision"),
+        head("Right, %"),
+        head("Median"),
+        head("95th percentile"),
+    ]
+    heads += [head("Memory"), head("File"), head("On the front")]
+    lines = []
+    for row in sorted(reading.part(study, "run_time"), key=lambda row: row["median_us"]):
+        look = marks.look_of(study, row["method"])
+        lines.append(
+            [
+                row_head(marks.named(study, row["method"])),
+                cell(reading.SETTINGS[row["settings"]]),
+                cell(row["precision"]),
+                share_cell(row, f"f{look.family} v0"),
+                *(
+                    cell(formats.duration(row[name]), value=row[name], class_="number")
+                    for name in ("median_us", "p95_us")
+                ),
+                *(
+                    cell(formats.size(row[name]), value=row[name], class_="number")
+                    for name in ("memory_bytes", "file_bytes")
+                ),
+                cell("yes" if row["front"] else "", value=float(row["front"])),
+            ]
+        )
+    return table("Run time, memory and size", SIMULATED, "The same points in figures, fastest first.", heads, lines)
+
+
+def online(study: Study) -> Markup:
+    heads = [
+        head("Method"),
+        head("Gestures"),
+        head("Published"),
+        head("Right, %"),
+        head("Wrong, %"),
+        head("Missed, %"),
+        head("Extra, %"),
+    ]
+    heads += [head("False a minute"), head("Latency, median"), head("95th percentile")]
+    lines = []
+    for row in reading.part(study, "online"):
+        look, latency = marks.look_of(study, row["method"]), row.get("latency_ms") or {}
+        lines.append(
+            [
+                row_head(marks.named(study, row["method"])),
+                cell(formats.count(row["gestures"]), value=row["gestures"], class_="number"),
+                published_cell(row.get("published")),
+                share_cell(row, f"f{look.family} v0", row.get("published")),
+                *(_share(row[name]) for name in ("wrong", "missed", "extra")),
+                cell(f"{row['false_per_minute']:.2f}", value=row["false_per_minute"], class_="number"),
+                *(_milliseconds(latency.get(name)) for name in ("p50", "p95")),
+            ]
+        )
+    caption = "Continuous sessions over UDP to a running daemon. Latency is from the finger's lift to the event."
+    return table("Online", SIMULATED, caption, heads, lines)
+
+
+def _milliseconds(value: float | None) -> Markup:
+    return cell(formats.NONE if value is None else f"{value:.0f}{formats.THIN}ms", value=value, class_="number")

@@ -1,0 +1,304 @@
+"""A study that nobody computed: plausible in form, plainly invented in its numbers."""
+
+import math
+import random
+from typing import Any
+
+from gestured.simulator import GESTURES
+
+Study = dict[str, Any]
+METHODS = {
+    "st_knn": ("Spatio-temporal KNN", "spatio-temporal features", (0.62, 0.79)),
+    "st_rf": ("Spatio-temporal random forest", "spatio-temporal features", (0.58, 0.96)),
+    "st_svm": ("Spatio-temporal SVM", "spatio-temporal features", (0.58, 0.98)),
+    "tp_knn": ("Touch-pattern KNN", "touch-pattern features", (0.56, 0.98)),
+    "tp_rf": ("Touch-pattern random forest", "touch-pattern features", (0.60, 0.98)),
+    "tp_svm": ("Touch-pattern SVM", "touch-pattern features", (0.56, 0.97)),
+    "cnn": ("CNN on motion history images", "motion history image", (0.77, 0.81)),
+    "lstm": ("LSTM", "recurrent", (0.82, 0.97)),
+    "cnn_lstm": ("CNN-LSTM", "recurrent", (0.89, 0.97)),
+    "cnn_gru": ("CNN-GRU", "beyond the paper", None),
+    "tcn": ("Causal TCN", "beyond the paper", None),
+    "transformer": ("Small transformer", "beyond the paper", None),
+    "trajectory": ("Trajectory features, boosted", "beyond the paper", None),
+}
+GROUPS = {
+    "gesture": list(GESTURES),
+    "speed": ["slow", "normal", "fast"],
+    "inclination": ["0", "1", "2"],
+    "participant": [f"p{k:02d}" for k in range(34)],
+    "hand size": ["small", "medium", "large"],
+    "pressure": ["light", "middle", "firm"],
+    "place": ["middle", "edge", "corner"],
+    "signal to noise": ["below 10", "10 to 20", "20 to 40", "above 40"],
+}
+
+
+def made_study(seed: int = 5) -> Study:
+    """Every part of the schema, filled."""
+    chance = random.Random(seed)
+    about = {"version": "0.0-made-up", "command": "gestured-lab study --out report/", "seed": 0, "quick": False}
+    return {
+        "about": {**about, "gestures": list(GESTURES)},
+        "machine": _machine(),
+        "data": _data(),
+        "methods": _methods(),
+        "cells": [cell for method in METHODS for cell in _cells(method, chance)],
+        "copies": [_copies(method, chance) for method in METHODS],
+        "tuning": [_tuning(method, chance) for method in ("st_knn", "st_svm", "tp_svm", "lstm")],
+        "choices": _choices(chance),
+        "run_time": [row for method in METHODS for row in _run_time(method, chance)],
+        "elapsed": [_elapsed(method, chance) for method in ("lstm", "cnn_lstm", "cnn_gru", "tcn")],
+        "learning": [_learning(method, chance) for method in ("tp_rf", "st_svm", "lstm", "cnn_lstm", "trajectory")],
+        "calibration": [_calibration(method, chance) for method in ("tp_rf", "lstm", "cnn_lstm", "tcn")],
+        "failures": [_failure(method, by, chance) for method in ("tp_rf", "lstm", "cnn_lstm") for by in GROUPS],
+        "signals": {gesture: _signal(k) for k, gesture in enumerate(GESTURES)},
+        "double_tap": _double_tap(),
+        "online": [_online(method, chance) for method in ("tp_rf", "lstm", "cnn_lstm")],
+    }
+
+
+def empty_study() -> Study:
+    """The same with nothing computed, as small as the schema allows."""
+    study = made_study()
+    lists = (
+        "cells",
+        "copies",
+        "tuning",
+        "choices",
+        "run_time",
+        "elapsed",
+        "learning",
+        "calibration",
+        "failures",
+        "online",
+    )
+    data = {"simulated": study["data"]["simulated"], "real": None, "own": [], "left_out": []}
+    nothing: Study = {name: [] for name in lists}
+    return {**study, **nothing, "methods": {}, "data": data, "signals": {}, "double_tap": None}
+
+
+def _machine() -> Study:
+    versions = {"python": "3.11.2", "numpy": "2.4", "torch": "2.13", "sklearn": "1.9", "onnxruntime": "1.31"}
+    return {
+        **versions,
+        "cpu": "A made-up CPU",
+        "cores": 2,
+        "memory_gib": 7.8,
+        "system": "Linux made-up",
+        "date": "2001-02-03",
+        "minutes": 87.5,
+    }
+
+
+def _data() -> Study:
+    return {
+        "simulated": {
+            "name": "gestured's simulator, cohort seed 0",
+            "participants": 34,
+            "performed": 3060,
+            "cut": 3011,
+            "lost": 49,
+        },
+        "real": {"name": "CapFingerId (made-up figures)", "subjects": 20, "gestures": 1801, "non_gestures": 350},
+        "own": [{"file": "mine.npz", "recordings": 30, "used": 28}],
+        "left_out": [
+            {"file": "mine.npz", "recording": 4, "field": "times", "reason": "times go back at frame 3"},
+            {
+                "file": "other.npz",
+                "recording": None,
+                "field": "frames",
+                "reason": "expected three dimensions, found two",
+            },
+        ],
+    }
+
+
+def _methods() -> Study:
+    found = {}
+    for method, (title, family, published) in METHODS.items():
+        tried = {"neighbours": 7} if method.endswith("knn") else {"C": 128.0, "gamma": 0.000488}
+        hyper = {"paper": tried if published else None, "tuned": {**tried, "more": 3}}
+        what = "One sentence of what it sees and how it decides."
+        found[method] = {
+            "title": title,
+            "family": family,
+            "paper": published is not None,
+            "what": what,
+            "hyperparameters": hyper,
+        }
+    return found
+
+
+def _between(right: float, width: float = 0.03) -> Study:
+    return {"right": right, "low": max(0.0, right - width), "high": min(1.0, right + 0.8 * width)}
+
+
+def _strength(method: str) -> float:
+    return {"st": 0.66, "tp": 0.62, "cnn": 0.80, "lstm": 0.90, "tcn": 0.95, "transformer": 0.93}.get(
+        method.split("_")[0] if method[:2] in ("st", "tp") else method, 0.955
+    )
+
+
+def _cells(method: str, chance: random.Random) -> list[Study]:
+    published = METHODS[method][2]
+    cells = []
+    for settings in ("paper", "tuned") if published else ("tuned",):
+        for augmentation in ("none", "shift", "wide"):
+            for protocol in ("paper", "clean", "participants", "real"):
+                right = _strength(method) + chance.uniform(-0.03, 0.02) + (0.01 if settings == "tuned" else 0.0)
+                right += {"paper": 0.0, "clean": 0.0, "participants": -0.03, "real": -0.12}[protocol]
+                if augmentation == "shift":
+                    right += 0.6 * (0.99 - right) if protocol == "paper" else 0.015
+                figure = None if published is None or augmentation == "wide" else published[augmentation == "shift"]
+                about = {"method": method, "settings": settings, "augmentation": augmentation, "protocol": protocol}
+                data = "real" if protocol == "real" else "simulated"
+                rest = {"data": data, "n": 459, "published": figure, "train": 2601, "seconds": 12.5}
+                confusion = _confusion(right, chance) if protocol == "participants" else None
+                cells.append({**about, **_between(right), **rest, "confusion": confusion})
+    return cells
+
+
+def _confusion(right: float, chance: random.Random) -> list[list[int]]:
+    rows = []
+    for k in range(10):
+        row = [0] * 10
+        for _ in range(45):
+            row[k if chance.random() < right else (k + chance.choice((1, 1, 1, -1, 3))) % 10] += 1
+        rows.append(row)
+    return rows
+
+
+def _copies(method: str, chance: random.Random) -> Study:
+    leaky = chance.uniform(0.05, 0.25)
+    gains = {"gain_leaky": leaky, "gain_clean": leaky * chance.uniform(0.05, 0.3)}
+    return {
+        "method": method,
+        "settings": "paper",
+        "test": 1836,
+        "with_copy": 930,
+        "right_with_copy": 0.99,
+        "right_without_copy": 0.71,
+        **gains,
+    }
+
+
+def _tuning(method: str, chance: random.Random) -> Study:
+    tried = [
+        {"values": {"C": 2.0**k, "gamma": 2.0 ** (k - 12)}, "right": 0.6 + chance.random() / 3, "spread": 0.02}
+        for k in range(6)
+    ]
+    return {"method": method, "candidates": tried, "chosen": max(tried, key=lambda row: row["right"])["values"]}
+
+
+def _choices(chance: random.Random) -> list[Study]:
+    table = {
+        "wavelet": ("db2", ["haar", "db2", "sym4"]),
+        "decay of the motion history image": ("0.9", ["0.8", "0.9", "linear"]),
+        "what a bounding box is": ("above 10 % of the peak", ["above 0", "above 10 % of the peak"]),
+    }
+    return [
+        {
+            "choice": choice,
+            "ours": ours,
+            "method": "st_svm",
+            "effect": "Between the best and the worst lie three points.",
+            "alternatives": [{"value": value, **_between(chance.uniform(0.6, 0.9))} for value in values],
+        }
+        for choice, (ours, values) in table.items()
+    ]
+
+
+def _run_time(method: str, chance: random.Random) -> list[Study]:
+    rows = []
+    for precision in ("float32", "int8") if METHODS[method][1] in ("recurrent", "beyond the paper") else ("float64",):
+        median = 10 ** chance.uniform(1.7, 3.9)
+        sizes = {"memory_bytes": int(median * 3000), "file_bytes": int(median * 900)}
+        times = {"median_us": median, "p95_us": median * 1.4, "front": False}
+        rows.append(
+            {
+                "method": method,
+                "settings": "tuned",
+                "precision": precision,
+                **_between(_strength(method)),
+                **times,
+                **sizes,
+            }
+        )
+    for row in rows:
+        row["front"] = row["right"] > 0.94 and row["median_us"] < 900
+    return rows
+
+
+def _elapsed(method: str, chance: random.Random) -> Study:
+    at = [{"share": share} for share in (0.25, 0.5, 0.75, 1.0)] + [{"after_s": after} for after in (0.0, 0.1, 0.2, 0.3)]
+    right = [_strength(method) * level - chance.uniform(0, 0.03) for level in (0.35, 0.62, 0.86, 0.97, 0.98, 1, 1, 1)]
+    return {
+        "method": method,
+        "at": at,
+        "right": right,
+        "low": [r - 0.03 for r in right],
+        "high": [r + 0.03 for r in right],
+    }
+
+
+def _learning(method: str, chance: random.Random) -> Study:
+    people = [2, 4, 8, 16, 28]
+    right = [_strength(method) - 0.5 / count + chance.uniform(-0.01, 0.01) for count in people]
+    return {
+        "method": method,
+        "participants": people,
+        "right": right,
+        "low": [r - 0.04 for r in right],
+        "high": [r + 0.04 for r in right],
+    }
+
+
+def _calibration(method: str, chance: random.Random) -> Study:
+    bins = [
+        {"confidence": c / 10 + 0.05, "right": c / 10 + chance.uniform(-0.08, 0.05), "n": 4 + c**3}
+        for c in range(1, 10)
+    ]
+    return {"method": method, "bins": bins, "error": 0.043}
+
+
+def _failure(method: str, by: str, chance: random.Random) -> Study:
+    return {
+        "method": method,
+        "by": by,
+        "groups": [
+            {"name": name, "n": 90, **_between(_strength(method) - chance.uniform(0, 0.12), 0.05)}
+            for name in GROUPS[by]
+        ],
+    }
+
+
+def _signal(k: int) -> Study:
+    times = [t / 15 for t in range(20)]
+    return {
+        "times_s": times,
+        "sum": [900 * math.exp(-((t - 0.6) ** 2) / 0.08) * (1 + 0.1 * math.sin(9 * t + k)) for t in times],
+    }
+
+
+def _double_tap() -> Study:
+    times = [t / 15 for t in range(15)]
+    force = [math.exp(-((t - 0.25) ** 2) / 0.005) + 0.9 * math.exp(-((t - 0.62) ** 2) / 0.006) for t in times]
+    snaps = []
+    for t in (2, 4, 6, 9, 12):
+        frame = [[400 * force[t] * math.exp(-((r - 4) ** 2 + (c - 5) ** 2) / 1.5) for c in range(9)] for r in range(9)]
+        snaps.append({"t_s": times[t], "frame": frame})
+    return {"times_s": times, "sum": [1900 * f for f in force], "snapshots": snaps}
+
+
+def _online(method: str, chance: random.Random) -> Study:
+    right = _strength(method) - 0.04
+    rest = {
+        "wrong": 0.03,
+        "missed": 0.02,
+        "extra": 0.012,
+        "false_per_minute": 0.31,
+        "latency_ms": {"p50": 133.0, "p95": 402.0},
+    }
+    published = {"tp_rf": 0.71, "lstm": 0.89, "cnn_lstm": 0.93}[method]
+    return {"method": method, "gestures": 600, **_between(right), **rest, "published": published}
