@@ -7,6 +7,7 @@ from pathlib import Path
 
 from gestured import __version__
 from gestured.core.errors import GesturedError
+from gestured.lab.recordings import commands as recordings
 
 CACHE = Path(".cache/lab")
 MODELS = Path("models")
@@ -59,6 +60,7 @@ def parser() -> argparse.ArgumentParser:
                     "gestured-lab stability --quick")  # fmt: skip
     stability.add_argument("--quick", action="store_true", help="some seconds instead of some minutes")
     stability.add_argument("--out", type=Path, help="folder for stability.svg, error against run time")
+    recordings.add(add)
     return top
 
 
@@ -74,6 +76,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from gestured.lab import bench
 
             return bench.run(args)
+        if args.command in recordings.COMMANDS:
+            return recordings.run(args)
         try:
             from gestured.lab import commands
             from gestured.lab.stability import command as stability

@@ -1,0 +1,44 @@
+"""`gestured-lab collect`: a participant, a sensor, a terminal."""
+
+import argparse
+import json
+from collections import Counter
+from contextlib import closing
+from pathlib import Path
+
+from gestured.core.errors import RecordingError
+from gestured.lab.recordings.live import LiveSensor
+from gestured.lab.recordings.protocol import order
+from gestured.lab.recordings.session import Session
+from gestured.lab.recordings.terminal import Terminal
+from gestured.recording import Recordings, read
+
+
+def run(args: argparse.Namespace) -> int:
+    """Collect until all is done or somebody quits; the same command goes on."""
+    terminal = Terminal()
+    args.out.mkdir(parents=True, exist_ok=True)
+    path: Path = args.out / f"{args.participant}.npz"
+    kept = already(path, args.participant, (args.rows, args.columns))
+    trials = order(args.participant, args.seed, args.gestures, args.repeats)
+    with closing(LiveSensor(args.listen, args.rows, args.columns, args.sensor, args.rate)) as sensor, terminal:
+        session = Session(args.participant, path, kept, sensor, terminal, args.countdown)
+        session.run(trials)
+    if args.json:
+        labels = Counter(session.kept.labels.tolist()) if session.kept is not None else {}
+        print(json.dumps({"file": str(path), "trials": len(trials), "recordings": labels}))
+    return 0
+
+
+def already(path: Path, participant: str, grid: tuple[int, int]) -> Recordings | None:
+    """What an earlier session kept; RecordingError where the file is somebody else's or another sensor's."""
+    if not path.exists():
+        return None
+    kept = read(path)
+    others = sorted(set(kept.subjects.astype(str).tolist()) - {participant})
+    if others:
+        raise RecordingError(f"{path}: subjects: expected {participant} alone, found {others[0]}; choose another --out")
+    if kept.frames.shape[1:] != grid:
+        found, expected = ("x".join(map(str, shape)) for shape in (kept.frames.shape[1:], grid))
+        raise RecordingError(f"{path}: frames: expected the grid {expected}, found {found}; see --rows and --columns")
+    return kept

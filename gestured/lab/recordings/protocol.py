@@ -1,0 +1,70 @@
+"""Who performs what in which order: ten gestures x three inclinations x three speeds, each `repeats` times."""
+
+import argparse
+import re
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gestured.recording import Recordings
+from gestured.simulator import SPEEDS
+
+INCLINATIONS = ("flat", "tilted", "upright")  # of the sensor; recordings hold their numbers 0, 1, 2
+PSEUDONYM = re.compile(r"[A-Za-z0-9_-]{1,32}")
+
+
+class Trial(NamedTuple):
+    """One thing to perform."""
+
+    gesture: str
+    speed: str
+    inclination: int
+
+    def __str__(self) -> str:
+        return f"{self.gesture}, {self.speed}, sensor {INCLINATIONS[self.inclination]}"
+
+
+def pseudonym(text: str) -> str:
+    """A participant's pseudonym; for argparse."""
+    if PSEUDONYM.fullmatch(text) is None:
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: expected 1 to 32 of A-Z a-z 0-9 _ -, such as 07: a participant is a pseudonym, never a name, "
+            "and it becomes the name of a file"
+        )
+    return text
+
+
+def order(participant: str, seed: int, gestures: Sequence[str], repeats: int) -> list[Trial]:
+    """All trials in this participant's own order: the same for the same arguments.
+
+    Inclinations come in blocks, in random order, since whoever moves the sensor must hold it still for a while before
+    it can be used again. Within a block gestures and speeds are shuffled, each once before any comes again.
+    """
+    rng = np.random.default_rng([seed, *participant.encode()])
+    trials: list[Trial] = []
+    for inclination in rng.permutation(len(INCLINATIONS)).tolist():
+        block = [Trial(gesture, speed, inclination) for gesture in gestures for speed in SPEEDS]
+        for _ in range(repeats):
+            trials += [block[k] for k in rng.permutation(len(block))]
+    return trials
+
+
+def left(trials: Sequence[Trial], kept: Recordings | None) -> list[Trial]:
+    """What of `trials` is still to do, in order, when `kept` holds what was done before."""
+    done = Counter(_performed(kept)) if kept is not None else Counter()
+    todo = []
+    for trial in trials:
+        if done[trial]:
+            done[trial] -= 1
+        else:
+            todo.append(trial)
+    return todo
+
+
+def _performed(kept: Recordings) -> list[Trial]:
+    if kept.speeds is None or kept.inclinations is None:
+        return []
+    fields = (kept.labels.tolist(), kept.speeds.tolist(), kept.inclinations.tolist())
+    return [Trial(*found) for found in zip(*fields, strict=True)]

@@ -1,0 +1,220 @@
+"""Leads a participant through the protocol at a terminal: prompt, countdown, gesture, verdict, key; again.
+
+Every kept take is on disk before the next prompt, so a session can end at any moment and go on later.
+"""
+
+import math
+import select
+import time
+from collections.abc import Callable, Sequence
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from gestured.client.picture import draw, trace
+from gestured.lab.recordings.live import LiveSensor
+from gestured.lab.recordings.protocol import INCLINATIONS, Trial, left
+from gestured.lab.recordings.quality import Take, faults
+from gestured.lab.recordings.store import compact, join
+from gestured.lab.recordings.terminal import Ended, Terminal
+from gestured.recording import Recordings, write
+from gestured.recording_check import FINGERS
+
+PATIENCE_S = 10.0  # for a gesture to begin, and for it to end
+APART_S = 0.4  # a second contact within so long belongs to the take (and spoils it)
+CONSENT = """\
+Consent of participant {participant}
+  What is recorded: the pressure on the sensor while you perform gestures, and when. No name, no picture, no sound.
+  It is kept under the pseudonym {participant} in {path}, to train and test gesture recognition.
+  You may stop at any time, and have your recordings deleted later: gestured-lab forget {participant} {path}"""
+KEEP = "Enter keep  "
+KEYS = KEEP + "r repeat  d discard, it comes again later  p pause  q quit and go on later"
+
+
+class Paused(Exception):
+    """Somebody asked for a pause; what was being captured is void."""
+
+
+class Session:
+    """One participant at one sensor; `kept` is what is on disk."""
+
+    def __init__(
+        self, participant: str, path: Path, kept: Recordings | None, sensor: LiveSensor, terminal: Terminal, wait_s: int
+    ) -> None:
+        self.participant, self.path, self.kept = participant, path, kept
+        self._sensor, self._terminal, self._wait_s = sensor, terminal, wait_s
+        self._consent = ""
+        self._inclination: int | None = None
+
+    def run(self, trials: Sequence[Trial]) -> None:
+        """Until everything is kept, or somebody quits."""
+        say = self._terminal.say
+        try:
+            if not self._agree():
+                say("No consent, so nothing is recorded.")
+                return
+            todo = left(trials, self.kept)
+            total = len(trials)
+            if len(todo) < total:
+                say(f"{total - len(todo)} of {total} are done already.")
+            self._await_sensor()
+            while todo:
+                take = self._trial(todo[0], total - len(todo) + 1, total)
+                trial = todo.pop(0)
+                if take is not None:
+                    self._keep(take, trial)
+                else:  # again before the sensor is moved
+                    others = (k for k, other in enumerate(todo) if other.inclination != trial.inclination)
+                    todo.insert(next(others, len(todo)), trial)
+            say(f"All {total} are done. Thank you.")
+        except Ended:
+            done = 0 if self.kept is None else len(self.kept)
+            say(f"\nEnded with {done} recordings in {self.path}; the same command goes on from here.")
+
+    def _agree(self) -> bool:
+        if self.kept is not None and self.kept.consents is not None and self.kept.consents[0]:
+            self._consent = str(self.kept.consents[0])
+            self._terminal.say(f"Participant {self.participant} gave consent on {self._consent}.")
+            return True
+        self._terminal.say(CONSENT.format(participant=self.participant, path=self.path))
+        if self._terminal.line("Do you agree? (yes/no) ").strip().lower() != "yes":
+            return False
+        self._consent = date.today().isoformat()
+        return True
+
+    def _await_sensor(self) -> None:
+        self._terminal.say(f"Waiting for the sensor on {self._sensor.where}; do not touch it.")
+        self._until(lambda: self._sensor.front.ready)
+        rows, columns = self._sensor.front.sent
+        self._terminal.say(f"Sensor {self._sensor.name}: {rows} x {columns} at {self._sensor.rate_hz:.0f} Hz.")
+
+    def _trial(self, trial: Trial, number: int, total: int) -> Take | None:
+        """The take to keep, or None where it was discarded."""
+        say = self._terminal.say
+        while True:
+            try:
+                if trial.inclination != self._inclination:
+                    self._inclination = None
+                    say(f"\nThe sensor {INCLINATIONS[trial.inclination]}, please. Enter when it is in place.")
+                    while self._until(None) != "\n":
+                        pass
+                    self._inclination = trial.inclination
+                say(f"\n{number}/{total}  {trial}")
+                answer, take = self._once(trial)
+            except Paused:
+                say("Paused. Enter goes on, q quits.")
+                while self._key() != "\n":
+                    pass
+                continue
+            if answer == "d":
+                return None
+            if answer == "\n" and take is not None:
+                return take
+
+    def _once(self, trial: Trial) -> tuple[str, Take | None]:
+        """One performance: what was captured, and the key that judges it."""
+        terminal, sensor = self._terminal, self._sensor
+        for left_s in range(self._wait_s, 0, -1):
+            terminal.say(f"{left_s} ", end="")
+            self._until(None, 1.0)
+        if sensor.front.touched:
+            terminal.say("let go of the sensor ", end="")
+            self._until(lambda: not sensor.front.touched)
+        sensor.begin()
+        terminal.say("now!")
+        self._until(lambda: sensor.onset is not None, PATIENCE_S)
+        if sensor.onset is not None:
+            self._until(lambda: sensor.quiet(APART_S), PATIENCE_S)
+        take = sensor.take()
+        self._show(trial, take)
+        usable = take is not None and not take.trouble
+        terminal.say(f"  {KEYS if usable else KEYS.removeprefix(KEEP)}")
+        while True:
+            key = self._until(None)
+            if key in ("r", "d") or (usable and key == "\n"):
+                return key, take
+
+    def _show(self, trial: Trial, take: Take | None) -> None:
+        if take is None:
+            self._terminal.say("  nothing touched the sensor")
+            return
+        wrong = faults(take, trial.gesture)
+        peak = take.peak()
+        words = [
+            "",
+            f"touched for {take.seconds:.2f} s, frames: {take.release - take.onset + 1}",
+            f"peak {peak:.0f} counts, {peak / max(take.noise, 1e-9):.0f} times the noise",
+            "good" if not wrong else "NOT GOOD: " + "; ".join(wrong),
+            "",
+        ]
+        start = max(take.onset - 2, 0)
+        picture = draw(trace(take.values()[start : take.release + 1]), colour=True)
+        for row, text in zip(picture, words, strict=True):
+            self._terminal.say(f"  {row}   {text}".rstrip())
+
+    def _keep(self, take: Take, trial: Trial) -> None:
+        new = recording(take, trial, self.participant, self._consent)
+        together = new if self.kept is None else join([self.kept, new])
+        write(self.path, together)
+        self.kept = together
+        self._terminal.say(f"  kept, {len(together)} in {self.path}")
+
+    def _until(self, done: Callable[[], bool] | None, seconds: float = math.inf) -> str:
+        """Feed the front end until `done`, or for so long; without `done` until a key, which it gives.
+
+        Raises Paused and Ended for their keys.
+        """
+        end = time.monotonic() + seconds
+        told = False
+        while True:
+            self._sensor.pump()
+            if done is not None and done():
+                return ""
+            key = self._terminal.key()
+            if key == "q":
+                raise Ended
+            if key == "p":
+                raise Paused
+            if key is not None and done is None and seconds == math.inf:
+                return key
+            if self._sensor.silent and not told:
+                told = True
+                self._terminal.say(f"\n  {self._sensor.trouble()}")
+            rest = end - time.monotonic()
+            if rest <= 0:
+                return ""
+            select.select([self._terminal.fileno(), self._sensor.socket.fileno()], [], [], min(rest, 0.5))
+
+    def _key(self) -> str:
+        try:
+            return self._until(None)
+        except Paused:
+            return "p"
+
+
+def recording(take: Take, trial: Trial, participant: str, consent: str) -> Recordings:
+    """A take in the contract's form, times counted from its first frame."""
+    times = take.times()
+    n = len(times)
+    touches = np.full((n, FINGERS, 2), np.nan, np.float32)
+    ids = np.full((n, FINGERS), -1, np.int32)
+    for i, frame in enumerate(take.frames):
+        for k, touch in enumerate(frame.touches[:FINGERS]):
+            if touch.id >= 0:
+                touches[i, k], ids[i, k] = (touch.x, touch.y), touch.id
+    return Recordings(
+        frames=compact(np.array([frame.values for frame in take.frames])),
+        times=times - times[0],
+        offsets=np.array([0, n], np.int64),
+        labels=np.array([trial.gesture]),
+        subjects=np.array([participant]),
+        speeds=np.array([trial.speed]),
+        inclinations=np.array([trial.inclination]),
+        kinds=np.array([trial.gesture]),
+        onsets=np.array([take.onset]),
+        releases=np.array([take.release]),
+        touches=touches,
+        touch_ids=ids,
+        consents=np.array([consent]),
+    )

@@ -1,0 +1,98 @@
+"""Sets of recordings put together, and what the front end marks in them."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.errors import RecordingError
+from gestured.core.frames import Frame, Segment
+from gestured.core.recognizer import Cut, FrontEnd
+from gestured.lab.dataset import with_idle
+from gestured.recording import Recordings
+from gestured.recording_check import EVENTS, FINGERS
+
+UNKNOWN = {"speeds": "", "inclinations": "", "kinds": "", "consents": ""}  # where one set has the field and one has not
+TOGETHER = ("onsets", "releases")  # are left out where one set does not know them
+
+
+def join(parts: Sequence[Recordings]) -> Recordings:
+    """Several sets as one, in that order; RecordingError where their grids differ.
+
+    What one set does not know of its recordings is empty there (NaN for touches).
+    """
+    grids = {part.frames.shape[1:] for part in parts}
+    if len(grids) != 1:
+        raise RecordingError(f"frames: expected one grid, found {' and '.join(f'{r}x{c}' for r, c in sorted(grids))}")
+    joined: dict[str, Any] = {}
+    for field in (field.name for field in fields(Recordings)):
+        known = [getattr(part, field) for part in parts]
+        if field == "offsets" or all(value is None for value in known):
+            continue
+        if field in TOGETHER and any(value is None for value in known):
+            continue
+        if field not in EVENTS:
+            known = [
+                _unknown(field, part) if value is None else value for part, value in zip(parts, known, strict=True)
+            ]
+        joined[field] = np.concatenate([value for value in known if value is not None])
+    lengths = np.concatenate([np.diff(part.offsets) for part in parts])
+    joined["offsets"] = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+    if "event_recording" in joined:
+        before = np.cumsum([0, *(len(part) for part in parts)])
+        joined["event_recording"] = np.concatenate(
+            [
+                part.event_recording + start
+                for part, start in zip(parts, before, strict=False)
+                if part.event_recording is not None
+            ]
+        )
+    return Recordings(**joined)
+
+
+def _unknown(field: str, part: Recordings) -> NDArray[Any]:
+    if field == "touches":
+        return np.full((len(part.frames), FINGERS, 2), np.nan, np.float32)
+    if field == "touch_ids":
+        return np.full((len(part.frames), FINGERS), -1, np.int32)
+    return np.full(len(part), UNKNOWN[field])
+
+
+def compact(frames: NDArray[Any]) -> NDArray[Any]:
+    """(T, R, C) counts in the smallest type that holds them all exactly: uint16 or int32 if whole, else as they are."""
+    if not len(frames) or not (frames == np.rint(frames)).all():
+        return frames
+    low, high = float(frames.min()), float(frames.max())
+    for kind in (np.uint16, np.int32):
+        if np.iinfo(kind).min <= low and high <= np.iinfo(kind).max:
+            return frames.astype(kind)
+    return frames
+
+
+def touched(frames: NDArray[Any], times: NDArray[np.float64]) -> tuple[int, int] | None:
+    """The first and the last touched frame of one gesture (T, R, C) at `times` (T,) s, as the front end sees them.
+
+    None where it does not see exactly one. A recording without a second of idle sensor before the touch gets one, as
+    for training: the quietest that each taxel shows.
+    """
+    for lead in (0, 20):
+        padded, stamps = (frames, times) if not lead else with_idle(frames, times, 0, len(times) - 1, 0, lead)[:2]
+        found = list(segments(Frame(float(t), values) for t, values in zip(stamps, padded, strict=True)))
+        if len(found) == 1:
+            first, last = np.searchsorted(stamps, [found[0].onset, found[0].offset]) - lead
+            if 0 <= first <= last < len(times):
+                return int(first), int(last)
+    return None
+
+
+def segments(frames: Iterable[Frame]) -> Iterator[Segment]:
+    """What the front end cuts out of one recording."""
+    front, t = None, 0.0
+    for frame in frames:
+        front = front or FrontEnd("lab", *frame.values.shape)
+        t = frame.t
+        yield from (x.segment for x in front.push(frame) if isinstance(x, Cut))
+    if front is not None:
+        yield from (x.segment for x in front.flush(t + front.timing.stale_s) if isinstance(x, Cut))

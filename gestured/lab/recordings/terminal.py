@@ -1,0 +1,75 @@
+"""A terminal that gives single keys, and is left as it was found."""
+
+import os
+import select
+import signal
+import sys
+import termios
+import tty
+from types import FrameType
+
+from gestured.core.errors import GesturedError
+
+
+class Ended(Exception):
+    """The terminal was closed, or the system asks to end."""
+
+
+class Terminal:
+    """Standard input and output as a context manager; raises GesturedError where they are no terminal.
+
+    However the block is left (a key, an error, Ctrl-C, SIGTERM, SIGHUP), the terminal is as before.
+    """
+
+    def __init__(self) -> None:
+        if not (sys.stdin.isatty() and sys.stdout.isatty()):
+            raise GesturedError("collect talks with a person: expected a terminal as standard input and output")
+        self._fd = sys.stdin.fileno()
+
+    def __enter__(self) -> "Terminal":
+        self._before = termios.tcgetattr(self._fd)
+        self._handlers = {number: signal.signal(number, self._end) for number in (signal.SIGTERM, signal.SIGHUP)}
+        tty.setcbreak(self._fd)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)
+        try:
+            termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
+        except termios.error:  # it has gone
+            pass
+
+    def fileno(self) -> int:
+        """To wait for a key with `select`."""
+        return self._fd
+
+    def key(self) -> str | None:
+        """A key that was pressed, in lower case ("\\n" for Enter), None where there is none; Ended where there is no
+        terminal any more."""
+        if not select.select([self._fd], [], [], 0)[0]:
+            return None
+        try:
+            typed = os.read(self._fd, 1)
+        except OSError:
+            typed = b""
+        if typed in (b"", b"\x04"):  # gone, or Ctrl-D
+            raise Ended
+        return typed.decode("latin-1").lower()
+
+    def line(self, prompt: str) -> str:
+        """A line that a person types after `prompt`, and can correct while typing."""
+        termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
+        try:
+            return input(prompt)
+        except EOFError:
+            raise Ended from None
+        finally:
+            tty.setcbreak(self._fd)
+
+    def say(self, text: str, end: str = "\n") -> None:
+        """Print."""
+        print(text, end=end, flush=True)
+
+    def _end(self, number: int, frame: FrameType | None) -> None:
+        raise Ended
