@@ -101,6 +101,15 @@ def _flashes(frames: Frames, times: Times, counts: Counts, rng: np.random.Genera
     return frames, times, counts
 
 
+def _spikes(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+    """Every ten seconds one taxel shows 1e30 in one frame, as a flipped bit of a float may."""
+    frames = frames.astype(np.float32)
+    for begin in np.arange(times[0] + LEAD_S, times[-1], EVERY_S):
+        at = min(int(np.searchsorted(times, begin + rng.uniform(0, 8))), len(frames) - 1)
+        frames[at, rng.integers(frames.shape[1]), rng.integers(frames.shape[2])] = 1e30
+    return frames, times, counts
+
+
 def _drift(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
     """Its rate wanders by a fifth, up and down within half a minute."""
     phase = rng.uniform(0, 2 * np.pi)
@@ -154,4 +163,5 @@ FAULTS: dict[str, Fault] = {
     "saturated at a third": Fault(sensor=_saturated),
     "1 % garbage frames": Fault(sensor=_garbage),
     "1 % flashes": Fault(sensor=_flashes),
+    "a spike of 1e30": Fault(sensor=_spikes),
 }
