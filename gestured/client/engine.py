@@ -62,6 +62,11 @@ class Engine:
         """Where it gives events."""
         return Path(self.ready["socket"])
 
+    @property
+    def pid(self) -> int:
+        """Its process."""
+        return self._process.pid
+
     def resident(self) -> int:
         """Bytes of memory that it holds now (Linux)."""
         pages = Path(f"/proc/{self._process.pid}/statm").read_text().split()[1]

@@ -1,0 +1,66 @@
+"""`python -m benchmarks`: the table of speed. Example: python -m benchmarks --only decode recognise"""
+
+import argparse
+import os
+import platform
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from benchmarks.timing import Row
+
+
+def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
+    from benchmarks import inside, latency, scenes, side_by_side, start, traffic
+
+    return {
+        "decode": inside.decode,
+        "datagrams": lambda: traffic.datagrams(model),
+        "latency": lambda: latency.latency(model),
+        "sensors": lambda: traffic.sensors(model),
+        "recognise": lambda: inside.recognise(model),
+        "start": lambda: start.start_and_memory(model),
+        "further": lambda: start.further_sensors(model),
+        "subscribers": inside.subscribers,
+        "ordinary": lambda: side_by_side.ordinary(model),
+        "subset": lambda: scenes.subset(model),
+    }
+
+
+def machine() -> str:
+    """One line that says where this was measured."""
+    found = [line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("model name")]
+    name = found[0].split(":")[1].strip() if found else platform.machine()
+    return f"{name}, {os.cpu_count()} cores, Python {platform.python_version()}, load {os.getloadavg()[0]:.1f}"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("--model", default="cnn_lstm", help="model to measure (cnn_lstm)")
+    parser.add_argument("--only", nargs="+", metavar="PART", help="parts of the table")
+    parser.add_argument("--scenes", action="store_true", help="the table of scenes instead")
+    args = parser.parse_args()
+    if args.scenes:
+        from benchmarks import scenes
+
+        scenes.table(args.model)
+        return 0
+    parts = _parts(args.model)
+    unknown = set(args.only or ()) - set(parts)
+    if unknown:
+        parser.error(f"--only: no part {', '.join(sorted(unknown))}; there are {', '.join(parts)}")
+    print(f"{machine()}\n\n| figure | gestured | against | ratio | to reach | |\n|---|---|---|---|---|---|", flush=True)
+    for name in args.only or parts:
+        try:
+            found = parts[name]()
+        except ImportError as error:
+            print(f"| {name} | not measured: {error} | | | | |", flush=True)
+            continue
+        for row in found if isinstance(found, list) else [found]:
+            verdict = {True: "reached", False: "not reached", None: ""}[row.reached]
+            print(f"| {row.figure} | {row.ours} | {row.against} | {row.ratio} | {row.goal} | {verdict} |", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,82 @@
+"""What each scene pays for: start, memory, CPU of a frame, and which packages its daemon has loaded."""
+
+import os
+import time
+
+import numpy as np
+
+from benchmarks.latency import play
+from benchmarks.timing import Row, cpu_s_of, percentile, resident_kib
+from benchmarks.traffic import touched
+from gestured.client.engine import Engine
+from gestured.client.sensor import Form
+from gestured.client.stream import Stream
+from gestured.core.frames import Frame
+from gestured.simulator import Participant, Sensor, generator, gesture_take
+
+SCENES: dict[str, tuple[str, ...]] = {
+    "minimal": (),
+    "metrics": ("--metrics", "127.0.0.1:0"),
+    "OSC out": ("--publish", "osc://127.0.0.1:9"),
+    "forest alone": (),
+    "swipes alone": ("--gestures", "swipe_left,swipe_right"),
+    "everything": ("--metrics", "127.0.0.1:0", "--publish", "osc://127.0.0.1:9", "--log-level", "debug"),
+}
+REPEATS = 5
+
+
+def table(model: str) -> None:
+    """Print the table of scenes."""
+    form = Form("bench", plain=True)
+    stream = [form.packet(Frame(0.0, f), 0, 0.0) for f in touched(40, 15.0).frames]
+    print("| scene | start to ready | resident | CPU a frame | threads | descriptors |\n|---|---|---|---|---|---|")
+    for name, flags in SCENES.items():
+        used = "touch_pattern_rf" if name == "forest alone" else model
+        seconds, kib = [], []
+        for _ in range(REPEATS):
+            begin = time.monotonic()
+            with Engine(used, 9, 9, *flags) as engine:
+                seconds.append(time.monotonic() - begin)
+                kib.append(resident_kib(engine.pid))
+        with Engine(used, 9, 9, *flags) as engine:
+            before = cpu_s_of(engine.pid)
+            play(engine.listen[1], stream)
+            cpu = 1e6 * (cpu_s_of(engine.pid) - before) / len(stream)
+            threads = len(os.listdir(f"/proc/{engine.pid}/task"))
+            descriptors = len(os.listdir(f"/proc/{engine.pid}/fd"))
+        print(
+            f"| {name} | {np.median(seconds):.2f} s ({min(seconds):.2f} to {max(seconds):.2f}) "
+            f"| {np.median(kib) / 1024:.1f} MiB | {cpu:.0f} us | {threads} | {descriptors} |",
+            flush=True,
+        )
+
+
+def subset(model: str) -> Row:
+    """How long a tap waits for its answer: with all gestures in use, and with swipes alone."""
+    waits = [_wait(model, ()), _wait(model, ("--gestures", "swipe_left,swipe_right"))]
+    return Row(
+        "last touched frame of a tap to its answer: swipes alone in use, all in use",
+        f"{1e3 * waits[1]:.0f} ms",
+        f"{1e3 * waits[0]:.0f} ms",
+        f"{waits[1] / waits[0]:.2g}",
+        "< 1",
+        waits[1] < waits[0],
+    )
+
+
+def _wait(model: str, flags: tuple[str, ...]) -> float:
+    """Seconds from the last touched frame to the answer, of the sensor's clock: median of ten taps."""
+    found = []
+    with Engine(model, 9, 9, "--clock", "sensor", *flags) as engine:
+        stream = Stream(engine.socket, {"types": ["gesture", "unknown"]})
+        for n in range(10):
+            take = gesture_take("one_tap", Participant(960 + n), Sensor.nominal(day=n), generator(960, n), "normal", 0)
+            form, epoch = Form(f"tap{n}"), time.time()
+            packets = [form.packet(Frame(0.0, f), k, epoch + k / 15) for k, f in enumerate(take.frames)]
+            play(engine.listen[1], packets)
+        for event in stream:
+            found.append(event["decided"] - event["offset"])
+            if len(found) == 8:  # a light tap may pass unseen
+                break
+        stream.close()
+    return percentile(found, 0.5)

@@ -1,0 +1,74 @@
+"""Start and memory, against the same imports alone."""
+
+import time
+
+import numpy as np
+
+from benchmarks.process import Program
+from benchmarks.timing import Row, interleaved, ratio, resident_kib
+from benchmarks.traffic import idle
+from gestured.client.engine import Engine
+from gestured.client.sensor import Form, Sensor
+from gestured.client.stream import Stream
+from gestured.core.frames import Frame
+from gestured.models import open_model, shipped
+
+REPEATS = 7
+MORE = 200  # further sensors
+
+
+def start_and_memory(model: str) -> list[Row]:
+    """Seconds from exec to ready, and resident memory then."""
+    path = str(shipped().get(model, model))
+    open_model(path)  # one warm-up: the files are in the page cache
+    memory: dict[str, list[float]] = {"ours": [], "bare": []}
+
+    def ours() -> float:
+        begin = time.monotonic()
+        with Engine(model, 9, 9) as engine:
+            took = time.monotonic() - begin
+            memory["ours"].append(resident_kib(engine.pid))
+        return took
+
+    def bare() -> float:
+        begin = time.monotonic()
+        with Program("bare", path) as program:
+            took = time.monotonic() - begin
+            memory["bare"].append(resident_kib(program.process.pid))
+        return took
+
+    a, b = interleaved(ours, bare, REPEATS)
+    seconds, kib = ratio(a, b), ratio(memory["ours"], memory["bare"])
+    what = "numpy, onnxruntime, the model opened"
+    return [
+        Row("start to ready", f"{np.median(a):.2f} s", f"{np.median(b):.2f} s ({what})", str(seconds), "<= 1.5",
+            seconds.median <= 1.5),
+        Row("resident memory, no sensor yet", f"{np.median(memory['ours']) / 1024:.1f} MiB",
+            f"{np.median(memory['bare']) / 1024:.1f} MiB ({what})", str(kib), "<= 1.3", kib.median <= 1.3),
+    ]  # fmt: skip
+
+
+def further_sensors(model: str) -> Row:
+    """KiB for each sensor more, 9 x 9 at 15 Hz, after three seconds of frames from all of them."""
+    with Engine(model, 9, 9, "--max-sensors", str(MORE + 1), "--clock", "sensor") as engine:
+        first = _heard(engine, ["first"])
+        all_of_them = _heard(engine, [f"more{n}" for n in range(MORE)])
+    each = (all_of_them - first) / MORE
+    return Row(
+        "resident memory of each further sensor", f"{each:.1f} KiB", "", "", "<= 64 KiB", each <= 64
+    )  # fmt: skip
+
+
+def _heard(engine: Engine, names: list[str]) -> int:
+    """Send three seconds of frames from each sensor; KiB once the daemon has them all."""
+    stream = Stream(engine.socket, {"types": ["status"]})
+    for k in range(45):
+        for n, name in enumerate(names):
+            sensor = Sensor(engine.listen, Form(name))
+            sensor.socket.send(sensor.form.packet(Frame(0.0, idle(n, 45)[k]), k, sensor.epoch))
+            sensor.close()
+    for event in stream:
+        if event["type"] == "status" and len(event["sensors"]) >= len(names):
+            break
+    stream.close()
+    return resident_kib(engine.pid)

@@ -1,0 +1,172 @@
+"""What a running daemon does with traffic: packets a CPU second, and a thousand sensors on one core."""
+
+import multiprocessing
+import os
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.process import Program
+from benchmarks.timing import Row, cpu_s_of, interleaved, percentile, ratio
+from gestured.client.engine import Engine
+from gestured.client.sensor import Form
+from gestured.client.stream import Stream
+from gestured.core.frames import Frame
+from gestured.simulator import Participant, Sensor, Take, generator, session
+
+RATE_HZ = 15.0
+SECONDS = 60.0
+SENSORS = 10  # one of them is being touched
+ROOM = 256 << 10  # bytes that may wait in the kernel: more, and the sender waits
+
+
+def touched(number: int, seconds: float) -> Take:
+    """A session of one person on the nominal sensor."""
+    return session(Participant(950 + number), Sensor.nominal(day=950 + number), generator(950, number), seconds, 0.2)
+
+
+def idle(number: int, frames: int) -> NDArray[np.float64]:
+    """(frames, 9, 9) counts of a sensor that nobody touches."""
+    rng = np.random.default_rng([951, number])
+    return rng.uniform(80, 160, (9, 9)) + rng.normal(0, 2, (frames, 9, 9))
+
+
+def packets(epoch: float) -> list[bytes]:
+    """A minute of ten sensors in turn, with time tags from `epoch` on."""
+    session = touched(0, SECONDS).frames
+    values = [session, *(idle(n, len(session)) for n in range(1, SENSORS))]
+    forms = [Form(f"bench{n}") for n in range(SENSORS)]
+    return [
+        form.packet(Frame(0.0, frames[k]), k, epoch + k / RATE_HZ)
+        for k in range(len(session))
+        for form, frames in zip(forms, values, strict=True)
+    ]
+
+
+def waiting(port: int) -> tuple[int, int]:
+    """Bytes in the receive queue of a UDP port, and packets that found no room (/proc/net/udp)."""
+    for line in Path("/proc/net/udp").read_text().splitlines()[1:]:
+        parts = line.split()
+        if int(parts[1].rsplit(":", 1)[1], 16) == port:
+            return int(parts[4].split(":")[1], 16), int(parts[-1])
+    raise RuntimeError(f"no UDP socket on port {port}")
+
+
+def pour(port: int, stream: list[bytes]) -> int:
+    """Send as fast as the receiver takes it; returns how many packets were lost."""
+    before = waiting(port)[1]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.connect(("127.0.0.1", port))
+        for start in range(0, len(stream), 128):
+            for packet in stream[start : start + 128]:
+                sock.send(packet)
+            while waiting(port)[0] > ROOM:
+                time.sleep(0.0002)
+        while waiting(port)[0]:
+            time.sleep(0.0005)
+    return waiting(port)[1] - before
+
+
+def datagrams(model: str, repeats: int = 5) -> Row:
+    """Datagrams a CPU second, front end and recognition on, against a protocol that does nothing."""
+    lost = 0
+    with Engine(model, 9, 9, "--clock", "sensor") as engine, Program("empty") as empty:
+        minute = iter(range(10_000))
+
+        def one(pid: int, port: int) -> float:
+            nonlocal lost
+            stream = packets(time.time() + next(minute) * SECONDS)
+            start = cpu_s_of(pid)
+            lost += pour(port, stream)
+            return (cpu_s_of(pid) - start) / len(stream)
+
+        ours, theirs = interleaved(
+            lambda: one(engine.pid, engine.listen[1]), lambda: one(empty.process.pid, empty.ready["port"]), repeats
+        )
+    found = ratio(theirs, ours)
+    return Row(
+        f"datagrams a CPU second, {SENSORS} sensors, one touched; {lost} lost",
+        f"{1 / np.median(ours):,.0f}",
+        f"{1 / np.median(theirs):,.0f} (empty uvloop protocol)",
+        str(found),
+        ">= 0.1",
+        found.median >= 0.1 and lost == 0,
+    )
+
+
+def _thousand(number: int) -> Iterator[list[bytes]]:
+    """The packets of each sensor: one in ten is touched."""
+    sessions = [touched(n, 30.0).frames for n in range(5)]
+    for n in range(number):
+        form = Form(f"s{n}", plain=True)
+        if n % 10 == 0:
+            yield [form.packet(Frame(0.0, f), 0, 0.0) for f in sessions[n // 10 % 5]]
+        else:
+            yield [form.packet(Frame(0.0, f), 0, 0.0) for f in idle(n, 30)]
+
+
+def _send(port: int, number: int, seconds: float, pipe: object) -> None:
+    """Be `number` sensors at 15 Hz, evenly spread; reports when each packet went out."""
+    streams = list(_thousand(number))
+    sent = np.zeros((int(seconds * RATE_HZ), number))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.connect(("127.0.0.1", port))
+        begin = time.monotonic() + 0.2
+        for k in range(len(sent)):
+            for n in range(number):
+                due = begin + (k + n / number) / RATE_HZ
+                while (wait := due - time.monotonic()) > 0:
+                    time.sleep(min(wait, 0.0005))
+                sock.send(streams[n][k % len(streams[n])])
+                sent[k, n] = time.monotonic()
+    pipe.send_bytes(sent.tobytes())  # type: ignore[attr-defined]
+
+
+def sensors(model: str, number: int = 1000, seconds: float = 20.0) -> Row:
+    """Sensors at 15 Hz on one core: loss, and the time from a sensor's last frame to its event."""
+    with Engine(model, 9, 9, "--max-sensors", str(number)) as engine:
+        os.sched_setaffinity(engine.pid, {0})
+        stream = Stream(engine.socket, {"types": ["gesture", "unknown"]})
+        heard: list[tuple[int, float]] = []
+
+        def listen() -> None:
+            for event in stream:
+                if event["type"] in ("gesture", "unknown"):
+                    heard.append((int(event["sensor"][1:]), time.monotonic()))
+
+        reader = threading.Thread(target=listen)
+        reader.start()
+        port = engine.listen[1]
+        before = waiting(port)[1]
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        sender = context.Process(target=_send, args=(port, number, seconds, theirs))
+        sender.start()
+        while not ours.poll(1.0) and sender.is_alive():
+            pass
+        start = np.frombuffer(ours.recv_bytes(), np.float64).reshape(-1, number)
+        sender.join()
+        lost = waiting(port)[1] - before
+        cpu = cpu_s_of(engine.pid) / seconds
+        stream.close()
+        reader.join()
+    late = []
+    for sensor, at in heard:
+        gone = start[:, sensor]
+        index = int(np.searchsorted(gone, at)) - 1
+        if 0 <= index < len(gone) - 1:
+            late.append(1e3 * (at - float(gone[index])))
+    p99 = percentile(late, 0.99)
+    return Row(
+        f"{number} sensors at 15 Hz on one core, 100 of them touched, {len(late)} events",
+        f"p50 {percentile(late, 0.5):.2f} ms, p99 {p99:.2f} ms, {lost} packets lost",
+        f"{cpu:.2f} of the core",
+        "",
+        "p99 < 5 ms, 0 lost",
+        p99 < 5 and lost == 0,
+    )
