@@ -69,6 +69,7 @@ class Ladder:
         self._clock = clock
         self._report = report or (lambda sentence: None)
         self.last_run_s = 0.0  # of the rung that answered
+        self.failures = 0  # how often a rung was put aside
         self._active, opened = self._first_open()
         self.gestures: tuple[str, ...] = tuple(opened.gestures)
         self.rows = int(getattr(opened, "rows", 0))
@@ -85,6 +86,11 @@ class Ladder:
     def active(self) -> str:
         """The name of the rung that answered last, or that would answer first."""
         return self._active.name
+
+    @property
+    def rung(self) -> int:
+        """How far down `active` stands; 0 is the best."""
+        return self.rungs.index(self._active)
 
     @property
     def degraded(self) -> bool:
@@ -149,17 +155,13 @@ class Ladder:
     def _put_aside(self, rung: Rung, reason: str) -> None:
         rung.slow = 0
         rung.aside_until = self._clock() + self.retry_after
+        self.failures += 1
         self._report(f"{rung.name} is put aside for {self.retry_after:g} s: {reason}")
 
     def _timed(self, rung: Rung, took: float) -> None:
         rung.slow = rung.slow + 1 if took > self.slow_s else 0
         if rung.slow >= self.slow_runs:
-            rung.slow = 0
-            rung.aside_until = self._clock() + self.retry_after
-            self._report(
-                f"{rung.name} is put aside for {self.retry_after:g} s: "
-                f"{self.slow_runs} runs in a row took more than {self.slow_s:g} s"
-            )
+            self._put_aside(rung, f"{self.slow_runs} runs in a row took more than {self.slow_s:g} s")
 
 
 def ladder_for(source: str | Path, fallbacks: Sequence[str | Path] | None = None, **settings: Any) -> Ladder:

@@ -34,7 +34,7 @@ class Stream:
             self.socket.close()
             reason = error.strerror or error
             raise Unreachable(f"no daemon on {path}: {reason}; start gestured, or name its --socket") from None
-        self.hello = _parsed(first, path)
+        self.hello = parsed(first, path)
         if self.hello.get("type") != "hello" or self.hello.get("protocol") != PROTOCOL:
             self.close()
             raise Refused(f"{path} does not speak protocol {PROTOCOL} of gestured: {first[:80]!r}")
@@ -46,7 +46,7 @@ class Stream:
         """Each line as it came, and parsed; ends when the daemon closes the connection."""
         try:
             for line in self._lines:
-                message = _parsed(line, self.path)
+                message = parsed(line, self.path)
                 yield line.decode().rstrip("\n"), message
         except ConnectionError:
             return
@@ -63,7 +63,8 @@ class Stream:
         self.socket.close()
 
 
-def _parsed(line: bytes, path: Path) -> dict[str, Any]:
+def parsed(line: bytes, path: Path) -> dict[str, Any]:
+    """One line as an object; raises Refused for anything else."""
     try:
         message = json.loads(line)
     except ValueError:

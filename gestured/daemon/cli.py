@@ -27,8 +27,9 @@ exit status:
 
 METAVARS = {
     "model": "MODEL", "fallback": "MODEL", "listen": "HOST:PORT", "publish": "osc://HOST:PORT",
-    "socket": "PATH", "metrics": "HOST:PORT", "grid": "RxC", "gestures": "A,B", "clock": "arrival|sensor",
-    "stale_s": "SECONDS", "max_sensors": "N", "allow": "CIDR", "log_level": "LEVEL",
+    "socket": "PATH", "control": "PATH", "metrics": "HOST:PORT", "grid": "RxC", "gestures": "A,B",
+    "clock": "arrival|sensor", "stale_s": "SECONDS", "max_sensors": "N", "allow": "CIDR",
+    "flight_recorder": "MIB", "log_level": "LEVEL",
 }  # fmt: skip
 
 
@@ -78,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             print(describe(settings, sources))
             return 0
-        from gestured.daemon.service import run
+        from gestured.daemon.start import run
 
         run(settings, lambda: load(given, os.environ)[0])
     except GesturedError as error:

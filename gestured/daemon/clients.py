@@ -23,6 +23,7 @@ from gestured.daemon.metrics import Metrics
 CLIENTS = 1024
 BACKLOG_BYTES = 256 << 10
 STALLED_S = 30.0  # a client that takes nothing for this long is cut off
+END, TEST = b"}\n", b',"test":true}\n'  # how a line ends
 READ_BYTES = 1024  # small: a client that sends rubbish waits its turn
 
 
@@ -148,12 +149,15 @@ class EventServer:
         """Bytes that wait for all of them."""
         return sum(client.backlog for client in tuple(self._clients))
 
-    def publish(self, event: Event, epoch: float) -> None:
-        """Send an event to everyone who wants it; it is encoded once, and only if somebody does."""
+    def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
+        """Send an event to everyone who wants it; it is encoded once, and only if somebody does.
+
+        A test's events have one key more: `"test":true`.
+        """
         line = None
         for subscription, clients in tuple(self._classes.items()):
             if subscription.matches(event):
-                line = line or messages.to_json(event, epoch)
+                line = line or messages.to_json(event, epoch)[: -len(END)] + (TEST if test else END)
                 for client in tuple(clients):
                     client.send(line)
 

@@ -9,8 +9,9 @@ from gestured.core.segmentation import Timing
 from gestured.daemon import clients
 from gestured.daemon.ladder import open_ladder
 from gestured.daemon.pipeline import DOUBLE_TAP
-from gestured.daemon.settings import Settings, default_socket
+from gestured.daemon.settings import Settings, control_beside, default_socket
 from gestured.daemon.sockets import RECEIVE_BYTES
+from gestured.daemon.tap import KEPT_S
 
 
 def explain(settings: Settings, sources: Mapping[str, str]) -> str:
@@ -51,6 +52,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
         f"unix {path}, mode 0660, {clients.CLIENTS} clients, {clients.BACKLOG_BYTES >> 10} KiB waiting each",
         *(f"osc://{destination}: gestures, and the status once a second" for destination in settings.publish),
     ]
+    publishes.append(f"control: unix {settings.control or control_beside(path)}, mode 0660, for owner and group")
     computes = [
         "decode, check, stamp; subtract the baseline, compare with the noise; no smoothing, no inference",
         f"after a contact: {'touch-pattern features' if forest else 'its frames as a window'}, one inference",
@@ -62,6 +64,10 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
         "fallback models: opened when the one above fails",
         "torch, scikit-learn, python-osc: never loaded by the daemon",
     ]
+    if settings.flight_recorder:
+        computes.append(f"flight recorder: the last {KEPT_S:g} s of packets, at most {settings.flight_recorder} MiB")
+    else:
+        leaves.append("flight recorder: flight_recorder is 0")
     if not settings.metrics:
         leaves.append("prometheus_client, HTTP: no --metrics")
     if not settings.publish:

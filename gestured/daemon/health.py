@@ -6,19 +6,20 @@ import time
 from gestured import __version__
 from gestured.core import messages
 from gestured.core.events import Cancelled, Event, Gesture, Status, Unknown
-from gestured.daemon.pipeline import Pipeline
-from gestured.ladder import Ladder
+from gestured.daemon.pipeline import SILENT, Pipeline
 
+TICK_S = 0.25  # the loop comes round at least so often
 HANG_S = 2.0  # the loop counts as hanging after so long without a beat
 
 
 class Health:
     """Read by the loop and by the HTTP thread. `beat` is set by the loop as long as it turns."""
 
-    def __init__(self, pipeline: Pipeline, ladder: Ladder) -> None:
-        self.pipeline, self.ladder = pipeline, ladder
+    def __init__(self, pipeline: Pipeline) -> None:
+        self.pipeline = pipeline
         self.instance = secrets.token_hex(8)
         self.beat = time.monotonic()
+        self._lag = 0.0
         self.stopping = False
         self._models_failed = False
 
@@ -29,19 +30,31 @@ class Health:
         elif isinstance(event, Cancelled) and event.reason == "model":
             self._models_failed = True
 
+    def woke(self, late_s: float) -> None:
+        """The loop came round, `late_s` after it wanted to."""
+        self.beat = time.monotonic()
+        self._lag = max(late_s, 0.95 * self._lag)
+
+    @property
+    def lag_s(self) -> float:
+        """How late the loop is: its worst of late (halved in about 4 s), and while it hangs, how long it does."""
+        return max(self._lag, time.monotonic() - self.beat - TICK_S)
+
     def status(self, now: float) -> Status:
         """The sign of life at `now` (monotonic seconds)."""
         states = self.pipeline.states(now)
-        if all(state == "stale" for state in states.values()):
+        if all(state in SILENT for state in states.values()):
             state = "no_data"
         else:
-            state = "degraded" if self.ladder.degraded or self._models_failed else "ok"
-        return Status(state, states, self.ladder.active, time.time())
+            state = "degraded" if self.pipeline.watched.ladder.degraded or self._models_failed else "ok"
+        return Status(state, states, self.pipeline.watched.ladder.active, time.time())
 
     def hello(self) -> bytes:
         """The first line to a client."""
-        sequences = {name: sensor.recognizer.sequence for name, sensor in self.pipeline.sensors.items()}
-        return messages.hello_json(__version__, self.instance, self.ladder.active, self.pipeline.gestures, sequences)
+        heard = {name: sensor.recognizer.sequence for name, sensor in self.pipeline.sensors.items()}
+        sequences = self.pipeline.given | heard
+        model, gestures = self.pipeline.watched.ladder.active, self.pipeline.gestures
+        return messages.hello_json(__version__, self.instance, model, gestures, sequences)
 
     def healthz(self) -> tuple[int, dict[str, object]]:
         """Whether the loop turns."""
@@ -63,7 +76,10 @@ class Health:
         return 503 if reasons else 200, {
             "ready": not reasons,
             "reason": "; ".join(reasons) or None,
-            "model": self.ladder.active,
-            "degraded": self.ladder.degraded,
+            "state": self.status(now).state,
+            "loop_lag_s": round(self.lag_s, 3),
+            "shift": self.pipeline.watched.shift.unlike(),
+            "model": self.pipeline.watched.ladder.active,
+            "degraded": self.pipeline.watched.ladder.degraded,
             "sensors": self.pipeline.states(now),
         }

@@ -6,27 +6,33 @@ labels that a peer can choose (sensors) are folded together after the first few.
 """
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from gestured import __version__
 from gestured.core.events import Cancelled, Event, Gesture, Unknown
+from gestured.daemon.reading import Reading
 
 NAMED_SENSORS = 8  # further sensors are counted together as "other"
-NAMED_VALUES = 32  # bound of any other label
-INFERENCE_S = (0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.1, 1.0)
-LATENCY_S = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.75, 1.0, 2.0, 5.0)
+NAMED_MODELS = 3
+NAMED_GESTURES = 12
+OTHER = "other"
+INFERENCE_S = (0.0005, 0.001, 0.0025, 0.005, 0.025, 0.1)
+LATENCY_S = (0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0)
+CONFIDENCE = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 
 
 class Counter:
-    """A total for each combination of labels."""
+    """A total for each combination of labels; `most` of them, those after that together as "other"."""
 
-    def __init__(self, name: str, text: str, *labels: str) -> None:
-        self.name, self.text, self.labels = name, text, labels
+    def __init__(self, name: str, text: str, *labels: str, most: int = 64) -> None:
+        self.name, self.text, self.labels, self._most = name, text, labels, most
         self.values: dict[tuple[str, ...], int] = {}
 
     def add(self, *labels: str, count: int = 1) -> None:
         """Count `count` more under these labels."""
+        if labels not in self.values and len(self.values) >= self._most:
+            labels = (OTHER,) * len(labels)
         self.values[labels] = self.values.get(labels, 0) + count
 
     def total(self) -> int:
@@ -35,21 +41,21 @@ class Counter:
 
 
 class Histogram:
-    """How often a duration in seconds fell below each bound, for each value of one label (or none)."""
+    """How often a value fell below each bound, for each value of one label (`most` of them), or of none."""
 
-    def __init__(self, name: str, text: str, bounds: Sequence[float], *labels: str) -> None:
-        self.name, self.text, self.bounds, self.labels = name, text, bounds, labels
+    def __init__(self, name: str, text: str, bounds: Sequence[float], *labels: str, most: int = 1) -> None:
+        self.name, self.text, self.bounds, self.labels, self._most = name, text, bounds, labels, most
         self.values: dict[tuple[str, ...], tuple[list[int], list[float]]] = {}
 
-    def observe(self, seconds: float, *labels: str) -> None:
-        """Count one duration."""
+    def observe(self, value: float, *labels: str) -> None:
+        """Count one value."""
         if labels not in self.values:
-            if len(self.values) >= NAMED_VALUES:
-                labels = ("other",) * len(labels)
+            if len(self.values) >= self._most:
+                labels = (OTHER,) * len(labels)
             self.values.setdefault(labels, ([0] * (len(self.bounds) + 1), [0.0]))
         buckets, total = self.values[labels]
-        buckets[bisect_left(self.bounds, seconds)] += 1
-        total[0] += seconds
+        buckets[bisect_left(self.bounds, value)] += 1
+        total[0] += value
 
 
 class Metrics:
@@ -59,7 +65,7 @@ class Metrics:
         self.frames = Counter("gestured_frames", "Frames by what became of them", "sensor", "result")
         self.dropped = Counter("gestured_dropped", "Packets and messages that were dropped", "reason")
         self.implausible = Counter("gestured_implausible_time_tags", "Time tags replaced by the arrival time")
-        self.gestures = Counter("gestured_gestures", "Recognised gestures", "gesture")
+        self.gestures = Counter("gestured_gestures", "Recognised gestures", "gesture", most=NAMED_GESTURES)
         self.unknown = Counter("gestured_unknown", "Segments that are none of the gestures")
         self.cancelled = Counter("gestured_cancelled", "Segments that were not answered", "reason")
         self.internal_errors = Counter("gestured_internal_errors", "Bugs caught; the sensor's recognizer was reset")
@@ -68,8 +74,14 @@ class Metrics:
         self.sent = Counter("gestured_osc_messages", "OSC messages to destinations", "result")
         self.lost_lines = Counter("gestured_client_lines_lost", "Lines that slow clients did not get")
         self.evicted = Counter("gestured_clients_evicted", "Clients that were cut off or turned away", "reason")
-        self.inference = Histogram("gestured_inference_seconds", "Time to classify a segment", INFERENCE_S, "model")
+        self.tests = Counter("gestured_test_events", "Gestures that gesturectl emit made up")
+        self.inference = Histogram(
+            "gestured_inference_seconds", "Time to classify a segment", INFERENCE_S, "model", most=NAMED_MODELS
+        )
         self.latency = Histogram("gestured_latency_seconds", "From the last touched frame to the event", LATENCY_S)
+        self.confidence = Histogram("gestured_confidence", "Confidence of the published gestures", CONFIDENCE)
+        self.sensors: Callable[[], Mapping[str, Reading]] = dict
+        self.shift: Callable[[], Mapping[str, float]] = dict
         self.readings: dict[str, tuple[str, Callable[[], float]]] = {}  # gauges, and counters that end in _total
         self.active_model: Callable[[], str] = str
         self._named: set[str] = set()
@@ -83,6 +95,7 @@ class Metrics:
                 self.degraded.add()
         if isinstance(event, Gesture):
             self.gestures.add(event.gesture)
+            self.confidence.observe(event.confidence)
         elif isinstance(event, Unknown):
             self.unknown.add()
         elif isinstance(event, Cancelled):
@@ -95,7 +108,7 @@ class Metrics:
         if len(self._named) < NAMED_SENSORS:
             self._named.add(sensor)
             return sensor
-        return "other"
+        return OTHER
 
     def exposition(self) -> bytes:
         """Everything in the Prometheus text format; imports prometheus_client."""
@@ -104,6 +117,18 @@ class Metrics:
         registry = CollectorRegistry()
         registry.register(_Collector(self))
         return generate_latest(registry)
+
+
+_OF_SENSORS: tuple[tuple[str, str, Callable[[Reading], float]], ...] = (
+    ("gestured_sensor_rate_hertz", "Frames a second", lambda r: r.rate_hz),
+    ("gestured_sensor_jitter_seconds", "Interarrival jitter of packets", lambda r: r.jitter_s),
+    ("gestured_sensor_bad_taxels", "Taxels that are bridged from their neighbours", lambda r: r.bad_taxels),
+    (
+        "gestured_sensor_drift_ratio",
+        "How far the baseline has gone, in units of noise",
+        lambda r: r.drift,
+    ),
+)
 
 
 class _Collector:
@@ -138,6 +163,21 @@ class _Collector:
                 yield CounterMetricFamily(name.removesuffix("_total"), text, value=read())
             else:
                 yield GaugeMetricFamily(name, text, value=read())
+        readings = self._metrics.sensors()
+        for name, text, value_of in _OF_SENSORS:
+            family = GaugeMetricFamily(name, text, labels=["sensor"])
+            for sensor, reading in readings.items():
+                family.add_metric([sensor], value_of(reading))
+            yield family
+        state = GaugeMetricFamily("gestured_sensor_state", "1 for the state of a sensor", labels=["sensor", "state"])
+        for sensor, reading in readings.items():
+            state.add_metric([sensor, reading.state], 1)
+        yield state
+        text = "Share of the last gestures outside of what the model was trained on"
+        shift = GaugeMetricFamily("gestured_shift_ratio", text, labels=["quantity"])
+        for quantity, share in self._metrics.shift().items():
+            shift.add_metric([quantity], share)
+        yield shift
         info = InfoMetricFamily("gestured_active_model", "The model that answers")
         info.add_metric([], {"model": self._metrics.active_model(), "version": __version__})
         yield info

@@ -8,7 +8,7 @@ nobody.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from gestured.core.conditioning import Mounting
@@ -20,12 +20,16 @@ from gestured.core.stamping import Stamper
 from gestured.core.wire import Arrival
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
+from gestured.daemon.reading import Reading
 from gestured.daemon.settings import SensorSettings, Settings
 from gestured.daemon.values import Grid
+from gestured.daemon.vitals import Vitals, faulty
+from gestured.daemon.watch import Watched
 from gestured.ladder import Ladder
 
 FORGET_S = 60.0  # a sensor that never made a gesture and is silent for this long gives its place to a new one
 DOUBLE_TAP = "double_tap"
+SILENT = ("no_data", "stale")  # states of sensors that are not there now
 Source = tuple[str, int]  # host and port of a sender
 Emit = Callable[[Event], None]
 
@@ -45,6 +49,8 @@ class Sensor:
     silent: bool = False  # and has been flushed
     open: int | None = None  # id of the contact that was not released yet
     answered: bool = True  # whether that contact has its answer
+    lost: int = 0  # frames, by its own counter
+    vitals: Vitals = field(default_factory=Vitals)
 
 
 class Pipeline:
@@ -52,19 +58,21 @@ class Pipeline:
 
     def __init__(self, settings: Settings, ladder: Ladder, metrics: Metrics, emit: Emit) -> None:
         self.sensors: dict[str, Sensor] = {}
-        self._settings, self._ladder, self._metrics, self._emit = settings, ladder, metrics, emit
+        self.watched = Watched(ladder)
+        self.given: dict[str, int] = {}  # sequence numbers that sensors which are not there have used
+        self._settings, self._metrics, self._emit = settings, metrics, emit
         self._throttle = Throttle()
 
     @property
     def gestures(self) -> tuple[str, ...]:
         """The gestures in use, in the model's order."""
         chosen = self._settings.gestures
-        return tuple(g for g in self._ladder.gestures if chosen is None or g in chosen)
+        return tuple(g for g in self.watched.gestures if chosen is None or g in chosen)
 
     def grid(self, sensor: str) -> Grid:
         """The grid in which a sensor sends."""
         own = self._settings.sensors.get(sensor)
-        model = Grid(self._ladder.rows, self._ladder.columns)
+        model = Grid(self.watched.ladder.rows, self.watched.ladder.columns)
         return (own and own.grid) or self._settings.grid or model
 
     def admit(self, name: str, source: Source, now: float) -> Sensor | None:
@@ -94,18 +102,20 @@ class Pipeline:
         except Exception:
             self._publish(sensor, self._recover(sensor, now))
             return
+        sensor.vitals.arrived(now, len(arrivals), sensor.recognizer.front_end.rate_hz)
         for arrival, stamp in zip(arrivals, stamps, strict=True):
             if stamp.dropped:
                 frames.add(sensor.label, stamp.dropped)
                 continue
             if stamp.lost:
                 frames.add(sensor.label, "lost", count=stamp.lost)
+                sensor.lost += stamp.lost
             if stamp.implausible:
                 self._metrics.implausible.add()
             try:
                 if stamp.restarted:
                     self._throttle.warn("sensor restarted", "restarted", sensor=sensor.name)
-                    self._publish(sensor, sensor.recognizer.reset())
+                    self.restart(sensor)
                 events = sensor.recognizer.push(Frame(stamp.t, arrival.values, arrival.touches, stamp.lost))
             except Exception:
                 events = self._recover(sensor, stamp.t)
@@ -124,9 +134,15 @@ class Pipeline:
                 self._throttle.warn("sensor is silent", "silent", sensor=sensor.name)
                 self.flush(sensor, now)
 
+    def review(self) -> None:
+        """What is looked at once a second, beside the way of a frame."""
+        for sensor in self.sensors.values():
+            sensor.vitals.review(sensor.recognizer.front_end)
+
     def flush(self, sensor: Sensor, now: float) -> None:
         """The sensor has nothing more to say: answer or cancel what is open."""
         sensor.silent = True
+        sensor.vitals.silent()
         t = sensor.stamper.at(now)
         try:
             events = sensor.recognizer.flush(t)
@@ -134,10 +150,19 @@ class Pipeline:
             events = self._recover(sensor, t)
         self._publish(sensor, events)
 
+    def restart(self, sensor: Sensor) -> None:
+        """Learn a sensor anew; a contact that is open is cancelled."""
+        sensor.vitals.restart()
+        self._publish(sensor, sensor.recognizer.reset())
+
     def reload(self, settings: Settings, ladder: Ladder) -> None:
         """Go on with other settings and models; what a sensor has learned stays where it still holds."""
         waits = DOUBLE_TAP in self.gestures
-        old, self._settings, self._ladder = self._settings, settings, ladder
+        old, self._settings = self._settings, settings
+        watched, shadow = Watched(ladder), self.watched.shadow
+        if shadow is not None and shadow.candidate.gestures == watched.gestures:
+            watched.shadow = shadow
+        self.watched = watched
         for name, sensor in self.sensors.items():
             front_end, fresh = sensor.recognizer.front_end, self._front_end(name)
             another_clock = _clock(old, name) != _clock(settings, name)
@@ -150,8 +175,18 @@ class Pipeline:
             sensor.recognizer = self._recognizer(front_end, sensor.recognizer.sequence)
 
     def states(self, now: float) -> dict[str, str]:
-        """State of each sensor: "ok", "starting", "degraded" (taxels are bridged) or "stale"."""
-        return {name: self._state(sensor, now) for name, sensor in tuple(self.sensors.items())}
+        """State of each sensor, heard or in the file: "no_data", "starting", "ok", "degraded" (taxels are bridged),
+        "faulty" (too many are) or "stale" (heard, but not now)."""
+        silent = dict.fromkeys(self._settings.sensors, "no_data")
+        return silent | {name: self._state(sensor, now) for name, sensor in tuple(self.sensors.items())}
+
+    def readings(self, now: float) -> dict[str, Reading]:
+        """What is known of each sensor; any thread may ask."""
+        sensors = dict(self.sensors)
+        return {
+            name: _reading(sensors[name], state) if name in sensors else Reading(state)
+            for name, state in self.states(now).items()
+        }
 
     def drop(self, reason: str, count: int = 1, **fields: object) -> None:
         """Count what was dropped; say so at a bounded rate."""
@@ -166,9 +201,10 @@ class Pipeline:
     def _state(self, sensor: Sensor, now: float) -> str:
         if now - sensor.heard > self._settings.stale_s:
             return "stale"
-        if not sensor.recognizer.front_end.ready:
+        front_end = sensor.recognizer.front_end
+        if not front_end.ready:
             return "starting"
-        return "degraded" if sensor.recognizer.front_end.bad_taxels else "ok"
+        return "faulty" if faulty(front_end) else "degraded" if front_end.bad_taxels else "ok"
 
     def _full(self, name: str, now: float) -> bool:
         """Whether there is no place for a new sensor; places for those in the file are kept free."""
@@ -185,7 +221,7 @@ class Pipeline:
         return True
 
     def _make(self, name: str, source: Source) -> Sensor:
-        recognizer = self._recognizer(self._front_end(name), 0)
+        recognizer = self._recognizer(self._front_end(name), self.given.pop(name, 0))
         stamper = Stamper(_clock(self._settings, name))
         return Sensor(name, self._metrics.sensor_label(name), recognizer, stamper, source)
 
@@ -203,7 +239,7 @@ class Pipeline:
         parts = self._settings.per_gesture
         return Recognizer(
             front_end,
-            self._ladder,
+            self.watched,
             gestures=self.gestures,
             thresholds={name: part.threshold for name, part in parts.items() if part.threshold is not None},
             refractory={name: part.refractory_s for name, part in parts.items()},
@@ -241,6 +277,12 @@ def _one_shot(sensor: Sensor, source: Source) -> bool:
     One packet from a port is no claim against another port of the same host; two are.
     """
     return sensor.packets == 1 and source[0] == sensor.source[0] and source != sensor.before
+
+
+def _reading(sensor: Sensor, state: str) -> Reading:
+    front_end, vitals = sensor.recognizer.front_end, sensor.vitals
+    rate = 0.0 if state in SILENT else front_end.rate_hz
+    return Reading(state, rate, vitals.jitter_s, front_end.bad_taxels, vitals.drift)
 
 
 def _alike(one: FrontEnd, other: FrontEnd) -> bool:

@@ -83,6 +83,10 @@ class Settings(Part):
         description="Unix socket of the event stream; by default $RUNTIME_DIRECTORY/events.sock, "
         "else $XDG_RUNTIME_DIR/gestured/events.sock, else /tmp/gestured-UID/events.sock",
     )
+    control: SocketField | None = Field(
+        default=None,
+        description="Unix socket of gesturectl's requests; by default the event socket's path with the suffix .ctl",
+    )
     metrics: AddressField | None = Field(
         default=None, description="HTTP address of /metrics, /healthz and /readyz; off unless set"
     )
@@ -106,6 +110,9 @@ class Settings(Part):
     allow: Annotated[tuple[NetworkField, ...], Listed] = Field(
         default=(), description="addresses or networks that may send frames; any unless set"
     )
+    flight_recorder: int = Field(
+        default=0, ge=0, le=1024, description="MiB that the last 30 s of packets may take in memory; 0: none are kept"
+    )
     log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="how much is logged")
     sensors: dict[Annotated[str, Field(pattern=SENSOR_NAME)], SensorSettings] = Field(
         default={}, description="tables `[sensors.NAME]`, in the file only"
@@ -128,3 +135,8 @@ def default_socket(environ: Mapping[str, str]) -> Path:
     if directory := environ.get("XDG_RUNTIME_DIR"):
         return Path(directory) / "gestured" / "events.sock"
     return Path(f"/tmp/gestured-{os.getuid()}") / "events.sock"
+
+
+def control_beside(socket: Path) -> Path:
+    """Where the control socket stands when nobody says so: beside the event socket."""
+    return socket.with_suffix(".ctl")

@@ -3,18 +3,22 @@
 import socket
 from typing import Protocol
 
-from gestured.core import messages
+from gestured.core import messages, osc
 from gestured.core.events import Event, Gesture, Status
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
+from gestured.daemon.pipeline import SILENT
 from gestured.daemon.sockets import resolve
 from gestured.daemon.values import Address
 
 
 class Sink(Protocol):
-    """Takes every event; `epoch` is what to add to an event's times to get seconds since the Unix epoch."""
+    """Takes every event; `epoch` is what to add to an event's times to get seconds since the Unix epoch.
 
-    def publish(self, event: Event, epoch: float) -> None:
+    `test`: nobody made this gesture; whoever gets it is told so.
+    """
+
+    def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
         """Deliver or count; never block, never raise."""
         ...
 
@@ -37,12 +41,17 @@ class OscSink:
         except OSError as error:
             log.error("publish: no such destination", destination=str(destination), error=error.strerror)
 
-    def publish(self, event: Event, epoch: float) -> None:
-        """Send a gesture or the status; other events do not travel by OSC."""
+    def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
+        """Send a gesture or the status; other events do not travel by OSC.
+
+        A test's gesture stands in a bundle behind `/gestured/test ,s sensor`: its own arguments are the contract's.
+        """
         if isinstance(event, Gesture):
-            self._send(messages.gesture_osc(event, epoch))
+            packet = messages.gesture_osc(event, epoch)
+            mark = osc.encode_message("/gestured/test", "s", (event.sensor,)) if test else b""
+            self._send(osc.encode_bundle([mark, packet]) if test else packet)
         elif isinstance(event, Status):
-            heard = sum(state != "stale" for state in event.sensors.values())
+            heard = sum(state not in SILENT for state in event.sensors.values())
             self._send(messages.status_osc(event.state, heard))
 
     def close(self) -> None:

@@ -73,7 +73,19 @@ def name_of(sock: socket.socket) -> str:
     return str(Address(host, port))
 
 
-class UnixListener:
+class Listener:
+    """A listening Unix stream socket that somebody else made, and whose path is not ours to remove."""
+
+    def __init__(self, sock: socket.socket) -> None:
+        self.sock = sock
+        self.path = Path(os.fsdecode(sock.getsockname()))
+
+    def close(self) -> None:
+        """Stop listening."""
+        self.sock.close()
+
+
+class UnixListener(Listener):
     """A listening Unix stream socket at `path` that no other daemon is using.
 
     A lock file beside it is held as long as we live, so two daemons that start at once cannot both win. What
@@ -81,13 +93,14 @@ class UnixListener:
     and replaced, anything else is not ours to remove.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, key: str = "socket") -> None:
+        """`key` is the setting to name where it cannot be had."""
+        self.path, self._key = path, key
         self._lock_path = path.with_name(path.name + ".lock")
         try:
             self._lock = self._take_lock()
         except OSError as error:
-            raise AddressError(f"socket: cannot make {self._lock_path}: {error.strerror}") from None
+            raise AddressError(f"{self._key}: cannot make {self._lock_path}: {error.strerror}") from None
         try:
             self._clear()
             self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK)
@@ -100,7 +113,7 @@ class UnixListener:
             self._inode = path.stat().st_ino
         except OSError as error:
             self._release_lock()
-            raise AddressError(f"socket: cannot bind {path}: {error.strerror}") from None
+            raise AddressError(f"{self._key}: cannot bind {path}: {error.strerror}") from None
         except AddressError:
             self._release_lock()
             raise
@@ -124,7 +137,7 @@ class UnixListener:
                     return lock
             except BlockingIOError:
                 os.close(lock)
-                raise AddressError(f"socket: another gestured is using {self.path}") from None
+                raise AddressError(f"{self._key}: another gestured is using {self.path}") from None
             except FileNotFoundError:
                 pass  # its owner removed it between our open and our flock: try again
             os.close(lock)
@@ -142,11 +155,11 @@ class UnixListener:
         except FileNotFoundError:
             return
         if not stat.S_ISSOCK(mode):
-            raise AddressError(f"socket: {self.path} exists and is not a socket")
+            raise AddressError(f"{self._key}: {self.path} exists and is not a socket")
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK) as probe:
             found = probe.connect_ex(str(self.path))
         if found != errno.ECONNREFUSED:
-            raise AddressError(f"socket: another program is using {self.path}")
+            raise AddressError(f"{self._key}: another program is using {self.path}")
         self.path.unlink()
 
 

@@ -42,6 +42,7 @@ class Receiver:
     ) -> None:
         self._loop = asyncio.get_running_loop()
         self._sock, self._pipeline, self._clock = sock, pipeline, clock
+        self.tap: Callable[[Sequence[tuple[bytes, Source]], float], None] | None = None  # is shown what is read
         self.configure(decoder, allow)
         self._loop.add_reader(sock, self.read)
 
@@ -72,6 +73,8 @@ class Receiver:
         except OSError as error:  # the network's complaint about something else; the socket goes on
             self._pipeline.drop("socket_error", error=error.strerror)
         now = self._clock()
+        if self.tap is not None and waiting:
+            self.tap(waiting, now)
         batch: dict[str, tuple[Sensor, list[Arrival]]] = {}
         for packet, source in waiting:
             try:

@@ -163,7 +163,7 @@ def test_one_packet_from_a_port_is_no_claim_but_two_are(pipeline) -> None:
 
 
 def test_healthz_says_when_the_loop_hangs(pipeline, model: Path) -> None:
-    health = Health(pipeline[0], ladder_for(model))
+    health = Health(pipeline[0])
     assert health.healthz()[0] == 200 == health.readyz()[0]
     health.beat = time.monotonic() - 10
     assert health.healthz()[0] == 503

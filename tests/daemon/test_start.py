@@ -34,7 +34,7 @@ def refused(status: int, *flags: object, env: dict[str, str] | None = None) -> s
 
 def test_the_ready_line_says_where_everything_is(start) -> None:
     daemon = start("--metrics", "127.0.0.1:0")
-    assert list(daemon.ready) == ["type", "listen", "socket", "metrics", "model"]
+    assert list(daemon.ready) == ["type", "listen", "socket", "metrics", "model", "control"]
     assert daemon.ready["type"] == "ready" and daemon.ready["model"] == "tiny"
     assert not daemon.ready["listen"].endswith(":0") and not daemon.ready["metrics"].endswith(":0")
     assert stat.S_IMODE(daemon.socket.stat().st_mode) == 0o660

@@ -1,0 +1,60 @@
+"""A client of the daemon's control socket: ask a verb, get an answer."""
+
+import json
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from gestured.client.stream import Refused, Unreachable, parsed
+
+
+class Control:
+    """One connection; a context manager. Raises Unreachable where no daemon answers."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            self.socket.connect(str(path))
+        except OSError as error:
+            self.socket.close()
+            reason = error.strerror or error
+            raise Unreachable(f"no daemon on {path}: {reason}; start gestured, or name its --control") from None
+        self._lines = self.socket.makefile("rb")
+
+    def ask(self, verb: str, **parameters: object) -> dict[str, Any]:
+        """What the daemon answers; parameters that are None are left out. Raises Refused with its reason."""
+        request = {"verb": verb} | {key: value for key, value in parameters.items() if value is not None}
+        try:
+            self.socket.sendall(json.dumps(request).encode() + b"\n")
+        except OSError:
+            pass  # it hung up; what it said before that is worth more
+        answer = next(self.lines(), None)
+        if answer is None:
+            raise Unreachable(f"the daemon on {self.path} closed the connection")
+        if answer.get("ok") is not True:
+            raise Refused(f"{verb}: {answer.get('reason')}")
+        return answer
+
+    def lines(self) -> Iterator[dict[str, Any]]:
+        """What the daemon sends, line by line, until it hangs up."""
+        try:
+            for line in self._lines:
+                yield parsed(line, self.path)
+        except ConnectionError:
+            return
+
+    def close(self) -> None:
+        """Hang up; a reader in another thread comes to its end."""
+        try:
+            self.socket.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass
+        self.socket.close()
+
+    def __enter__(self) -> "Control":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,99 @@
+"""All sockets of one daemon: those that systemd passed, by their names, and those that it binds itself."""
+
+import os
+import socket
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from gestured.daemon.log import log
+from gestured.daemon.settings import Settings, control_beside, default_socket
+from gestured.daemon.sockets import (
+    AddressError,
+    Listener,
+    UnixListener,
+    bind_tcp,
+    bind_udp,
+    make_default_directory,
+    name_of,
+)
+
+INTERNET = (socket.AF_INET, socket.AF_INET6)
+# FileDescriptorName= -> what such a socket must be, in systemd's words
+NAMES = {
+    "osc": (INTERNET, socket.SOCK_DGRAM, "ListenDatagram=HOST:PORT"),
+    "events": ((socket.AF_UNIX,), socket.SOCK_STREAM, "ListenStream=/PATH"),
+    "control": ((socket.AF_UNIX,), socket.SOCK_STREAM, "ListenStream=/PATH"),
+    "metrics": (INTERNET, socket.SOCK_STREAM, "ListenStream=HOST:PORT"),
+}
+
+
+@dataclass(slots=True)
+class Bound:
+    """They stay open until `close`."""
+
+    udp: socket.socket
+    events: Listener
+    control: Listener
+    http: socket.socket | None
+
+    def close(self) -> None:
+        """Close them; what stood in the file system because of us goes."""
+        self.udp.close()
+        self.events.close()
+        self.control.close()
+        if self.http is not None:
+            self.http.close()
+
+
+def bind_all(settings: Settings, passed: Sequence[tuple[str, socket.socket]]) -> Bound:
+    """Take what was passed and bind the rest. All or nothing; raises AddressError."""
+    given = _by_name(passed)
+    opened: list[socket.socket | Listener] = list(given.values())
+    try:
+        if (udp := given.get("osc")) is None:
+            opened.append(udp := bind_udp(settings.listen))
+        if (http := given.get("metrics")) is None and settings.metrics is not None:
+            opened.append(http := bind_tcp(settings.metrics))
+        path = settings.socket
+        if "events" in given:
+            events = Listener(given["events"])
+            path = path or events.path
+        else:
+            if path is None:
+                path = default_socket(os.environ)
+                make_default_directory(path.parent)
+            opened.append(events := UnixListener(path))
+        if "control" in given:
+            control = Listener(given["control"])
+        else:
+            control = UnixListener(settings.control or control_beside(path), "control")
+    except AddressError:
+        for sock in opened:
+            sock.close()
+        raise
+    for name, sock in given.items():
+        log.info("socket from systemd", name=name, address=_where(sock))
+    return Bound(udp, events, control, http)
+
+
+def _where(sock: socket.socket) -> str:
+    return str(sock.getsockname()) if sock.family == socket.AF_UNIX else name_of(sock)
+
+
+def _by_name(passed: Sequence[tuple[str, socket.socket]]) -> dict[str, socket.socket]:
+    found: dict[str, socket.socket] = {}
+    for name, sock in passed:
+        if name not in NAMES:
+            raise AddressError(
+                f"systemd passed a socket named {name!r}, expected FileDescriptorName= one of {', '.join(NAMES)}"
+            )
+        families, kind, words = NAMES[name]
+        if sock.family not in families or sock.type != kind or name in found:
+            raise AddressError(
+                f"systemd's socket {name!r}: expected one, of {words}, found {sock.family.name} {sock.type.name}"
+            )
+        if kind == socket.SOCK_STREAM and not sock.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN):
+            raise AddressError(f"systemd's socket {name!r}: expected it listening (Accept=no), found a connection")
+        sock.setblocking(False)
+        found[name] = sock
+    return found

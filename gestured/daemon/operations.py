@@ -1,0 +1,140 @@
+"""What an operator may ask of a running daemon: the table of the control socket's verbs."""
+
+import asyncio
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from gestured import __version__
+from gestured.core.events import Gesture, Onset, Release
+from gestured.core.wire import is_sensor
+from gestured.daemon.control import Answer, Connection, Parameter, Refusal, Verb
+from gestured.daemon.status import status
+from gestured.daemon.tap import as_lines
+from gestured.models import open_model
+
+if TYPE_CHECKING:
+    from gestured.daemon.service import Service
+
+TEST_SENSORS = 64  # names of sensors that are not there
+TEST_S = 0.4  # how long a made-up gesture took
+
+SENSOR = Parameter(str, "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", check=is_sensor)
+LABEL = Parameter(str, "a gesture's name", required=True)
+MODEL = Parameter((str, type(None)), "a model's path or name, or null to end it", required=True)
+
+
+def verbs(service: "Service") -> dict[str, Verb]:
+    """Name -> verb. This table is all that the control socket can do."""
+    do = Operations(service)
+    return {
+        "status": Verb(do.status, changes=False),
+        "reload": Verb(do.reload),
+        "recalibrate": Verb(do.recalibrate, {"sensor": SENSOR}),
+        "emit": Verb(do.emit, {"gesture": LABEL, "sensor": SENSOR}),
+        "shadow": Verb(do.shadow, {"model": MODEL}),
+        "tap": Verb(do.tap),
+        "flight": Verb(do.flight),
+    }
+
+
+class Operations:
+    """The verbs. Each checks everything before it changes anything."""
+
+    def __init__(self, service: "Service") -> None:
+        self._service = service
+
+    async def status(self, connection: Connection) -> Answer:
+        """How the daemon is."""
+        return status(self._service)
+
+    async def reload(self, connection: Connection) -> Answer:
+        """Read configuration and model anew; the old ones stay where the new ones are bad."""
+        reason = await self._service.reload()
+        if reason is not None:
+            raise Refusal(f"{reason}; nothing has changed")
+        return {"model": self._service.pipeline.watched.ladder.active}
+
+    async def recalibrate(self, connection: Connection, sensor: str | None = None) -> Answer:
+        """Learn the idle sensor anew: one, or all. Refused while one of them is touched: a hand is no baseline."""
+        sensors = self._service.pipeline.sensors
+        if sensor is not None and sensor not in sensors:
+            raise Refusal(f"no sensor {sensor!r}, expected one of {', '.join(sensors) or 'none: no sensor was heard'}")
+        chosen = list(sensors.values()) if sensor is None else [sensors[sensor]]
+        if not chosen:
+            raise Refusal("no sensor was heard so far")
+        touched = [one.name for one in chosen if one.recognizer.front_end.touched]
+        if touched:
+            raise Refusal(f"touched: {', '.join(touched)}; take the hand off, and whatever lies there")
+        for one in chosen:
+            self._service.pipeline.restart(one)
+        return {"sensors": [one.name for one in chosen]}
+
+    async def emit(self, connection: Connection, gesture: str, sensor: str = "test") -> Answer:
+        """A made-up gesture through every output, marked as a test; it takes the sensor's next numbers."""
+        pipeline = self._service.pipeline
+        if gesture not in pipeline.gestures:
+            raise Refusal(f"no gesture {gesture!r} is in use, expected one of {', '.join(pipeline.gestures)}")
+        now = time.monotonic()
+        live = pipeline.sensors.get(sensor)
+        if live is None:
+            if sensor not in pipeline.given and len(pipeline.given) >= TEST_SENSORS:
+                raise Refusal(f"tests used {TEST_SENSORS} names of sensors that are not there; use one of them again")
+            sequence = number = pipeline.given[sensor] = pipeline.given.get(sensor, 0) + 1
+        elif live.recognizer.front_end.touched or live.open is not None:
+            raise Refusal(f"{sensor} is touched; a test would mix with what is being done there")
+        else:
+            live.recognizer.sequence += 1
+            live.recognizer.front_end.segments += 1
+            sequence, number = live.recognizer.sequence, live.recognizer.front_end.segments
+        scores = {name: float(name == gesture) for name in pipeline.gestures}
+        onset, frames = now - TEST_S, round(TEST_S * 15)
+        model = pipeline.watched.ladder.active
+        for event in (
+            Onset(sensor, number, onset),
+            Gesture(sensor, number, gesture, 1.0, sequence, onset, now, now, frames, 0, model, False, scores),
+            Release(sensor, number, now),
+        ):
+            self._service.emit(event, test=True)
+        return {"sensor": sensor, "gesture": gesture, "sequence": sequence}
+
+    async def shadow(self, connection: Connection, model: str | None) -> Answer:
+        """Run a candidate beside the active model; null ends it. Gives what the last one was worth."""
+        watched = self._service.pipeline.watched
+        if model is None:
+            last, watched.shadow = watched.shadow, None
+            return {"shadow": last.report() if last else None}
+        opened = await asyncio.to_thread(open_model, model)
+        self._service.pipeline.watched.compare(opened)  # a reload may have come in between
+        return {"shadow": self._service.pipeline.watched.shadow.report()}  # type: ignore[union-attr]
+
+    async def tap(self, connection: Connection) -> Answer:
+        """Stream packets and events over this connection from now on."""
+        self._service.tap(connection)
+        return self.scene()
+
+    async def flight(self, connection: Connection) -> Answer:
+        """Stream what the flight recorder holds, then `{"type":"end"}`."""
+        taps = self._service.taps
+        if not taps.ring_bytes:
+            raise Refusal("the flight recorder is off; set flight_recorder = MiB (or --flight-recorder) and restart")
+        held = taps.flight()
+        task = asyncio.ensure_future(connection.pour([*as_lines(held), b'{"type":"end"}\n']))
+        self._service.tasks.add(task)
+        task.add_done_callback(self._service.tasks.discard)
+        return self.scene() | {"lines": len(held)}
+
+    def scene(self) -> dict[str, Any]:
+        """What a recording must know to be understood without this daemon."""
+        pipeline = self._service.pipeline
+        model: Any = pipeline.watched.ladder.model
+        settings: Mapping[str, Any] = self._service.settings.model_dump(mode="json")
+        return {
+            "version": __version__,
+            "instance": self._service.health.instance,
+            "epoch_ns": time.time_ns() - time.monotonic_ns(),
+            "model": {"name": pipeline.watched.ladder.active, "sha256": model.sha256},
+            "gestures": list(pipeline.gestures),
+            "grids": {name: list(pipeline.grid(name)) for name in pipeline.sensors},
+            "settings": settings,
+        }

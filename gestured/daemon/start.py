@@ -1,0 +1,70 @@
+"""From settings to a daemon that serves: sockets, models, signals, and the line that says so."""
+
+import asyncio
+import gc
+import json
+import resource
+import signal
+import sys
+from typing import Any
+
+from gestured.daemon import log as logging
+from gestured.daemon import systemd
+from gestured.daemon.bound import bind_all
+from gestured.daemon.ladder import open_ladder
+from gestured.daemon.log import Throttle, log
+from gestured.daemon.service import Loader, Service
+from gestured.daemon.settings import Settings
+
+DESCRIPTORS = 4096  # for 1024 clients; the usual soft limit is 1024 in all
+SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+
+
+def run(settings: Settings, load: Loader) -> None:
+    """Run a daemon until it is asked to end. Raises AddressError, ModelError, SettingsError."""
+    import uvloop
+
+    with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+        runner.run(_run(settings, load))
+
+
+async def _run(settings: Settings, load: Loader) -> None:
+    """Bind, open, serve. What cannot be had ends it before it says that it is ready."""
+    loop = asyncio.get_running_loop()
+    stop, reload = asyncio.Event(), asyncio.Event()
+    throttle = Throttle()
+    loop.set_exception_handler(
+        lambda _, what: throttle.error("a bug in a callback", what["message"], exc_info=what.get("exception"))
+    )
+    for number, asked in zip(SIGNALS, (stop, stop, reload), strict=True):
+        loop.add_signal_handler(number, asked.set)
+    _raise_descriptor_limit()
+    bound = bind_all(settings, systemd.passed_sockets())
+    try:
+        ladder = open_ladder(settings)
+        service = Service(settings, ladder, bound, load)
+        gc.freeze()  # what the start has made stays: later collections need not walk through it
+        await service.start()
+        _announce(service, ladder.active)
+        await service.serve(stop, reload)
+        # The loop gives signals back as it closes; one that is repeated then must not count as a crash.
+        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    finally:
+        bound.close()
+
+
+def _announce(service: Service, model: str) -> None:
+    where = {key: value for key, value in service.addresses().items() if value is not None}
+    control = where.pop("control")
+    ready: dict[str, Any] = {"type": "ready", **where, "model": model, "control": control}
+    log.info("ready", **where, model=model)
+    if sys.stdout is not None:
+        logging.say(sys.stdout, json.dumps(ready, separators=(",", ":")))
+    systemd.notify(f"READY=1\nSTATUS={model} on {where['listen']}")
+
+
+def _raise_descriptor_limit() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(DESCRIPTORS, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))

@@ -1,0 +1,102 @@
+"""Packets as they arrived, with the events they led to: for recordings, and for the flight recorder.
+
+A packet is kept as the bytes that came, before anything looked at them, with the time that the pipeline gave it: so
+a recording replays through the same code to the same events. Nothing is kept and nothing is copied as long as nobody
+taps and no flight recorder is set.
+"""
+
+import base64
+import json
+import time
+from collections import deque
+from collections.abc import Iterable, Sequence
+
+from gestured.core import messages
+from gestured.core.events import Event, Status
+from gestured.daemon.control import Connection
+
+KEPT_S = 30.0  # of the flight recorder
+OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps
+Source = tuple[str, int]
+Kept = tuple[int, Source, bytes] | bytes  # a packet with its time in ns (monotonic), or an event's line
+
+
+class Taps:
+    """Live taps, and the ring. `active` says whether anything here wants packets."""
+
+    def __init__(self, ring_bytes: int) -> None:
+        """Remember the last KEPT_S seconds, but never more than `ring_bytes` (0: nothing)."""
+        self.ring_bytes = ring_bytes
+        self._live: list[Connection] = []
+        self._ring: deque[tuple[int, int, Kept]] = deque()  # ns, bytes, what
+        self._size = 0
+
+    @property
+    def active(self) -> bool:
+        """Whether packets are wanted."""
+        return bool(self.ring_bytes or self._live)
+
+    def join(self, connection: Connection) -> None:
+        """Stream to this connection from now on."""
+        self._live.append(connection)
+
+    def packets(self, waiting: Sequence[tuple[bytes, Source]], now: float) -> None:
+        """What was read in one go at `now` (monotonic s)."""
+        t_ns = round(now * 1e9)
+        for packet, source in waiting:
+            if self._live:
+                self._stream(packet_line(t_ns, source, packet))
+            if self.ring_bytes:
+                self._keep(t_ns, len(packet) + OVERHEAD_BYTES, (t_ns, source, packet))
+
+    def event(self, event: Event, epoch: float) -> None:
+        """An event, in the order in which it came of the packets; the status is no consequence of one."""
+        if self.active and not isinstance(event, Status):
+            line = messages.to_json(event, epoch)
+            self._stream(line)
+            if self.ring_bytes:
+                self._keep(time.monotonic_ns(), len(line) + OVERHEAD_BYTES, line)
+
+    def flight(self) -> list[Kept]:
+        """What the ring holds, oldest first."""
+        self._forget(time.monotonic_ns())
+        return [what for _, _, what in self._ring]
+
+    @property
+    def held_bytes(self) -> int:
+        """How much the ring holds."""
+        return self._size
+
+    def tick(self) -> None:
+        """Tell slow readers what they lost, forget those that went; call it once a second."""
+        self._live = [connection for connection in self._live if not connection.closed]
+        for connection in self._live:
+            lost, connection.lost = connection.lost, 0
+            if lost and not connection.send(messages.lost_json(lost)):
+                connection.lost += lost - 1  # the line that says so was no packet
+        self._forget(time.monotonic_ns())
+
+    def _stream(self, line: bytes) -> None:
+        for connection in self._live:
+            connection.send(line)
+
+    def _keep(self, t_ns: int, size: int, what: Kept) -> None:
+        self._ring.append((t_ns, size, what))
+        self._size += size
+        self._forget(t_ns)
+
+    def _forget(self, now_ns: int) -> None:
+        oldest = now_ns - round(KEPT_S * 1e9)
+        while self._ring and (self._size > self.ring_bytes or self._ring[0][0] < oldest):
+            self._size -= self._ring.popleft()[1]
+
+
+def packet_line(t_ns: int, source: Source, packet: bytes) -> bytes:
+    """A packet as a line of the control socket: its time in ns (monotonic), who sent it, its bytes as base64."""
+    line = {"type": "packet", "t_ns": t_ns, "source": source[:2], "data": base64.b64encode(packet).decode()}
+    return json.dumps(line, separators=(",", ":")).encode() + b"\n"
+
+
+def as_lines(flight: Iterable[Kept]) -> Iterable[bytes]:
+    """The ring's content as a tap would have streamed it."""
+    return (what if isinstance(what, bytes) else packet_line(*what) for what in flight)

@@ -1,0 +1,233 @@
+"""The control socket of a real daemon: who may, what is refused, and what each verb does."""
+
+import base64
+import os
+import socket
+import stat
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from gestured.client.control import Control
+from gestured.client.stream import Refused, Unreachable
+from tests.daemon import tiny_model
+from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
+
+
+@pytest.fixture(scope="module")
+def daemon(model: Path, tmp_path_factory: pytest.TempPathFactory):
+    """One for the verbs that leave no trace that another test could trip over."""
+    daemon = Daemon.start(tmp_path_factory.mktemp("control"), model, "--clock", "sensor", "--flight-recorder", 1)
+    yield daemon
+    assert daemon.stop() == 0
+    assert "Traceback" not in daemon.stderr()
+
+
+def test_it_stands_beside_the_event_socket_for_owner_and_group(daemon: Daemon) -> None:
+    path = Path(daemon.ready["control"])
+    assert path == daemon.socket.with_suffix(".ctl")
+    assert stat.S_IMODE(path.stat().st_mode) == 0o660
+
+
+@pytest.fixture
+def nobody():
+    """The test is user and group 65534 while it is inside."""
+    if os.getuid() != 0:
+        pytest.skip("only root can be somebody else for a moment")
+
+    @contextmanager
+    def become():
+        groups = os.getgroups()
+        os.setgroups([])
+        os.setegid(65534)
+        os.seteuid(65534)
+        try:
+            yield
+        finally:
+            os.seteuid(0)
+            os.setegid(0)
+            os.setgroups(groups)
+
+    return become
+
+
+def test_a_stranger_is_refused_even_where_the_file_lets_him_in(start, nobody) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        os.chmod(folder, 0o755)
+        daemon = start("--control", f"{folder}/control")
+        path = Path(daemon.ready["control"])
+        with nobody(), pytest.raises(Unreachable, match="Permission denied"):
+            Control(path)
+        os.chmod(path, 0o666)
+        with nobody():
+            control = Control(path)
+        with control, pytest.raises(Refused, match="group"):
+            control.ask("status")
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (b"hello\n", ("JSON object",)),
+        (b"[]\n", ("verb",)),
+        (b'{"verb":"launch"}\n', ("verb", '"launch"', "status")),
+        (b'{"verb":"emit"}\n', ("emit.gesture", "missing")),
+        (b'{"verb":"emit","gesture":7}\n', ("emit.gesture", "7", "name")),
+        (b'{"verb":"emit","gesture":"wink"}\n', ("wink", "one_tap")),
+        (b'{"verb":"emit","gesture":"one_tap","sensor":"a b"}\n', ("emit.sensor", '"a b"')),
+        (b'{"verb":"emit","gesture":"one_tap","loud":true}\n', ("emit", '"loud"', "gesture, sensor")),
+        (b'{"verb":"status","x":1}\n', ("status", '"x"', "no key")),
+        (b'{"verb":"recalibrate","sensor":"nobody"}\n', ("nobody",)),
+        (b'{"verb":"shadow","model":"/no/such.onnx"}\n', ("/no/such.onnx",)),
+        (b"[" * 4000 + b"\n", ("JSON object",)),
+        (b"\xff\n", ("JSON object",)),
+    ],
+)
+def test_a_bad_request_is_answered_and_the_connection_goes_on(daemon: Daemon, line: bytes, said: tuple[str]) -> None:
+    with Control(Path(daemon.ready["control"])) as control:
+        control.socket.sendall(line)
+        answer = next(control.lines())
+        assert answer["ok"] is False and all(word in answer["reason"] for word in said), answer
+        assert control.ask("status")["state"] in ("ok", "no_data")
+
+
+def test_a_request_that_is_too_long_is_refused(daemon: Daemon) -> None:
+    with Control(Path(daemon.ready["control"])) as control, pytest.raises(Refused, match="4096"):
+        control.ask("emit", gesture="x" * 100_000)
+
+
+def test_status_says_how_the_daemon_is(daemon: Daemon) -> None:
+    client = daemon.client()
+    Sensor(daemon, "seen").begin().perform("left")
+    client.events("gesture", "seen")
+    with Control(Path(daemon.ready["control"])) as control:
+        status = control.ask("status")
+    assert status["model"]["active"] == "tiny" and status["model"]["rung"] == 0
+    assert status["addresses"]["listen"] == daemon.ready["listen"]
+    sensor = status["sensors"]["seen"]
+    assert (sensor["state"], sensor["gestures"], sensor["grid"]) == ("ok", 1, "9x9")
+    assert sensor["rate_hz"] == pytest.approx(15, rel=0.1)
+    assert {"sensor": "seen", "answer": "swipe_left", "test": False}.items() <= status["recent"][-1].items()
+    assert status["answers"]["gestures"]["swipe_left"] >= 1
+    assert status["flight_recorder"]["held_bytes"] > 0
+
+
+def test_a_test_event_is_marked_on_every_output_and_keeps_the_numbers(start) -> None:
+    osc_message = pytest.importorskip("pythonosc.osc_packet")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        out.bind(("127.0.0.1", 0))
+        out.settimeout(DEADLINE_S)
+        daemon = start("--clock", "sensor", "--publish", f"osc://127.0.0.1:{out.getsockname()[1]}")
+        client = daemon.client().subscribe("gesture", "onset", "release")
+        with Control(Path(daemon.ready["control"])) as control:
+            assert control.ask("emit", gesture="swipe_up", sensor="arm")["sequence"] == 1
+        assert [(e["type"], e["id"], e["test"]) for e in (client.line() for _ in range(3))] == [
+            ("onset", 1, True), ("gesture", 1, True), ("release", 1, True),
+        ]  # fmt: skip
+        found = []
+        while len(found) < 2:
+            packet = osc_message.OscPacket(out.recv(9999))
+            found += [timed.message for timed in packet.messages if timed.message.address != "/gestured/status"]
+    assert (found[0].address, found[0].params) == ("/gestured/test", ["arm"])
+    assert found[1].address == "/gestured/arm/gesture" and found[1].params[:3] == ["swipe_up", 1.0, 1]
+    assert daemon.client().hello["sensors"] == {"arm": 1}
+    Sensor(daemon, "arm").begin().perform("left")  # the sensor comes: its gestures are numbered on, unmarked
+    (event,) = client.events("gesture", "arm")
+    assert (event["gesture"], event["sequence"]) == ("swipe_left", 2) and "test" not in event
+    with Control(Path(daemon.ready["control"])) as control:
+        assert control.ask("emit", gesture="one_tap", sensor="arm")["sequence"] == 3
+
+
+def test_recalibration_is_refused_while_touched(start) -> None:
+    daemon = start("--clock", "sensor")
+    client = daemon.client().subscribe("onset", "gesture", "unknown")
+    sensor = Sensor(daemon, "arm").begin()
+    sensor.send([sensor.hand.frame(4.0) for _ in range(5)])
+    client.events("onset", "arm")
+    with Control(Path(daemon.ready["control"])) as control:
+        with pytest.raises(Refused, match=r"touched: arm"):
+            control.ask("recalibrate")
+        with pytest.raises(Refused, match=r"arm is touched"):
+            control.ask("emit", gesture="one_tap", sensor="arm")
+        sensor.send(sensor.hand.idle(2.0))
+        client.until(lambda line: line["type"] in ("gesture", "unknown"))
+        assert control.ask("recalibrate", sensor="arm") == {"ok": True, "sensors": ["arm"]}
+        assert control.ask("status")["sensors"]["arm"]["state"] == "starting"
+
+
+def test_reload_says_what_was_wrong_and_keeps_the_old(start, model: Path, tmp_path: Path) -> None:
+    path = tmp_path / "mine.onnx"
+    path.write_bytes(model.read_bytes())
+    daemon = start("--clock", "sensor", model=path)
+    with Control(Path(daemon.ready["control"])) as control:
+        before = control.ask("status")["model"]["sha256"]
+        path.write_bytes(model.read_bytes()[:2000])
+        with pytest.raises(Refused, match=str(path)):
+            control.ask("reload")
+        assert control.ask("status")["model"]["sha256"] == before
+        tiny_model.make(path, version="2")
+        assert control.ask("reload")["model"] == "mine"
+        status = control.ask("status")
+        assert status["model"]["version"] == "2" and status["reloads"] == {"refused": 1, "done": 1}
+
+
+def test_a_shadow_sees_the_same_and_publishes_nothing(start, model: Path, tmp_path: Path) -> None:
+    swapped = list(tiny_model.GESTURES)
+    other = tiny_model.make(tmp_path / "candidate.onnx", version="9")
+    wrong = tiny_model.make(tmp_path / "wrong.onnx", gestures=("knock", *swapped[1:]))
+    daemon = start("--clock", "sensor")
+    client = daemon.client()
+    with Control(Path(daemon.ready["control"])) as control:
+        with pytest.raises(Refused, match="knock"):
+            control.ask("shadow", model=str(wrong))
+        assert control.ask("shadow", model=str(other))["shadow"]["segments"] == 0
+        Sensor(daemon, "arm").begin().perform("left", "up")
+        assert {e["model"] for e in client.events("gesture", "arm", 2)} == {"tiny"}
+        report = control.ask("status")["shadow"]
+        assert (report["model"], report["segments"], report["agreement"]) == ("candidate", 2, 1.0)
+        assert report["confidence"] == report["active_confidence"]
+        control.socket.sendall(b'{"verb":"shadow","model":null}\n')
+        assert next(control.lines())["shadow"]["segments"] == 2
+        assert control.ask("status")["shadow"] is None
+
+
+def test_a_tap_shows_packets_as_they_came_and_events(daemon: Daemon) -> None:
+    with Control(Path(daemon.ready["control"])) as control:
+        scene = control.ask("tap")
+        assert scene["model"]["name"] == "tiny" and scene["settings"]["clock"] == "sensor"
+        sensor = Sensor(daemon, "tapped")
+        sent = [sensor.packet(frame) for frame in [*sensor.hand.idle(2.0), *sensor.hand.swipe("up")]]
+        sent += [b"rubbish!"] + [sensor.packet(frame) for frame in sensor.hand.idle(1.0)]
+        for packet in sent:
+            sensor.sock.send(packet)
+        packets, events, times = [], [], []
+        for line in control.lines():
+            if line["type"] == "packet":
+                packets.append(base64.b64decode(line["data"]))
+                times.append(line["t_ns"])
+            else:
+                events.append(line["type"])
+            if len(packets) == len(sent) and line["type"] == "release":
+                break
+    assert packets == sent and times == sorted(times)
+    assert events == ["onset", "gesture", "release"]
+
+
+def test_the_flight_recorder_gives_what_it_held(daemon: Daemon, start) -> None:
+    client = daemon.client()
+    Sensor(daemon, "flown").begin().perform("left")
+    client.events("gesture", "flown")
+    with Control(Path(daemon.ready["control"])) as control:
+        answer = control.ask("flight")
+        lines = []
+        for line in control.lines():
+            if line["type"] == "end":
+                break
+            lines.append(line)
+    assert len(lines) == answer["lines"]
+    assert sum(line["type"] == "packet" for line in lines) >= 2 * 15 + 7
+    assert "swipe_left" in {line.get("gesture") for line in lines}
+    with Control(Path(start().ready["control"])) as control, pytest.raises(Refused, match="flight_recorder"):
+        control.ask("flight")
