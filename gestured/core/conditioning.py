@@ -79,6 +79,9 @@ class Conditioner:
         self._still_since = np.full(rows * columns, math.inf)  # s
         self._previous: Array = np.zeros(rows * columns)  # raw counts
         self._rail = -math.inf  # the largest raw count seen under a touch
+        self._step = 0.0  # counts, one quantisation step: below it noise cannot be known
+        self._unit = 0.0  # counts, the smallest change that a sensor has shown which stood still when it was learned
+        self._shown: Array = np.zeros(rows * columns)  # raw counts of its last frame
         self._fine = False  # whether a finger's tremble shows in the last digit
         self._strikes = np.zeros(rows * columns, dtype=np.int64)
         self.bad = np.zeros(rows * columns, dtype=bool)
@@ -105,6 +108,8 @@ class Conditioner:
 
     def deviation(self, raw: Array) -> tuple[Array, float, float]:
         """(N,) raw counts -> (N,) counts above the baseline; activity and the lowest taxel in units of noise."""
+        if self._unit > 0:
+            self._learn_unit(raw)
         d = raw - self._baseline
         scaled = d * self._weight
         return d, self.activity(scaled), float(scaled.min())
@@ -139,14 +144,16 @@ class Conditioner:
         learned = self._settling.push(t, raw, patience=not self.ready)
         if learned is None:
             return False
-        self._baseline, self._sigma, self._stuck, stable, self._fine, stack = learned
+        self._baseline, self._sigma, self._stuck = learned.baseline, learned.noise, learned.constant
+        self._fine, self._step = learned.fine, learned.step
+        self._unit, self._shown = math.inf if learned.still else 0.0, raw
         self._frozen[:] = False
-        self._provisional = not stable
+        self._provisional = not learned.stable
         self.ready = True
         self._tracked = self._reviewed = t
         self._scale, self._usual = 1.0, 0.0
         self._review()
-        scaled = (stack - self._baseline) * self._weight
+        scaled = (learned.frames - self._baseline) * self._weight
         self._usual = float(np.median([self.activity(row) for row in scaled]))
         self._review()
         return True
@@ -184,7 +191,8 @@ class Conditioner:
                 self._baseline = self._baseline + d * -math.expm1((self._tracked - t) / tau)
             if t - self._reviewed >= REVIEW_S:
                 seen = np.minimum(np.abs(d), 4 * self._sigma) * 1.2533
-                self._sigma = self._sigma + (seen - self._sigma) * -math.expm1((self._reviewed - t) / NOISE_TAU_S)
+                sigma = self._sigma + (seen - self._sigma) * -math.expm1((self._reviewed - t) / NOISE_TAU_S)
+                self._sigma = np.maximum(sigma, self._step / 2)  # what shows no noise may have some all the same
                 self._reviewed = t
                 self._review()
         self._tracked = t
@@ -237,6 +245,18 @@ class Conditioner:
             grid = np.where(fill, around, grid)
             good = good | fill
         return grid
+
+    def _learn_unit(self, raw: Array) -> None:
+        """What has stood still tells its step when it moves. Whole numbers count in ones, as `quantum` has it."""
+        changed = raw[raw != self._shown] - self._shown[raw != self._shown]
+        self._shown = raw
+        if not changed.size or np.array_equal(raw, np.rint(raw)):
+            return
+        unit = max(float(np.abs(changed).min()), 1e-6 * float(np.abs(raw).max()))
+        if unit < self._unit:
+            self._unit = self._step = unit
+            self._sigma = np.full_like(self._sigma, unit)
+            self._review()
 
     def _review(self) -> None:
         """Weights, the sensor's noise and its bad taxels from what is known of each taxel."""

@@ -14,6 +14,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unkn
 from gestured.core.frames import Frame, Segment, Touch
 from gestured.core.segmentation import TOUCHED, Action, Phase, Segmenter, Timing
 
+LARGEST = float(np.finfo(np.float32).max)  # counts; also what a frame on the wire can hold
 LEAD_S = 0.15  # quiet frames kept before an onset: at 15 Hz two of them
 
 
@@ -105,9 +106,16 @@ class FrontEnd:
         return 1.0 / self._interval if self._interval > 0 else 0.0
 
     def push(self, frame: Frame) -> list[Contact]:
-        """Take one frame; its time must lie after the last one's (ValueError), its grid must be the sensor's."""
+        """Take one frame; its time must lie after the last one's (ValueError), its grid must be the sensor's.
+
+        One with a value that is not finite, or beyond float32, is passed over as if it had been lost.
+        """
         t = frame.t
         out: list[Contact] = []
+        values = self.mounting.frame(frame.values) if self._mounted else frame.values
+        raw = values.astype(np.float64).reshape(-1)
+        if not np.abs(raw).max() <= LARGEST:
+            return out
         if self._last is not None:
             step = t - self._last
             if not step > 0:
@@ -117,8 +125,6 @@ class FrontEnd:
             else:
                 self._interval += (step - self._interval) * (0.05 if self._interval else 1.0)
         self._last = t
-        values = self.mounting.frame(frame.values) if self._mounted else frame.values
-        raw = values.astype(np.float64).reshape(-1)
         conditioner, segmenter = self.conditioner, self.segmenter
         if not conditioner.ready:
             conditioner.settle(t, raw)
@@ -217,8 +223,7 @@ class FrontEnd:
         first = int(np.searchsorted(times, onset))
         last = int(np.searchsorted(times, offset))
         self.conditioner.inspect(stack[first : last + 1])
-        limit = float(np.finfo(np.float32).max)
-        frames = np.clip(self.conditioner.bridge(stack), -limit, limit).astype(np.float32)
+        frames = np.clip(self.conditioner.bridge(stack), -LARGEST, LARGEST).astype(np.float32)
         touches: tuple[tuple[Touch, ...], ...] = ()
         if any(k[2] for k in self._kept):
             touches = tuple(tuple(self._mount(touch) for touch in k[2]) for k in self._kept)

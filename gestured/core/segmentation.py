@@ -37,6 +37,9 @@ class Timing:
 OFF_SHARE = 0.12  # of the contact's peak: below it the finger is off (textile recovers slowly)
 ON_SHARE = 0.20  # of the last contact's peak: what a new contact must exceed while the textile recovers
 RECOVERY_S = 1.0
+AFTER_S = (
+    8.0  # then nothing is left of a contact, however large a spike it was: a firm finger has faded below the noise
+)
 
 
 class Phase(Enum):
@@ -184,6 +187,8 @@ class Segmenter:
     def after_effect(self, t: float) -> float:
         """Activity that a contact may leave behind, now: textile comes back slowly, or swings below its baseline."""
         past = 0.0 if self.phase is not Phase.IDLE else self._closed - t
+        if past < -AFTER_S:
+            return 0.0
         return ON_SHARE * self._peak * math.exp(past / RECOVERY_S)
 
     def let_go(self) -> bool:

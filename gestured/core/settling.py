@@ -1,6 +1,7 @@
 """What the idle sensor looks like: learned from one second in which nothing moved."""
 
 from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,25 @@ LOOK_S = 0.06  # how often it is looked whether the last second was stable
 SETTLE_FRAMES = 64  # frames kept of that second; faster sensors are thinned out
 PATIENCE_S = 5.0  # a sensor that never settles (hum, a hand that never rests) is used all the same after this
 RESTLESS = 5.0  # a taxel that moves more than this many times the sensor's noise was touched, or is bad
+SPIKE = 1000.0  # a frame so many times further off than frames usually jump is a fault of the readout, not idle
 
-Learned = tuple[Array, Array, NDArray[np.bool_], bool, bool, Array]  # baseline, noise, constant, stable, fine, frames
+
+class Learned(NamedTuple):
+    """What a second says of the idle sensor."""
+
+    baseline: Array  # (N,) counts
+    noise: Array  # (N,) counts, one standard deviation
+    constant: NDArray[np.bool_]  # (N,) taxels that never changed while others did
+    moved: int  # taxels that moved
+    fine: bool  # whether noise shows in the last digit
+    step: float  # counts, one quantisation step
+    still: bool  # nothing changed at all, so that the step is a guess
+    frames: Array  # (n, N) counts that this was learned from
+
+    @property
+    def stable(self) -> bool:
+        """Whether hardly a taxel moved."""
+        return self.moved <= min(3, self.baseline.size // 20)
 
 
 class Settling:
@@ -46,18 +64,18 @@ class Settling:
         if t - frames[0][0] < SETTLE_S or len(frames) < 4:
             return None
         stack = np.array([f for _, f in frames])  # (n, N)
-        baseline, noise, constant, restless, fine = _idle(stack)
-        stable = restless <= min(3, raw.size // 20)
-        if not stable and not (patience and t - self._since >= PATIENCE_S):
+        learned = _idle(stack)
+        if not learned.stable and not (patience and t - self._since >= PATIENCE_S):
             while t - frames[0][0] >= SETTLE_S - LOOK_S:  # look again soon: movement may just have ended
                 frames.popleft()
             return None
         self.clear()
-        return baseline, noise, constant, stable, fine, stack
+        return learned
 
 
-def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int, bool]:
-    """(n, N) counts -> baseline (N,), noise (N,), taxels that never changed (N,), how many moved, does noise show?"""
+def _idle(stack: Array) -> Learned:
+    """What (n, N) counts show."""
+    stack = _without_spikes(stack)
     n = len(stack)
     baseline = np.median(stack, axis=0)
     # Successive differences see noise and not slow movement; mean absolute values, since one outlier must not rule.
@@ -76,7 +94,16 @@ def _idle(stack: Array) -> tuple[Array, Array, NDArray[np.bool_], int, bool]:
     constant = np.all(jumps == 0, axis=0)
     if clipped or pooled < step or np.count_nonzero(constant) > stack.shape[1] // 4:
         constant[:] = False  # a clipped or coarse sensor stands still when idle: that proves nothing
-    return baseline, noise, constant, moved, pooled >= 0.35 * step
+    return Learned(baseline, noise, constant, moved, pooled >= 0.35 * step, step, not jumps.any(), stack)
+
+
+def _without_spikes(stack: Array) -> Array:
+    """(n, N) counts but for single frames that lie beyond all reason: one of them would rule the noise for minutes."""
+    jumps = np.abs(np.diff(stack, axis=0))
+    leaps = jumps.max(axis=1)
+    usual = float(np.partition(leaps, len(leaps) // 4)[len(leaps) // 4])
+    good = np.abs(stack - np.median(stack, axis=0)).max(axis=1) <= SPIKE * max(usual, quantum(stack, jumps))
+    return stack if good.all() or len(stack) - np.count_nonzero(good) > max(1, len(stack) // 8) else stack[good]
 
 
 def quantum(stack: Array, jumps: Array) -> float:
@@ -84,5 +111,5 @@ def quantum(stack: Array, jumps: Array) -> float:
     if np.array_equal(stack, np.rint(stack)) and np.abs(stack).max() < 2**52:
         return 1.0
     seen = jumps[jumps > 0]
-    top = float(np.abs(stack).max())
+    top = float(np.median(np.abs(stack).max(axis=1)))  # of most frames: one spike must not rule
     return max(float(seen.min()) if seen.size else 0.0, top * 1e-6, 1e-35)

@@ -548,3 +548,60 @@ def test_a_negative_burst_does_not_cut_a_swipe_in_two() -> None:
     assert kinds(events) == ONE
     (segment,) = segments(events)
     assert times[hit] not in segment.times and segment.offset - segment.onset > 0.85
+
+
+# --- extremes
+
+
+@pytest.mark.parametrize(("value", "hours"), [(300.0, 0.1), (0.0, 7.0)])  # then 1 / noise would overflow
+def test_a_sensor_that_stood_still_for_long_hears_no_single_count(value: float, hours: float) -> None:
+    """Clipped sensors show no noise for hours: it is not known to be nothing."""
+    front_end = FrontEnd("s", *SHAPE)
+    times = np.concatenate([np.arange(20) / 15, 1.34 + np.arange(int(hours * 3600 / 0.9)) * 0.9])
+    frames = np.full((len(times), *SHAPE), value)
+    with np.errstate(all="raise"):
+        assert play(front_end, times, frames) == []
+        frames[:2, 4, 4] += 1.0
+        assert play(front_end, times[:30] + times[-1] + 0.1, frames[:30]) == []
+        assert 0.3 < front_end.noise < 1.0
+        frames[:2] += finger(4, 4, SHAPE)
+        assert kinds(play(front_end, times[:30] + times[-1] + 30.0, frames[:30])) == ONE
+
+
+@pytest.mark.parametrize("gain", [1e-6, 1e-3, 1.0, 1e3, 1e6])
+def test_a_clipped_sensor_may_have_any_unit(gain: float) -> None:
+    """It shows nothing at all until somebody touches it, so that only the touch tells its unit."""
+    times, frames = stream(SHAPE, GESTURES, level=0.0, noise=0.0)
+    counts = np.rint(frames) * gain
+    _, events = heard(times, counts)
+    assert kinds(events) == 3 * ONE
+    if gain <= 1:  # whole numbers are taken to count in ones
+        _, softly = heard(times, np.where(counts > 0, gain, 0.0))  # never more than one count
+        assert softly == []
+
+
+@pytest.mark.parametrize("size", [1e6, 1e12, 1e30, -1e12])
+@pytest.mark.parametrize("taxels", [1, 81])
+@pytest.mark.parametrize("moment", [0.4, 1.4, 2.4])  # while it settles, in idle, in a gesture
+def test_one_spike_is_forgotten(size: float, taxels: int, moment: float) -> None:
+    times, frames = stream(SHAPE, [quiet(2), swipe(SHAPE, row=4), quiet(10), *GESTURES])
+    frames[np.searchsorted(times, moment)].reshape(-1)[:taxels] += size
+    with np.errstate(all="raise"):
+        front_end, events = heard(times, frames)
+    follow_rules(events)
+    late = [event for event in events if isinstance(event, Cut) and event.segment.onset > 12.0]
+    assert len(late) == 3
+    assert front_end.noise == pytest.approx(2.0, rel=0.3)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300, -1e300])
+@pytest.mark.parametrize("moment", [0.4, 1.4, 2.4])
+@pytest.mark.parametrize("taxels", [1, 81])
+def test_a_frame_that_is_no_number_is_a_lost_frame(value: float, moment: float, taxels: int) -> None:
+    times, frames = stream(SHAPE, [quiet(2), swipe(SHAPE, row=4), quiet(2), *GESTURES])
+    at = int(np.searchsorted(times, moment))
+    _, expected = heard(np.delete(times, at), np.delete(frames, at, axis=0))
+    frames[at].reshape(-1)[-taxels:] = value
+    with np.errstate(all="raise"):
+        _, events = heard(times, frames)
+    assert told(events) == told(expected)
