@@ -1,0 +1,119 @@
+"""A booted systemd in a container: this machine's /usr, read-only, and above it what `make install` has made."""
+
+import ctypes
+import os
+import shutil
+import signal
+import subprocess
+import threading
+import time
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+CLONE_NEWNET = 0x40000000
+DEADLINE_S = 60.0
+
+
+def missing() -> str | None:
+    """Why no container can be booted here, or None."""
+    if os.geteuid() != 0:
+        return "only root can boot a container"
+    for program in ("systemd-nspawn", "nsenter", "mount", "systemctl"):
+        if shutil.which(program) is None:
+            return f"{program} is not installed (apt install systemd-container util-linux)"
+    if not Path("/usr/lib/systemd/systemd").exists():
+        return "systemd itself is not installed"
+    return None
+
+
+def wait(what: str, condition: Callable[[], Any]) -> Any:
+    """Ask until the answer is true; there is no message to wait for from a systemd that boots."""
+    end = time.monotonic() + DEADLINE_S
+    while not (found := condition()):
+        assert time.monotonic() < end, f"{what}: not within {DEADLINE_S:.0f} s"
+        time.sleep(0.02)
+    return found
+
+
+class Container:
+    """`installed` is a folder that `make install DESTDIR=` has filled; it becomes the root. A context manager."""
+
+    def __init__(self, installed: Path) -> None:
+        self.root = installed
+        self._usr = installed.with_name("usr")
+        self._log = installed.with_name("console.txt")
+
+    def __enter__(self) -> "Container":
+        (self.root / "usr").rename(self._usr)
+        for name in ("usr", "dev", "proc", "sys", "run", "tmp", "var"):
+            (self.root / name).mkdir(exist_ok=True)
+        for name in ("bin", "sbin", "lib", "lib64"):
+            (self.root / name).symlink_to(f"usr/{name}")
+        shutil.copy("/usr/lib/os-release", self.root / "etc")
+        (self.root / "etc" / "machine-id").write_text(uuid.uuid4().hex + "\n")  # no first boot: nothing is preset
+        lower = f"lowerdir={self._usr}:/usr"
+        subprocess.run(["mount", "-t", "overlay", "overlay", "-o", lower, self.root / "usr"], check=True)
+        command = [
+            "systemd-nspawn", "--boot", f"--directory={self.root}", f"--machine=gestured-{os.getpid()}",
+            "--register=no", "--keep-unit", "--private-network", "--console=pipe", "systemd.unit=multi-user.target",
+        ]  # fmt: skip
+        try:
+            with self._log.open("wb") as log:
+                self._nspawn = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+            self.leader = wait("the container's first process", self._leader)
+            wait("the end of the boot", lambda: self._state() in ("running", "degraded"))
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._nspawn.send_signal(signal.SIGTERM)  # an orderly shutdown
+        try:
+            self._nspawn.wait(DEADLINE_S)
+        except subprocess.TimeoutExpired:
+            self._nspawn.kill()
+            self._nspawn.wait()
+        subprocess.run(["umount", self.root / "usr"], check=True)
+
+    def _leader(self) -> int | None:
+        assert self._nspawn.poll() is None, self._log.read_text()
+        children = Path(f"/proc/{self._nspawn.pid}/task/{self._nspawn.pid}/children").read_text().split()
+        for pid in children:
+            if Path(f"/proc/{pid}/comm").read_text().strip() == "systemd":
+                return int(pid)
+        return None
+
+    def _state(self) -> str:
+        return self.run("systemctl", "is-system-running", check=False).stdout.strip()
+
+    def run(self, *command: str, check: bool = True) -> "subprocess.CompletedProcess[str]":
+        """Run a command inside, as root."""
+        enter = ["nsenter", f"--target={self.leader}", "--mount", "--uts", "--ipc", "--net", "--pid", "--root", "--wd"]
+        done = subprocess.run([*enter, *command], capture_output=True, text=True, timeout=DEADLINE_S, env=ENVIRONMENT)
+        assert not check or done.returncode == 0, f"{' '.join(command)}: {done.stdout}{done.stderr}"
+        return done
+
+    def path(self, path: str) -> Path:
+        """A path inside, as seen from outside."""
+        return Path(f"/proc/{self.leader}/root{path}")
+
+    def call(self, function: Callable[[], Any]) -> Any:
+        """Call a function in the container's network: sockets that it makes stay there."""
+        found: list[Any] = []
+
+        def enter() -> None:
+            with open(f"/proc/{self.leader}/ns/net") as network:
+                if ctypes.CDLL(None, use_errno=True).setns(network.fileno(), CLONE_NEWNET) != 0:
+                    raise OSError(ctypes.get_errno(), "setns")
+            found.append(function())
+
+        thread = threading.Thread(target=enter)  # it stays in that network until it ends
+        thread.start()
+        thread.join()
+        return found[0]
+
+
+ENVIRONMENT = {"PATH": "/usr/bin:/usr/sbin", "LANG": "C.UTF-8", "PAGER": "cat", "SYSTEMD_COLORS": "0"}

@@ -1,0 +1,166 @@
+"""`make system-test`: installed into an empty root, enabled under a booted systemd, used and then treated badly.
+
+One test, because each step stands on the one before; it prints what it measured. The limits are the project's own.
+"""
+
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from gestured.client.stream import Stream
+from tests.daemon.harness import Sensor
+from tests.systemd.container import Container, missing, wait
+
+ROOT = Path(__file__).resolve().parents[2]
+EVENTS = "/run/gestured/events.sock"
+CONFIGURATION = "/etc/gestured/gestured.toml"
+SOCKETS = ("gestured-osc.socket", "gestured-events.socket", "gestured-metrics.socket")
+FRAMES = 300
+RATE_HZ = 100.0
+RELOADS = (  # a configuration, and what becomes of it
+    ('model = "lstm"\nmodle = 1\n', "reload refused"),
+    ('model = "/nowhere.onnx"\n', "reload refused"),
+    ('model = "lstm"\n', '"reloaded"'),
+)
+
+pytestmark = [
+    pytest.mark.skipif(missing() is not None, reason=f"no container here: {missing()}"),
+    pytest.mark.timeout(600),
+]
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What `make install` makes of an empty folder."""
+    root = tmp_path_factory.mktemp("install") / "root"
+    begin = time.monotonic()
+    done = subprocess.run(["make", "install", f"DESTDIR={root}"], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    report("make install", time.monotonic() - begin)
+    return root
+
+
+@pytest.fixture(scope="module")
+def box(installed: Path) -> Iterator[Container]:
+    """The booted container."""
+    begin = time.monotonic()
+    with Container(installed) as container:
+        report("boot", time.monotonic() - begin)
+        yield container
+
+
+def report(what: str, seconds: float, limit: float | None = None) -> None:
+    """Print a measured time; it is an error where it is above its limit."""
+    print(f"{what:44} {seconds:7.2f} s" + (f"  (at most {limit:g} s)" if limit else ""), file=sys.stderr)
+    assert limit is None or seconds <= limit, f"{what}: {seconds:.2f} s, at most {limit} s"
+
+
+class Vehicle:
+    """The installed daemon, as those around it see it."""
+
+    def __init__(self, box: Container) -> None:
+        self.box = box
+
+    def stream(self, *types: str) -> Stream:
+        """A new subscriber; it waits until the daemon answers."""
+        return Stream(self.box.path(EVENTS), {"types": list(types or ("gesture",))})
+
+    def instance(self) -> str:
+        """Which start of the daemon answers."""
+        with closing(self.stream()) as stream:
+            return str(stream.hello["instance"])
+
+    def sensor(self, name: str) -> Sensor:
+        """A sensor in the container's network."""
+        found: Sensor = self.box.call(lambda: Sensor(SimpleNamespace(address=("127.0.0.1", 9000)), name))  # type: ignore[arg-type]
+        return found
+
+    def frames(self, sensor: str) -> int:
+        """Frames of a sensor that this start of the daemon has seen, whatever became of them."""
+        url = "http://127.0.0.1:9108/metrics"
+        text = self.box.call(lambda: urllib.request.urlopen(url, timeout=20).read().decode())
+        lines = [line for line in text.splitlines() if line.startswith("gestured_frames_total{")]
+        return round(sum(float(line.split()[-1]) for line in lines if f'sensor="{sensor}"' in line))
+
+    def configure(self, text: str) -> None:
+        """Replace the configuration."""
+        self.box.path(CONFIGURATION).write_text(text)
+
+    def log(self) -> str:
+        """What the service has said."""
+        return self.box.run("journalctl", "-u", "gestured", "-o", "cat").stdout
+
+
+def steady(sensor: Sensor, count: int = FRAMES) -> threading.Thread:
+    """Send idle frames at a steady rate, in a thread."""
+
+    def send() -> None:
+        begin = time.monotonic()
+        for i in range(count):
+            time.sleep(max(begin + i / RATE_HZ - time.monotonic(), 0))
+            sensor.send([sensor.hand.frame()])
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    return thread
+
+
+def harmed(vehicle: Vehicle, number: str) -> float:
+    """Send the daemon a signal while frames come; seconds until a new start of it answers. No frame is lost."""
+    before, sensor = vehicle.instance(), vehicle.sensor(number)
+    begin = time.monotonic()
+    vehicle.box.run("systemctl", "kill", f"--signal={number}", "gestured.service")
+    sender = steady(sensor, 50)
+    # Who connects now waits in the kernel until the next start of the daemon.
+    assert vehicle.instance() != before
+    seconds = time.monotonic() - begin
+    sender.join()
+    wait("frames that were sent meanwhile", lambda: vehicle.frames(number) == sensor.count)
+    return seconds
+
+
+def test_installed_enabled_used_killed_hung_reloaded_and_stopped(box: Container):
+    vehicle = Vehicle(box)
+    begin = time.monotonic()
+    box.run("systemctl", "enable", "--now", "gestured.service")
+    report("enable --now, until ready", time.monotonic() - begin)
+
+    with closing(vehicle.stream()) as stream:
+        simulate = "gesturectl simulate --to 127.0.0.1:9000 --sensor armrest --kinds swipe_left --seconds 10"
+        sender = threading.Thread(target=box.run, args=simulate.split())
+        sender.start()
+        _, event = next(stream.raw())
+        assert (event["type"], event["sensor"]) == ("gesture", "armrest")
+        sender.join()
+
+    report("kill -9, until it answers again", harmed(vehicle, "SIGKILL"), 2.0)
+    report("a hang, until it answers again", harmed(vehicle, "SIGSTOP"), 5.0)
+    assert "Watchdog timeout" in vehicle.log()
+
+    # A bad reload changes nothing, a good one the model; neither loses a frame or a subscriber.
+    instance, sensor = vehicle.instance(), vehicle.sensor("reload")
+    with closing(vehicle.stream("status")) as stream:
+        sender = steady(sensor)
+        for text, says in RELOADS:
+            vehicle.configure(text)
+            said, begin = vehicle.log().count(says), time.monotonic()
+            box.run("systemctl", "reload", "gestured")
+            wait(says, lambda said=said, says=says: vehicle.log().count(says) > said)
+            report(f"reload, until it says {says}", time.monotonic() - begin)
+        sender.join()
+        wait("the new model", lambda: next(stream.raw())[1]["model"] == "lstm")
+    assert vehicle.instance() == instance
+    wait("every frame sent during the reloads", lambda: vehicle.frames("reload") == sensor.count)
+
+    begin = time.monotonic()
+    box.run("systemctl", "stop", "gestured.service", *SOCKETS)
+    report("SIGTERM, until it has ended", time.monotonic() - begin, 1.0)
+    assert box.run("systemctl", "show", "-P", "Result", "gestured").stdout.strip() == "success"
