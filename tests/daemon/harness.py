@@ -73,6 +73,10 @@ class Client:
             found.append(self.until(lambda line: (line["type"], line.get("sensor")) == (kind, sensor))[-1])
         return found
 
+    def rest(self) -> list[Line]:
+        """All lines until the daemon hangs up."""
+        return [json.loads(raw) for raw in self._file]
+
     def close(self) -> None:
         """Hang up."""
         self._file.close()
