@@ -21,10 +21,14 @@ def trace(frames: NDArray[np.generic]) -> NDArray[np.float32]:
     if peak <= 0.0:
         return np.zeros((SIZE, SIZE), np.float32)
     age = np.linspace(0.3, 1.0, len(rise), dtype=np.float32)[:, None, None]
-    path = (age * rise / peak).max(axis=0)
-    rows = np.linspace(0, path.shape[0] - 1, SIZE).round().astype(int)
-    columns = np.linspace(0, path.shape[1] - 1, SIZE).round().astype(int)
-    return np.asarray(path[np.ix_(rows, columns)], np.float32)
+    return shrunk((age * rise / peak).max(axis=0))
+
+
+def shrunk(picture: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(R, C) from 0 to 1 -> (9, 9): the nearest taxels of any grid."""
+    rows = np.linspace(0, picture.shape[0] - 1, SIZE).round().astype(int)
+    columns = np.linspace(0, picture.shape[1] - 1, SIZE).round().astype(int)
+    return np.asarray(picture[np.ix_(rows, columns)], np.float32)
 
 
 def draw(picture: NDArray[np.float32], colour: bool) -> list[str]:

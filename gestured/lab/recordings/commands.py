@@ -2,14 +2,30 @@
 
 import argparse
 from collections.abc import Callable
+from datetime import date
 from pathlib import Path
 
 from gestured.client.address import host_port
 from gestured.core.wire import is_sensor
 from gestured.lab.recordings.protocol import pseudonym
-from gestured.simulator import GESTURES
+from gestured.lab.recordings.sources import SESSION
+from gestured.simulator import GESTURES, NONE
 
+COMMANDS = ("collect", "import", "inspect", "forget")
 FOLDER = Path("recordings")
+IMPORT = """\
+Make recordings of files of another form. What cannot be used is told and
+counted: the file, the line, the field, and what was expected.
+
+csv          A row for each frame: time, then rows x columns values, row by row,
+             the top row first; with commas, a heading or none. With a gesture as
+             --label the file holds one performance of it, whose touched frames
+             are marked as the daemon would see them.
+capfingerid  The text files of github.com/interactionlab/CapFingerId, a line for
+             each frame: participant;hand;finger;task;-1; then seconds, nanoseconds
+             and 27 x 15 counts with commas, one more at the end. Each file becomes
+             a session. Its tasks (TAP, DRAG, SCROLL) are no gestures: they become
+             events labelled "other"."""
 Add = Callable[[str, str, str], argparse.ArgumentParser]
 
 
@@ -31,17 +47,41 @@ def add(command: Add) -> None:
     collect.add_argument("--repeats", type=_count, default=1, metavar="N", help="times that each trial is done (1)")
     collect.add_argument("--countdown", type=_seconds, default=3, metavar="S", help="seconds before each gesture (3)")
 
+    bring = command("import", "make recordings of files of another form",
+                    "gestured-lab import --format csv --participant 07 --label one_tap tap.csv --out 07.npz")  # fmt: skip
+    bring.formatter_class = argparse.RawDescriptionHelpFormatter
+    bring.description = IMPORT
+    bring.add_argument("files", type=Path, nargs="+", metavar="FILE", help="one recording each")
+    bring.add_argument("--format", choices=("csv", "capfingerid"), required=True, help="their form")
+    bring.add_argument("--out", type=Path, required=True, metavar="F.npz", help="a new file for all of them")
+    only = bring.add_argument_group("only for --format csv")
+    only.add_argument("--rows", type=_side, metavar="N", help="rows of the grid (9)")
+    only.add_argument("--columns", type=_side, metavar="N", help="columns of the grid (9)")
+    only.add_argument("--time-unit", choices=("s", "ms", "us"), help="of the first column (s)")
+    only.add_argument("--label", type=_label, metavar="LABEL",
+                      help="what was performed: one of the ten gestures, none, or session (session)")  # fmt: skip
+    only.add_argument("--participant", type=pseudonym, metavar="NAME", help="whose recordings they are, a pseudonym")
+    only.add_argument("--consent", type=_day, metavar="YYYY-MM-DD", help="the day of the participant's consent")
+    look = command("inspect", "print and draw what a file of recordings holds",
+                   "gestured-lab inspect recordings/07.npz --index 3")  # fmt: skip
+    look.add_argument("file", type=Path, metavar="FILE", help="a .npz file of recordings")
+    look.add_argument("--index", type=int, metavar="N", help="draw this recording over time, counted from 0")
+    forget = command("forget", "remove a participant from files of recordings, and say which models learned from them",
+                     "gestured-lab forget 07 recordings --dry-run")  # fmt: skip
+    forget.add_argument("participant", type=pseudonym, metavar="NAME", help="the pseudonym")
+    forget.add_argument("paths", type=Path, nargs="+", metavar="DIR|FILE", help="files, and folders of .npz files")
+    forget.add_argument("--models", type=Path, default=Path("models"), help="folder of the models to ask (models)")
+    forget.add_argument("--yes", action="store_true", help="do not ask")
+    forget.add_argument("--dry-run", action="store_true", help="say what would be removed, and remove nothing")
+
 
 def run(args: argparse.Namespace) -> int:
     """Run one of the four."""
-    if args.command == "collect":
-        from gestured.lab.recordings import collect
+    from gestured.lab.recordings import collect, forget, importing, looking
 
-        return collect.run(args)
-    raise AssertionError(args.command)
-
-
-COMMANDS = ("collect",)
+    modules = {"collect": collect, "import": importing, "inspect": looking, "forget": forget}
+    status: int = modules[args.command].run(args)
+    return status
 
 
 def _sensor(text: str) -> str:
@@ -56,6 +96,19 @@ def _gestures(text: str) -> tuple[str, ...]:
     if unknown:
         raise argparse.ArgumentTypeError(f"{unknown[0]!r}: expected some of {', '.join(GESTURES)}, with commas")
     return tuple(dict.fromkeys(found))
+
+
+def _label(text: str) -> str:
+    if text not in (*GESTURES, NONE, SESSION):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected one of {', '.join((*GESTURES, NONE, SESSION))}")
+    return text
+
+
+def _day(text: str) -> str:
+    try:
+        return date.fromisoformat(text).isoformat()
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a day such as 2026-01-31") from None
 
 
 def _within(low: float, high: float, whole: bool) -> Callable[[str], float]:

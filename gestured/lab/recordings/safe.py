@@ -20,15 +20,17 @@ OPTIONAL = {field: {field} for field in ("speeds", "inclinations", "kinds", "con
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """What could not be used: one recording of a file, or a field of all of them."""
+    """What could not be used: a recording of a file, a field of all of them, or a line of a text."""
 
     file: Path
     recording: int | None  # its index in the file; None: the field was left out of every recording
     field: str
     reason: str  # the field, and what was expected
+    line: int | None = None  # of a text that is imported
 
     def __str__(self) -> str:
         what = f"the field {self.field}" if self.recording is None else f"recording {self.recording}"
+        what = what if self.line is None else f"line {self.line}"
         return f"{self.file}: {what} is left out: {self.reason}"
 
 

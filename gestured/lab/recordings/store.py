@@ -61,14 +61,13 @@ def _unknown(field: str, part: Recordings) -> NDArray[Any]:
 
 
 def compact(frames: NDArray[Any]) -> NDArray[Any]:
-    """(T, R, C) counts in the smallest type that holds them all exactly: uint16 or int32 if whole, else as they are."""
-    if not len(frames) or not (frames == np.rint(frames)).all():
-        return frames
+    """(T, R, C) counts as uint16 or int32 if they are whole numbers that fit, else float32, else as they are."""
     low, high = float(frames.min()), float(frames.max())
-    for kind in (np.uint16, np.int32):
-        if np.iinfo(kind).min <= low and high <= np.iinfo(kind).max:
-            return frames.astype(kind)
-    return frames
+    if (frames == np.rint(frames)).all():
+        for kind in (np.uint16, np.int32):
+            if np.iinfo(kind).min <= low and high <= np.iinfo(kind).max:
+                return frames.astype(kind)
+    return frames.astype(np.float32) if max(-low, high) <= np.finfo(np.float32).max else frames
 
 
 def touched(frames: NDArray[Any], times: NDArray[np.float64]) -> tuple[int, int] | None:

@@ -1,0 +1,65 @@
+"""`gestured-lab import`: files of other forms -> one file of recordings."""
+
+import argparse
+import json
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from gestured.core.errors import GesturedError, RecordingError
+from gestured.lab.recordings.safe import LeftOut
+from gestured.lab.recordings.sources import SESSION, Csv, read_capfingerid, read_csv
+from gestured.lab.recordings.store import join
+from gestured.recording import Recordings, write
+
+SHOWN = 10  # of what was left out; the rest is counted
+CSV_ALONE = ("rows", "columns", "time_unit", "label", "participant", "consent")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Import what can be; what cannot is told and counted. Nothing is written where nothing can be."""
+    if args.out.exists():
+        raise GesturedError(f"--out: {args.out} is there already; expected a new file")
+    parts: list[Recordings] = []
+    left: list[LeftOut] = []
+    refused: list[str] = []
+    read = _reader(args)
+    for path in args.files:
+        try:
+            recordings, gone = read(path)
+        except RecordingError as error:
+            refused.append(str(error))
+            continue
+        if parts and recordings.frames.shape[1:] != parts[0].frames.shape[1:]:
+            raise GesturedError(f"{path}: expected the grid of {args.files[0]}")
+        parts.append(recordings)
+        left += gone
+    for line in [*refused, *map(str, left[:SHOWN])]:
+        print(line)
+    if len(left) > SHOWN:
+        print(f"and {len(left) - SHOWN} lines more")
+    if not parts:
+        raise GesturedError("nothing could be imported, so nothing was written")
+    together = join(parts)
+    write(args.out, together)
+    found = {"recordings": len(together), "frames": len(together.frames), "lines_left_out": len(left),
+             "files_left_out": len(refused)}  # fmt: skip
+    if args.json:
+        print(json.dumps(found))
+    else:
+        print(f"{args.out}: {len(together)} recordings, {len(together.frames)} frames; left out: "
+              f"{len(refused)} files, {len(left)} lines")  # fmt: skip
+    return 0
+
+
+def _reader(args: argparse.Namespace) -> Callable[[Path], tuple[Recordings, list[LeftOut]]]:
+    if args.format == "capfingerid":
+        given = [name for name in CSV_ALONE if getattr(args, name) is not None]
+        if given:
+            raise GesturedError(f"--{given[0].replace('_', '-')}: only for --format csv; CapFingerId says it itself")
+        return read_capfingerid
+    if args.participant is None:
+        raise GesturedError("--participant: expected a pseudonym; a CSV file does not say whose it is")
+    form = Csv(args.rows or 9, args.columns or 9, args.time_unit or "s", args.label or SESSION,
+               args.participant, args.consent or "")  # fmt: skip
+    return partial(read_csv, form=form)

@@ -1,0 +1,44 @@
+"""Whose recordings a model learned from: written into the model's metadata, and read again when somebody asks."""
+
+import hashlib
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from gestured.model_file import inspect
+from gestured.recording import read
+
+KEY = "learned_from"  # in an .onnx file's metadata: a JSON list of Origin
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """A file of recordings as it was when a model learned from it."""
+
+    file: str
+    sha256: str
+    subjects: list[str]
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def origins(paths: Iterable[Path]) -> list[dict[str, Any]]:
+    """What a model that learns from these files says of them; RecordingError for what is no recording."""
+    return [asdict(Origin(path.name, digest(path), sorted(set(read(path).subjects.astype(str))))) for path in paths]
+
+
+def said(model: Path) -> list[Origin] | None:
+    """The recordings that a model says it learned from; None where it does not say. ValueError for no model."""
+    text = inspect(model.read_bytes()).get(KEY)
+    if text is None:
+        return None
+    try:
+        return [Origin(str(o["file"]), str(o["sha256"]), [str(s) for s in o["subjects"]]) for o in json.loads(text)]
+    except (TypeError, KeyError) as error:
+        raise ValueError(f"{KEY}: expected a list of file, sha256 and subjects: {error}") from None
