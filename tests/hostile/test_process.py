@@ -1,0 +1,213 @@
+"""What happens to the process and to what it stands on: its clock, its model, its memory, its output, its end."""
+
+import os
+import resource
+import select
+import signal
+import socket
+from pathlib import Path
+
+import pytest
+
+from tests.daemon.harness import DEADLINE_S, Sensor, lines_of
+from tests.hostile import bad_models
+from tests.hostile.grammar import TYPES, violations
+
+INJECT = Path(__file__).with_name("inject")
+
+
+def press(sensor: Sensor, seconds: float = 3.0) -> Sensor:
+    """A touch that lasts."""
+    return sensor.send([sensor.hand.frame(4.0) for _ in range(round(15 * seconds))], sensor.hand.idle(1.0))
+
+
+def test_after_a_kill_the_next_daemon_takes_the_place(start) -> None:
+    first = start("--clock", "sensor")
+    client = first.client().subscribe(*TYPES)
+    sensor = Sensor(first, "arm").begin()
+    sensor.send(sensor.hand.swipe("left")[:4])
+    assert client.line()["type"] == "onset"
+    first.signal(signal.SIGKILL)
+    assert first.wait() == -signal.SIGKILL and client.rest() == []
+    assert first.socket.exists()  # nobody could remove it
+    second = start("--clock", "sensor", "--socket", first.socket, "--listen", first.ready["listen"])
+    again = second.client()
+    assert again.hello["instance"] != client.hello["instance"] and again.hello["sensors"] == {}
+    sensor.begin().perform("left")
+    assert again.line()["sequence"] == 1
+
+
+@pytest.mark.parametrize("step", [3600.0, -3600.0])
+def test_the_wall_clock_may_step_by_an_hour(start, tmp_path: Path, step: float) -> None:
+    clock = tmp_path / "clock"
+    clock.write_text("0")
+    path = os.pathsep.join((str(INJECT), *filter(None, [os.environ.get("PYTHONPATH")])))
+    daemon = start("--clock", "sensor", env={"HOSTILE_CLOCK": str(clock), "PYTHONPATH": path})
+    client = daemon.client().subscribe(*TYPES)
+    sensor = Sensor(daemon, "arm").begin().perform("left")
+    lines = [client.line() for _ in range(3)]
+    frames = sensor.hand.swipe("right")
+    sensor.send(frames[:3])
+    lines.append(client.line())
+    clock.write_text(str(step))
+    sensor.send(frames[3:], sensor.hand.idle(1.0))
+    lines += [client.line() for _ in range(2)]
+    assert violations(lines) == []
+    before, after = (line for line in lines if line["type"] == "gesture")
+    assert (before["gesture"], after["gesture"]) == ("swipe_left", "swipe_right")
+    assert after["onset"] - before["onset"] == pytest.approx(step, abs=60)
+    assert after["offset"] - after["onset"] == pytest.approx(6 / 15, abs=1e-3)  # no event stands on both sides
+
+
+@pytest.mark.parametrize("step", [3600.0, -3600.0])
+def test_the_sensors_clock_may_step_by_an_hour(start, step: float) -> None:
+    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0")
+    client = daemon.client().subscribe(*TYPES)
+    sensor = Sensor(daemon, "arm").begin().perform("left")
+    sensor.t += step
+    sensor.perform("right")
+    lines = [client.line() for _ in range(6)]
+    assert violations(lines) == []
+    assert [line["gesture"] for line in lines if line["type"] == "gesture"] == ["swipe_left", "swipe_right"]
+    assert daemon.metric("gestured_implausible_time_tags_total") == 1
+
+
+def test_a_model_that_fails_hands_over_to_the_next(start, model: Path, tmp_path: Path) -> None:
+    bad = bad_models.failing(model, tmp_path / "bad.onnx")
+    daemon = start("--fallback", model, "--clock", "sensor", "--metrics", "127.0.0.1:0", model=bad)
+    client = daemon.client().subscribe("gesture", "unknown")
+    sensor = Sensor(daemon, "arm").begin().perform("left")
+    press(sensor)
+    sensor.perform("left")
+    lines = [client.line() for _ in range(3)]
+    assert [(line["model"], line["degraded"]) for line in lines] == [("bad", False), ("tiny", True), ("tiny", True)]
+    assert lines[0]["gesture"] == lines[2]["gesture"] == "swipe_left"
+    assert daemon.metric("gestured_degraded_answers_total") == 2
+    assert daemon.metric("gestured_active_model_info", model="tiny", version=client.hello["version"]) == 1
+
+
+def test_without_another_model_what_fails_is_cancelled_and_said(start, model: Path, tmp_path: Path) -> None:
+    bad = bad_models.failing(model, tmp_path / "bad.onnx")
+    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", model=bad)
+    client = daemon.client().subscribe(*TYPES)
+    sensor = Sensor(daemon, "arm").begin()
+    press(sensor)
+    lines = [client.line() for _ in range(3)]
+    assert (lines[1]["type"], lines[1]["reason"]) == ("cancelled", "model")
+    assert daemon.get("/readyz")[0] == 503 and daemon.metric("gestured_cancelled_total", reason="model") == 1
+    sensor.perform("left")
+    lines += [client.line() for _ in range(3)]
+    assert lines[4]["gesture"] == "swipe_left" and violations(lines) == []
+    assert daemon.get("/readyz")[0] == 200
+
+
+@pytest.mark.hostile
+def test_a_model_that_failed_is_tried_again(start, model: Path, tmp_path: Path) -> None:
+    bad = bad_models.failing(model, tmp_path / "bad.onnx")
+    daemon = start("--fallback", model, "--clock", "sensor", model=bad)
+    client = daemon.client().subscribe("gesture", "unknown", "status")
+    sensor = Sensor(daemon, "arm").begin()
+    press(sensor)
+    seen = client.until(lambda line: line["type"] != "status")
+    while seen[-1]["degraded"]:  # it is put aside for half a minute
+        sensor.perform("left")
+        seen += client.until(lambda line: line["type"] == "gesture")
+        client.until(lambda line: line["type"] == "status")
+    assert seen[-1]["model"] == "bad"
+
+
+def test_a_model_that_hangs_is_seen_from_outside(start, model: Path, tmp_path: Path) -> None:
+    bad = bad_models.hanging(model, tmp_path / "bad.onnx")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
+        supervisor.bind(str(tmp_path / "notify"))
+        supervisor.settimeout(DEADLINE_S)
+        env = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "300000"}
+        daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", model=bad, env=env)
+        client = daemon.client()
+        sensor = Sensor(daemon, "arm").begin().perform("left")
+        assert client.line()["gesture"] == "swipe_left"
+        assert daemon.get("/healthz")[0] == 200
+        press(sensor)
+        # systemd would now hear nothing for its WatchdogSec, and kill it; /healthz says it after two seconds.
+        while daemon.get("/healthz")[0] == 200:
+            while select.select([supervisor], [], [], 0.1)[0]:
+                supervisor.recv(4096)
+        assert daemon.get("/readyz")[0] == 503 and "hangs" in daemon.get("/readyz")[1]
+        assert select.select([supervisor], [], [], 0.3)[0] == []
+        daemon.signal(signal.SIGKILL)
+        assert daemon.wait() == -signal.SIGKILL
+
+
+@pytest.mark.parametrize("how", ["replaced", "truncated", "removed"])
+def test_a_model_file_that_changes_under_a_running_daemon(start, model: Path, tmp_path: Path, how: str) -> None:
+    path = tmp_path / "mine.onnx"
+    path.write_bytes(model.read_bytes())
+    daemon = start("--clock", "sensor", model=path)
+    client = daemon.client()
+    sensor = Sensor(daemon, "arm").begin()
+    if how == "removed":
+        path.unlink()
+    elif how == "truncated":
+        os.truncate(path, 100)  # in place: a file that were mapped would kill the process now
+    else:
+        bad_models.failing(model, tmp_path / "other.onnx").replace(path)
+    sensor.perform("left")
+    assert client.line()["gesture"] == "swipe_left"
+
+
+def test_a_full_disk_takes_the_log_and_nothing_else(start, tmp_path: Path) -> None:
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("there is no /dev/full here")
+    (tmp_path / "stderr.txt").symlink_to(full)
+    daemon = start("--clock", "sensor", "--log-level", "debug")
+    client = daemon.client()
+    Sensor(daemon, "arm").begin().perform("left", "tap")
+    assert [line["gesture"] for line in client.events("gesture", "arm", 2)] == ["swipe_left", "one_tap"]
+    assert daemon.stop() == 0
+
+
+def test_a_destination_that_cannot_be_reached_costs_nobody_an_event(start) -> None:
+    # The broadcast address is refused by our own kernel at once: no packet leaves this machine.
+    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", "--publish", "osc://255.255.255.255:9")
+    client = daemon.client()
+    Sensor(daemon, "arm").begin().perform("left")
+    assert client.line()["gesture"] == "swipe_left"
+    assert daemon.metric("gestured_osc_messages_total", result="unreachable") >= 1
+    daemon.stop()
+    said = [line for line in lines_of(daemon.stderr()) if line.get("reason") == "unreachable"]
+    assert len(said) == 1 and said[0]["destination"] == "255.255.255.255:9"
+
+
+@pytest.mark.hostile
+def test_memory_that_cannot_be_had_costs_a_sensor_its_contact_and_not_the_process(start, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text('max_sensors = 1000\ngrid = "64x64"\n[sensors.arm]\ngrid = "9x9"\n')
+    daemon = start("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0")
+    client = daemon.client().subscribe(*TYPES)
+    arm = Sensor(daemon, "arm").begin().perform("left")
+    lines = client.until(lambda line: line["type"] == "release")
+    pages = int(Path(f"/proc/{daemon.process.pid}/statm").read_text().split()[0])
+    before = resource.prlimit(daemon.process.pid, resource.RLIMIT_AS)
+    resource.prlimit(daemon.process.pid, resource.RLIMIT_AS, (pages * resource.getpagesize() + (8 << 20), before[1]))
+    crowd = [Sensor(daemon, f"s{i}") for i in range(300)]
+    for n in range(40):
+        for sensor in crowd:
+            sensor.sock.send(big(sensor.name, n))
+        arm.send(arm.hand.idle(1 / 15))
+        client.subscribe(*TYPES)  # when it has answered, it has taken what was sent
+    assert daemon.metric("gestured_internal_errors_total") > 0
+    resource.prlimit(daemon.process.pid, resource.RLIMIT_AS, before)
+    arm.begin().perform("left")
+    lines += client.until(lambda line: line["type"] == "release" and line["sensor"] == "arm")
+    assert [line["gesture"] for line in lines if line["type"] == "gesture"] == ["swipe_left", "swipe_left"]
+    assert violations([line for line in lines if line.get("sensor") == "arm"]) == []
+
+
+def big(name: str, n: int) -> bytes:
+    """A frame of 64 x 64."""
+    import numpy as np
+
+    from gestured.core import osc
+
+    return osc.encode_message(f"/{name}/pressure", "ib", (n, np.full(4096, n % 7, ">u2").tobytes()))
