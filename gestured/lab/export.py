@@ -24,6 +24,7 @@ from sklearn.ensemble import RandomForestClassifier
 from gestured.core.errors import ModelError
 from gestured.core.window import Window
 from gestured.lab.forest_graph import OPSET, Outputs, around_thresholds, forest_graph, forest_outputs
+from gestured.lab.recordings import origin
 from gestured.model_file import SelfTest, inspect
 from gestured.models import Model
 
@@ -43,10 +44,12 @@ def export_net(
     calibration: Mapping[str, Any],
     training_data: str,
     quantiles: Mapping[str, Any],
+    learned_from: Sequence[Mapping[str, Any]] | None = None,
 ) -> dict[str, float]:
     """Write a torch module whose `forward` takes frames (B, T, R, C) and gives calibrated outputs.
 
-    `forward` returns (scores (B, G), unknown (B,)). B and T stay open. Gives the file's size in bytes and the
+    `forward` returns (scores (B, G), unknown (B,)). B and T stay open. `learned_from` are the recordings of people
+    (`recordings.origin`), None where nobody knows. Gives the file's size in bytes and the
     largest difference from torch; raises ModelError where it is above `PARITY` or a check fails.
     """
     module = module.eval()
@@ -75,7 +78,7 @@ def export_net(
         )
         proto = onnx.load(traced)
     example = np.round(_windows(2, 12, rows, columns), 3)
-    metadata = _metadata(kind, version, gestures, window, calibration, training_data, quantiles)
+    metadata = _metadata(kind, version, gestures, window, calibration, training_data, quantiles, learned_from)
     inputs = [_windows(b, t, rows, columns) for b in BATCHES for t in LENGTHS]
     return _finish(proto, Path(path), metadata, example, truth, inputs)
 
@@ -92,6 +95,7 @@ def export_forest(
     training_data: str,
     quantiles: Mapping[str, Any],
     features: Sequence[str],
+    learned_from: Sequence[Mapping[str, Any]] | None = None,
 ) -> dict[str, float]:
     """Write a random forest over `features`; its classes are 0 .. G-1 for the gestures, the others for none.
 
@@ -108,7 +112,7 @@ def export_forest(
         return forest_outputs(forest.predict_proba(values), count, calibration)
 
     sample = around_thresholds(forest, 508)
-    metadata = _metadata(kind, version, gestures, window, calibration, training_data, quantiles)
+    metadata = _metadata(kind, version, gestures, window, calibration, training_data, quantiles, learned_from)
     metadata["features"] = json.dumps(list(features))
     inputs = [sample[start : start + size] for start, size in ((0, 1), (1, 2), (3, 5), (8, 500))]
     return _finish(forest_graph(forest, count, calibration), Path(path), metadata, sample[:4], truth, inputs)
@@ -155,8 +159,10 @@ def _metadata(
     calibration: Mapping[str, Any],
     training_data: str,
     quantiles: Mapping[str, Any],
+    learned_from: Sequence[Mapping[str, Any]] | None,
 ) -> dict[str, str]:
-    return {
+    people = {} if learned_from is None else {origin.KEY: json.dumps([dict(one) for one in learned_from])}
+    return people | {
         "gestures": json.dumps(list(gestures)),
         "kind": kind,
         "version": version,

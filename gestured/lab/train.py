@@ -26,6 +26,7 @@ from gestured.lab.export import export_forest, export_net, write_manifest
 from gestured.lab.fit import CLASSES, FitConfig, finetune, load_nets, logits, pretrain, save_nets, targets
 from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.nets import Judged
+from gestured.lab.recordings.origin import origins
 from gestured.recording import read
 from gestured.simulator import GESTURES, NONE, wide
 
@@ -88,13 +89,14 @@ def load(plan: Plan, cache: Path, real: Path | None, jobs: int) -> Data:
 
 
 def _real(cache: Path, folder: Path | None) -> Samples | None:
+    paths = _real_files(folder)
+    return join([recorded(read(path)) for path in paths]) if paths else None
+
+
+def _real_files(folder: Path | None) -> list[Path]:
+    """The real recordings, all of them or none."""
     paths = [folder / name for name in REAL] if folder else []
-    if not paths or not all(path.exists() for path in paths):
-        return None
-    parts = []
-    for path in paths:
-        parts.append(recorded(read(path)))
-    return join(parts)
+    return paths if all(path.exists() for path in paths) else []
 
 
 def folds(real: Samples) -> list[NDArray[np.bool_]]:
@@ -250,7 +252,7 @@ def train(plan: Plan, out: Path, cache: Path, real: Path | None, jobs: int) -> D
     digest = hashlib.sha256((data.teach.digest() + (data.real.digest() if data.real else "")).encode()).hexdigest()
     common: dict[str, Any] = {
         "version": gestured.__version__, "gestures": list(GESTURES), "window": WINDOW,
-        "training_data": digest, "quantiles": quantiles(data.teach),
+        "training_data": digest, "quantiles": quantiles(data.teach), "learned_from": origins(_real_files(real)),
     }  # fmt: skip
     out.mkdir(parents=True, exist_ok=True)
     for name in ("cnn_lstm", "lstm"):

@@ -48,7 +48,7 @@ def add(command: Add) -> None:
     collect.add_argument("--countdown", type=_seconds, default=3, metavar="S", help="seconds before each gesture (3)")
 
     bring = command("import", "make recordings of files of another form",
-                    "gestured-lab import --format csv --participant 07 --label one_tap tap.csv --out 07.npz")  # fmt: skip
+                    "gestured-lab import --format csv --participant 07 --label one_tap a.csv --out b.npz")  # fmt: skip
     bring.formatter_class = argparse.RawDescriptionHelpFormatter
     bring.description = IMPORT
     bring.add_argument("files", type=Path, nargs="+", metavar="FILE", help="one recording each")

@@ -97,7 +97,7 @@ def _counts(values: NDArray[Any]) -> dict[str, int]:
 def _words(inclinations: NDArray[Any]) -> NDArray[Any]:
     """As the protocol calls them, where they are its numbers; else as they are."""
     if inclinations.dtype.kind in "iu" and np.isin(inclinations, range(len(INCLINATIONS))).all():
-        return np.array(INCLINATIONS)[inclinations]
+        return np.take(np.array(INCLINATIONS), inclinations)
     return inclinations
 
 
