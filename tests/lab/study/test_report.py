@@ -1,23 +1,92 @@
-"""The report as a reader meets it: everything there, nothing broken, nothing from elsewhere, the numbers true."""
+"""The report as a reader meets it: everything there, nothing from elsewhere, the numbers true, said when missing."""
 
+import copy
 import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
 from gestured.lab.study.report import write_report
-from tests.lab.study.made_study import made_study
+from tests.lab.study.made_study import empty_study, made_study
+
+Study = dict[str, Any]
+HOSTILE = "</script></style><script>alert('\"x\"')</script>&\x00\ud800"
+LISTS = ("cells", "copies", "tuning", "choices", "run_time", "elapsed", "learning", "calibration", "failures", "online")
+VOID = {"meta", "br"}
+
+
+class Reader(HTMLParser):
+    """The page as elements: checks that they close, and collects the text of each row and caption."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.rows: list[str] = []
+        self.heads_without_scope = 0
+        self.scripts = 0
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        self.ids += [found["id"] or ""] if "id" in found else []
+        self.links += [found["href"] or ""] if "href" in found else []
+        self.heads_without_scope += tag == "th" and found.get("scope") not in ("row", "col")
+        self.scripts += tag == "script"
+        if tag == "tr":
+            self.rows.append("")
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        pass
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if "tr" in self.open and "svg" not in self.open:
+            self.rows[-1] += data + " "
+
+
+def read(page: str) -> Reader:
+    reader = Reader()
+    reader.feed(page)
+    reader.close()
+    assert reader.open == []
+    return reader
+
+
+def text(page: str) -> str:
+    return re.sub(r"<[^>]*>", "", page.split("<main>")[1])
 
 
 @pytest.fixture(scope="module")
-def study() -> dict[str, Any]:
+def study() -> Study:
     return made_study()
 
 
 @pytest.fixture(scope="module")
-def page(study: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> str:
+def page(study: Study, tmp_path_factory: pytest.TempPathFactory) -> str:
     return write_report(study, tmp_path_factory.mktemp("report")).read_text("utf-8")
+
+
+def report(study: Study, out: Path) -> str:
+    path = write_report(study, out)
+    assert path == out / "index.html"
+    return path.read_text("utf-8")
+
+
+def test_it_is_well_formed_and_its_contents_lead_somewhere(page: str) -> None:
+    reader = read(page)
+    assert reader.heads_without_scope == 0
+    assert len(reader.links) >= 12
+    assert {link.removeprefix("#") for link in reader.links} <= set(reader.ids)
+    assert len(reader.ids) == len(set(reader.ids))
 
 
 def test_every_drawing_is_valid_xml_and_says_in_words_what_it_shows(page: str) -> None:
@@ -27,8 +96,153 @@ def test_every_drawing_is_valid_xml_and_says_in_words_what_it_shows(page: str) -
         root = ElementTree.fromstring(drawing)
         title = root.find("title")
         assert root.get("role") == "img" and title is not None and title.text
+        assert not re.search(r"\b(nan|inf|None)\b", drawing)
 
 
-def test_nothing_is_fetched(page: str) -> None:
+def test_nothing_is_fetched_and_all_stands_in_one_file(page: str, study: Study, tmp_path: Path) -> None:
     assert not re.search(r"""(?:src|href)\s*=\s*["'](?!#)""", page)
-    assert not re.search(r"(?:https?:)?//[a-z]|url\(|@import", page.split("<script>")[0])
+    assert not re.search(r"//[a-z]|url\(|@import", page.split("<script>")[0])
+    assert not re.search(r"fetch|XMLHttp|import\b", page.split("<script>")[1])
+    write_report(study, tmp_path / "deep" / "report")
+    assert [path.name for path in (tmp_path / "deep" / "report").iterdir()] == ["index.html"]
+
+
+def test_every_cell_of_the_tables_stands_in_the_row_of_its_method(page: str, study: Study) -> None:
+    rows = read(page).rows
+    for cell in study["cells"]:
+        title = study["methods"][cell["method"]]["title"]
+        figure = f"{100 * cell['right']:.1f}"
+        interval = f"{100 * cell['low']:.1f}–{100 * cell['high']:.1f}"
+        settings = "tuned" if cell["settings"] == "tuned" else "the paper's"
+        assert any(title in row and figure in row and interval in row and settings in row for row in rows), cell
+
+
+def test_published_figures_stand_beside_ours(page: str, study: Study) -> None:
+    rows = read(page).rows
+    for cell in study["cells"] + study["online"]:
+        if cell.get("published") is not None:
+            title, figure = study["methods"][cell["method"]]["title"], f" {100 * cell['published']:.0f} "
+            assert any(title in row and figure in row for row in rows), cell
+
+
+def test_every_figure_of_the_schema_is_drawn(page: str, study: Study) -> None:
+    drawn = [ElementTree.fromstring(d).findtext("title") or "" for d in re.findall(r"<svg.*?</svg>", page, re.DOTALL)]
+    wanted = ["The published figures and ours", "Error against run time", "Error against elapsed", "Learning curves"]
+    wanted += ["A double tap's pressure over time"]
+    for part, words in (("calibration", "Reliability diagram of"), ("methods", "Confusion matrix of")):
+        methods = [row["method"] for row in study[part]] if part == "calibration" else list(study["methods"])
+        wanted += [f"{words} {study['methods'][method]['title']}" for method in methods]
+    wanted += [gesture.replace("_", " ") + ": raw signal" for gesture in study["signals"]]
+    wanted += [f"By {by}" for by in {row["by"] for row in study["failures"]}]
+    for words in wanted:
+        found = [title for title in drawn if title.startswith(words)]
+        assert found and all("simulated" in title or "real" in title for title in found), words
+
+
+def test_drawings_hold_all_points(page: str, study: Study) -> None:
+    for row in study["run_time"]:
+        title = study["methods"][row["method"]]["title"]
+        told = f"{title} ({row['settings']}, {row['precision']}): {100 * (1 - row['right']):.1f}\u202f% wrong in "
+        assert told in page
+    for row in study["failures"]:
+        title = study["methods"][row["method"]]["title"]
+        for group in row["groups"]:
+            name = group["name"].replace("_", " ")
+            assert f"{title}, {name}: {100 * group['right']:.1f}\u202f%" in page
+    assert page.count('class="moment"') == len(study["double_tap"]["snapshots"])
+
+
+def test_all_else_is_told(page: str, study: Study) -> None:
+    words = text(page)
+    told = [study["about"]["command"], study["machine"]["cpu"], study["data"]["real"]["name"]]
+    told += [row["reason"] for row in study["data"]["left_out"]] + [row["choice"] for row in study["choices"]]
+    told += [option["value"] for row in study["choices"] for option in row["alternatives"]]
+    told += [f"C = {row['chosen']['C']:g}" for row in study["tuning"]]
+    for some in told:
+        assert some in words
+
+
+def test_the_summary_counts_what_reproduces(tmp_path: Path) -> None:
+    study = made_study()
+    cells = [c for c in study["cells"] if c["protocol"] == "participants" and c["settings"] == "paper"]
+    compared = [cell for cell in cells if cell["published"] is not None]
+    for k, cell in enumerate(compared):
+        cell.update(right=cell["published"] - (0.2 if k < 3 else 0.01), low=0.0, high=0.1)
+    words = text(report(study, tmp_path))
+    assert f"{len(compared) - 3} of {len(compared)} on people never seen" in words
+    short = words.split("Lower than published")[1].split(".")[0]
+    assert short.count("→") == 3
+
+
+def test_the_summary_says_how_much_of_the_gain_is_copies(tmp_path: Path) -> None:
+    study = made_study()
+    for row in study["copies"]:
+        row.update(gain_leaky=0.2, gain_clean=0.05, test=100, with_copy=40)
+    words = text(report(study, tmp_path))
+    assert "+20.0 points" in words and "+5.0" in words
+    assert "75\u202f% of the gain is owed to copies" in words and "40\u202f% of the test gestures" in words
+
+
+def test_no_string_of_the_study_becomes_markup(tmp_path: Path) -> None:
+    def spoilt(value: Any, key: str = "") -> Any:
+        if isinstance(value, dict):
+            return {name: spoilt(inner, name) for name, inner in value.items()}
+        if isinstance(value, list):
+            return [spoilt(inner, key) for inner in value]
+        kept = ("method", "settings", "augmentation", "protocol", "data", "family", "precision", "by")
+        return value + HOSTILE if isinstance(value, str) and key not in kept else value
+
+    page = report(spoilt(made_study()), tmp_path)
+    reader = read(page)
+    assert reader.scripts == 1
+    for drawing in re.findall(r"<svg.*?</svg>", page, re.DOTALL):
+        ElementTree.fromstring(drawing)
+    assert "alert" in text(page)
+
+
+def test_a_study_without_anything_says_what_is_missing(tmp_path: Path) -> None:
+    words = text(report(empty_study(), tmp_path))
+    missing = ("tables of the paper", "Copies", "Sessions", "Confusions", "Run times", "elapsed time", "methods fail")
+    missing += ("Calibration", "Learning curves", "Signals", "double tap", "Methods", "Hyperparameters", "open choices")
+    for part in missing:
+        assert re.search(rf"[^.]*{part}[^.]* not computed in this run", words, re.IGNORECASE), part
+    assert "no real recording was used" in words and "Nothing was left out" in words
+    assert "None" not in words and "nan" not in words
+
+
+@pytest.mark.parametrize("part", [*LISTS, "signals", "double_tap", "data", "machine", "methods"])
+@pytest.mark.parametrize(
+    "without", [lambda study, part: study.pop(part), lambda study, part: study.update({part: None})]
+)
+def test_any_part_may_be_missing(part: str, without: Callable[[Study, str], None], tmp_path: Path) -> None:
+    study = made_study()
+    without(study, part)
+    read(report(study, tmp_path))
+
+
+def test_intervals_times_and_sizes_may_be_missing(tmp_path: Path) -> None:
+    study = made_study()
+    gone = ("low", "high", "p95_us", "memory_bytes", "file_bytes", "published", "confusion", "error", "latency_ms")
+    gone += ("gain_clean", "spread", "snapshots", "minutes", "torch", "paper")
+    for name in gone:
+        less = copy.deepcopy(study)
+        _null(less, name)
+        words = text(report(less, tmp_path))
+        assert "None" not in words, name
+
+
+def _null(value: Any, name: str) -> None:
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    for item in inner:
+        _null(item, name)
+    if isinstance(value, dict) and name in value:
+        value[name] = None
+
+
+def test_a_quick_run_says_that_its_figures_mean_nothing(study: Study, page: str, tmp_path: Path) -> None:
+    quick = {**study, "about": {**study["about"], "quick": True}}
+    assert "A quick run" in text(report(quick, tmp_path)) and "A quick run" not in text(page)
+
+
+def test_the_same_study_gives_the_same_page(study: Study, page: str, tmp_path: Path) -> None:
+    assert report(study, tmp_path) == page

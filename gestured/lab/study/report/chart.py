@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from .markup import Markup, svg, tag
 
 Point = tuple[float, float]
-LETTER = 6.3  # mean width of a letter of 12 pixels
 
 
 @dataclass(frozen=True)
@@ -54,17 +53,6 @@ def text(x: float, y: float, words: str, anchor: str = "start", class_: str | No
 
 def polyline(points: Sequence[Point], class_: str) -> Markup:
     return tag("path", d="M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points), class_=class_)
-
-
-def spread(places: Sequence[float], gap: float, low: float, high: float) -> list[float]:
-    """Places moved as little as need be, in their order, so that neighbours are `gap` apart and within the bounds."""
-    order = sorted(range(len(places)), key=lambda k: places[k])
-    moved = list(places)
-    for before, k in zip([None, *order], order, strict=False):
-        moved[k] = max(places[k], low if before is None else moved[before] + gap)
-    for after, k in zip([None, *reversed(order)], reversed(order), strict=False):
-        moved[k] = min(moved[k], high if after is None else moved[after] - gap)
-    return moved
 
 
 @dataclass

@@ -2,7 +2,7 @@
 
 from . import formats, icons, marks, reading
 from .chart import Plot, Scale, text
-from .layout import SIMULATED, figure
+from .layout import REAL, SIMULATED, figure, small
 from .markup import Markup, join, svg, tag
 from .reading import Row, Study
 
@@ -40,7 +40,7 @@ def overview(study: Study) -> Markup:
     entries = [("circle", "published-key", "published (textile, 34 participants)")]
     entries += [(*FORMS[name], f"ours, {name}" + (" recordings" if name == "real" else "")) for name in protocols]
     return figure(
-        "The paper's figures and ours",
+        "Published and measured",
         SIMULATED if "real" not in protocols else "simulated data, but for “real”",
         "Share of gestures that are right; lines are 95 % intervals over participants. The paper's hyperparameters, "
         "tuned ones where the paper gives none.",
@@ -53,9 +53,12 @@ def _panel(
     study: Study, methods: list[str], protocols: list[str], augmentation: str, left: float, height: float, pitch: float
 ) -> Markup:
     plot = Plot(
-        PANEL, height, Scale(_floor(study), 1.0, left + 10, left + PANEL - 14), Scale(0, len(methods), 40, height - 30)
+        PANEL,
+        height,
+        Scale(reading.floor(study), 1.0, left + 14, left + PANEL - 16),
+        Scale(0, len(methods), 40, height - 30),
     )
-    plot.add(text(left + 10, 20, reading.AUGMENTATIONS[augmentation], class_="panel"))
+    plot.add(text(left + 14, 20, reading.AUGMENTATIONS[augmentation], class_="panel"))
     plot.x_axis(plot.x.ticks(4), lambda share: formats.percent(share, 0), grid=True)
     for k, method in enumerate(methods):
         if k:
@@ -77,15 +80,8 @@ def _share(plot: Plot, row: Row, y: float, protocol: str, study: Study) -> Marku
     name, classes = FORMS[protocol]
     method, right = reading.title(study, row["method"]), float(row["right"])
     words = f"{method}, {protocol}: {formats.with_unit(right)} ({formats.interval(row)})"
-    ends = [right if row.get(name) is None else float(row[name]) for name in ("low", "high")]
-    low, high = (plot.x(max(plot.x.low, end)) for end in ends)
+    low, high = (plot.x(end) for end in reading.ends(row))
     return join(marks.whisker(low, y, high, y, classes), marks.form(name, plot.x(right), y, classes + " small", words))
-
-
-def _floor(study: Study) -> float:
-    """Where the axis begins: a round share below all that is shown."""
-    shares = [row[key] for row in reading.part(study, "cells") for key in ("low", "right", "published") if row.get(key)]
-    return max(0.0, int(10 * min(shares, default=0.0)) / 10)
 
 
 def confusions(study: Study) -> Markup:
@@ -110,14 +106,11 @@ def _confusion(study: Study, method: str, names: list[str]) -> Markup:
         for k, count in enumerate(counts):
             parts.append(_square(j, k, count, count / total, edge, names))
     side = edge + CELL * len(matrix) + 2
-    source = "real recordings" if row["data"] == "real" else "simulated data"
-    title = f"{reading.title(study, method)}: {formats.percent(row['right'])} % right, {source}"
-    drawing = svg(side, side, f"Confusion matrix. {title}", _most_often(matrix, names), *parts, class_="matrix")
-    setting = (
-        f"{row['protocol']}, {reading.SETTINGS[row['settings']]} settings, {reading.AUGMENTATIONS[row['augmentation']]}"
-    )
-    words = tag("span", f"{setting}. {_most_often(matrix, names)}", class_="words")
-    return tag("figure", tag("figcaption", tag("strong", title), " ", words), drawing)
+    title, source = reading.title(study, method), REAL if row["data"] == "real" else SIMULATED
+    words = _most_often(matrix, names)
+    drawing = svg(side, side, f"Confusion matrix of {title}, {source}", words, *parts, class_="matrix")
+    setting = f"{row['protocol']} · {row['settings']} · {row['augmentation']}"
+    return small(title, source, f"{formats.with_unit(row['right'])} right ({setting}). {words}", drawing)
 
 
 def _square(j: int, k: int, count: int, share: float, edge: float, names: list[str]) -> Markup:

@@ -68,7 +68,7 @@ def double_tap(tap: dict[str, Any]) -> Markup:
     return figure(
         "A double tap, frame by frame",
         SIMULATED,
-        "Pressure over time, and the sensor's frame at the marked moments; deeper is more pressure.",
+        "Pressure over time, and the sensor's frame at the marked moments; the stronger the colour, the more pressure.",
         plot.svg(
             "A double tap's pressure over time, simulated data", f"{len(shots)} frames as heat maps below the curve."
         ),

@@ -47,7 +47,7 @@ def _arrow(step: tuple[int, int], shift: float) -> Markup:
 
 def _circle(turn: float) -> Markup:
     """Most of a circle from the top; on the screen y grows downward, so a positive angle turns clockwise."""
-    radius, begin, extent = 20.0, -pi / 2, turn * 1.72 * pi
+    radius, begin, extent = 20.0, -pi / 2, turn * 1.5 * pi
     start, end = ((32 + radius * cos(a), 32 + radius * sin(a)) for a in (begin, begin + extent))
     sweep = 1 if turn > 0 else 0
     arc = f"M{start[0]:.1f} {start[1]:.1f}A{radius:g} {radius:g} 0 1 {sweep} {end[0]:.1f} {end[1]:.1f}"

@@ -35,6 +35,11 @@ def figure(title: str, source: str, caption: str, *content: str, wide: bool = Tr
     return tag("figure", tag("figcaption", *_caption(title, source, caption)), body)
 
 
+def small(title: str, source: str, caption: str, drawing: Markup) -> Markup:
+    """One of several figures of a kind, side by side in a `class="multiples"`."""
+    return tag("figure", tag("figcaption", *_caption(title, source, caption)), drawing)
+
+
 def scrolling(title: str, *content: str) -> Markup:
     return tag("div", *content, class_="scroll", tabindex="0", role="region", aria_label=title)
 
@@ -57,7 +62,7 @@ def table(title: str, source: str, caption: str, heads: Sequence[str], rows: Seq
     """A table in a box that scrolls; `heads` and the cells are made by `head`, `row_head` and `cell`."""
     top = tag("thead", tag("tr", *heads))
     body = tag("tbody", *(tag("tr", *row) for row in rows))
-    words = tag("caption", *_caption(title, source, caption))
+    words = tag("caption", tag("div", *_caption(title, source, caption)))
     return tag("div", tag("table", words, top, body), class_="scroll", tabindex="0", role="region", aria_label=title)
 
 

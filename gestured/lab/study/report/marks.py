@@ -6,9 +6,9 @@ from typing import Any
 
 from . import formats, reading
 from .chart import Scale
-from .markup import Markup, join, svg, tag
+from .markup import Markup, svg, tag
 
-WIDTH, HEIGHT = 104, 14  # of an interval in a table's cell
+WIDTH, HEIGHT = 118, 14  # of an interval in a table's cell
 FORMS = {  # around (0, 0), of about the same area
     "square": "M-4.2-4.2H4.2V4.2H-4.2Z",
     "triangle": "M0-5.6L5.4 4H-5.4Z",
@@ -92,9 +92,9 @@ def _legend(entries: Sequence[tuple[Markup, str]]) -> Markup:
     return tag("ul", *(tag("li", picture, " ", words) for picture, words in entries), class_="legend")
 
 
-def dot(row: dict[str, Any], classes: str = "f0 v0", published: float | None = None) -> Markup:
-    """A share with its interval and the published figure as a stroke, on 0 to 100 %, for a table's cell."""
-    place = Scale(0.0, 1.0, 6.0, WIDTH - 6.0)
+def dot(row: dict[str, Any], classes: str = "f0 v0", published: float | None = None, low: float = 0.0) -> Markup:
+    """A share with its interval and the published figure as a stroke, from `low` to 100 %, for a table's cell."""
+    place = Scale(low, 1.0, 6.0, WIDTH - 6.0)
     middle = HEIGHT / 2
     words = formats.with_unit(row["right"])
     parts = [tag("line", x1=6, x2=WIDTH - 6, y1=middle, y2=middle, class_="grid")]
@@ -105,9 +105,20 @@ def dot(row: dict[str, Any], classes: str = "f0 v0", published: float | None = N
         words += f"; published {formats.with_unit(published)}"
         x = place(published)
         parts.append(tag("line", x1=x, x2=x, y1=1, y2=HEIGHT - 1, class_="published"))
-    parts.append(tag("circle", cx=place(row["right"]), cy=middle, r=3.2, class_=f"dot {classes}"))
+    parts.append(tag("circle", cx=place(row["right"]), cy=middle, r=2.8, class_=f"dot {classes}"))
     return svg(WIDTH, HEIGHT, words, "", *parts, class_="inline")
 
 
+def gain(before: float | None, after: float | None, most: float) -> Markup:
+    """A bar as long as the gain with copies, on a scale up to `most`; filled as far as what is left without them."""
+    place = Scale(0.0, most or 1.0, 0.0, WIDTH)
+    long, short = (place(max(0.0, value or 0.0)) for value in (before, after))
+    bars = [tag("rect", x=0, y=2, width=long, height=10, class_="owed")]
+    bars.append(tag("rect", x=0, y=2, width=min(long, short), height=10, class_="kept"))
+    title = f"gain {formats.points(before or 0.0)} points, {formats.points(after or 0.0)} without copies"
+    return svg(WIDTH, HEIGHT, title, "", *bars, class_="inline")
+
+
 def named(study: reading.Study, method: str) -> Markup:
-    return join(swatch(study, method), " ", reading.title(study, method))
+    """A method's mark and name, for the head of a row."""
+    return tag("span", swatch(study, method), tag("span", reading.title(study, method)), class_="named")

@@ -3,7 +3,7 @@
 from importlib.resources import files
 from pathlib import Path
 
-from . import figures_right, figures_signal, figures_time, figures_trust, reading, summary, tables, tables_about
+from . import curves, figures_right, figures_signal, figures_time, figures_trust, reading, summary, tables, tables_about
 from .layout import Section, absent, folded, paragraph
 from .markup import Markup, join, tag
 from .reading import Study
@@ -52,12 +52,8 @@ def _opening(study: Study) -> Markup:
         if about.get("quick")
         else Markup("")
     )
-    found = summary.sentences(study)
-    told = (
-        tag("ul", *(tag("li", sentence) for sentence in found))
-        if found
-        else absent("The comparison with the paper was")
-    )
+    found = [join(tag("dt", word), tag("dd", words)) for word, words in summary.findings(study).items()]
+    told = tag("dl", *found, class_="findings") if found else absent("The comparison with the paper was")
     return join(
         tag(
             "header",
@@ -70,14 +66,14 @@ def _opening(study: Study) -> Markup:
             paragraph(" · ".join(fact for fact in facts if fact), class_="byline"),
         ),
         quick,
-        tag("section", tag("h2", "Summary"), told, _figures_are(study), id="summary"),
+        tag("section", tag("h2", "Summary"), _figures_are(study), told, id="summary"),
     )
 
 
 def _figures_are(study: Study) -> Markup:
     real = bool((study.get("data") or {}).get("real"))
-    words = "The figures here are from a simulator, and are figures about it, "
-    words += "but for those marked as real recordings." if real else "all of them: no real recording was used."
+    words = "All figures come from a simulator and are figures about it"
+    words += ", but for those that are marked as real recordings." if real else ": no real recording was used."
     return paragraph(words, class_="aside")
 
 
@@ -86,13 +82,13 @@ def _sections(study: Study) -> list[Section]:
         "figures": ("The paper's figures and ours", "cells", "The tables of the paper were", _figures),
         "copies": ("Augmentation and copies", "copies", "Copies of test gestures were", tables.copies),
         "online": ("Online", "online", "Sessions with the running daemon were", tables.online),
+        "gestures": ("The gestures and their signals", "about", "The gestures were", _gestures),
         "confusion": ("Which gesture for which", "cells", "Confusions were", _confusion),
         "run-time": ("Error against run time", "run_time", "Run times were", _run_time),
-        "elapsed": ("Before the gesture has ended", "elapsed", "Error against elapsed time was", figures_time.elapsed),
+        "elapsed": ("Before the gesture has ended", "elapsed", "Error against elapsed time was", curves.elapsed),
         "failures": ("Where it fails", "failures", "Where the methods fail was", figures_trust.failures),
         "calibration": ("How sure it is", "calibration", "Calibration was", figures_trust.calibration),
-        "learning": ("How many people it takes", "learning", "Learning curves were", figures_trust.learning),
-        "gestures": ("The gestures and their signals", "about", "The gestures were", _gestures),
+        "learning": ("How many people it takes", "learning", "Learning curves were", curves.learning),
         "methods": ("The methods", "methods", "Methods were", tables_about.methods),
         "tuning": ("Tuning", "tuning", "Hyperparameters were", tables_about.tuning),
         "choices": ("What the paper leaves open", "choices", "The effects of open choices were", tables_about.choices),

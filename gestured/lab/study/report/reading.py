@@ -22,8 +22,8 @@ PROTOCOLS = {
 }
 AUGMENTATIONS = {
     "none": "no augmentation",
-    "shift": "augmented by shifting (Algorithm 1)",
-    "wide": "wide randomisation of the domain",
+    "shift": "shifted (Algorithm 1)",
+    "wide": "wide randomisation",
 }
 SETTINGS = {"paper": "the paper's", "tuned": "tuned"}
 NEAR = 0.05  # a figure this close to the published one counts as reproduced
@@ -31,7 +31,7 @@ NEAR = 0.05  # a figure this close to the published one counts as reproduced
 
 def part(study: Study, name: str) -> list[Row]:
     """A list of the study; empty where it was not computed."""
-    return list(study.get(name) or [])
+    return [row for row in study.get(name) or [] if row.get("right", 0.0) is not None]
 
 
 def title(study: Study, method: str) -> str:
@@ -67,16 +67,38 @@ def published(study: Study, method: str, augmentation: str) -> float | None:
 
 def as_published(row: Row) -> bool:
     """Whether a figure reproduces: the published one lies in its interval, or no more than NEAR away."""
-    inside = row.get("low") is not None and row["low"] <= row["published"] <= row["high"]
-    return bool(inside or abs(row["right"] - row["published"]) <= NEAR + 1e-9)
+    low, high = ends(row)
+    return bool(low <= row["published"] <= high or abs(row["right"] - row["published"]) <= NEAR + 1e-9)
+
+
+def ends(row: Row) -> tuple[float, float]:
+    """The interval of a share; the share itself where there is none."""
+    low, high = row.get("low"), row.get("high")
+    return (row["right"] if low is None else low), (row["right"] if high is None else high)
+
+
+def bounds(row: Row) -> tuple[list[float], list[float]]:
+    """The same for a row that holds lists."""
+    return list(row.get("low") or row["right"]), list(row.get("high") or row["right"])
+
+
+def below(lowest: float) -> float:
+    """Where an axis of shares begins: a round figure below all that is shown."""
+    return max(0.0, int(10 * lowest) / 10)
+
+
+def floor(study: Study) -> float:
+    """The same for all the cells of the paper's tables."""
+    shares = [row["published"] for row in part(study, "cells") if row.get("published") is not None]
+    return below(min([*shares, *(ends(row)[0] for row in part(study, "cells"))], default=0.0))
 
 
 def shown(study: Study, method: str) -> Row | None:
     """The cell whose confusion matrix is drawn: new people first, then tuned, then the most augmented."""
-    order = (tuple(PROTOCOLS), ("tuned", "paper"), ("wide", "shift", "none"))
-    protocols = ("participants", "clean", "paper", "real", "online")
-
-    def rank(row: Row) -> tuple[int, int, int]:
-        return protocols.index(row["protocol"]), order[1].index(row["settings"]), order[2].index(row["augmentation"])
-
-    return min((row for row in cells(study, method=method) if row.get("confusion")), key=rank, default=None)
+    order = {
+        "protocol": ("participants", "clean", "paper", "real", "online"),
+        "settings": ("tuned", "paper"),
+        "augmentation": ("wide", "shift", "none"),
+    }
+    drawn = [row for row in cells(study, method=method) if row.get("confusion")]
+    return min(drawn, key=lambda row: [names.index(row[key]) for key, names in order.items()], default=None)

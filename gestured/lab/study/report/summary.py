@@ -1,26 +1,31 @@
 """The report in a few plain sentences, all computed from the study."""
 
-from collections.abc import Callable
-
 from . import formats, reading
 from .markup import Markup, join, tag
 from .reading import Row, Study
-from .tables import from_copies
 
 FEW = 20  # gestures: a group smaller than this is not called the weakest
-PLAIN = {
+PROTOCOLS = {
     "paper": "under the paper's own protocol",
     "clean": "augmented after the split",
     "participants": "on people never seen",
 }
 
 
-def sentences(study: Study) -> list[Markup]:
-    """What one would tell a colleague: what reproduces, what does not, what augmentation is worth, what to use."""
-    parts: tuple[Callable[[Study], list[Markup]], ...] = (
-        _reproduced, _missed, _copies, _best, _real, _fast, _online, _weak,
-    )  # fmt: skip
-    return [sentence for tell in parts for sentence in tell(study)]
+def findings(study: Study) -> dict[str, Markup]:
+    """What one would tell a colleague: a word in the margin, and the sentence. What was not computed is left out."""
+    told = {
+        "Reproduces": _reproduced(study),
+        "Falls short": _missed(study, "Lower", -1),
+        "Does better": _missed(study, "Higher", 1),
+        "Augmentation": _copies(study),
+        "Best": _best(study),
+        "Real fingers": _real(study),
+        "Run time": _fast(study),
+        "In use": _online(study),
+        "Weakest": _weak(study),
+    }
+    return {word: sentence for word, sentence in told.items() if sentence}
 
 
 def compared(study: Study, protocol: str) -> list[Row]:
@@ -29,74 +34,56 @@ def compared(study: Study, protocol: str) -> list[Row]:
     return [row for row in rows if row.get("published") is not None]
 
 
-def _reproduced(study: Study) -> list[Markup]:
+def _reproduced(study: Study) -> Markup | None:
     told = []
-    for protocol, words in PLAIN.items():
+    for protocol, words in PROTOCOLS.items():
         rows = compared(study, protocol)
         if rows:
             good = sum(reading.as_published(row) for row in rows)
             told.append(join(tag("strong", f"{good} of {len(rows)}"), f" {words}"))
     if not told:
-        return []
-    near = f"{100 * reading.NEAR:.0f}"
-    return [
-        join(
-            "Published figures that come out on simulated data as the paper gives them (within our 95 % interval or ",
-            f"{near} points): ",
-            formats.listed(told),
-            ".",
-        )
-    ]
+        return None
+    rule = f"within our 95{formats.THIN}% interval, or {100 * reading.NEAR:.0f} points"
+    return join("On simulated data the published figures come out again (", rule, "): ", formats.listed(told), ".")
 
 
-def _missed(study: Study) -> list[Markup]:
+def _missed(study: Study, word: str, sign: int) -> Markup | None:
     rows = [row for row in compared(study, "participants") if not reading.as_published(row)]
-    sentences = []
-    for words, wanted in (("Lower", -1), ("Higher", 1)):
-        found = [row for row in rows if (row["right"] - row["published"]) * wanted > 0]
-        found.sort(key=lambda row: -abs(row["right"] - row["published"]))
-        if found:
-            named = [
-                join(
-                    _kind(study, row), f" ({formats.percent(row['published'], 0)} → {formats.percent(row['right'], 0)})"
-                )
-                for row in found
-            ]
-            sentences.append(join(f"{words} than published, on people never seen: ", formats.listed(named), "."))
-    return sentences
-
-
-def _kind(study: Study, row: Row) -> str:
-    return reading.title(study, row["method"]) + {"none": "", "shift": ", augmented"}.get(row["augmentation"], "")
-
-
-def _copies(study: Study) -> list[Markup]:
-    rows = [
-        row
-        for row in reading.part(study, "copies")
-        if row.get("gain_leaky") is not None and row.get("gain_clean") is not None
-    ]
+    rows = [row for row in rows if (row["right"] - row["published"]) * sign > 0]
     if not rows:
-        return []
+        return None
+    told = []
+    for row in sorted(rows, key=lambda row: -abs(row["right"] - row["published"])):
+        name = reading.title(study, row["method"]) + (", augmented" if row["augmentation"] == "shift" else "")
+        change = f"{formats.percent(row['published'], 0)} → {formats.percent(row['right'], 0)}"
+        told.append(join(name, " (", tag("span", change, class_="value"), ")"))
+    return join(f"{word} than published, on people never seen: ", formats.listed(told), ".")
+
+
+def from_copies(row: Row) -> float | None:
+    """The share of the gain that is lost when only the training part is augmented; None where nothing is gained."""
+    before, after = row.get("gain_leaky"), row.get("gain_clean")
+    if before is None or after is None or before <= 0.005:
+        return None
+    return float(min(1.0, max(0.0, 1.0 - after / before)))
+
+
+def _copies(study: Study) -> Markup | None:
+    rows = [row for row in reading.part(study, "copies") if None not in (row.get("gain_leaky"), row.get("gain_clean"))]
+    if not rows:
+        return None
     before, after = (sum(row[name] for row in rows) / len(rows) for name in ("gain_leaky", "gain_clean"))
     test, copied = (sum(row[name] for row in rows) for name in ("test", "with_copy"))
     owed = from_copies({"gain_leaky": before, "gain_clean": after})
-    much = (
-        join(": ", tag("strong", formats.with_unit(owed, 0), " of the gain is owed to copies"), " of test gestures")
-        if owed
-        else ""
-    )
-    found = f"; {formats.with_unit(copied / test, 0)} of them have one in the training set" if test else ""
-    return [
-        join(
-            f"Augmenting before the split is worth {formats.points(before)} points in the mean of {len(rows)} ",
-            "methods, ",
-            f"augmenting only the training part {formats.points(after)}",
-            much,
-            found,
-            ".",
-        )
+    parts = [
+        f"Augmenting before the split is worth {formats.points(before)} points in the mean of {len(rows)} methods; ",
+        f"augmenting only the training part, {formats.points(after)}. ",
     ]
+    if owed is not None:
+        much = tag("strong", f"{formats.with_unit(owed, 0)} of the gain")
+        parts.append(join("So ", much, " is owed to copies of test gestures in the training set"))
+        parts.append(f", which {formats.with_unit(copied / test, 0)} of the test gestures have." if test else ".")
+    return join(*parts)
 
 
 def best(study: Study, paper: bool) -> Row | None:
@@ -107,81 +94,61 @@ def best(study: Study, paper: bool) -> Row | None:
     return max(mine, key=lambda row: float(row["right"]), default=None)
 
 
-def _best(study: Study) -> list[Markup]:
+def _best(study: Study) -> Markup | None:
     told = []
     for words, paper in (("of the paper's methods ", True), ("of those beyond it ", False)):
         row = best(study, paper)
         if row is not None:
-            told.append(
-                join(words, _named(study, row), f" ({formats.with_unit(row['right'])}, {formats.interval(row)})")
-            )
-    return [join("Best on simulated people never seen: ", formats.listed(told), ".")] if told else []
+            told.append(join(words, _named(study, row), f" ({_measured(row)})"))
+    return join("On simulated people never seen: ", formats.listed(told), ".") if told else None
 
 
 def _named(study: Study, row: Row) -> Markup:
     return tag("strong", reading.title(study, row["method"]))
 
 
-def _real(study: Study) -> list[Markup]:
+def _measured(row: Row) -> str:
+    interval = formats.interval(row)
+    return formats.with_unit(row["right"]) + (f", {interval}" if interval else "")
+
+
+def _real(study: Study) -> Markup | None:
     row = max(reading.cells(study, data="real"), key=lambda row: float(row["right"]), default=None)
     if row is None:
-        return []
-    return [
-        join(
-            "On real recordings, subjects held out in turn: at best ",
-            _named(study, row),
-            f" with {formats.with_unit(row['right'])} ({formats.interval(row)}).",
-        )
-    ]
+        return None
+    return join("On real recordings, subjects held out in turn: at best ", _named(study, row), f" ({_measured(row)}).")
 
 
-def _fast(study: Study) -> list[Markup]:
-    front = sorted(
-        (row for row in reading.part(study, "run_time") if row.get("front")), key=lambda row: float(row["median_us"])
-    )
+def _fast(study: Study) -> Markup | None:
+    front = [row for row in reading.part(study, "run_time") if row.get("front")]
     if not front:
-        return []
+        return None
     told = [
         join(_named(study, row), f" ({formats.duration(row['median_us'])}, {formats.with_unit(row['right'])})")
-        for row in front
+        for row in sorted(front, key=lambda row: float(row["median_us"]))
     ]
-    one = (
-        "Nothing is both faster and more often right than "
-        if len(front) > 1
-        else "Faster and more often right than all others: "
-    )
-    return [join(one, formats.listed(told), ".")]
+    return join("Nothing is both faster and, on simulated data, more often right than ", formats.listed(told), ".")
 
 
-def _online(study: Study) -> list[Markup]:
-    rows = reading.part(study, "online")
+def _online(study: Study) -> Markup | None:
+    rows = sorted(reading.part(study, "online"), key=lambda row: -float(row["right"]))
     if not rows:
-        return []
+        return None
     told = []
-    for row in sorted(rows, key=lambda row: -float(row["right"])):
-        published = f", published {formats.percent(row['published'], 0)}" if row.get("published") is not None else ""
-        told.append(join(reading.title(study, row["method"]), f" {formats.with_unit(row['right'])}{published}"))
-    return [
-        join("In continuous simulated sessions with the running daemon, right: ", tag("span", "; ".join(told)), ".")
-    ]
+    for row in rows:
+        published = "" if row.get("published") is None else f", published {formats.percent(row['published'], 0)}"
+        told.append(join(_named(study, row), f" ({formats.with_unit(row['right'])}{published})"))
+    return join("Right in continuous simulated sessions with the running daemon: ", formats.listed(told), ".")
 
 
-def _weak(study: Study) -> list[Markup]:
+def _weak(study: Study) -> Markup | None:
     """Where the best of the methods that were looked at fails most."""
-    rows = [row for row in reading.part(study, "failures") if row["by"] != "participant"]
-    means = {
-        row["method"]: sum(group["right"] for group in row["groups"]) / len(row["groups"])
-        for row in rows
-        if row["groups"]
-    }
-    if not means:
-        return []
-    method = max(means, key=lambda name: means[name])
-    groups = [
-        (group, row["by"]) for row in rows if row["method"] == method for group in row["groups"] if group["n"] >= FEW
-    ]
-    if not groups:
-        return []
+    rows = [row for row in reading.part(study, "failures") if row["by"] != "participant" and row["groups"]]
+    means = {row["method"]: sum(g["right"] for g in row["groups"]) / len(row["groups"]) for row in rows}
+    method = max(means, key=lambda name: means[name], default=None)
+    groups = [(g, row["by"]) for row in rows if row["method"] == method for g in row["groups"] if g["n"] >= FEW]
+    if method is None or not groups:
+        return None
     group, by = min(groups, key=lambda pair: float(pair[0]["right"]))
-    where = f"{reading.title(study, method)} fails most at {by} “{formats.plain(str(group['name']))}”"
-    return [join(f"{where}: {formats.with_unit(group['right'])} right ({formats.interval(group)}).")]
+    where = f" fails most by {by} at “{formats.plain(str(group['name']))}”"
+    return join(tag("strong", reading.title(study, method)), where, f" ({_measured(group)}, simulated).")

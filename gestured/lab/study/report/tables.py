@@ -4,10 +4,11 @@ from . import formats, marks, reading
 from .layout import SIMULATED, cell, head, row_head, table
 from .markup import Markup, join, tag
 from .reading import Row, Study
+from .summary import from_copies
 
 
-def share_cell(row: Row | None, classes: str = "f0 v0", published: float | None = None) -> Markup:
-    """A share in per cent with its interval, in figures and drawn."""
+def share_cell(row: Row | None, classes: str, published: float | None = None, low: float = 0.0) -> Markup:
+    """A share in per cent with its interval, in figures and drawn from `low` to 1."""
     if row is None:
         return cell(formats.NONE, class_="none")
     words = join(
@@ -15,7 +16,7 @@ def share_cell(row: Row | None, classes: str = "f0 v0", published: float | None 
         " ",
         tag("span", formats.interval(row), class_="interval"),
     )
-    return cell(words, marks.dot(row, classes, published), value=row["right"], class_="right")
+    return cell(words, marks.dot(row, classes, published, low), value=row["right"], class_="right")
 
 
 def published_cell(share: float | None) -> Markup:
@@ -30,16 +31,20 @@ def protocols(study: Study) -> Markup:
 def _augmented(study: Study, augmentation: str) -> Markup:
     rows = reading.cells(study, augmentation=augmentation)
     present = [name for name in reading.PROTOCOLS if any(row["protocol"] == name for row in rows)]
-    heads = [head("Method"), head("Settings"), head("Published")]
+    told = any(row.get("published") is not None for row in rows)
+    heads = [head("Method"), head("Settings"), *([head("Published")] if told else [])]
     heads += [head(tag("span", name), tag("small", _on(rows, name))) for name in present]
     lines = []
     for method in reading.in_order(study, {row["method"] for row in rows}):
         for settings in ("paper", "tuned"):
             mine = {row["protocol"]: row for row in rows if row["method"] == method and row["settings"] == settings}
             if mine:
-                lines.append(_line(study, method, settings, augmentation, [mine.get(name) for name in present]))
-    words = reading.AUGMENTATIONS[augmentation]
-    caption = "Right in per cent with its 95 % interval over participants; the stroke is the published figure."
+                figure = [published_cell(reading.published(study, method, augmentation))] if told else []
+                shares = _shares(study, method, augmentation, [mine.get(name) for name in present])
+                lines.append([row_head(marks.named(study, method)), cell(reading.SETTINGS[settings]), *figure, *shares])
+    words, floor = reading.AUGMENTATIONS[augmentation], formats.percent(reading.floor(study), 0)
+    caption = f"Right in per cent and its 95 % interval over participants, drawn from {floor} to 100"
+    caption += "; the stroke is the published figure." if told else "."
     title = f"{words[0].upper()}{words[1:]}"
     source = "simulated data, but for “real”" if "real" in present else SIMULATED
     return table(title, source, caption, heads, lines)
@@ -50,12 +55,9 @@ def _on(rows: list[Row], protocol: str) -> str:
     return " and ".join(sorted(data)) + " data"
 
 
-def _line(study: Study, method: str, settings: str, augmentation: str, found: list[Row | None]) -> list[Markup]:
-    figure = reading.published(study, method, augmentation)
-    look = marks.look_of(study, method)
-    name = cell(reading.SETTINGS[settings])
-    shares = [share_cell(row, f"f{look.family} v0", figure) for row in found]
-    return [row_head(marks.named(study, method)), name, published_cell(figure), *shares]
+def _shares(study: Study, method: str, augmentation: str, rows: list[Row | None]) -> list[Markup]:
+    look, figure = marks.look_of(study, method), reading.published(study, method, augmentation)
+    return [share_cell(row, f"f{look.family} v0", figure, reading.floor(study)) for row in rows]
 
 
 def copies(study: Study) -> Markup:
@@ -66,10 +68,12 @@ def copies(study: Study) -> Markup:
         head("Right without"),
         head("Gain, augmented before"),
         head("Gain, after"),
-        head("From copies"),
+        head("From copies, %"),
+        head("Gain, drawn"),
     ]
-    lines = []
-    for row in reading.part(study, "copies"):
+    rows, lines = reading.part(study, "copies"), []
+    most = max((row["gain_leaky"] or 0.0 for row in rows), default=0.0)
+    for row in rows:
         owed = from_copies(row)
         lines.append(
             [
@@ -86,6 +90,7 @@ def copies(study: Study) -> Markup:
                 _points(row["gain_leaky"]),
                 _points(row["gain_clean"]),
                 _share(owed),
+                cell(marks.gain(row["gain_leaky"], row["gain_clean"], most)),
             ]
         )
     return table(
@@ -93,18 +98,10 @@ def copies(study: Study) -> Markup:
         SIMULATED,
         "Shares in per cent, gains in percentage points against no augmentation. “Before” augments before the split, "
         "as the published figures suggest; “after” only the training part. What is gained before but not after is "
-        "owed to copies.",
+        "owed to copies: the pale part of the bar.",
         heads,
         lines,
     )
-
-
-def from_copies(row: Row) -> float | None:
-    """The share of the gain that is lost when only the training part is augmented; None where nothing is gained."""
-    before, after = row.get("gain_leaky"), row.get("gain_clean")
-    if before is None or after is None or before <= 0.005:
-        return None
-    return float(min(1.0, max(0.0, 1.0 - after / before)))
 
 
 def _part(row: Row) -> float | None:
@@ -178,7 +175,7 @@ def online(study: Study) -> Markup:
             ]
         )
     caption = "Continuous sessions over UDP to a running daemon. Latency is from the finger's lift to the event."
-    return table("Online", SIMULATED, caption, heads, lines)
+    return table("Sessions with the running daemon", SIMULATED, caption, heads, lines)
 
 
 def _milliseconds(value: float | None) -> Markup:

@@ -1,7 +1,7 @@
 """The tables of what the study is made of: methods, data, tuning, open choices, what was left out, the machine."""
 
 from . import formats, marks, reading
-from .layout import SIMULATED, cell, folded, head, row_head, scrolling, table
+from .layout import SIMULATED, cell, folded, head, paragraph, row_head, scrolling, table
 from .markup import Markup, join, tag
 from .reading import Row, Study
 
@@ -29,14 +29,14 @@ def methods(study: Study) -> Markup:
         lines.append(
             [
                 row_head(marks.named(study, method)),
-                cell(about.get("family", "")),
+                cell(about.get("family", ""), class_="short"),
                 cell(about.get("what", ""), class_="prose"),
-                cell(formats.values(hyper.get("paper"))),
-                cell(formats.values(hyper.get("tuned"))),
+                cell(formats.values(hyper.get("paper")), class_="short"),
+                cell(formats.values(hyper.get("tuned")), class_="short"),
             ]
         )
     heads = [head("Method"), head("Family"), head("What it does"), head("The paper's settings"), head("Tuned")]
-    return table("The methods", "", "All on the front end that the daemon uses.", heads, lines)
+    return table("All methods", "", "All on the front end that the daemon uses.", heads, lines)
 
 
 def data(study: Study) -> Markup:
@@ -56,8 +56,8 @@ def data(study: Study) -> Markup:
         lines.append([row_head(own["file"]), cell("your own"), cell(formats.NONE), cell(told)])
     heads = [head("Name"), head("Kind"), head("People"), head("Gestures")]
     out = found.get("left_out") or []
-    rest = _left_out(out) if out else tag("p", "Nothing was left out: every recording was used.")
-    return join(table("The data", "", "", heads, lines), tag("h3", "What was left out"), rest)
+    rest = _left_out(out) if out else paragraph("Nothing was left out: every recording was used.")
+    return join(table("What was used", "", "", heads, lines), rest)
 
 
 def _set(kind: str, row: Row, people: str, told: str) -> list[Markup]:
@@ -90,11 +90,18 @@ def tuning(study: Study) -> Markup:
         best = next((tried for tried in row["candidates"] if tried["values"] == row["chosen"]), None)
         right = _spread(best) if best else cell(formats.NONE)
         count = cell(str(len(row["candidates"])), value=len(row["candidates"]), class_="number")
-        lines.append([row_head(marks.named(study, row["method"])), cell(formats.values(row["chosen"])), right, count])
+        lines.append(
+            [
+                row_head(marks.named(study, row["method"])),
+                cell(formats.values(row["chosen"]), class_="short"),
+                right,
+                count,
+            ]
+        )
         more.append(_candidates(study, row))
     heads = [head("Method"), head("Chosen"), head("Right, %"), head("Candidates")]
     caption = "Five-fold cross-validation with participants left out; the mean over the folds, and their spread."
-    return join(table("What was chosen", SIMULATED, caption, heads, lines), *more)
+    return join(table("What was chosen", SIMULATED, caption, heads, lines), folded("All candidates", *more))
 
 
 def _candidates(study: Study, row: Row) -> Markup:
@@ -104,7 +111,7 @@ def _candidates(study: Study, row: Row) -> Markup:
         lines.append([row_head(formats.values(tried["values"])), _spread(tried), cell("chosen" if chosen else "")])
     title = f"Candidates for {reading.title(study, row['method'])}"
     heads = [head("Values"), head("Right, %"), head("")]
-    return folded(title, table(title, SIMULATED, "", heads, lines))
+    return table(title, SIMULATED, "", heads, lines)
 
 
 def _spread(tried: Row) -> Markup:
@@ -128,7 +135,7 @@ def choices(study: Study) -> Markup:
         lines.append(
             [
                 row_head(row["choice"]),
-                cell(row["ours"], class_="prose"),
+                cell(row["ours"], class_="short"),
                 cell(tag("ul", *options, class_="options")),
                 cell(marks.named(study, row["method"])),
                 cell(row["effect"], class_="prose"),
@@ -162,4 +169,4 @@ def _again(study: Study) -> Markup:
     command = tag("pre", tag("code", str(about.get("command", ""))))
     words = f"gestured {about.get('version', '')}, seed {about.get('seed', '')}. "
     words += "The same seed gives the same numbers; run times are the machine's."
-    return join(scrolling("The command that made this report", command), tag("p", words))
+    return join(scrolling("The command that made this report", command), paragraph(words))
