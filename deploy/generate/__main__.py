@@ -1,9 +1,9 @@
-"""`python -m deploy.generate configuration` prints the example, `... install SHARE` writes the rest."""
+"""`python -m deploy.generate configuration | dashboard` prints what is kept; `... install SHARE` writes the rest."""
 
 import sys
 from pathlib import Path
 
-from deploy.generate import completion, configuration, man, programs
+from deploy.generate import completion, configuration, dashboard, man, programs
 
 
 def install(share: Path) -> None:
@@ -26,7 +26,9 @@ if __name__ == "__main__":
     match sys.argv[1:]:
         case ["configuration"]:
             print(configuration.example(), end="")
+        case ["dashboard"]:
+            print(dashboard.dashboard(), end="")
         case ["install", share]:
             install(Path(share))
         case _:
-            sys.exit("usage: python -m deploy.generate configuration | install SHARE")
+            sys.exit("usage: python -m deploy.generate configuration | dashboard | install SHARE")

@@ -1,0 +1,97 @@
+"""What is made from the programs' own words is up to date, complete, and understood by those who read it."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from deploy.generate import completion, configuration, dashboard, man, programs
+from gestured.daemon.settings import FLAGS, TABLES, Settings
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAMS = {program.name: program for program in programs.all_programs()}
+PAGES = man.pages(PROGRAMS.values())
+
+
+@pytest.mark.parametrize(
+    ("kept", "made"),
+    [
+        ("deploy/gestured.toml", configuration.example),
+        ("deploy/grafana/dashboards/gestured.json", dashboard.dashboard),
+    ],
+)
+def test_what_is_kept_is_what_is_made(kept: str, made):
+    what = made.__module__.rsplit(".", 1)[-1]
+    hint = f"python -m deploy.generate {what} > {kept}"
+    assert (ROOT / kept).read_text() == made(), f"make it anew: {hint}"
+
+
+def explain(path: Path) -> "subprocess.CompletedProcess[str]":
+    """What the daemon says of a configuration."""
+    command = [sys.executable, "-m", "gestured.daemon", "--config", str(path), "--explain"]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+
+
+def test_the_example_sets_nothing_and_each_of_its_keys_is_valid(tmp_path: Path):
+    done = explain(ROOT / "deploy" / "gestured.toml")
+    assert done.returncode == 0 and "nothing, all defaults" in done.stdout, done.stderr
+    everything = tmp_path / "all.toml"
+    everything.write_text(re.sub(r"^#(?=[\w\[])", "", configuration.example(), flags=re.MULTILINE))
+    done = explain(everything)
+    assert done.returncode == 0, done.stderr
+    set_by = {line.split(":")[0].strip() for line in done.stdout.split("set by:")[1].splitlines() if line}
+    assert set_by == set(Settings.model_fields) == {*FLAGS, *TABLES}
+
+
+@pytest.mark.skipif(shutil.which("man") is None, reason="man is not installed")
+@pytest.mark.parametrize("name", sorted(PAGES))
+def test_man_pages_are_readable(tmp_path: Path, name: str):
+    path = tmp_path / name
+    path.write_text(PAGES[name])
+    command = ["man", "--warnings", "--encoding=utf-8", "--local-file", str(path)]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=60, env={"MANWIDTH": "100", "LANG": "C.UTF-8"}
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    shown = " ".join(done.stdout.replace("\u2010", "-").split())
+    program = PROGRAMS.get(name.rpartition(".")[0])
+    parts = () if program is None else (program, *program.commands)
+    for flag in (flag for part in parts for option in part.options for flag in option.flags):
+        assert flag in shown
+    for key in configuration.tables()[""] if program is None else ():
+        assert key.written in shown
+
+
+def complete(program: str, *words: str) -> set[str]:
+    """What bash offers after these words."""
+    script = completion.bash(PROGRAMS[program]) + (
+        f"COMP_WORDS=({' '.join(repr(word) for word in (program, *words))}); COMP_CWORD={len(words)}\n"
+        f'_{program}; printf "%s\\n" "${{COMPREPLY[@]}}"\n'
+    )
+    done = subprocess.run(["bash", "-eu", "-c", script], capture_output=True, text=True, timeout=20, cwd=ROOT)
+    assert done.stderr == ""
+    return set(done.stdout.split())
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
+def test_bash_completes_commands_flags_choices_and_files():
+    assert complete("gesturectl", "lis") == {"listen"}
+    for command in PROGRAMS["gesturectl"].commands:
+        name = command.name.split()[-1]
+        flags = {flag for option in command.options for flag in option.flags if flag.startswith("--")}
+        assert complete("gesturectl", name, "--") == flags
+    assert "--model" in complete("gestured", "--mo")
+    assert "README.md" in complete("gestured", "--config", "READ")
+
+
+@pytest.mark.skipif(shutil.which("fish") is None, reason="fish is not installed")
+@pytest.mark.parametrize("name", sorted(PROGRAMS))
+def test_fish_takes_the_completion(tmp_path: Path, name: str):
+    path = tmp_path / f"{name}.fish"
+    path.write_text(completion.fish(PROGRAMS[name]))
+    ask = f"source {path}; complete --do-complete '{name} --h'"
+    done = subprocess.run(["fish", "--no-config", "-c", ask], capture_output=True, text=True, timeout=20)
+    assert done.stderr == "" and "--help" in done.stdout
