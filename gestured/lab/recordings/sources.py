@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
+from gestured.lab.recordings.protocol import PSEUDONYM
 from gestured.lab.recordings.safe import LeftOut
 from gestured.lab.recordings.store import compact, touched
 from gestured.recording import Recordings
@@ -75,7 +76,7 @@ def read_csv(path: Path, form: Csv) -> tuple[Recordings, list[LeftOut]]:
         return whole, left
     contact = touched(frames, times)
     if contact is None:
-        raise RecordingError(f"{path}: frames: expected one {form.label}, and the front end does not see exactly one")
+        raise RecordingError(f"{path}: frames: expected one {form.label} with untouched frames before or after it")
     return replace(whole, onsets=np.array(contact[:1]), releases=np.array(contact[1:])), left
 
 
@@ -96,12 +97,13 @@ def read_capfingerid(path: Path) -> tuple[Recordings, list[LeftOut]]:
                 head = text.split(";")
                 if len(head) != 6:
                     raise _Refused("line", f"expected six parts with ; between them, found {len(head)}")
-                who[:] = who or head[:3]
-                if head[:3] != who:
-                    raise _Refused("participant", f"expected {' '.join(who)}, found {' '.join(head[:3])[:40]}")
+                if PSEUDONYM.fullmatch(head[0]) is None or (who and head[:3] != who):
+                    expected = " ".join(who) or "1 to 32 of A-Z a-z 0-9 _ -"
+                    raise _Refused("participant", f"expected {expected}, found {' '.join(head[:3])[:40]}")
                 seconds, nanoseconds, *values = _numbers(head[5].removesuffix(",").split(","), size)
                 if not 0 <= nanoseconds < 1e9:
                     raise _Refused("time", f"expected 0 to 999999999 nanoseconds, found {nanoseconds:g}")
+                who[:] = head[:3]
             except _Refused as refused:
                 left.append(_left(path, number, refused))
                 continue

@@ -67,18 +67,23 @@ def compact(frames: NDArray[Any]) -> NDArray[Any]:
         for kind in (np.uint16, np.int32):
             if np.iinfo(kind).min <= low and high <= np.iinfo(kind).max:
                 return frames.astype(kind)
-    return frames.astype(np.float32) if max(-low, high) <= np.finfo(np.float32).max else frames
+    return frames.astype(np.float32) if max(-low, high) <= float(np.finfo(np.float32).max) else frames
 
 
 def touched(frames: NDArray[Any], times: NDArray[np.float64]) -> tuple[int, int] | None:
     """The first and the last touched frame of one gesture (T, R, C) at `times` (T,) s, as the front end sees them.
 
-    None where it does not see exactly one. A recording without a second of idle sensor before the touch gets one, as
-    for training: the quietest that each taxel shows.
+    None where it does not see exactly one. A recording that is touched too early for the front end to learn the idle
+    sensor gets idle frames of its own before it, as for training; without any, nothing can be told.
     """
-    for lead in (0, 20):
-        padded, stamps = (frames, times) if not lead else with_idle(frames, times, 0, len(times) - 1, 0, lead)[:2]
-        found = list(segments(Frame(float(t), values) for t, values in zip(stamps, padded, strict=True)))
+    rise = (frames - np.quantile(frames, 0.25, axis=0)).max(axis=(1, 2))
+    strong = np.flatnonzero(rise >= 0.3 * rise.max())
+    first, last = max(int(strong[0]) - 1, 0), int(strong[-1]) + 1
+    tries = [(frames, times, 0)]
+    if first > 1 or last + 3 < len(times):
+        tries.append(with_idle(frames, times, first, last, 0))
+    for values, stamps, lead in tries:
+        found = list(segments(Frame(float(t), one) for t, one in zip(stamps, values, strict=True)))
         if len(found) == 1:
             first, last = np.searchsorted(stamps, [found[0].onset, found[0].offset]) - lead
             if 0 <= first <= last < len(times):

@@ -1,0 +1,218 @@
+"""`gestured-lab collect` in a real pseudo-terminal, with the simulated sensor over UDP: a whole session and its end."""
+
+import os
+import pty
+import select
+import signal
+import socket
+import subprocess
+import sys
+import termios
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gestured.core.errors import RecordingError
+from gestured.lab.cli import main
+from gestured.lab.recordings.collect import already
+from gestured.lab.recordings.protocol import order
+from gestured.recording import read, write
+from tests.control.conftest import environment
+from tests.small_recording import example
+
+PATIENCE_S = 60.0
+KEYS = "r repeat  d discard"
+GOOD = "Enter keep  " + KEYS
+
+
+class Person:
+    """Someone at a terminal in front of `gestured-lab collect`."""
+
+    def __init__(self, folder: Path, port: int, *more: str) -> None:
+        self.master, self.terminal = pty.openpty()
+        self.before = termios.tcgetattr(self.terminal)
+        self.seen, self.read = "", 0
+        command = [sys.executable, "-m", "gestured.lab.cli", "collect", "--participant", "07", "--out", str(folder)]
+        command += ["--listen", f"127.0.0.1:{port}", "--gestures", "one_tap", "--countdown", "0", *more]
+        self.process = subprocess.Popen(
+            command, stdin=self.terminal, stdout=self.terminal, stderr=self.terminal, env=environment()
+        )
+
+    def sees(self, *texts: str) -> str:
+        """Wait until one of the texts is shown; gives it."""
+        end = time.monotonic() + PATIENCE_S
+        while True:
+            found = {self.seen.find(text, self.read): text for text in texts}
+            found.pop(-1, None)
+            if found:
+                first = min(found)
+                self.read = first + len(found[first])
+                return found[first]
+            assert time.monotonic() < end, f"{texts} not in: {self.seen[self.read :]}"
+            if select.select([self.master], [], [], 1.0)[0]:
+                self.seen += os.read(self.master, 65536).decode()
+
+    def types(self, text: str) -> None:
+        os.write(self.master, text.encode())
+
+    def keeps_one(self) -> None:
+        """Repeats until a take is good, as a person does."""
+        while self.sees(GOOD, "  " + KEYS) != GOOD:
+            self.types("r")
+        self.types("\n")
+        self.sees("kept, ")
+
+    def ends(self) -> int:
+        """The exit status; the terminal must be as it was."""
+        status = self.process.wait(PATIENCE_S)
+        assert termios.tcgetattr(self.terminal) == self.before
+        return status
+
+    def leave(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        for fd in (self.master, self.terminal):
+            os.close(fd)
+
+
+@pytest.fixture
+def port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        number: int = probe.getsockname()[1]
+        return number
+
+
+@pytest.fixture
+def sensor(port: int) -> Iterator[None]:
+    command = [sys.executable, "-m", "gestured.control", "simulate", "--to", f"127.0.0.1:{port}", "--kinds", "one_tap"]
+    with subprocess.Popen(command, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        yield
+        process.terminate()
+
+
+@pytest.mark.slow
+def test_a_session_that_is_ended_and_goes_on(tmp_path: Path, port: int, sensor: None) -> None:
+    trials = order("07", 0, ["one_tap"], 1)
+    path = tmp_path / "07.npz"
+    person = Person(tmp_path, port)
+    try:
+        person.sees("Do you agree?")
+        person.types("yes\n")
+        person.sees("Enter when it is in place")
+        person.types("\n")
+        person.sees(f"1/9  {trials[0]}")
+        person.keeps_one()
+        assert read(path).labels.tolist() == ["one_tap"]  # on disk before the next prompt
+        person.sees(f"2/9  {trials[1]}")
+        person.types("p")
+        person.sees("Paused")
+        person.types("\n")
+        person.sees(f"2/9  {trials[1]}")
+        person.sees(KEYS)
+        person.types("r")
+        person.sees(f"2/9  {trials[1]}")
+        person.sees(KEYS)
+        person.types("d")
+        person.sees(f"2/9  {trials[2]}")  # the one that was discarded comes later
+        person.keeps_one()
+        person.sees(f"3/9  {trials[1]}")
+        person.types("q")
+        person.sees("the same command goes on from here")
+        assert person.ends() == 0
+    finally:
+        person.leave()
+
+    person = Person(tmp_path, port)
+    try:
+        person.sees("gave consent on")
+        person.sees("2 of 9 are done already")
+        person.sees("Enter when it is in place")
+        person.types("\n")
+        person.sees(f"3/9  {trials[1]}")
+        person.keeps_one()
+        person.sees("Enter when it is in place")  # another inclination
+        person.process.send_signal(signal.SIGTERM)
+        person.sees("Ended with 3 recordings")
+        assert person.ends() == 0
+    finally:
+        person.leave()
+
+    kept = read(path)
+    assert kept.speeds is not None and kept.inclinations is not None and kept.consents is not None
+    done = [trials[0], trials[2], trials[1]]
+    assert kept.speeds.tolist() == [trial.speed for trial in done]
+    assert kept.inclinations.tolist() == [trial.inclination for trial in done]
+    assert set(kept.subjects.tolist()) == {"07"}
+    assert len(set(kept.consents.tolist())) == 1
+    assert kept.onsets is not None and kept.releases is not None
+    for i in range(3):  # what is marked as touched is what was touched
+        rise = kept.frames_of(i).astype(float) - np.median(kept.frames_of(i), axis=0)
+        strongest = int(rise.max(axis=(1, 2)).argmax())
+        assert kept.onsets[i] <= strongest <= kept.releases[i]
+        assert kept.times_of(i)[0] == 0.0
+    assert os.listdir(tmp_path) == ["07.npz"]
+
+
+def test_without_consent_nothing_is_recorded(tmp_path: Path, port: int) -> None:
+    person = Person(tmp_path, port)
+    try:
+        person.sees("Do you agree?")
+        person.types("no\n")
+        person.sees("nothing is recorded")
+        assert person.ends() == 0
+    finally:
+        person.leave()
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_silent_sensor_is_told_and_ctrl_c_leaves_the_terminal_as_it_was(tmp_path: Path, port: int) -> None:
+    person = Person(tmp_path, port, "--sensor", "door")
+    try:
+        person.sees("Do you agree?")
+        person.types("yes\n")
+        person.sees(f"no frames of door arrive on 127.0.0.1:{port}")
+        person.process.send_signal(signal.SIGINT)
+        assert person.ends() == 130
+    finally:
+        person.leave()
+
+
+def test_without_a_terminal_it_says_what_it_needs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["collect", "--participant", "07"]) == 1
+    assert capsys.readouterr().err == (
+        "gestured-lab: collect talks with a person: expected a terminal as standard input and output\n"
+    )
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("flag", "value"),
+    [("--participant", "Anna Meier"), ("--gestures", "one_tap,wave"), ("--rows", "1"), ("--rate", "2000"),
+     ("--repeats", "0"), ("--countdown", "x"), ("--listen", "9000"), ("--sensor", "a/b")],
+)  # fmt: skip
+def test_flags_are_checked(flag: str, value: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["collect", "--participant", "07", flag, value])
+    assert ended.value.code == 2
+    assert "expected" in capsys.readouterr().err
+
+
+def test_a_file_that_is_somebody_elses_or_another_sensors_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "07.npz"
+    assert already(path, "07", (2, 3)) is None
+    write(path, replace(example(), subjects=np.array(["07", "08"])))
+    with pytest.raises(RecordingError, match="subjects: expected 07 alone, found 08"):
+        already(path, "07", (2, 3))
+    write(path, replace(example(), subjects=np.array(["07", "07"])))
+    with pytest.raises(RecordingError, match="frames: expected the grid 9x9, found 2x3"):
+        already(path, "07", (9, 9))
+    kept = already(path, "07", (2, 3))
+    assert kept is not None and len(kept) == 2

@@ -1,0 +1,154 @@
+"""`gestured-lab forget`: whoever is forgotten is gone, everybody else is untouched, and models are asked."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gestured.lab.cli import main
+from gestured.lab.recordings import forget
+from gestured.lab.recordings.origin import Origin, origins
+from gestured.lab.recordings.store import join
+from gestured.recording import read, write
+from tests.small_recording import example, same, save, session
+
+
+def of(*subjects: str):
+    return replace(session(), subjects=np.array(subjects))
+
+
+def folder(tmp_path: Path) -> Path:
+    write(tmp_path / "07.npz", of("07", "07"))
+    write(tmp_path / "both.npz", of("07", "08"))
+    write(tmp_path / "08.npz", of("08", "70"))
+    return tmp_path
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    status = main(["forget", *map(str, arguments)])
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in path.iterdir()}
+
+
+def test_whoever_is_forgotten_is_gone_and_nobody_else(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = folder(tmp_path)
+    other = (path / "08.npz").read_bytes()
+    status, out, _ = run(capsys, "07", path, "--yes")
+    assert status == 0
+    assert f"{path / '07.npz'}: all 2 recordings: the file is deleted" in out
+    assert f"{path / 'both.npz'}: 1 of 2 recordings: the file is written again without them" in out
+    assert "removed: 3 recordings of 07" in out
+    assert contents(path).keys() == {"both.npz", "08.npz"}
+    same(read(path / "both.npz"), of("07", "08").take([1]))
+    assert (path / "08.npz").read_bytes() == other
+    assert "no recording of 07 was found" in run(capsys, "07", path, "--yes")[1]
+
+
+def test_numbers_as_subjects_are_found_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(tmp_path / "numbers.npz", example())
+    assert run(capsys, "3", tmp_path / "numbers.npz", "--yes")[0] == 0
+    assert read(tmp_path / "numbers.npz").subjects.tolist() == [4]
+
+
+@pytest.mark.parametrize("answer", ["no\n", "y\n", "\n", ""])
+def test_without_a_yes_nothing_is_removed(
+    answer: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = folder(tmp_path)
+    before = contents(path)
+    monkeypatch.setattr(forget.sys, "stdin", Typed(answer))
+    status, out, _ = run(capsys, "07", path)
+    assert (status, contents(path)) == (0, before)
+    assert "nothing was removed" in out
+
+
+class Typed:
+    """A person at a terminal."""
+
+    def __init__(self, answer: str) -> None:
+        self.answer = answer
+
+    def isatty(self) -> bool:
+        return True
+
+    def readline(self) -> str:
+        return self.answer
+
+
+def test_a_yes_removes(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(forget.sys, "stdin", Typed("yes\n"))
+    assert "removed: 3 recordings" in run(capsys, "07", folder(tmp_path))[1]
+
+
+def test_a_dry_run_and_a_missing_terminal_remove_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = folder(tmp_path)
+    before = contents(path)
+    status, out, _ = run(capsys, "07", path, "--dry-run", "--json")
+    assert status == 0
+    said = json.loads(out)
+    assert (said["removed"], [file["recordings"] for file in said["files"]]) == (False, [2, 1])
+    status, _, err = run(capsys, "07", path)
+    assert (status, "expected --yes or --dry-run" in err) == (1, True)
+    assert run(capsys, "07", path, path / "nowhere", "--yes")[0] == 1
+    assert contents(path) == before
+
+
+def test_what_cannot_be_looked_into_or_kept_whole_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = folder(tmp_path)
+    (path / "damaged.npz").write_bytes(b"no recording")
+    extra = save(path / "extra.npz", of("07", "08"), temperature=np.array([20.0]))
+    before = extra.read_bytes()
+    status, out, _ = run(capsys, "07", path, "--yes")
+    assert status == 1
+    assert f"not looked into: {path / 'damaged.npz'}: cannot be read" in out
+    assert f"not looked into: {extra}: temperature.npy: is no field" in out
+    assert extra.read_bytes() == before
+    assert not (path / "07.npz").exists()  # what can be removed is
+
+
+def test_models_say_whose_recordings_they_learned_from(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = folder(tmp_path)
+    models = path / "models"
+    models.mkdir()
+    learned = {
+        "a.onnx": origins([path / "both.npz"]),
+        "b.onnx": [vars_of(Origin("07.npz", "0" * 64, ["07"]))],
+        "c.onnx": origins([path / "08.npz"]),
+        "d.onnx": None,
+        "e.onnx": [],
+    }
+    for name, origin in learned.items():
+        (models / name).write_bytes(json.dumps(origin).encode())
+
+    def inspect(data: bytes) -> dict[str, str]:
+        return {} if data == b"null" else {"learned_from": data.decode()}
+
+    monkeypatch.setattr("gestured.lab.recordings.origin.inspect", inspect)
+    _, out, _ = run(capsys, "07", path, "--models", models, "--yes")
+    told = [line.split(": ", 1)[1] for line in out.splitlines() if line.startswith("model ")]
+    assert told == [
+        f"was trained with 07: it learned from {path / 'both.npz'} as it is now",
+        "was trained with a participant 07, in a file 07.npz with other contents than any here",
+        "was not trained with 07",
+        "cannot say: it does not list the recordings that it learned from",
+        "was not trained with 07",
+    ]
+
+
+def vars_of(origin: Origin) -> dict[str, object]:
+    return {"file": origin.file, "sha256": origin.sha256, "subjects": origin.subjects}
+
+
+def test_what_is_no_model_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "broken.onnx").write_bytes(b"no model at all")
+    write(tmp_path / "07.npz", join([of("07", "08"), of("08", "08")]))
+    _, out, _ = run(capsys, "07", tmp_path / "07.npz", "--models", tmp_path, "--dry-run")
+    assert f"model {tmp_path / 'broken.onnx'}: cannot be read: " in out

@@ -1,0 +1,166 @@
+"""`gestured-lab import`: what was written is read, and what is no frame is told with its line."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gestured.lab.cli import main
+from gestured.recording import read
+from gestured.simulator import Participant, Sensor, Take, generator, gesture_take
+
+
+def take(gesture: str = "swipe_left") -> Take:
+    return gesture_take(gesture, Participant(901), Sensor.nominal(day=901), generator(3, 1), "normal", 1)
+
+
+def csv_lines(made: Take, scale: float = 1.0) -> list[str]:
+    rows = zip(made.times.tolist(), made.frames.reshape(len(made.frames), -1).tolist(), strict=True)
+    return [",".join(map(repr, [t * scale, *values])) for t, values in rows]
+
+
+def written(path: Path, lines: Sequence[str]) -> str:
+    path.write_text("\n".join(lines) + "\n")
+    return str(path)
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    status = main(["import", *map(str, arguments)])
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("s", 1.0), ("ms", 1e3), ("us", 1e6)])
+def test_a_csv_file_is_read_as_it_was_written(
+    unit: str, scale: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made, out = take(), tmp_path / "out.npz"
+    file = written(tmp_path / "a.csv", ["time," + ",".join(f"t{k}" for k in range(81)), *csv_lines(made, scale)])
+    flags = ("--format", "csv", "--participant", "07", "--label", "swipe_left", "--time-unit", unit)
+    status, text, _ = run(capsys, *flags, "--consent", "2026-01-31", file, "--out", out)
+    assert (status, text) == (0, f"{out}: 1 recordings, {len(made.frames)} frames; left out: 0 files, 0 lines\n")
+    found = read(out)
+    np.testing.assert_array_equal(found.frames, made.frames)
+    np.testing.assert_allclose(found.times, made.times - made.times[0], atol=1e-9)
+    assert (found.labels[0], found.subjects[0], found.consents[0]) == ("swipe_left", "07", "2026-01-31")
+    event = made.events[0]
+    assert abs(made.times[found.onsets[0]] - event.onset_s) < 0.15
+    assert abs(made.times[found.releases[0]] - event.offset_s) < 0.15
+
+
+BAD = {
+    "too few": ("1.0,2,3", "line: expected 82 numbers, found 3"),
+    "a word": ("1.0," + ",".join(["x"] * 81), "number 2: expected a finite number, found 'x'"),
+    "not finite": ("1.0," + ",".join(["nan"] * 81), "number 2: expected a finite number, found 'nan'"),
+    "back": ("0.0," + ",".join(["0"] * 81), "time: expected later than"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_a_bad_line_is_left_out_and_told(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bad, reason = BAD[kind]
+    made, out = take(), tmp_path / "out.npz"
+    lines = csv_lines(made)
+    file = written(tmp_path / "a.csv", [*lines[:7], bad, *lines[7:]])
+    status, text, _ = run(capsys, "--format", "csv", "--participant", "07", file, "--out", out)
+    first, last = text.splitlines()
+    assert status == 0
+    assert first.startswith(f"{file}: line 8 is left out: {reason}")
+    assert last.endswith("left out: 0 files, 1 lines")
+    np.testing.assert_array_equal(read(out).frames, made.frames)
+
+
+def test_a_file_of_another_form_is_refused_and_the_others_are_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    good = written(tmp_path / "good.csv", csv_lines(take()))
+    other = written(tmp_path / "other.csv", ["1;2;3"] * 50)
+    idle = take()
+    still = written(tmp_path / "still.csv", csv_lines(idle)[:8])
+    out = tmp_path / "out.npz"
+    flags = ("--format", "csv", "--participant", "07", "--label", "swipe_left", "--json")
+    status, text, _ = run(capsys, *flags, good, other, still, "--out", out)
+    first, second, figures = text.splitlines()
+    assert status == 0
+    assert first.startswith(f"{other}: expected frames, found 0 and 49 lines that are none; line: expected 82 numbers")
+    assert second == f"{still}: frames: expected one swipe_left with untouched frames before or after it"
+    assert json.loads(figures) == {
+        "recordings": 1, "frames": len(idle.frames), "lines_left_out": 0, "files_left_out": 2,
+    }  # fmt: skip
+
+
+def test_where_nothing_is_good_nothing_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out.npz"
+    flags = ("--format", "csv", "--participant", "07")
+    status, text, err = run(capsys, *flags, tmp_path / "none.csv", "--out", out)
+    assert (status, text) == (1, f"{tmp_path / 'none.csv'}: is no file\n")
+    assert "nothing could be imported" in err
+    assert not out.exists()
+    out.write_text("somebody's")
+    assert run(capsys, *flags, written(tmp_path / "a.csv", csv_lines(take())), "--out", out)[0] == 1
+    assert out.read_text() == "somebody's"
+
+
+@pytest.mark.parametrize("flags", [("--participant", "Anna Meier"), ("--label", "wave"), ("--consent", "May")])
+def test_flags_are_checked(flags: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["import", "--format", "csv", "a.csv", "--out", str(tmp_path / "b.npz"), *flags])
+    assert ended.value.code == 2
+    assert "expected" in capsys.readouterr().err
+
+
+def test_a_csv_file_needs_a_participant_and_capfingerid_says_it_itself(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = written(tmp_path / "a", ["1"]), tmp_path / "out.npz"
+    assert "--participant: expected a pseudonym" in run(capsys, "--format", "csv", file, "--out", out)[2]
+    status, _, err = run(capsys, "--format", "capfingerid", "--rows", "9", file, "--out", out)
+    assert (status, "--rows: only for --format csv" in err) == (1, True)
+
+
+def capfingerid_lines(tasks: Sequence[str]) -> tuple[list[str], np.ndarray]:
+    """Lines in the form of the public files (nanoseconds without leading zeros, a comma at the end), made up."""
+    rng = np.random.default_rng(1)
+    frames = rng.integers(-5, 250, (len(tasks), 27, 15))
+    start = 1_508_231_640_900_000_000
+    lines = []
+    for k, (task, frame) in enumerate(zip(tasks, frames, strict=True)):
+        seconds, nanoseconds = divmod(start + k * 70_000_000, 10**9)
+        counts = ",".join(map(str, frame.ravel().tolist()))
+        lines.append(f"7;left;ring;{task};-1;{seconds},{nanoseconds},{counts},")
+    return lines, frames
+
+
+def test_capfingerid_becomes_a_session_whose_tasks_are_no_gestures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines, frames = capfingerid_lines(["TAP"] * 3 + ["PAUSE"] * 2 + ["DRAG"] * 4 + ["TAP"])
+    doubled = [*lines[:5], lines[4], *lines[5:]]  # as every few lines of the public files are
+    out = tmp_path / "out.npz"
+    status, text, _ = run(capsys, "--format", "capfingerid", written(tmp_path / "a.txt", doubled), "--out", out)
+    assert (status, text) == (0, f"{out}: 1 recordings, 10 frames; left out: 0 files, 0 lines\n")
+    found = read(out)
+    np.testing.assert_array_equal(found.frames, frames)
+    np.testing.assert_allclose(found.times, np.arange(10) * 0.07, atol=1e-6)
+    assert (found.labels[0], found.subjects[0], found.kinds[0]) == ("session", "7", "ring finger, left hand")
+    assert found.event_labels.tolist() == ["other"] * 3
+    assert found.event_kinds.tolist() == ["tap", "drag", "tap"]
+    np.testing.assert_allclose(found.event_onsets, [0, 0.35, 0.63], atol=1e-6)
+    np.testing.assert_allclose(found.event_offsets, [0.14, 0.56, 0.63], atol=1e-6)
+
+
+def test_lines_of_capfingerid_that_are_cut_off_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines, frames = capfingerid_lines(["TAP"] * 6)
+    lines[2] = lines[2][:200]
+    lines[3] = lines[3].replace("7;left", "8;left", 1)
+    lines[4] = lines[4].replace(";-1;", ";", 1)
+    out = tmp_path / "out.npz"
+    status, text, _ = run(capsys, "--format", "capfingerid", written(tmp_path / "a.txt", lines), "--out", out)
+    assert status == 0
+    told = text.splitlines()
+    assert "line 3 is left out: line: expected 407 numbers" in told[0]
+    assert "line 4 is left out: participant: expected 7 left ring, found 8 left ring" in told[1]
+    assert "line 5 is left out: line: expected six parts" in told[2]
+    np.testing.assert_array_equal(read(out).frames, frames[[0, 1, 5]])
