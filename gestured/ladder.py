@@ -88,6 +88,11 @@ class Ladder:
         return self._active.name
 
     @property
+    def source(self) -> str:
+        """The file, or the shipped name, of `active`."""
+        return str(self._active.source) if isinstance(self._active.source, str | Path) else self.active
+
+    @property
     def rung(self) -> int:
         """How far down `active` stands; 0 is the best."""
         return self.rungs.index(self._active)

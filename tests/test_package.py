@@ -23,6 +23,8 @@ EXTRAS = (
     "pytest",
     "hypothesis",
     "setuptools",
+    "mcap",
+    "pythonosc",
 )
 ALL_BUT_LAB = """
 import importlib, pkgutil, gestured

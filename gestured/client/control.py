@@ -24,8 +24,8 @@ class Control:
         self._lines = self.socket.makefile("rb")
 
     def ask(self, verb: str, **parameters: object) -> dict[str, Any]:
-        """What the daemon answers; parameters that are None are left out. Raises Refused with its reason."""
-        request = {"verb": verb} | {key: value for key, value in parameters.items() if value is not None}
+        """What the daemon answers. Raises Refused with its reason."""
+        request = {"verb": verb} | parameters
         try:
             self.socket.sendall(json.dumps(request).encode() + b"\n")
         except OSError:

@@ -7,10 +7,31 @@ import sys
 from collections.abc import Sequence
 
 import gestured
-from gestured.control import check, demo, listen, simulate
+from gestured.control import (
+    check,
+    demo,
+    doctor,
+    emit,
+    export,
+    flag,
+    listen,
+    recalibrate,
+    record,
+    reload,
+    replay,
+    shadow,
+    simulate,
+    sniff,
+    status,
+)
 from gestured.core.errors import GesturedError
 
-SUBCOMMANDS = (listen, simulate, check, demo)
+SUBCOMMANDS = (
+    *(status, listen, doctor, sniff),
+    *(reload, recalibrate, shadow, emit),
+    *(record, flag, replay, export),
+    *(simulate, check, demo),
+)
 
 
 def parser() -> argparse.ArgumentParser:

@@ -72,6 +72,7 @@ def readable(event: dict[str, Any]) -> str:
         number = f"#{event['sequence']}" if kind == "gesture" else ""
         waited = 1000 * (event["decided"] - event["offset"])
         tail = f"  by {event['model']}, degraded" if event["degraded"] else ""
+        tail += "  (test)" if event.get("test") else ""
         name = f"{event.get('gesture', 'unknown'):<24} {event['confidence']:4.2f}"
         return f"{head}{name}  {number:<6} {waited:4.0f} ms{tail}"
     if kind == "status":

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 TEST_SENSORS = 64  # names of sensors that are not there
 TEST_S = 0.4  # how long a made-up gesture took
 
-SENSOR = Parameter(str, "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", check=is_sensor)
+SENSOR = Parameter(
+    (str, type(None)), "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", check=lambda name: name is None or is_sensor(name)
+)
 LABEL = Parameter(str, "a gesture's name", required=True)
 MODEL = Parameter((str, type(None)), "a model's path or name, or null to end it", required=True)
 
@@ -70,9 +72,9 @@ class Operations:
             self._service.pipeline.restart(one)
         return {"sensors": [one.name for one in chosen]}
 
-    async def emit(self, connection: Connection, gesture: str, sensor: str = "test") -> Answer:
+    async def emit(self, connection: Connection, gesture: str, sensor: str | None = None) -> Answer:
         """A made-up gesture through every output, marked as a test; it takes the sensor's next numbers."""
-        pipeline = self._service.pipeline
+        pipeline, sensor = self._service.pipeline, sensor or "test"
         if gesture not in pipeline.gestures:
             raise Refusal(f"no gesture {gesture!r} is in use, expected one of {', '.join(pipeline.gestures)}")
         now = time.monotonic()

@@ -26,11 +26,11 @@ from gestured.daemon.values import Grid
 from gestured.daemon.vitals import Vitals, faulty
 from gestured.daemon.watch import Watched
 from gestured.ladder import Ladder
+from gestured.owner import Owner, Source
 
 FORGET_S = 60.0  # a sensor that never made a gesture and is silent for this long gives its place to a new one
 DOUBLE_TAP = "double_tap"
 SILENT = ("no_data", "stale")  # states of sensors that are not there now
-Source = tuple[str, int]  # host and port of a sender
 Emit = Callable[[Event], None]
 
 
@@ -42,10 +42,7 @@ class Sensor:
     label: str  # in metrics
     recognizer: Recognizer
     stamper: Stamper
-    source: Source
-    before: Source | None = None  # the owner before this one
-    packets: int = 0  # of this owner
-    heard: float = 0.0  # s, monotonic
+    owner: Owner
     silent: bool = False  # and has been flushed
     open: int | None = None  # id of the contact that was not released yet
     answered: bool = True  # whether that contact has its answer
@@ -84,13 +81,10 @@ class Pipeline:
                 return None
             sensor = self.sensors[name] = self._make(name, source)
             log.info("new sensor", sensor=name, source=f"{source[0]}:{source[1]}", grid=str(self.grid(name)))
-        elif sensor.source != source:
-            if now - sensor.heard <= self._settings.stale_s and not _one_shot(sensor, source):
-                self.drop("second_source")
-                return None
-            sensor.before, sensor.source, sensor.packets = sensor.source, source, 0
-        sensor.packets += 1
-        sensor.heard, sensor.silent = now, False
+        if not sensor.owner.admits(source, now, self._settings.stale_s):
+            self.drop("second_source")
+            return None
+        sensor.silent = False
         return sensor
 
     def take(self, sensor: Sensor, arrivals: Sequence[Arrival], now: float) -> None:
@@ -130,7 +124,7 @@ class Pipeline:
     def tick(self, now: float) -> None:
         """Close what is open where a sensor has been silent for longer than `stale_s`."""
         for sensor in self.sensors.values():
-            if not sensor.silent and now - sensor.heard > self._settings.stale_s:
+            if not sensor.silent and now - sensor.owner.heard > self._settings.stale_s:
                 self._throttle.warn("sensor is silent", "silent", sensor=sensor.name)
                 self.flush(sensor, now)
 
@@ -199,7 +193,7 @@ class Pipeline:
         self._throttle.error("a bug, caught", what, **fields)
 
     def _state(self, sensor: Sensor, now: float) -> str:
-        if now - sensor.heard > self._settings.stale_s:
+        if now - sensor.owner.heard > self._settings.stale_s:
             return "stale"
         front_end = sensor.recognizer.front_end
         if not front_end.ready:
@@ -215,7 +209,7 @@ class Pipeline:
         if len(strangers) < self._settings.max_sensors - len(named):
             return False
         for sensor in strangers:
-            if now - sensor.heard > FORGET_S and sensor.recognizer.sequence == 0:
+            if now - sensor.owner.heard > FORGET_S and sensor.recognizer.sequence == 0:
                 del self.sensors[sensor.name]
                 return False
         return True
@@ -223,7 +217,7 @@ class Pipeline:
     def _make(self, name: str, source: Source) -> Sensor:
         recognizer = self._recognizer(self._front_end(name), self.given.pop(name, 0))
         stamper = Stamper(_clock(self._settings, name))
-        return Sensor(name, self._metrics.sensor_label(name), recognizer, stamper, source)
+        return Sensor(name, self._metrics.sensor_label(name), recognizer, stamper, Owner(source))
 
     def _front_end(self, name: str) -> FrontEnd:
         own = self._settings.sensors.get(name, SensorSettings())
@@ -269,14 +263,6 @@ class Pipeline:
                 events.append(Cancelled(sensor.name, sensor.open, "internal_error"))
             events.append(Release(sensor.name, sensor.open, t))
         return events
-
-
-def _one_shot(sensor: Sensor, source: Source) -> bool:
-    """Whether the owner may be a program that opens a new port for each packet, as `oscsend` does.
-
-    One packet from a port is no claim against another port of the same host; two are.
-    """
-    return sensor.packets == 1 and source[0] == sensor.source[0] and source != sensor.before
 
 
 def _reading(sensor: Sensor, state: str) -> Reading:

@@ -71,6 +71,7 @@ def status(service: "Service") -> dict[str, Any]:
             "rung": ladder.rung,
             "degraded": ladder.degraded,
             "failures": ladder.failures,
+            "file": ladder.source,
             "version": model.metadata.version,
             "sha256": model.sha256,
             "gestures": list(pipeline.gestures),
@@ -111,8 +112,8 @@ def _sensor(service: "Service", name: str, reading: dict[str, Any], now: float) 
     if sensor is None:
         return rounded
     return rounded | {
-        "source": f"{sensor.source[0]}:{sensor.source[1]}",
-        "heard_s_ago": round(now - sensor.heard, 3),
+        "source": f"{sensor.owner.source[0]}:{sensor.owner.source[1]}",
+        "heard_s_ago": round(now - sensor.owner.heard, 3),
         "lost": sensor.lost,
         "noise": round(sensor.recognizer.front_end.noise, 4),
         "touched": sensor.recognizer.front_end.touched,

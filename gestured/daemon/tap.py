@@ -14,10 +14,10 @@ from collections.abc import Iterable, Sequence
 from gestured.core import messages
 from gestured.core.events import Event, Status
 from gestured.daemon.control import Connection
+from gestured.owner import Source
 
 KEPT_S = 30.0  # of the flight recorder
 OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps
-Source = tuple[str, int]
 Kept = tuple[int, Source, bytes] | bytes  # a packet with its time in ns (monotonic), or an event's line
 
 

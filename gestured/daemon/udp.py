@@ -12,11 +12,15 @@ import time
 from collections.abc import Callable, Sequence
 
 from gestured.core.wire import Arrival, Decoder
-from gestured.daemon.pipeline import Pipeline, Sensor, Source
+from gestured.daemon.pipeline import Pipeline, Sensor
+from gestured.daemon.rations import Rations
+from gestured.owner import Source
 
 PACKET_BYTES = 65_536
-BATCH = 256  # packets in one go: a flood must leave room for everything else
-CATCH_UP = 16  # batches
+BATCH = 256  # packets in one go, and
+BATCH_BYTES = 256 << 10  # so many bytes: a flood must leave room for everything else
+CATCH_UP = 16  # batches, and
+CATCH_UP_S = 0.25
 SOURCES = 1024  # remembered decisions of the allow-list
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
@@ -43,6 +47,7 @@ class Receiver:
         self._loop = asyncio.get_running_loop()
         self._sock, self._pipeline, self._clock = sock, pipeline, clock
         self.tap: Callable[[Sequence[tuple[bytes, Source]], float], None] | None = None  # is shown what is read
+        self._rations = Rations()
         self.configure(decoder, allow)
         self._loop.add_reader(sock, self.read)
 
@@ -57,22 +62,31 @@ class Receiver:
 
     def read_all(self) -> None:
         """Take everything that waits, within reason: after a stall timers run before readers do."""
+        end = self._clock() + CATCH_UP_S
         for _ in range(CATCH_UP):
-            if self.read() < BATCH:
+            if not self.read() or self._clock() >= end:
                 break
 
-    def read(self) -> int:
-        """Take what waits, at most a batch; says how many packets that were."""
+    def read(self) -> bool:
+        """Take what waits, at most a batch; says whether it has left something behind."""
         receive = self._sock.recvfrom
         waiting: list[tuple[bytes, Source]] = []
+        size, left = 0, False
         try:
-            for _ in range(BATCH):
-                waiting.append(receive(PACKET_BYTES))
+            while len(waiting) < BATCH and size < BATCH_BYTES:
+                datagram = receive(PACKET_BYTES)
+                waiting.append(datagram)
+                size += len(datagram[0])
+            left = True
         except (BlockingIOError, InterruptedError):
             pass
-        except OSError as error:  # the network's complaint about something else; the socket goes on
-            self._pipeline.drop("socket_error", error=error.strerror)
+        except (OSError, MemoryError) as error:  # the network's complaint about something else; the socket goes on
+            self._pipeline.drop("socket_error", error=str(error))
         now = self._clock()
+        served = self._rations.share(waiting, left, now)
+        if len(served) < len(waiting):
+            self._pipeline.drop("flood", count=len(waiting) - len(served))
+            waiting = served
         if self.tap is not None and waiting:
             self.tap(waiting, now)
         batch: dict[str, tuple[Sensor, list[Arrival]]] = {}
@@ -83,7 +97,7 @@ class Receiver:
                 self._pipeline.bug("in the decoding of a packet", source=source[0])
         for sensor, arrivals in batch.values():
             self._pipeline.take(sensor, arrivals, now)
-        return len(waiting)
+        return left
 
     def _packet(
         self, packet: bytes, source: Source, now: float, batch: dict[str, tuple[Sensor, list[Arrival]]]

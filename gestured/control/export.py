@@ -1,0 +1,124 @@
+"""`gesturectl export`: a recording as frames, in the form that NumPy reads."""
+
+import argparse
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gestured import recording, tape
+from gestured.core.errors import RecordingError
+from gestured.core.wire import Arrival, Decoder
+from gestured.offline import Scene
+
+FINGERS = 3
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the subcommand to gesturectl's command line."""
+    parser = commands.add_parser(
+        "export",
+        help="a recording as .npz",
+        description="Write the frames of a recording as .npz, one session a sensor, with the gestures that the\n"
+        "daemon recognised as its events. Sensors of one file have one grid.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="example:\n  gesturectl export drive.mcap drive.npz --sensor armrest",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="what gesturectl record or flag wrote")
+    parser.add_argument("out", type=Path, metavar="OUT", help="the .npz to write")
+    parser.add_argument("--sensor", metavar="NAME", help="only this sensor")
+    parser.add_argument("--json", action="store_true", help="print what was written as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Decode, stamp and write."""
+    found = tape.read(args.file)
+    sessions = {
+        name: stamped
+        for name, arrivals in _arrivals(found).items()
+        if args.sensor in (None, name) and (stamped := list(_stamped(found, name, arrivals)))
+    }
+    if not sessions:
+        raise RecordingError(f"{args.file}: holds no frame of {args.sensor or 'any sensor'}")
+    grids = {name: each[0][1].values.shape for name, each in sessions.items()}
+    if len(set(grids.values())) > 1:
+        said = ", ".join(f"{name} {rows}x{columns}" for name, (rows, columns) in grids.items())
+        raise RecordingError(f"{args.file}: sensors of several grids ({said}), choose one with --sensor")
+    made = _recordings(sessions, found)
+    recording.write(args.out, made)
+    summary = {"file": str(args.out), "sessions": list(sessions), "frames": len(made.frames)}
+    words = f"{args.out}: {len(made.frames)} frames of {', '.join(sessions)}, {_count(made.event_labels)} gestures"
+    print(json.dumps(summary | {"events": _count(made.event_labels)}) if args.json else words)
+    return 0
+
+
+def _count(labels: Any) -> int:
+    return 0 if labels is None else len(labels)
+
+
+def _scene(found: tape.Tape) -> Scene:
+    rows, columns = next(iter(found.scene.get("grids", {}).values()), (9, 9))
+    return Scene(found.scene, rows, columns)
+
+
+def _arrivals(found: tape.Tape) -> dict[str, list[tuple[float, Arrival]]]:
+    """Sensor -> its frames with their arrival in seconds since the epoch."""
+    scene = _scene(found)
+    decoder = Decoder(scene.addresses, scene.grid)
+    out: dict[str, list[tuple[float, Arrival]]] = {}
+    for packet in found.packets:
+        for arrival in decoder.decode(packet.data, packet.source)[0]:
+            out.setdefault(arrival.sensor, []).append((packet.t_ns / 1e9, arrival))
+    return out
+
+
+def _stamped(found: tape.Tape, name: str, arrivals: list[tuple[float, Arrival]]) -> Iterator[tuple[float, Arrival]]:
+    """The frames that the daemon used, at the times that it gave them."""
+    stamper = _scene(found).stamper(name)
+    last, start = -np.inf, 0
+    while start < len(arrivals):
+        now = arrivals[start][0]
+        end = start
+        while end < len(arrivals) and arrivals[end][0] == now:
+            end += 1
+        batch = [arrival for _, arrival in arrivals[start:end]]
+        for arrival, stamp in zip(batch, stamper.stamp(batch, now), strict=True):
+            if not stamp.dropped and stamp.t > last:
+                last = stamp.t
+                yield last, arrival
+        start = end
+
+
+def _recordings(sessions: dict[str, list[tuple[float, Arrival]]], found: tape.Tape) -> recording.Recordings:
+    frames = [arrival.values for each in sessions.values() for _, arrival in each]
+    touches = np.full((len(frames), FINGERS, 2), np.nan, np.float32)
+    ids = np.full((len(frames), FINGERS), -1, np.int32)
+    for n, arrival in enumerate(arrival for each in sessions.values() for _, arrival in each):
+        for k, touch in enumerate(arrival.touches[:FINGERS]):
+            touches[n, k], ids[n, k] = (touch.x, touch.y), touch.id
+    spans = {name: (each[0][0], each[-1][0]) for name, each in sessions.items()}
+    events = [
+        (list(sessions).index(e["sensor"]), e["gesture"], e["onset"], e["offset"])
+        for e in found.events
+        if e["type"] == "gesture"
+        and e["sensor"] in spans
+        and spans[e["sensor"]][0] <= e["onset"] <= e["offset"] <= spans[e["sensor"]][1]
+    ]
+    labels = np.array([label for _, label, _, _ in events], dtype="U64")
+    return recording.Recordings(
+        frames=np.stack(frames),
+        times=np.array([t for each in sessions.values() for t, _ in each]),
+        offsets=np.cumsum([0, *map(len, sessions.values())], dtype=np.int64),
+        labels=np.array(["session"] * len(sessions)),
+        subjects=np.array(list(sessions)),
+        touches=touches,
+        touch_ids=ids,
+        event_recording=np.array([g for g, _, _, _ in events], np.int64),
+        event_labels=labels,
+        event_kinds=labels,
+        event_onsets=np.array([onset for _, _, onset, _ in events], np.float64),
+        event_offsets=np.array([offset for _, _, _, offset in events], np.float64),
+    )

@@ -1,0 +1,49 @@
+"""`gesturectl flag`: "that was wrong" - what the flight recorder holds, kept as a recording."""
+
+import argparse
+import json
+from datetime import datetime
+from pathlib import Path
+
+from gestured.client.stream import Unreachable
+from gestured.control.address import add_control, connect
+from gestured.control.record import Keeper
+from gestured.tape import Writer, library
+
+LIMIT_BYTES = 2 << 30  # more than the ring may hold
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the subcommand to gesturectl's command line."""
+    parser = commands.add_parser(
+        "flag",
+        help="keep the last 30 seconds: that was wrong",
+        description="Keep what the daemon's flight recorder holds, the packets of the last 30 seconds with the\n"
+        "events and the model's sha256, as a recording. The daemon must run with --flight-recorder.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog='examples:\n  gesturectl flag\n  gesturectl flag wrong.mcap --note "a tap, taken for a swipe"',
+    )
+    parser.add_argument("file", type=Path, nargs="?", metavar="FILE", help="default: flag-DATE-TIME.mcap")
+    parser.add_argument("--note", default="", metavar="TEXT", help="what was wrong; kept with it")
+    add_control(parser)
+    parser.add_argument("--json", action="store_true", help="print what was kept as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fetch it and write it."""
+    path = args.file or Path(f"flag-{datetime.now():%Y%m%d-%H%M%S}.mcap")
+    library()
+    with connect(args) as control:
+        scene = control.ask("flight")
+        with Writer(path, scene | {"note": args.note}, LIMIT_BYTES) as tape:
+            keeper = Keeper(tape, scene["epoch_ns"])
+            for line in control.lines():
+                if line["type"] == "end":
+                    break
+                keeper.keep(line)
+            else:
+                raise Unreachable(f"the daemon closed the connection; {path} is not complete")
+    kept = {"file": str(path), "packets": keeper.packets, "events": keeper.events, "model": scene["model"]}
+    print(json.dumps(kept) if args.json else f"{path}: {keeper.packets} packets, {keeper.events} events")
+    return 0

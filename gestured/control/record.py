@@ -1,0 +1,136 @@
+"""`gesturectl record`: packets and events of a running daemon into a file."""
+
+import argparse
+import base64
+import json
+import queue
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from gestured.client.control import Control
+from gestured.client.stream import Unreachable
+from gestured.control.address import add_control, connect
+from gestured.core.errors import GesturedError
+from gestured.tape import Writer, library
+
+FLUSH_S = 1.0  # what a crash or a power cut costs
+WAITING = 50_000  # lines; the daemon counts what finds no room
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the subcommand to gesturectl's command line."""
+    parser = commands.add_parser(
+        "record",
+        help="record packets and events",
+        description="Record what reaches the daemon, packet by packet as it came, and the events that it makes of\n"
+        "it, as MCAP. The daemon hands both over (no second listener, nothing slips past); what a slow\n"
+        "disk makes it lose is counted. The file is new, and good up to the last second whatever happens.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="examples:\n  gesturectl record drive.mcap --seconds 60\n  gesturectl record night.mcap --max-mib 2048",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="what to write; must not exist")
+    parser.add_argument("--seconds", type=float, metavar="S", help="end after so long (default: at Ctrl-C)")
+    parser.add_argument("--max-mib", type=int, default=1024, metavar="N", help="end at this size (default: 1024)")
+    add_control(parser)
+    parser.add_argument("--json", action="store_true", help="print the summary as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Record until the time is over, the file full, the daemon gone, or Ctrl-C; 1 where something was lost."""
+    if not 1 <= args.max_mib <= 1 << 20:
+        raise GesturedError(f"--max-mib {args.max_mib}: expected 1 to {1 << 20}")
+    if args.seconds is not None and not 0 < args.seconds < 1e9:
+        raise GesturedError(f"--seconds {args.seconds:g}: expected more than 0")
+    library()  # before anything is asked of the daemon
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with connect(args) as control:
+        scene = control.ask("tap")
+        with Writer(args.file, scene, args.max_mib << 20) as tape:
+            print(f"recording into {args.file}; Ctrl-C ends", file=sys.stderr, flush=True)
+            end = time.monotonic() + args.seconds if args.seconds else None
+            keeper = Keeper(tape, scene["epoch_ns"])
+            why = keeper.follow(control, end)
+            size = tape.count, args.file.stat().st_size
+    summary = {"file": str(args.file), "packets": keeper.packets, "events": keeper.events, "lost": keeper.lost}
+    if args.json:
+        print(json.dumps(summary | {"ended": why}))
+    else:
+        lost = f", {keeper.lost} lost: this disk is too slow" if keeper.lost else ""
+        print(f"{args.file}: {keeper.packets} packets, {keeper.events} events{lost}; ended: {why}")
+    if why == GONE:
+        raise Unreachable(f"the daemon closed the connection; {args.file} is good up to there ({size[0]} messages)")
+    return 1 if keeper.lost else 0
+
+
+GONE = "the daemon went"
+
+
+class Keeper:
+    """Puts the lines of a tap into a tape."""
+
+    def __init__(self, tape: Writer, epoch_ns: int) -> None:
+        self._tape, self._epoch_ns = tape, epoch_ns
+        self._t_ns = time.time_ns()
+        self.packets = self.events = self.lost = 0
+
+    def keep(self, line: Mapping[str, Any]) -> None:
+        """One line."""
+        if line["type"] == "packet":
+            self._t_ns = line["t_ns"] + self._epoch_ns
+            host, port = line["source"]
+            self._tape.packet(self._t_ns, f"{host}:{port}", base64.b64decode(line["data"]))
+            self.packets += 1
+        elif line["type"] == "lost":
+            self.lost += line["count"]
+        else:
+            self._tape.event(self._t_ns, line)
+            self.events += 1
+
+    def follow(self, control: Control, end: float | None) -> str:
+        """Keep what comes until `end` (monotonic s); says why it ended."""
+        try:
+            for line in _waiting(control):
+                if line is not None:
+                    self.keep(line)
+                if line is None or time.monotonic() > self._flushed + FLUSH_S:
+                    self._flush()
+                if self._tape.full:
+                    return "the file is as large as it may be"
+                if end is not None and time.monotonic() >= end:
+                    return "as asked"
+        except KeyboardInterrupt:
+            return "as asked"
+        return GONE
+
+    _flushed = 0.0
+
+    def _flush(self) -> None:
+        self._tape.flush()
+        self._flushed = time.monotonic()
+
+
+def _waiting(control: Control) -> Iterator[dict[str, Any] | None]:
+    """The daemon's lines; None now and then where none come."""
+    lines: queue.Queue[dict[str, Any] | None] = queue.Queue(WAITING)
+
+    def read() -> None:
+        for line in control.lines():
+            lines.put(line)
+        lines.put(None)
+
+    threading.Thread(target=read, daemon=True).start()
+    while True:
+        try:
+            line = lines.get(timeout=FLUSH_S / 4)
+        except queue.Empty:
+            yield None
+            continue
+        if line is None:
+            return
+        yield line

@@ -1,0 +1,60 @@
+"""`gesturectl shadow`: a candidate model beside the active one."""
+
+import argparse
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from gestured.control.address import add_control, connect
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the subcommand to gesturectl's command line."""
+    parser = commands.add_parser(
+        "shadow",
+        help="try a model beside the active one",
+        description="Have the daemon run a candidate model on the same segments as the active one. It publishes\n"
+        "nothing; without MODEL, how far the two agree is printed. A restart ends it.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="examples:\n  gesturectl shadow candidate.onnx\n  gesturectl shadow\n  gesturectl shadow --stop",
+    )
+    parser.add_argument("model", metavar="MODEL", nargs="?", help="a path that the daemon can read, or a shipped name")
+    parser.add_argument("--stop", action="store_true", help="end it, and print what came of it")
+    add_control(parser)
+    parser.add_argument("--json", action="store_true", help="print the report as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Begin, end, or report; exit status 1 where there is nothing to report."""
+    with connect(args) as control:
+        if args.stop:
+            report = control.ask("shadow", model=None)["shadow"]
+        elif args.model is not None:
+            # The daemon stands in another folder.
+            path = Path(args.model)
+            model = str(path.absolute()) if path.exists() or os.sep in args.model else args.model
+            report = control.ask("shadow", model=model)["shadow"]
+        else:
+            report = control.ask("status")["shadow"]
+    if args.json:
+        print(json.dumps(report))
+    elif report is None:
+        print("no model runs in the shadow")
+    else:
+        print(words(report))
+    return 1 if report is None else 0
+
+
+def words(report: dict[str, Any]) -> str:
+    """A report for a person."""
+    lines = [f"{report['model']} in the shadow: {report['segments']} segments, {report['failed']} failed"]
+    if report["agreement"] is not None:
+        lines.append(
+            f"  agreement {100 * report['agreement']:.1f} %, mean confidence {report['confidence']:.2f} "
+            f"(active {report['active_confidence']:.2f})"
+        )
+    for pair in report["disagreements"]:
+        lines.append(f"  {pair['count']:4d} x active {pair['active']}, candidate {pair['candidate']}")
+    return "\n".join(lines)

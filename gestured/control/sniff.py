@@ -1,0 +1,226 @@
+"""`gesturectl sniff`: which OSC messages arrive, and what to set for them."""
+
+import argparse
+import base64
+import json
+import re
+import socket
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import groupby
+
+from gestured.client.address import host_port
+from gestured.client.stream import Unreachable
+from gestured.control.address import add_control, connect
+from gestured.core import osc
+from gestured.core.errors import GesturedError, ProtocolError
+from gestured.core.wire import is_sensor
+
+USUAL = "/{sensor}/pressure"
+LEAST_TAXELS = 4  # 2 x 2
+SEEN = 256  # addresses; what comes after that is counted together
+POLL_S = 0.2
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the subcommand to gesturectl's command line."""
+    parser = commands.add_parser(
+        "sniff",
+        help="show which OSC messages arrive",
+        description="Show the OSC messages that reach the daemon (or, with --listen, a port where no daemon is),\n"
+        "with type tags and rates, and propose [addresses] and grid for them.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="examples:\n  gesturectl sniff --seconds 3\n  gesturectl sniff --listen 0.0.0.0:9000",
+    )
+    parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help="how long (default: 5)")
+    parser.add_argument("--listen", type=host_port, metavar="HOST:PORT", help="a UDP address that nobody has")
+    add_control(parser)
+    parser.add_argument("--json", action="store_true", help="print what was seen as JSON")
+    parser.set_defaults(run=run)
+
+
+@dataclass
+class Seen:
+    """What came to one address with one kind of arguments."""
+
+    address: str
+    types: str
+    count: int = 0
+    first: float = 0.0  # s
+    last: float = 0.0
+    sources: set[str] = field(default_factory=set)
+
+    @property
+    def rate_hz(self) -> float:
+        """Messages a second, 0 for a single one."""
+        return (self.count - 1) / (self.last - self.first) if self.last > self.first else 0.0
+
+
+def run(args: argparse.Namespace) -> int:
+    """Look, and say what was there; exit status 1 where nothing came."""
+    if not 0 < args.seconds <= 86_400:
+        raise GesturedError(f"--seconds {args.seconds:g}: expected more than 0, at most 86400")
+    sight = Sight()
+    end = time.monotonic() + args.seconds
+    try:
+        for t, source, packet in _listen(args.listen, end) if args.listen else _tap(args, end):
+            sight.packet(t, source, packet)
+    except KeyboardInterrupt:
+        pass
+    rows = sorted(sight.seen.values(), key=lambda seen: -seen.count)
+    proposed = propose(rows)
+    if args.json:
+        found = [
+            {"address": s.address, "types": s.types, "count": s.count, "rate_hz": round(s.rate_hz, 2),
+             "sources": sorted(s.sources)} for s in rows
+        ]  # fmt: skip
+        print(json.dumps({"packets": sight.packets, "messages": found, "errors": sight.errors, "proposed": proposed}))
+    else:
+        _print(sight, rows, proposed)
+    return 0 if rows else 1
+
+
+def _print(sight: "Sight", rows: list[Seen], proposed: list[str]) -> None:
+    print(f"{sight.packets} packets")
+    for s in rows:
+        print(
+            f"  {s.address:<32} ,{s.types:<16} {s.count:6d}  {s.rate_hz:7.1f} Hz  from {', '.join(sorted(s.sources))}"
+        )
+    for reason, count in sight.errors.items():
+        print(f"  {count} packets are no OSC: {reason}")
+    print("\n" + ("\n".join(proposed) if proposed else "nothing that looks like a pressure frame"))
+
+
+class Sight:
+    """What was seen; bounded whatever arrives."""
+
+    def __init__(self) -> None:
+        self.packets = 0
+        self.seen: dict[tuple[str, str], Seen] = {}
+        self.errors: Counter[str] = Counter()
+
+    def packet(self, t: float, source: str, packet: bytes) -> None:
+        """Take one packet, read at `t` s."""
+        self.packets += 1
+        errors: list[ProtocolError] = []
+        try:
+            messages = osc.decode(packet, errors)
+        except ProtocolError as error:
+            messages, errors = [], [error]
+        self.errors.update(error.reason for error in errors)
+        for message in messages:
+            key = message.address, short_types(message)
+            if key not in self.seen and len(self.seen) >= SEEN:
+                key = "(others)", ""
+            seen = self.seen.setdefault(key, Seen(*key, first=t))
+            seen.count += 1
+            seen.last = t
+            if len(seen.sources) < 4:
+                seen.sources.add(source)
+
+
+def short_types(message: osc.Message) -> str:
+    """Type tags with runs written as a number, such as `i f*81`; a blob with its size, as `b[162]`."""
+    words = []
+    sizes = iter([len(a) for a in message.args if isinstance(a, bytes)])
+    for tag, run_of in groupby(message.types):
+        count = len(list(run_of))
+        if tag == "b":
+            words += [f"b[{next(sizes)}]" for _ in range(count)]
+        else:
+            words.append(tag if count == 1 else f"{tag}*{count}")
+    return " ".join(words)
+
+
+def propose(rows: list[Seen]) -> list[str]:
+    """Lines for the configuration file, from what looks like frames: many numbers, or one blob, again and again."""
+    patterns: Counter[str] = Counter()
+    sizes: dict[str, tuple[int, ...]] = {}
+    for seen in rows:
+        taxels, split = _taxels(seen.types), _sensor(seen.address)
+        if taxels and split is not None:
+            patterns[split[0]] += seen.count
+            sizes.setdefault(split[1], taxels)
+    if not patterns:
+        return []
+    pressure = patterns.most_common(1)[0][0]
+    lines = [] if pressure == USUAL else ["[addresses]", f'pressure = "{pressure}"']
+    for name, taxels in sizes.items():
+        sides = [round(size**0.5) for size in taxels if round(size**0.5) ** 2 == size]
+        if 9 not in sides:
+            grid = f"{sides[0]}x{sides[0]}" if sides else f"ROWSxCOLUMNS, of {' or '.join(map(str, taxels))} in all"
+            lines += [f"[sensors.{name}]", f'grid = "{grid}"']
+    return lines or ["the defaults fit what arrives"]
+
+
+def _taxels(types: str) -> tuple[int, ...]:
+    """How many taxels a message of these types may hold, the likeliest first; () where it is no frame."""
+    if match := re.fullmatch(r"(?:i )?b\[(\d+)\]", types):  # of uint16, float32 or uint8
+        size = int(match[1])
+        return tuple(size // n for n in (2, 4, 1) if size % n == 0 and size // n >= LEAST_TAXELS)
+    if match := re.fullmatch(r"(?:i )?[fi]\*(\d+)", types):
+        size = int(match[1])
+        found = (size, size - 1) if types.startswith("i*") else (size,)  # with a counter before them
+        return tuple(n for n in found if n >= LEAST_TAXELS)
+    return ()
+
+
+def _sensor(address: str) -> tuple[str, str] | None:
+    """(pattern, sensor) of an address: the last part but one that can be a name, else the last."""
+    parts = address.split("/")[1:]
+    places = [i for i, part in enumerate(parts) if is_sensor(part)]
+    if address.endswith("/trajectory") or not places:
+        return None
+    place = places[0] if len(places) == 1 else places[-2]
+    pattern = "/".join(["", *parts[:place], "{sensor}", *parts[place + 1 :]])
+    return pattern, parts[place]
+
+
+def _tap(args: argparse.Namespace, end: float) -> Iterator[tuple[float, str, bytes]]:
+    with connect(args) as control:
+        control.ask("tap")
+        control.socket.settimeout(None)
+        _hang_up_at(control.socket, end)
+        for line in control.lines():
+            if line["type"] == "packet":
+                host, port = line["source"]
+                yield line["t_ns"] / 1e9, f"{host}:{port}", base64.b64decode(line["data"])
+        if time.monotonic() < end - POLL_S:
+            raise Unreachable("the daemon closed the connection")
+
+
+def _hang_up_at(sock: socket.socket, end: float) -> None:
+    """The reader of `sock` comes to its end then."""
+    import threading
+
+    def hang_up() -> None:
+        try:
+            sock.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass
+
+    timer = threading.Timer(max(end - time.monotonic(), 0.0), hang_up)
+    timer.daemon = True
+    timer.start()
+
+
+def _listen(address: tuple[str, int], end: float) -> Iterator[tuple[float, str, bytes]]:
+    try:
+        family, kind, _, _, where = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0]
+        receiver = socket.socket(family, kind)
+        receiver.bind(where)
+    except OSError as error:
+        hint = "; without --listen I ask the daemon that has it" if error.errno == 98 else ""
+        raise GesturedError(f"cannot listen on {address[0]}:{address[1]}: {error.strerror}{hint}") from None
+    with receiver:
+        print(f"listening on {address[0]}:{address[1]}", file=sys.stderr, flush=True)
+        while (left := end - time.monotonic()) > 0:
+            receiver.settimeout(left)
+            try:
+                packet, source = receiver.recvfrom(65_536)
+            except TimeoutError:
+                return
+            yield time.monotonic(), f"{source[0]}:{source[1]}", packet

@@ -1,0 +1,114 @@
+"""`gesturectl status`: how the daemon is, on one screen."""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Any
+
+from gestured.control.address import add_control, connect
+from gestured.control.shadow import words as shadow_words
+
+CLEAR = "\x1b[2J\x1b[H"
+PERIOD_S = 1.0
+NAMES = {"strength": "strength", "duration_s": "duration", "area": "area"}
+SENSORS = 12  # lines; what is more is counted
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the subcommand to gesturectl's command line."""
+    parser = commands.add_parser(
+        "status",
+        help="how the daemon is, on one screen",
+        description="Show sensors, rates, health, model and the last answers of a running daemon.\n"
+        "Exit status 1 if it is not ready.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="examples:\n  gesturectl status --watch\n  gesturectl status --json",
+    )
+    parser.add_argument("--watch", action="store_true", help="again every second, until Ctrl-C")
+    add_control(parser)
+    parser.add_argument("--json", action="store_true", help="print all that is known as JSON, one line each time")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print once, or again and again."""
+    with connect(args) as control:
+        while True:
+            status = control.ask("status")
+            if args.json:
+                print(json.dumps(status), flush=True)
+            else:
+                clear = CLEAR if args.watch and sys.stdout.isatty() else ""
+                print(clear + "\n".join(screen(status)), flush=True)
+            if not args.watch:
+                return 0 if status["ready"]["ready"] else 1
+            time.sleep(PERIOD_S)
+
+
+def screen(status: dict[str, Any]) -> Iterator[str]:
+    """The lines for a person."""
+    model, out, ready = status["model"], status["output"], status["ready"]
+    word = status["state"] if ready["ready"] else f"not ready: {ready['reason']}"
+    yield f"gestured {status['version']}, {word}, up {_span(status['uptime_s'])}, pid {status['pid']}"
+    where = ", ".join(f"{key} {value}" for key, value in status["addresses"].items() if value)
+    yield f"  {where}"
+    fallback = f", a fallback for {model['asked']}" if model["degraded"] else ""
+    failures = f", {model['failures']} failures" if model["failures"] else ""
+    yield f"  model {model['active']} {model['version']} ({model['sha256'][:12]}){fallback}{failures}"
+    yield ""
+    yield from _sensors(status["sensors"])
+    yield ""
+    answers = status["answers"]
+    total = sum(answers["gestures"].values())
+    cancelled = ", ".join(f"{count} {reason}" for reason, count in answers["cancelled"].items()) or "none"
+    yield f"answers: {total} gestures, {answers['unknown']} unknown; cancelled: {cancelled}"
+    yield from _recent(status["recent"])
+    yield ""
+    dropped = ", ".join(f"{count} {reason}" for reason, count in status["input"]["dropped"].items()) or "none"
+    yield f"dropped packets: {dropped}; by the kernel: {status['input']['kernel_drops']}"
+    yield (
+        f"subscribers: {out['subscribers']}, {out['backlog_bytes']} bytes waiting, {out['lines_lost']} lines lost, "
+        f"{sum(out['evicted'].values())} cut off"
+    )
+    yield f"loop: {1000 * status['loop_lag_s']:.0f} ms late, {status['internal_errors']} bugs caught"
+    yield f"shift: {_shift(status['shift'])}"
+    if status["shadow"]:
+        yield shadow_words(status["shadow"])
+
+
+def _sensors(sensors: dict[str, dict[str, Any]]) -> Iterator[str]:
+    if not sensors:
+        yield "no sensor was heard so far (gesturectl sniff shows what arrives)"
+        return
+    yield "sensor           state         Hz  jitter   lost  bad  drift gestures  grid"
+    for name, s in list(sensors.items())[:SENSORS]:
+        numbers = f"{s['rate_hz']:6.1f} {1000 * s['jitter_s']:4.0f} ms {s.get('lost', 0):6d} {s['bad_taxels']:4d}"
+        touched = "  touched" if s.get("touched") else ""
+        tail = f"{s['drift']:6.1f} {s.get('gestures', 0):8d}  {s['grid']}{touched}"
+        yield f"{name[:16]:<16} {s['state']:<9} {numbers} {tail}"
+    if len(sensors) > SENSORS:
+        yield f"and {len(sensors) - SENSORS} more"
+
+
+def _recent(recent: list[dict[str, Any]]) -> Iterator[str]:
+    for line in recent[-5:]:
+        clock = datetime.fromtimestamp(line["time"]).strftime("%H:%M:%S")
+        confidence = "" if line["confidence"] is None else f"{line['confidence']:.2f}"
+        mark = "  (test)" if line["test"] else ""
+        yield f"  {clock}  {line['sensor'][:16]:<16} {line['answer']:<24} {confidence}{mark}"
+
+
+def _shift(shift: dict[str, Any]) -> str:
+    if not shift["outside"]:
+        return f"nothing to say yet ({shift['gestures']} gestures)"
+    shares = ", ".join(f"{NAMES.get(name, name)} {100 * share:.0f} %" for name, share in shift["outside"].items())
+    verdict = "unlike the training data" if shift["unlike"] else "as in training"
+    return f"{verdict}; outside its range (2 % expected) in {shift['gestures']} gestures: {shares}"
+
+
+def _span(seconds: float) -> str:
+    hours, rest = divmod(int(seconds), 3600)
+    return f"{hours} h {rest // 60} min" if hours else f"{rest // 60} min {rest % 60} s"

@@ -1,0 +1,130 @@
+"""A tape through the same code as in the daemon, without one: decode, stamp, recognise, event for event."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+from gestured.core.conditioning import Mounting
+from gestured.core.errors import RecordingError
+from gestured.core.events import Event
+from gestured.core.frames import Frame
+from gestured.core.recognizer import Classifier, FrontEnd, Recognizer
+from gestured.core.segmentation import Timing
+from gestured.core.stamping import Stamper
+from gestured.core.wire import Addresses, Arrival, Decoder
+from gestured.owner import Owner
+from gestured.tape import Packet, Tape
+
+
+class Scene:
+    """The part of a tape's `scene` that decides. Raises RecordingError for one that says something else."""
+
+    def __init__(self, scene: Mapping[str, Any], rows: int, columns: int) -> None:
+        """`rows` x `columns` is the model's grid, which holds where nothing else was set."""
+        settings = scene.get("settings")
+        if not isinstance(settings, dict):
+            raise RecordingError("scene.settings: expected the daemon's settings")
+        try:
+            self.gestures: list[str] = [str(name) for name in scene["gestures"]]
+            self.addresses = Addresses(settings["addresses"]["pressure"], settings["addresses"]["trajectory"])
+            self.stale_s = float(settings["stale_s"])
+            self._grid = (rows, columns) if settings["grid"] is None else tuple(settings["grid"])
+            self._clock = settings["clock"]
+            self._sensors: Mapping[str, Any] = dict(settings["sensors"])
+            parts: Mapping[str, Any] = dict(settings["per_gesture"])
+            self.thresholds = {n: float(p["threshold"]) for n, p in parts.items() if p["threshold"] is not None}
+            self.refractory = {n: float(p["refractory_s"]) for n, p in parts.items()}
+            for name in self._sensors:
+                self.grid(name), self.front_end(name), self.stamper(name)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise RecordingError(
+                f"scene: expected gestures and settings as the daemon writes them: {error!r}"
+            ) from None
+
+    def grid(self, name: str) -> tuple[int, int]:
+        """Rows and columns of a sensor's frames, as they are sent."""
+        rows, columns = self._sensors.get(name, {}).get("grid") or self._grid
+        if not (2 <= int(rows) <= 64 and 2 <= int(columns) <= 64):
+            raise ValueError(f"a grid of {rows} x {columns}")
+        return int(rows), int(columns)
+
+    def front_end(self, name: str) -> FrontEnd:
+        """A sensor's, new."""
+        own = self._sensors.get(name, {})
+        return FrontEnd(
+            name,
+            *self.grid(name),
+            mounting=Mounting(own.get("rotate", 0), own.get("mirror", False)),
+            wait_for_double_tap="double_tap" in self.gestures,
+            timing=Timing(stale_s=self.stale_s),
+        )
+
+    def stamper(self, name: str) -> Stamper:
+        """A sensor's, new."""
+        clock = self._sensors.get(name, {}).get("clock") or self._clock
+        if clock not in ("arrival", "sensor"):
+            raise ValueError(f"clock: {clock!r}")
+        return Stamper(clock)
+
+
+class Stream:
+    """One sensor's."""
+
+    def __init__(self, scene: Scene, name: str, packet: Packet, classifier: Classifier) -> None:
+        self.owner = Owner(packet.source)
+        self.stamper = scene.stamper(name)
+        self.recognizer = Recognizer(
+            scene.front_end(name),
+            classifier,
+            gestures=scene.gestures,
+            thresholds=scene.thresholds,
+            refractory=scene.refractory,
+        )
+        self.ready: float | None = None  # s, when it was first known
+
+    def take(self, arrivals: Sequence[Arrival], now: float) -> Iterator[Event]:
+        """Push frames that were found waiting at `now` s."""
+        for arrival, stamp in zip(arrivals, self.stamper.stamp(arrivals, now), strict=True):
+            if stamp.dropped:
+                continue
+            if stamp.restarted:
+                yield from self.recognizer.reset()
+            yield from self.recognizer.push(Frame(stamp.t, arrival.values, arrival.touches, stamp.lost))
+            if self.ready is None and self.recognizer.front_end.ready:
+                self.ready = stamp.t
+
+
+class Replay:
+    """Plays a tape with a classifier. The events' times count from its first packet, at `epoch` (s since 1970)."""
+
+    def __init__(self, tape: Tape, classifier: Classifier, rows: int, columns: int) -> None:
+        self.scene = Scene(tape.scene, rows, columns)
+        self.streams: dict[str, Stream] = {}
+        self._start = tape.packets[0].t_ns if tape.packets else 0
+        self.epoch = self._start / 1e9
+        self._tape, self._classifier = tape, classifier
+        self._decoder = Decoder(self.scene.addresses, self.scene.grid, keep_touches=False)
+
+    def events(self) -> Iterator[Event]:
+        """All that comes of it, to the end, where every sensor falls silent."""
+        now = 0.0
+        for t_ns, packets in groupby(self._tape.packets, lambda packet: packet.t_ns):
+            now = (t_ns - self._start) / 1e9
+            yield from self._silent(now)
+            waiting: dict[str, list[Arrival]] = {}
+            for packet in packets:
+                for arrival in self._decoder.decode(packet.data, packet.source)[0]:
+                    name = arrival.sensor
+                    if name not in self.streams:
+                        self.streams[name] = Stream(self.scene, name, packet, self._classifier)
+                    if self.streams[name].owner.admits(packet.source, now, self.scene.stale_s):
+                        waiting.setdefault(name, []).append(arrival)
+            for name, arrivals in waiting.items():
+                yield from self.streams[name].take(arrivals, now)
+        for stream in self.streams.values():
+            yield from stream.recognizer.flush(stream.stamper.at(now + self.scene.stale_s))
+
+    def _silent(self, now: float) -> Iterator[Event]:
+        for stream in self.streams.values():
+            if now - stream.owner.heard > self.scene.stale_s:
+                yield from stream.recognizer.flush(stream.stamper.at(now))
