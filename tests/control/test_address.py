@@ -1,0 +1,33 @@
+"""Which daemon gesturectl talks to when nobody says so."""
+
+from pathlib import Path
+
+import pytest
+
+from gestured.control import address
+
+
+@pytest.fixture
+def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The installed service's socket, in a folder that is not there yet."""
+    path = tmp_path / "run" / "events.sock"
+    monkeypatch.setattr(address, "SYSTEM", path)
+    return path
+
+
+def test_a_daemon_of_ones_own_comes_before_the_installed_service(tmp_path: Path, system: Path):
+    own = tmp_path / "gestured" / "events.sock"
+    environ = {"XDG_RUNTIME_DIR": str(tmp_path)}
+    assert address.default_socket(environ) == own
+    system.parent.mkdir()
+    assert address.default_socket(environ) == system
+    assert address.default_control(environ) == system.with_suffix(".ctl")
+    own.parent.mkdir()
+    own.touch()
+    assert address.default_socket(environ) == own
+
+
+def test_what_the_environment_says_comes_first(tmp_path: Path, system: Path):
+    system.parent.mkdir()
+    assert address.default_socket({"GESTURED_SOCKET": "/a/b.sock", "RUNTIME_DIRECTORY": "/c"}) == Path("/a/b.sock")
+    assert address.default_socket({"RUNTIME_DIRECTORY": "/c:/d"}) == Path("/c/events.sock")
