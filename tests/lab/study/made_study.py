@@ -224,7 +224,7 @@ def _run_time(method: str, chance: random.Random) -> list[Study]:
                 "method": method,
                 "settings": "tuned",
                 "precision": precision,
-                **_between(_strength(method)),
+                **_between(_strength(method) + chance.uniform(-0.03, 0.02)),
                 **times,
                 **sizes,
             }

@@ -246,3 +246,25 @@ def test_a_quick_run_says_that_its_figures_mean_nothing(study: Study, page: str,
 
 def test_the_same_study_gives_the_same_page(study: Study, page: str, tmp_path: Path) -> None:
     assert report(study, tmp_path) == page
+
+
+def _luminance(colour: str) -> float:
+    """Relative luminance of #rrggbb (WCAG 2.1)."""
+    channels = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    return sum(weight * c for weight, c in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+
+def _contrast(one: str, other: str) -> float:
+    darker, lighter = sorted((_luminance(one), _luminance(other)))
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+@pytest.mark.parametrize("scheme", [0, 1], ids=["light", "dark"])
+def test_words_and_marks_stand_out_from_the_page(scheme: int, page: str) -> None:
+    colours = dict(re.findall(r"--(\w+): (#\w{6});", page.split(":root {")[1 + scheme].split("}")[0]))
+    for ground in ("page", "card"):
+        for words in ("ink", "soft", "link", "f0"):
+            assert _contrast(colours[words], colours[ground]) >= 4.5, (words, ground)
+    for mark in ("f0", "f1", "f2", "f3", "f4", "deep", "miss"):
+        assert _contrast(colours[mark], colours["page"]) >= 3.0, mark

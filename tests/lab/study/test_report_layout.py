@@ -1,4 +1,4 @@
-"""The report in a real browser, at the width of a phone and of a desk: nothing sticks out, no names collide."""
+"""The report in a real browser, on a phone and on a desk: nothing sticks out, no names collide, tables sort."""
 
 import html
 import json
@@ -37,7 +37,11 @@ frame.addEventListener("load", () => {
   const wide = [...page.querySelectorAll("main *")]
     .filter((part) => !part.closest(".scroll, svg") && part.getBoundingClientRect().right > window.innerWidth + 1)
     .map((part) => part.outerHTML.slice(0, 80));
-  const found = { inner: window.innerWidth, scroll: root.scrollWidth, clipped, collided, wide };
+  const table = page.querySelector("#figures table"), last = table?.tHead.rows[0].cells.length - 1;
+  const shares = () => [...table.tBodies[0].rows].map((row) => parseFloat(row.cells[last].textContent));
+  const sort = () => (table.tHead.rows[0].cells[last].querySelector("button").click(), shares());
+  const sorted = table ? [sort(), sort()] : [];
+  const found = { sorted, inner: window.innerWidth, scroll: root.scrollWidth, clipped, collided, wide };
   document.body.dataset.found = JSON.stringify(found);
 });
 """
@@ -61,12 +65,14 @@ def measured(page: Path, width: int) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("width", [400, 1400])
-def test_only_boxes_scroll_and_all_words_can_be_read(width: int, tmp_path: Path) -> None:
+def test_only_boxes_scroll_all_words_can_be_read_and_tables_sort(width: int, tmp_path: Path) -> None:
     found = measured(write_report(made_study(), tmp_path), width)
     assert found["inner"] == width
     assert found["scroll"] <= width and found["wide"] == []
     assert found["clipped"] == []
     assert found["collided"] == []
+    down, up = found["sorted"]
+    assert down == sorted(down, reverse=True) and up == sorted(down) and up != down
 
 
 def test_a_page_with_nothing_on_it_fits_too(tmp_path: Path) -> None:

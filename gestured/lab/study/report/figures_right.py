@@ -15,6 +15,7 @@ FORMS = {  # of the protocols: form and colour
     "online": ("diamond", "f4 v0"),
 }
 CELL = 27.0  # of a confusion matrix
+DEEPEST = 0.58  # of a colour behind a number that must be read, on a light and on a dark page
 
 
 def overview(study: Study) -> Markup:
@@ -115,17 +116,14 @@ def _confusion(study: Study, method: str, names: list[str]) -> Markup:
 
 def _square(j: int, k: int, count: int, share: float, edge: float, names: list[str]) -> Markup:
     x, y = edge + CELL * k, edge + CELL * j
-    kind = "hit" if j == k else "miss"
-    # A square root, so that the few that go wrong are seen beside the many that do not.
-    depth = share if j == k else min(1.0, share**0.5 * 1.25)
-    box = tag("rect", x=x + 0.5, y=y + 0.5, width=CELL - 1, height=CELL - 1, class_="ground")
-    shade = tag(
-        "rect", x=x + 0.5, y=y + 0.5, width=CELL - 1, height=CELL - 1, class_=kind, fill_opacity=round(depth, 3)
-    )
+    place = {"x": x + 0.5, "y": y + 0.5, "width": CELL - 1, "height": CELL - 1}
+    box = tag("rect", **place, class_="ground")
     if not count:
         return box
-    dark = " on" if depth > 0.55 else ""
-    written = text(x + CELL / 2, y + CELL / 2 + 4, f"{100 * share:.0f}", "middle", f"count{dark}")
+    # A square root, so that the few that go wrong are seen beside the many that do not.
+    depth = DEEPEST * (share if j == k else min(1.0, share**0.5 * 1.25))
+    shade = tag("rect", **place, class_="hit" if j == k else "miss", fill_opacity=depth)
+    written = text(x + CELL / 2, y + CELL / 2 + 4, f"{100 * share:.0f}", "middle", "count")
     words = f"{formats.plain(names[j])} taken for {formats.plain(names[k])}: {count}, {100 * share:.1f} %"
     return tag("g", tag("title", words), box, shade, written)
 
@@ -141,7 +139,7 @@ def _most_often(matrix: list[list[int]], names: list[str]) -> str:
     if not wrong:
         return "No gesture is taken for another."
     told = [
-        f"{formats.plain(names[j])} for {formats.plain(names[k])} ({count} of {total})"
+        f"{formats.plain(names[j])} taken for {formats.plain(names[k])} ({count} of {total})"
         for _, count, total, j, k in sorted(wrong, reverse=True)[:2]
     ]
-    return "Most often " + ", then ".join(told) + "."
+    return "Most often: " + ", then ".join(told) + "."
