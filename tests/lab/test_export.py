@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from gestured.core.frames import Segment  # noqa: E402
 from gestured.core.window import Window  # noqa: E402
 from gestured.lab.export import export_forest, export_net, write_manifest  # noqa: E402
 from gestured.lab.forest_graph import forest_outputs  # noqa: E402
+from gestured.lab.recordings.origin import Origin, said  # noqa: E402
 from gestured.models import open_model  # noqa: E402
 
 GESTURES = ("one_tap", "swipe_up", "swipe_left")
@@ -243,6 +245,15 @@ def test_forest_that_does_not_fit_is_not_written(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="temperature"):
         export_forest(forest(3), path, **{**CARD, "calibration": {"temperature": 0}}, features=FEATURES)
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("learned", [None, [], [Origin("07.npz", "0" * 64, ["07", "A-1"])]])
+def test_a_model_says_whose_recordings_it_learned_from(learned: list[Origin] | None, tmp_path: Path) -> None:
+    path = tmp_path / "model.onnx"
+    people = None if learned is None else [asdict(one) for one in learned]
+    export_forest(forest(5), path, **CARD, features=FEATURES, learned_from=people)
+    assert said(path) == learned
+    assert open_model(path).gestures == GESTURES
 
 
 # --- the manifest ---

@@ -1,0 +1,68 @@
+"""docs/collecting.md: its commands run, in its order, on what they speak of."""
+
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gestured.control.cli import parser as gesturectl_parser
+from gestured.core.frames import Frame
+from gestured.lab.cli import main, parser
+from gestured.lab.recordings.protocol import Trial
+from gestured.lab.recordings.quality import Take
+from gestured.lab.recordings.session import recording
+from gestured.lab.recordings.store import join, touched
+from gestured.recording import read, write
+from gestured.simulator import GESTURES, Participant, Sensor, generator, gesture_take
+from tests.lab.recordings.test_import import capfingerid_lines, csv_lines, take, written
+
+DOCUMENT = Path(__file__).resolve().parents[3] / "docs" / "collecting.md"
+LINES = "".join(re.findall(r"^```sh\n(.*?)^```$", DOCUMENT.read_text(), re.MULTILINE | re.DOTALL)).splitlines()
+NEEDS_A_SENSOR = "# needs a sensor"
+
+
+def collected(gesture: str) -> Take:
+    made = gesture_take(gesture, Participant(7), Sensor.nominal(day=7), generator(8, 1), "normal", 1)
+    marks = touched(made.frames, made.times)
+    assert marks is not None
+    frames = tuple(Frame(float(t), values) for t, values in zip(made.times, made.frames, strict=True))
+    return Take(frames, *marks, 1.0)
+
+
+def test_the_walk_through_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("recordings").mkdir()
+    takes = [recording(collected(g), Trial(g, "normal", 0), "07", "2026-01-31") for g in GESTURES]
+    write("recordings/07.npz", join(takes))
+    for name in ("left-1.csv", "left-2.csv"):
+        written(Path(name), csv_lines(take()))
+    written(Path("session.csv"), csv_lines(take(), 1e3))
+    written(Path("CapMatrix_P1_index_right.txt"), capfingerid_lines(["TAP"] * 20)[0])
+    ran = 0
+    for line in LINES:
+        program, *arguments = shlex.split(line, comments=True)
+        if line.endswith(NEEDS_A_SENSOR):  # test_collect runs such ones
+            (gesturectl_parser() if program == "gesturectl" else parser()).parse_args(arguments)
+            continue
+        assert program == "gestured-lab"
+        assert main(arguments) == 0, capsys.readouterr().err
+        assert capsys.readouterr().out
+        ran += 1
+    assert ran == 8
+    assert not Path("recordings/07.npz").exists()
+    more = read("more.npz")
+    assert more.labels.tolist() == ["swipe_left"] * 2
+    assert more.onsets is not None and np.all(more.onsets > 0)
+
+
+def test_each_verdict_of_the_table_is_one_that_the_program_gives() -> None:
+    package = Path(__file__).resolve().parents[3] / "gestured" / "lab" / "recordings"
+    code = "".join(path.read_text() for path in package.glob("*.py"))
+    verdicts = re.findall(r"^\| `([a-z ]+)`", DOCUMENT.read_text(), re.MULTILINE)
+    assert len(verdicts) >= 5
+    for verdict in verdicts:
+        assert verdict in code or verdict in ("r", "d", "p", "q"), verdict
