@@ -12,7 +12,7 @@ clients: set[asyncio.StreamWriter] = set()
 
 class Echo(asyncio.DatagramProtocol):
     def datagram_received(self, data: bytes, source: tuple[str, int]) -> None:
-        for client in clients:
+        for client in [c for c in clients if not c.is_closing()]:
             client.write(b'{"type":"echo"}\n')
 
 

@@ -50,7 +50,7 @@ def pressure(address: str, *values: float) -> None:
         scores = net(window / window.max().clamp(min=1e-6))[0]
     best = int(scores.argmax())
     line = json.dumps({"sensor": address, "gesture": best, "confidence": float(scores[best])}) + "\n"
-    for client in clients:
+    for client in [c for c in clients if not c.is_closing()]:
         client.write(line.encode())
 
 

@@ -1,0 +1,110 @@
+"""A scene pays for what it uses and for nothing else: what real daemons import, map, open and start."""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gestured.models import shipped
+from tests.daemon.harness import Daemon, Sensor
+
+NEVER = {"torch", "sklearn", "pywt", "matplotlib", "scipy", "onnx", "mcap"}
+EVERYTHING = ("--metrics", "127.0.0.1:0", "--publish", "osc://127.0.0.1:9", "--flight-recorder", "1")
+Start = Callable[..., Daemon]
+
+
+def imported(daemon: Daemon) -> set[str]:
+    """The packages that it has imported so far, as the interpreter itself reports them."""
+    names = re.findall(r"^import time:.*\| +(\S+)$", daemon.stderr(), re.MULTILINE)
+    return {name.partition(".")[0] for name in names}
+
+
+def libraries(daemon: Daemon) -> str:
+    """What is mapped into its memory."""
+    return Path(f"/proc/{daemon.process.pid}/maps").read_text()
+
+
+def count(daemon: Daemon, what: str) -> int:
+    """Its threads ("task") or descriptors ("fd")."""
+    return len(os.listdir(f"/proc/{daemon.process.pid}/{what}"))
+
+
+def used(start: Start, *flags: str, model: object = "cnn_lstm") -> Daemon:
+    """A daemon that has answered one swipe, with `python -X importtime`."""
+    if model in shipped() and not shipped()[str(model)].exists():
+        pytest.skip(f"{shipped()[str(model)]} is not there")
+    daemon = start("--clock", "sensor", *flags, model=model, python=("-X", "importtime"))
+    with_client = daemon.client().subscribe("gesture", "unknown")
+    sensor = Sensor(daemon, "armrest")
+    sensor.send(sensor.hand.idle(1.5) + sensor.hand.swipe("right") + sensor.hand.idle(1.0))
+    with_client.until(lambda line: line["type"] in ("gesture", "unknown"))
+    with_client.close()
+    return daemon
+
+
+SCENES = {
+    "minimal": (),
+    "metrics": ("--metrics", "127.0.0.1:0"),
+    "OSC out": ("--publish", "osc://127.0.0.1:9"),
+    "subset": ("--gestures", "swipe_left,swipe_right"),
+    "everything": EVERYTHING,
+}
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_no_scene_loads_what_belongs_to_training(start: Start, scene: str) -> None:
+    daemon = used(start, *SCENES[scene])
+    assert not imported(daemon) & NEVER
+    assert "libtorch" not in libraries(daemon)
+    assert "numpy" in imported(daemon)  # so that an empty report does not pass
+
+
+def test_the_metrics_library_comes_with_metrics_alone(start: Start) -> None:
+    assert "prometheus_client" not in imported(used(start, "--publish", "osc://127.0.0.1:9"))
+
+
+def test_the_metrics_library_comes_with_the_first_scrape(start: Start) -> None:
+    daemon = used(start, "--metrics", "127.0.0.1:0")
+    daemon.get("/metrics")
+    assert "prometheus_client" in imported(daemon)
+
+
+def test_a_daemon_without_metrics_has_no_http_thread_and_no_tcp_socket(start: Start) -> None:
+    daemon = used(start)
+    with_http = Path(f"/proc/{daemon.process.pid}/net/tcp").read_text()
+    own = {os.readlink(f"/proc/{daemon.process.pid}/fd/{fd}") for fd in os.listdir(f"/proc/{daemon.process.pid}/fd")}
+    listening = {line.split()[9] for line in with_http.splitlines()[1:] if line.split()[3] == "0A"}
+    assert not own & {f"socket:[{inode}]" for inode in listening}
+    assert "gestured.daemon.http" not in daemon.stderr()
+
+
+def test_threads_and_descriptors_of_http_are_there_with_metrics_alone(start: Start) -> None:
+    plain = used(start)
+    before = count(plain, "task"), count(plain, "fd")
+    plain.stop()
+    watched = used(start, "--metrics", "127.0.0.1:0")
+    watched.get("/healthz")
+    assert count(watched, "task") > before[0]
+    assert count(watched, "fd") > before[1]
+
+
+def test_the_forest_alone_opens_no_network(start: Start) -> None:
+    daemon = used(start, model="touch_pattern_rf")
+    assert "cnn_lstm" not in daemon.stderr() + libraries(daemon)
+    assert daemon.client().hello["model"] == "touch_pattern_rf"
+
+
+def test_the_explanation_names_what_is_left_out() -> None:
+    def explained(*flags: str) -> str:
+        command = [sys.executable, "-m", "gestured.daemon", "--model", "cnn_lstm", *flags, "--explain"]
+        return subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+
+    minimal, everything = explained(), explained(*EVERYTHING)
+    for text in ("no --metrics", "no --publish"):
+        assert text in minimal
+        assert text not in everything
+    assert "second tap" in explained("--gestures", "swipe_left,swipe_right")
