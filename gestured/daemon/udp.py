@@ -71,19 +71,20 @@ class Receiver:
         """Take what waits, at most a batch; says whether it has left something behind."""
         receive = self._sock.recvfrom
         waiting: list[tuple[bytes, Source]] = []
-        size, left = 0, False
+        room = BATCH_BYTES * (BATCH if self._rations.on(self._clock()) else 1)  # what is not served costs little
+        full = False
         try:
-            while len(waiting) < BATCH and size < BATCH_BYTES:
+            while len(waiting) < BATCH and room > 0:
                 datagram = receive(PACKET_BYTES)
                 waiting.append(datagram)
-                size += len(datagram[0])
-            left = True
+                room -= len(datagram[0])
+            full = True
         except (BlockingIOError, InterruptedError):
             pass
         except (OSError, MemoryError) as error:  # the network's complaint about something else; the socket goes on
             self._pipeline.drop("socket_error", error=str(error))
         now = self._clock()
-        served = self._rations.share(waiting, left, now)
+        served = self._rations.share(waiting, full, now)
         if len(served) < len(waiting):
             self._pipeline.drop("flood", count=len(waiting) - len(served))
             waiting = served
@@ -97,7 +98,7 @@ class Receiver:
                 self._pipeline.bug("in the decoding of a packet", source=source[0])
         for sensor, arrivals in batch.values():
             self._pipeline.take(sensor, arrivals, now)
-        return left
+        return full
 
     def _packet(
         self, packet: bytes, source: Source, now: float, batch: dict[str, tuple[Sensor, list[Arrival]]]

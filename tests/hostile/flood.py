@@ -1,0 +1,53 @@
+"""One source that sends far too much: `python -m tests.hostile.flood 127.0.0.1:9000 frames --seconds 5`."""
+
+import argparse
+import socket
+import sys
+import time
+
+import numpy as np
+
+from gestured.core import osc
+
+BURST = 50  # packets at a time; fifty microseconds of work
+
+
+def packets(kind: str) -> list[bytes]:
+    """What is sent in turn."""
+    values = np.full(81, 20.0, np.float32)
+    if kind == "rubbish":
+        return [b"x" * 340]
+    if kind == "frames":  # of one sensor
+        return [osc.encode_message("/flood/pressure", "f" * 81, (values,))]
+    if kind == "sensors":  # of a new sensor each time
+        return [osc.encode_message(f"/flood{i}/pressure", "f" * 81, (values,)) for i in range(1000)]
+    frame = osc.encode_message("/flood/pressure", "b", (bytes(81),))
+    return [osc.encode_bundle([frame] * 500)]  # "full": as many frames as a packet can hold
+
+
+def main() -> int:
+    """Send at the rate, or as fast as it goes; print how many packets a second went out."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("to")
+    parser.add_argument("kind", choices=("rubbish", "frames", "sensors", "full"))
+    parser.add_argument("--rate", type=float, default=50_000.0, help="packets a second")
+    parser.add_argument("--seconds", type=float, default=5.0)
+    args = parser.parse_args()
+    host, port = args.to.rsplit(":", 1)
+    what, sent = packets(args.kind), 0
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.connect((host, int(port)))
+        start = time.monotonic()
+        while (passed := time.monotonic() - start) < args.seconds:
+            if sent > passed * args.rate:
+                time.sleep(BURST / args.rate)
+                continue
+            for _ in range(min(BURST, max(1, int(args.rate / 100)))):
+                sock.send(what[sent % len(what)])
+                sent += 1
+    print(f"{args.kind}: {sent / args.seconds:.0f} packets/s", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
