@@ -3,7 +3,7 @@
 # Two environments: .venv holds the runtime alone (what a vehicle gets), .venv-dev what tests and training need.
 # A stamp in each says that it is complete, so that the second run asks pip for nothing and works offline.
 
-.PHONY: help demo test lint lab hostile fuzz soak clean
+.PHONY: help demo test lint bench lab hostile fuzz soak install uninstall system-test clean
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
 MAKEFLAGS += --no-builtin-rules
@@ -38,6 +38,9 @@ lint: .venv-dev/.dev  ## ruff and mypy
 	@.venv-dev/bin/ruff format --check .
 	@.venv-dev/bin/mypy
 
+bench: .venv-dev/.dev .venv-dev/.lab  ## speed as ratios measured side by side, some minutes: ARGS="--only decode start"
+	@.venv-dev/bin/python -m benchmarks $(ARGS)
+
 lab: .venv-dev/.dev .venv-dev/.lab  ## what training needs (torch), and how to train
 	@.venv-dev/bin/gestured-lab --help
 
@@ -57,6 +60,9 @@ soak: .venv-dev/.dev  ## a day compressed, then ten minutes of 20 sensors in rea
 install: PYTHON := $(or $(PYTHON),/usr/bin/python3)
 install: build/install/.ready  ## into DESTDIR, below PREFIX=/usr, for PYTHON=/usr/bin/python3: programs, units, pages
 	@deploy/install.sh build/install "$(DESTDIR)" "$(PREFIX)"
+
+uninstall:  ## remove what `make install` has put there; settings and account stay
+	@deploy/uninstall.sh "$(DESTDIR)" "$(PREFIX)"
 
 system-test: .venv-dev/.dev  ## install, boot a real systemd (root, systemd-nspawn), and treat the daemon badly
 	@.venv-dev/bin/python -m pytest -rs -s tests/systemd/system.py

@@ -1,10 +1,12 @@
 """`python -m benchmarks`: the table of speed. Example: python -m benchmarks --only decode recognise"""
 
 import argparse
+import json
 import os
 import platform
 import sys
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 
 from benchmarks.timing import Row
@@ -39,6 +41,7 @@ def main() -> int:
     parser.add_argument("--model", default="cnn_lstm", help="model to measure (cnn_lstm)")
     parser.add_argument("--only", nargs="+", metavar="PART", help="parts of the table")
     parser.add_argument("--scenes", action="store_true", help="the table of scenes instead")
+    parser.add_argument("--json", action="store_true", help="print the rows as JSON")
     args = parser.parse_args()
     if args.scenes:
         from benchmarks import scenes
@@ -49,16 +52,25 @@ def main() -> int:
     unknown = set(args.only or ()) - set(parts)
     if unknown:
         parser.error(f"--only: no part {', '.join(sorted(unknown))}; there are {', '.join(parts)}")
-    print(f"{machine()}\n\n| figure | gestured | against | ratio | to reach | |\n|---|---|---|---|---|---|", flush=True)
+    rows = []
+    if not args.json:
+        print(
+            f"{machine()}\n\n| figure | gestured | against | ratio | to reach | |\n|---|---|---|---|---|---|",
+            flush=True,
+        )
     for name in args.only or parts:
         try:
             found = parts[name]()
         except ImportError as error:
-            print(f"| {name} | not measured: {error} | | | | |", flush=True)
-            continue
+            found = Row(name, f"not measured: {error}", "", "", "", None)
         for row in found if isinstance(found, list) else [found]:
+            rows.append(asdict(row))
             verdict = {True: "reached", False: "not reached", None: ""}[row.reached]
-            print(f"| {row.figure} | {row.ours} | {row.against} | {row.ratio} | {row.goal} | {verdict} |", flush=True)
+            if not args.json:
+                cells = (row.figure, row.ours, row.against, row.ratio, row.goal, verdict)
+                print("| " + " | ".join(cells) + " |", flush=True)
+    if args.json:
+        print(json.dumps({"machine": machine(), "rows": rows}, indent=2))
     return 0
 
 

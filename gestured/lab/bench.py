@@ -1,14 +1,20 @@
 """What it costs here: replay in the process, start to ready, resident memory. Quote the ratios and the spread."""
 
 import argparse
+import importlib.util
 import json
 import os
 import platform
+import subprocess
+import sys
 import time
+from pathlib import Path
 from statistics import median
 from typing import Any
 
+import gestured
 from gestured.client.engine import Engine
+from gestured.core.errors import GesturedError
 from gestured.core.events import Gesture, Unknown
 from gestured.core.frames import Frame
 from gestured.core.recognizer import FrontEnd, Recognizer
@@ -18,6 +24,7 @@ from gestured.simulator import Participant, Sensor, Take, generator, session
 
 SECONDS = 300.0
 REPEATS = 5
+CHECKOUT = Path(gestured.__file__).parent.parent / "benchmarks"
 
 
 def _take() -> Take:
@@ -75,13 +82,29 @@ def run(args: argparse.Namespace) -> int:
         "start_to_ready_s": _spread(seconds),
         "resident_mib": _spread(memory),
     }
+    beside = ordinary(args.model)
     if args.json:
-        print(json.dumps(figures, indent=2))
+        print(json.dumps(figures | {"beside_an_ordinary_script": beside}, indent=2))
     else:
         for name, value in figures.items():
             text = "median {median}, {least} to {most}".format(**value) if isinstance(value, dict) else value
             print(f"{name:<24} {text}")
+        print("beside an ordinary script of python-osc and torch, which classifies each frame anew:")
+        for row in beside or [{"figure": f"not measured: needs torch, and a checkout with {CHECKOUT.name}/"}]:
+            print(f"  {row['figure']}: {row['ours']}, {row['against']}" if "ours" in row else f"  {row['figure']}")
     return 0
+
+
+def ordinary(model: str) -> list[dict[str, Any]] | None:
+    """What a user would otherwise write, beside gestured; None without torch or outside of a checkout."""
+    if not CHECKOUT.is_dir() or importlib.util.find_spec("torch") is None:
+        return None
+    command = [sys.executable, "-m", CHECKOUT.name, "--model", model, "--json", "--only", "ordinary", "latency"]
+    done = subprocess.run(command, cwd=CHECKOUT.parent, stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode:
+        raise GesturedError(f"{CHECKOUT}: the comparison failed, see above")
+    rows: list[dict[str, Any]] = json.loads(done.stdout)["rows"]
+    return [row for row in rows if "ordinary" in row["against"]]
 
 
 def _spread(values: list[float]) -> dict[str, float]:
