@@ -12,7 +12,7 @@ from gestured.lab.recordings import commands as recordings
 CACHE = Path(".cache/lab")
 MODELS = Path("models")
 REAL = Path("../shared/data")
-NEEDED = ("torch", "sklearn", "onnx", "mpmath")
+NEEDED = ("torch", "sklearn", "onnx", "mpmath", "pywt")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -60,6 +60,14 @@ def parser() -> argparse.ArgumentParser:
                     "gestured-lab stability --quick")  # fmt: skip
     stability.add_argument("--quick", action="store_true", help="some seconds instead of some minutes")
     stability.add_argument("--out", type=Path, help="folder for stability.svg, error against run time")
+    study = add("study", "compare every method of the paper, and some beyond it, under several protocols; "
+                "writes one HTML page, study.json and CSV files; goes on where it was interrupted",
+                "gestured-lab study --out report/ --jobs 2")  # fmt: skip
+    study.add_argument("--out", type=Path, default=Path("report"), help="folder for the report (report)")
+    study.add_argument("--recordings", type=Path, nargs="+", default=[], metavar="FILE", help="recordings of your own")
+    study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")
+    study.add_argument("--seed", type=int, default=0, help="of splits and training: same seed, same numbers (0)")
+    add_data(study)
     recordings.add(add)
     return top
 
@@ -81,6 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             from gestured.lab import commands
             from gestured.lab.stability import command as stability
+            from gestured.lab.study import study
         except ModuleNotFoundError as error:
             package = (error.name or "").split(".")[0]
             if package not in NEEDED:
@@ -88,6 +97,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from None
         if args.command == "stability":
             return stability.run(args)
+        if args.command == "study":
+            args.words = " ".join(["gestured-lab", *(sys.argv[1:] if arguments is None else arguments)])
+            return study.run(args)
         args.cache.mkdir(parents=True, exist_ok=True)
         if args.command == "evaluate":
             return commands.evaluate_models(args)

@@ -1,0 +1,114 @@
+"""Checkpoints and the schedule: what is computed is not computed again, on one machine or on a cluster.
+
+A cell's file is named by a digest of the code that shapes it, its data and its task; it is written by the process
+that collects the results, so that workers on other machines need no common folder.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from joblib import Parallel, delayed, parallel_config
+
+import gestured.core
+import gestured.lab
+from gestured.core.errors import GesturedError
+from gestured.lab.progress import progress
+from gestured.lab.study.material import Data
+from gestured.lab.study.protocols import Result, Task, run
+
+SHAPING = (  # the rooms whose code decides what a cell's numbers are
+    "dataset", "fit", "nets", "trajectory", "study/shifting", "study/wavelets", "study/touch_patterns",
+    "study/motion_history", "study/trajectory_boosting", "study/nets", "study/training", "study/methods",
+    "study/material", "study/protocols", "study/elapsed",
+)  # fmt: skip
+
+
+def code_digest() -> str:
+    """Of everything that shapes a cell, besides its data and its task."""
+    lab = Path(str(gestured.lab.__file__)).parent
+    core = sorted(Path(str(gestured.core.__file__)).parent.glob("*.py"))
+    total = hashlib.sha256()
+    for path in [*core, *(lab / f"{room}.py" for room in SHAPING)]:
+        total.update(path.read_bytes())
+    return total.hexdigest()
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Where work is done and kept."""
+
+    cache: Path
+    jobs: int
+    cluster: str | None = None  # a Dask scheduler's address
+
+    def path(self, task: Task, data: Data) -> Path:
+        """A cell's file."""
+        key = json.dumps([code_digest(), data.key, asdict(task)], sort_keys=True)
+        return self.cache / "cells" / f"{task.method}-{hashlib.sha256(key.encode()).hexdigest()[:20]}.json"
+
+    def results(self, tasks: Sequence[Task], sets: Mapping[str, Data], title: str) -> dict[Task, Result]:
+        """Every task's result, from its file where it was computed before."""
+        paths = {task: self.path(task, sets[task.data]) for task in tasks}
+        done = {task: _read(path) for task, path in paths.items() if path.exists()}
+        found = {task: result for task, result in done.items() if result is not None}
+        todo = [task for task in paths if task not in found]
+        for task, result in progress(self._computed(todo, sets), len(todo), title):
+            keep(paths[task], result)
+            found[task] = result
+        return found
+
+    def _computed(self, todo: Sequence[Task], sets: Mapping[str, Data]) -> Iterator[tuple[Task, Result]]:
+        if not todo:
+            return
+        with _backend(self.cluster, sets):
+            jobs = -1 if self.cluster else self.jobs
+            calls = (delayed(_compute)(task, sets[task.data]) for task in todo)
+            yield from Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2 * n_jobs", batch_size=1)(
+                calls
+            )
+
+
+def _compute(task: Task, data: Data) -> tuple[Task, Result]:
+    return task, run(task, data)
+
+
+@contextmanager
+def _backend(cluster: str | None, sets: Mapping[str, Data]) -> Iterator[None]:
+    """joblib's own processes, or Dask's workers behind a scheduler's address."""
+    if cluster is None:
+        with parallel_config(backend="loky", inner_max_num_threads=1):
+            yield
+        return
+    try:
+        from distributed import Client
+    except ModuleNotFoundError:
+        raise GesturedError("--cluster needs distributed: pip install 'gestured[cluster]'") from None
+    try:
+        client = Client(cluster, timeout=10)
+    except (OSError, ValueError) as error:
+        raise GesturedError(f"--cluster: no Dask scheduler answers at {cluster}: {error}") from None
+    with client, parallel_config(backend="dask", scatter=list(sets.values())):
+        yield
+
+
+def keep(path: Path, result: Any) -> None:
+    """Write a checkpoint, all or nothing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    part.write_text(json.dumps(result))
+    part.replace(path)
+
+
+def _read(path: Path) -> Result | None:
+    """A checkpoint; None where the file is damaged, so that it is computed again."""
+    try:
+        found: Result = json.loads(path.read_text())
+    except ValueError:
+        return None
+    return found

@@ -1,0 +1,117 @@
+"""The simulated cohort of 3060 as the study needs it: each gesture's segment, its window, and who did what and how.
+
+Every trial goes through the front end that the daemon runs. A trial whose gesture was not cut out is lost and
+counted; where several segments hold parts of it, the one that holds most of it stands for it.
+"""
+
+import hashlib
+import multiprocessing
+import signal
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import gestured.core
+import gestured.lab.dataset
+import gestured.simulator
+from gestured.core.frames import Segment
+from gestured.core.window import Window
+from gestured.lab.dataset import TRIALS, WINDOW, Performed, Samples, collect, cuts, matched
+from gestured.lab.progress import progress
+from gestured.simulator import Trial, cohort_take
+
+SEED = 0  # the cohort's
+
+
+@dataclass(frozen=True)
+class Cohort:
+    """G gestures that were cut out of the trials."""
+
+    frames: NDArray[np.float32]  # (N, R, C) counts above the baseline, one segment after the other
+    times: NDArray[np.float64]  # (N,) s
+    offsets: NDArray[np.int64]  # (G + 1,)
+    first: NDArray[np.int64]  # (G,) first touched frame within the segment
+    last: NDArray[np.int64]  # (G,) last one
+    noise: NDArray[np.float64]  # (G,) counts
+    trial: NDArray[np.int64]  # (G,) index into the cohort's plan
+    performed: int  # trials, cut out or not
+
+    def __len__(self) -> int:
+        return len(self.trial)
+
+    @property
+    def lost(self) -> int:
+        """Trials whose gesture was not cut out."""
+        return self.performed - len(self)
+
+    def segment(self, i: int) -> Segment:
+        """One gesture as the front end cut it."""
+        span = slice(self.offsets[i], self.offsets[i + 1])
+        return Segment(self.frames[span], self.times[span], int(self.first[i]), int(self.last[i]), float(self.noise[i]))
+
+    def trials(self) -> list[Trial]:
+        """What was performed, for each gesture."""
+        return [TRIALS[i] for i in self.trial]
+
+    @cached_property
+    def samples(self) -> Samples:
+        """Windows as the daemon's models see them."""
+        return self.windows(WINDOW)
+
+    def windows(self, window: Window) -> Samples:
+        """The gestures through another window."""
+        plan = self.trials()
+        return collect(
+            (window.apply(segment).astype(np.float16), trial.gesture, trial.gesture, trial.participant, _peak(segment))
+            for trial, segment in zip(plan, map(self.segment, range(len(self))), strict=True)
+        )
+
+
+def _peak(segment: Segment) -> float:
+    return float(segment.frames[segment.first : segment.last + 1].max()) / max(segment.noise, 1e-30)
+
+
+def _cut(seed: int, index: int) -> Segment | None:
+    """The segment that holds most of a trial's gesture."""
+    take = cohort_take(TRIALS[index], seed)
+    performed = [Performed(e.label, e.kind, e.participant, e.onset_s, e.offset_s) for e in take.events]
+    found = [segment for segment in cuts(take.frames, take.times) if any(matched([segment], performed))]
+    return max(found, key=lambda s: min(s.offset, performed[0].offset) - max(s.onset, performed[0].onset), default=None)
+
+
+def load(cache: Path, trials: NDArray[np.int64], jobs: int) -> Cohort:
+    """The cohort's gestures of these trials, from `cache` where they were made before."""
+    code = hashlib.sha256(trials.tobytes())
+    for package in (gestured.core, gestured.simulator):
+        for path in sorted(Path(str(package.__file__)).parent.glob("*.py")):
+            code.update(path.read_bytes())
+    for room in (gestured.lab.dataset.__file__, __file__):
+        code.update(Path(room).read_bytes())
+    path = cache / f"study-cohort-{len(trials)}-{code.hexdigest()[:12]}.npz"
+    if not path.exists():
+        with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+            made = pool.imap(partial(_cut, SEED), trials.tolist(), chunksize=30)
+            segments = list(progress(made, len(trials), "simulating the cohort"))
+        _write(path, trials, segments)
+    with np.load(path, allow_pickle=False) as stored:
+        return Cohort(**{name: stored[name] for name in stored.files}, performed=len(trials))
+
+
+def _write(path: Path, trials: NDArray[np.int64], segments: list[Segment | None]) -> None:
+    cut = [(index, segment) for index, segment in zip(trials, segments, strict=True) if segment is not None]
+    kept = [segment for _, segment in cut]
+    part = path.with_suffix(".part.npz")
+    np.savez(
+        part,
+        frames=np.concatenate([s.frames for s in kept]).astype(np.float32),
+        times=np.concatenate([s.times for s in kept]),
+        offsets=np.concatenate([[0], np.cumsum([len(s.frames) for s in kept])]).astype(np.int64),
+        first=np.array([s.first for s in kept], np.int64),
+        last=np.array([s.last for s in kept], np.int64),
+        noise=np.array([s.noise for s in kept]),
+        trial=np.array([index for index, _ in cut], np.int64),
+    )
+    part.replace(path)

@@ -1,0 +1,256 @@
+"""The registry: every method, its hyperparameters, and what the paper says it is worth.
+
+Hyperparameters `paper` are those of the paper's Table IV (it has one column for plain and one for augmented data);
+for the networks the paper gives the layers and the LSTM's width, the rest is ours. The best of `grid` is the tuned
+setting. Feature vectors are standardised over what is learned from before KNN and SVM, which the paper leaves open.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import ClassifierMixin
+from sklearn.ensemble import HistGradientBoostingClassifier, RandomForestClassifier
+from sklearn.neighbors import KNeighborsClassifier
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import SVC
+
+from gestured.lab.dataset import Samples
+from gestured.lab.study import training
+from gestured.lab.study.motion_history import motion_history_images
+from gestured.lab.study.touch_patterns import touch_pattern_features
+from gestured.lab.study.training import Images, Windows
+from gestured.lab.study.trajectory_boosting import trajectory_matrix
+from gestured.lab.study.wavelets import spatio_temporal_features
+
+Values = Mapping[str, Any]
+Indices = NDArray[np.int64]
+SPATIO_TEMPORAL, TOUCH_PATTERN, HISTORY = "spatio-temporal features", "touch-pattern features", "motion history image"
+RECURRENT, BEYOND = "recurrent", "beyond the paper"
+
+
+class Scorer(Protocol):
+    """What has been learned."""
+
+    def scores(self, inputs: Any, index: Indices) -> NDArray[np.float64]:
+        """(n, K) probabilities of the chosen inputs."""
+        ...
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """A fitted scikit-learn classifier."""
+
+    fitted: ClassifierMixin
+    classes: int
+
+    def scores(self, inputs: NDArray[np.float32], index: Indices) -> NDArray[np.float64]:
+        """(n, K); an SVM's decision values as a softmax, which is not calibrated."""
+        if hasattr(self.fitted, "predict_proba"):
+            found = self.fitted.predict_proba(inputs[index])
+        else:
+            values = self.fitted.decision_function(inputs[index])
+            powers = np.exp(values - values.max(axis=1, keepdims=True))
+            found = powers / powers.sum(axis=1, keepdims=True)
+        out = np.zeros((len(index), self.classes))
+        out[:, self.fitted.classes_] = found
+        return out
+
+
+def _nearest(values: Values, seed: int) -> ClassifierMixin:
+    return make_pipeline(StandardScaler(), KNeighborsClassifier(values["neighbours"]))
+
+
+def _forest(values: Values, seed: int) -> ClassifierMixin:
+    return RandomForestClassifier(values["trees"], max_depth=values["depth"], random_state=seed)
+
+
+def _vectors(values: Values, seed: int) -> ClassifierMixin:
+    machine = SVC(C=2.0 ** values["log2_c"], gamma=2.0 ** values["log2_gamma"], cache_size=400, random_state=seed)
+    return make_pipeline(StandardScaler(), machine)
+
+
+def _boosting(values: Values, seed: int) -> ClassifierMixin:
+    return HistGradientBoostingClassifier(
+        max_iter=values["rounds"], learning_rate=values["rate"], max_leaf_nodes=values["leaves"],
+        l2_regularization=1.0, early_stopping=False, random_state=seed,
+    )  # fmt: skip
+
+
+def _estimate(
+    build: Callable[[Values, int], ClassifierMixin],
+    inputs: NDArray[np.float32], index: Indices, labels: Indices, classes: int, values: Values, seed: int,
+) -> Estimator:  # fmt: skip
+    return Estimator(build(values, seed).fit(inputs[index], labels[index]), classes)
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to tell gestures apart."""
+
+    id: str
+    title: str
+    family: str
+    what: str  # one sentence
+    prepare: Callable[[Samples, Values, bool], Any]  # samples, hyperparameters, whether padding counts -> inputs
+    fit: Callable[[Any, Indices, Indices, int, Values, int], Scorer]  # inputs, chosen, labels, classes, values, seed
+    grid: tuple[Values, ...]  # candidates for tuning, whole sets of hyperparameters
+    paper: Mapping[str, Values] | None  # by augmentation; None beyond the paper
+    published: Mapping[str, float]  # the paper's share right, by augmentation
+    prepared_by: tuple[str, ...] = ()  # the hyperparameters that `prepare` looks at
+    slow: bool = False  # tuned on fewer batches
+    published_online: float | None = None
+
+    @property
+    def network(self) -> bool:
+        """Whether it is trained in batches."""
+        return "steps" in self.grid[0]
+
+    @property
+    def elapses(self) -> bool:
+        """Whether it can answer after every frame."""
+        return self.network and self.family != HISTORY
+
+
+def _wavelets(samples: Samples, values: Values, padded: bool) -> NDArray[np.float32]:
+    return spatio_temporal_features(samples, values["wavelet"], values["level"])
+
+
+def _touches(samples: Samples, values: Values, padded: bool) -> NDArray[np.float32]:
+    return touch_pattern_features(samples, values["features"])
+
+
+def _history(samples: Samples, values: Values, padded: bool) -> Images:
+    return Images(motion_history_images(samples, values["decay_s"]))
+
+
+def _windows(samples: Samples, values: Values, padded: bool) -> Windows:
+    return Windows(samples, padded)
+
+
+def _trajectories(samples: Samples, values: Values, padded: bool) -> NDArray[np.float32]:
+    return trajectory_matrix(samples)
+
+
+KINDS = {
+    "knn": ("k nearest neighbours", _nearest, [{"neighbours": k} for k in (1, 4, 7, 15)]),
+    "rf": ("random forest", _forest, [{"trees": 200, "depth": d} for d in (9, 14, 20)]),
+    "svm": (
+        "support vector machine (RBF)",
+        _vectors,
+        [{"log2_c": c, "log2_gamma": g} for c in (3, 7, 11) for g in (-11, -8, -5)],
+    ),
+}
+FOREST = {"trees": 200, "depth": 9}
+
+
+def _classical(
+    prefix: str, family: str, seen: str, prepare: Callable[[Samples, Values, bool], Any], given: Values,
+    variants: tuple[Values, ...], settings: Mapping[str, tuple[Values, Values]],
+    published: Mapping[str, tuple[float, float]],
+) -> list[Method]:  # fmt: skip
+    """KNN, forest and SVM on one set of features."""
+    out = []
+    for kind, (title, build, grid) in KINDS.items():
+        plain, augmented = settings[kind]
+        out.append(
+            Method(
+                f"{prefix}_{kind}",
+                f"{family}, {title}",
+                family,
+                f"{title.capitalize()} on {seen}.",
+                prepare,
+                partial(_estimate, build),
+                tuple({**v, **g} for v in variants for g in grid),
+                {"none": {**given, **plain}, "shift": {**given, **augmented}, "wide": {**given, **plain}},
+                dict(zip(("none", "shift"), published[kind], strict=True)),
+                tuple(given),
+                published_online=0.71 if (prefix, kind) == ("tp", "rf") else None,
+            )  # fmt: skip
+        )
+    return out
+
+
+HAAR = {"wavelet": "haar", "level": 3}
+STEPS = 800  # batches
+
+
+def _net(
+    kind: str, title: str, what: str, rates: tuple[float, ...], widths: tuple[int, ...],
+    published: tuple[float, float, float] | None,
+) -> Method:  # fmt: skip
+    channels = {"channels": 8} if kind.startswith("cnn_") else {}
+    grid = [{"units": u, "rate": r, "steps": STEPS, **channels} for u in widths for r in rates]
+    given = {"units": 32, "rate": rates[0], "steps": STEPS, **channels}
+    return Method(
+        kind, title, RECURRENT if published else BEYOND, what, _windows, partial(_sequence, kind), tuple(grid),
+        dict.fromkeys(("none", "shift", "wide"), given) if published else None,
+        {"none": published[0], "shift": published[1]} if published else {}, slow=True,
+        published_online=published[2] if published else None,
+    )  # fmt: skip
+
+
+def _sequence(
+    kind: str, inputs: Windows, index: Indices, labels: Indices, classes: int, values: Values, seed: int
+) -> Scorer:
+    return training.sequence(kind, inputs, index, labels, classes, dict(values), seed)
+
+
+def _images(inputs: Images, index: Indices, labels: Indices, classes: int, values: Values, seed: int) -> Scorer:
+    return training.history(inputs, index, labels, classes, dict(values), seed)
+
+
+HISTORY_GRID = [
+    {"decay_s": 0.0, "channels": c, "rate": r, "steps": STEPS} for c, r in ((8, 4e-3), (16, 2e-3), (16, 4e-3))
+]
+
+METHODS: dict[str, Method] = {
+    method.id: method
+    for method in [
+        *_classical(
+            "st", SPATIO_TEMPORAL, "statistics of the wavelet bands of each taxel's signal", _wavelets, HAAR, (HAAR,),
+            {
+                "knn": ({"neighbours": 7}, {"neighbours": 7}),
+                "rf": (FOREST, FOREST),
+                "svm": ({"log2_c": 7, "log2_gamma": -11}, {"log2_c": 9, "log2_gamma": -13}),
+            },
+            {"knn": (0.62, 0.79), "rf": (0.58, 0.96), "svm": (0.58, 0.98)},
+        ),
+        *_classical(
+            "tp", TOUCH_PATTERN, "pressure, contact area and duration, without the order of the frames", _touches,
+            {"features": "paper"}, ({"features": "paper"}, {"features": "daemon"}),
+            {
+                "knn": ({"neighbours": 4}, {"neighbours": 1}),
+                "rf": (FOREST, FOREST),
+                "svm": ({"log2_c": 13, "log2_gamma": -13}, {"log2_c": 9, "log2_gamma": -7}),
+            },
+            {"knn": (0.56, 0.98), "rf": (0.60, 0.98), "svm": (0.56, 0.97)},
+        ),
+        Method(
+            "mhi_cnn", "CNN on motion history images", HISTORY,
+            "Four convolutions with leaky ReLU and two fully connected layers on one image of the whole movement.",
+            _history, _images, tuple(HISTORY_GRID), dict.fromkeys(("none", "shift", "wide"), HISTORY_GRID[2]),
+            {"none": 0.77, "shift": 0.81}, ("decay_s",), slow=True,
+        ),
+        _net("lstm", "LSTM", "An LSTM of 32 units on the 81 taxels of each frame (81 -> 32 -> 10).", (8e-3, 4e-3),
+             (32, 64), (0.82, 0.97, 0.89)),
+        _net("cnn_lstm", "CNN-LSTM", "Two convolutions with ReLU and max-pooling on each frame, then an LSTM.",
+             (8e-3, 4e-3), (32,), (0.89, 0.97, 0.93)),
+        _net("cnn_gru", "CNN-GRU", "The same convolutions, then gated recurrent units: fewer weights than an LSTM.",
+             (8e-3, 4e-3), (32,), None),
+        _net("tcn", "causal TCN", "Dilated causal convolutions over the frames, 15 frames deep, and a running maximum.",
+             (4e-3, 2e-3), (32,), None),
+        _net("transformer", "small transformer", "Two layers of causal self-attention, four heads, 32 wide.",
+             (3e-3, 1.5e-3), (32,), None),
+        Method(
+            "trajectory_gb", "trajectory features, gradient boosting", BEYOND,
+            "Gradient boosting on where the centroid went, how it turned and how many fingers there were.",
+            _trajectories, partial(_estimate, _boosting),
+            tuple({"rounds": n, "rate": r, "leaves": 15} for n, r in ((40, 0.2), (80, 0.1))), None, {}, slow=True,
+        ),
+    ]
+}  # fmt: skip

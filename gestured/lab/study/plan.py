@@ -1,0 +1,34 @@
+"""How much is computed: the full study, and a quick one for tests whose figures are worth little."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.lab.dataset import TRIALS
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Every number that decides how long the study takes."""
+
+    seed: int = 0
+    quick: bool = False
+    folds: int = 5  # of participants, and of real subjects
+    steps: int | None = None  # batches for every network; None: as its hyperparameters say
+    tuning_steps: int = 300  # batches for networks while hyperparameters are compared
+    wide: int = 4_000  # takes of the wide stream to learn from; two thirds are gestures
+    real: int | None = None  # gestures of each real subject; None: all
+    learning: tuple[int, ...] = (2, 4, 8, 16)  # participants to learn from; the held-out protocol adds the last point
+    timed: int = 300  # gestures that the run time is measured on
+    minutes: float = 8.0  # of continuous sessions for each model
+
+    @classmethod
+    def small(cls, seed: int) -> "Plan":
+        """What takes at most two minutes on two cores."""
+        return cls(seed, True, folds=2, steps=40, tuning_steps=0, wide=0, real=40, learning=(), timed=40, minutes=0.0)
+
+    def trials(self) -> NDArray[np.int64]:
+        """Which of the cohort's trials are performed: all, or one in five of a third of the participants."""
+        chosen = [t.index for t in TRIALS if not self.quick or (t.participant % 3 == 0 and t.inclination == 1)]
+        return np.array(chosen, np.int64)

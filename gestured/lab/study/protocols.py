@@ -1,0 +1,128 @@
+"""Who learns and who is judged. One `Task` is one cell of a table; `run` computes it from the data alone.
+
+paper         85/15 by gesture, augmented before the split, padded or cut to equal length: copies of test gestures are
+              learned from, and padding is part of every input. The paper does not say its length; ours is the 90th
+              percentile of all gestures'.
+clean         85/15 by gesture, split first; only the training part is augmented; every window has its own length
+participants  whole participants are held out, in folds: everybody is judged once, by what has never seen them
+real          the same with the subjects of real recordings
+"""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.lab.study import elapsed
+from gestured.lab.study.material import SHIFT, Data, Pool, pool
+from gestured.lab.study.methods import METHODS, Indices, Scorer
+from gestured.lab.study.training import Net
+from gestured.simulator import GESTURES
+
+PAPER, CLEAN, PARTICIPANTS, REAL = "paper", "clean", "participants", "real"
+HELD_OUT = 0.15
+LENGTH = 0.9  # quantile of the lengths
+Result = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A cell: method, hyperparameters and data as the words say; `data` names one of the sets at hand."""
+
+    method: str
+    values: tuple[tuple[str, Any], ...]  # hyperparameters, sorted
+    augmentation: str
+    protocol: str
+    data: str
+    seed: int
+    folds: int
+    people: int = 0  # learn from so many participants only; 0: from all that are not held out
+    elapsed: bool = False  # ask the network in the middle of each gesture too
+
+
+def values_of(values: Any) -> tuple[tuple[str, Any], ...]:
+    """Hyperparameters as a task holds them."""
+    return tuple(sorted(dict(values).items()))
+
+
+def equal_frames(data: Data) -> int:
+    """The length that the paper's protocol brings all windows to."""
+    return int(np.quantile(data.gestures.lengths(), LENGTH))
+
+
+@lru_cache(maxsize=6)
+def _inputs(data: Data, augmentation: str, frames: int, method: str, prepared: tuple[tuple[str, Any], ...]) -> Any:
+    return METHODS[method].prepare(pool(data, augmentation, frames).samples, dict(prepared), frames > 0)
+
+
+def material(task: Task, data: Data) -> tuple[Pool, Any]:
+    """The pool of a task, and its method's view of it."""
+    frames = equal_frames(data) if task.protocol == PAPER else 0
+    prepared = tuple(item for item in task.values if item[0] in METHODS[task.method].prepared_by)
+    return pool(data, task.augmentation, frames), _inputs(data, task.augmentation, frames, task.method, prepared)
+
+
+def splits(task: Task, of: Pool) -> Iterator[tuple[Indices, Indices]]:
+    """(training, test) indices into the pool, fold by fold."""
+    rng = np.random.default_rng([task.seed, 0x59])
+    if task.protocol == PAPER:
+        order = rng.permutation(len(of.labels))
+        count = round(HELD_OUT * len(order))
+        yield order[count:], order[:count]
+        return
+    if task.protocol == CLEAN:
+        order = rng.permutation(of.gestures)
+        held = order[: round(HELD_OUT * len(order))]
+        yield np.flatnonzero(~np.isin(of.source, held)), held
+        return
+    people = of.samples.people[: of.gestures]
+    everybody = rng.permutation(np.unique(people))
+    for fold in np.array_split(everybody, min(task.folds, len(everybody))):
+        others = everybody[~np.isin(everybody, fold)]
+        taught = others[: task.people] if task.people else others
+        owner = np.where(of.source >= 0, people[of.source], taught[0])  # strangers may always be learned from
+        yield np.flatnonzero(np.isin(owner, taught)), np.flatnonzero(np.isin(people, fold))
+
+
+def fitted(task: Task, inputs: Any, train: Indices, labels: NDArray[np.int64]) -> Scorer:
+    """The task's method, fitted to a part of its inputs."""
+    return METHODS[task.method].fit(inputs, train, labels, len(GESTURES), dict(task.values), task.seed)
+
+
+def run(task: Task, data: Data) -> Result:
+    """Every judged gesture of a cell: whose it was, what it was, what it was called and how surely.
+
+    `same` and `version` (the paper's protocol alone): whether the very same window, and whether any shifted version
+        of the same gesture, was learned from. `elapsed`, where asked for: right or not at each of `elapsed.POINTS`.
+    """
+    of, inputs = material(task, data)
+    found: dict[str, list[Any]] = {n: [] for n in ("source", "person", "truth", "predicted", "confidence", "fold")}
+    seen: dict[str, list[bool]] = {"same": [], "version": []}
+    early: list[list[bool]] = []
+    taught, seconds = 0, 0.0
+    for fold, (train, test) in enumerate(splits(task, of)):
+        start = time.perf_counter()
+        model = fitted(task, inputs, train, of.labels)
+        seconds += time.perf_counter() - start
+        taught += len(train)
+        scores = model.scores(inputs, test)
+        found["source"] += of.source[test].tolist()
+        found["person"] += of.samples.people[test].tolist()
+        found["truth"] += of.labels[test].tolist()
+        found["predicted"] += scores.argmax(axis=1).tolist()
+        found["confidence"] += scores.max(axis=1).round(4).tolist()
+        found["fold"] += [fold] * len(test)
+        if task.protocol == PAPER and task.augmentation == SHIFT:
+            itself = of.source[train][of.same[train]]  # gestures that are learned from as they are
+            seen["same"] += (of.same[test] & np.isin(of.source[test], itself)).tolist()
+            seen["version"] += np.isin(of.source[test], of.source[train]).tolist()
+        if task.elapsed:
+            assert isinstance(model, Net)
+            named = elapsed.answers(model, of.samples, test, task.seed)
+            early += (named == of.labels[test, None]).tolist()
+    folds = found["fold"][-1] + 1
+    return {**found, **seen, "elapsed": early, "train": taught // folds, "seconds": round(seconds, 3)}

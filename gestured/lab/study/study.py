@@ -1,0 +1,120 @@
+"""`gestured-lab study`, put together: data, hyperparameters, cells, and every section of study.json."""
+
+import argparse
+import csv
+import json
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import torch
+
+import gestured
+from gestured.core.errors import GesturedError
+from gestured.lab.cli import REAL
+from gestured.lab.dataset import NONE, Samples, simulated
+from gestured.lab.study import cohort, elapsed, own, tables
+from gestured.lab.study.cells import Schedule
+from gestured.lab.study.machine import machine
+from gestured.lab.study.material import Data
+from gestured.lab.study.methods import METHODS, Values
+from gestured.lab.study.plan import Plan
+from gestured.lab.study.tuning import tune
+from gestured.simulator import GESTURES
+
+WIDE_SEED = 1  # of the stream that the shipped models learn from as well
+
+
+def run(args: argparse.Namespace) -> int:
+    """`gestured-lab study`."""
+    if args.jobs < 1:
+        raise GesturedError(f"--jobs: expected 1 or more, found {args.jobs}")
+    if args.real != REAL and not args.real.is_dir():
+        raise GesturedError(f"--real: {args.real} is no folder")
+    torch.set_num_threads(1)
+    plan = Plan.small(args.seed) if args.quick else Plan(args.seed)
+    study = compute(plan, Schedule(args.cache / "study", args.jobs, args.cluster), args.real, args.recordings)
+    study["about"]["command"] = args.words
+    args.out.mkdir(parents=True, exist_ok=True)
+    write(study, args.out)
+    from gestured.lab.study.report import write_report
+
+    page = write_report(study, args.out)
+    print(json.dumps(study, indent=2) if args.json else f"{page}: {study['machine']['minutes']} minutes")
+    return 0
+
+
+def compute(plan: Plan, schedule: Schedule, folder: Path, recordings: Sequence[Path]) -> dict[str, Any]:
+    """Everything that study.json holds."""
+    start = time.monotonic()
+    schedule.cache.mkdir(parents=True, exist_ok=True)
+    mine = own.own(recordings)  # first, so that a wrong file is told of before half an hour of work
+    people = cohort.load(schedule.cache, plan.trials(), schedule.jobs)
+    real = own.real(folder, plan.real)
+    wide = _strangers(plan, schedule)
+    sets = {"simulated": Data.of("simulated", people.samples, wide)}
+    if real:
+        sets["real"] = Data.of("real", real[0], wide)
+    if mine.samples is not None:
+        sets["own"] = Data.of("own", mine.samples)
+    tuned, tuning = tune(plan, sets, schedule)
+    cells = tables.wanted(plan, sets)
+    tasks = {cell: tables.task_of(cell, tuned, plan) for cell in cells}
+    results = schedule.results(list(tasks.values()), sets, "cells")
+    found = {cell: results[task] for cell, task in tasks.items()}
+    study: dict[str, Any] = {
+        "about": {
+            "version": gestured.__version__, "command": "", "seed": plan.seed, "quick": plan.quick,
+            "gestures": list(GESTURES),
+        },
+        "machine": machine(),
+        "data": {
+            "simulated": {
+                "name": f"gestured's simulator, cohort seed {cohort.SEED}",
+                "participants": len({trial.participant for trial in people.trials()}),
+                "performed": people.performed, "cut": len(people), "lost": people.lost,
+            },
+            "real": real[1] if real else None, "own": mine.files, "left_out": mine.left_out,
+        },
+        "methods": {method.id: _about(method.id, tuned) for method in METHODS.values()},
+        "cells": [tables.row(cell, result) for cell, result in found.items()],
+        "copies": tables.copies(found),
+        "tuning": tuning,
+        "elapsed": tables.elapsed_rows(found, elapsed.POINTS),
+        "calibration": tables.calibration(found),
+    }  # fmt: skip
+    study["machine"]["minutes"] = round((time.monotonic() - start) / 60, 1)
+    return study
+
+
+def _strangers(plan: Plan, schedule: Schedule) -> Samples | None:
+    """Gestures of other people on randomised sensors."""
+    if not plan.wide:
+        return None
+    found = simulated(schedule.cache, "wide", WIDE_SEED, plan.wide, schedule.jobs)
+    return found.take(found.labels != NONE)
+
+
+def _about(name: str, tuned: Mapping[str, Values]) -> dict[str, Any]:
+    method = METHODS[name]
+    given = {k: dict(v) for k, v in method.paper.items()} if method.paper else None
+    return {
+        "title": method.title, "family": method.family, "paper": method.paper is not None, "what": method.what,
+        "hyperparameters": {"paper": given, "tuned": dict(tuned[name])},
+    }  # fmt: skip
+
+
+def write(study: Mapping[str, Any], out: Path) -> None:
+    """study.json, and a CSV file for each section that is a table."""
+    part = out / "study.json.part"
+    part.write_text(json.dumps(study))
+    part.replace(out / "study.json")
+    for name in ("cells", "copies", "run_time", "learning", "online"):
+        rows = [{k: v for k, v in row.items() if not isinstance(v, list | dict)} for row in study.get(name, [])]
+        if not rows:
+            continue
+        with (out / f"{name}.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
+            writer.writeheader()
+            writer.writerows(rows)

@@ -1,0 +1,156 @@
+"""The main tables: which cells there are, and what each says."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.lab.study.bootstrap import summary
+from gestured.lab.study.material import AUGMENTATIONS, NONE, SHIFT, WIDE, Data
+from gestured.lab.study.methods import METHODS, Method, Values
+from gestured.lab.study.plan import Plan
+from gestured.lab.study.protocols import CLEAN, PAPER, PARTICIPANTS, REAL, Result, Task, values_of
+from gestured.simulator import GESTURES
+
+GIVEN, TUNED = "paper", "tuned"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A place in a table."""
+
+    method: str
+    settings: str
+    augmentation: str
+    protocol: str
+    data: str
+
+
+def wanted(plan: Plan, sets: Mapping[str, Data]) -> list[Cell]:
+    """The cells of all tables; what goes beyond the paper has tuned hyperparameters alone."""
+    cells = []
+    for method in METHODS.values():
+        for settings in (GIVEN, TUNED) if method.paper else (TUNED,):
+            for data in sets.values():
+                for protocol in (PAPER, CLEAN, PARTICIPANTS) if data.name != "real" else (REAL,):
+                    for augmentation in AUGMENTATIONS:
+                        if _skipped(plan, method, settings, protocol, augmentation, data):
+                            continue
+                        cells.append(Cell(method.id, settings, augmentation, protocol, data.name))
+    return cells
+
+
+def _skipped(plan: Plan, method: Method, settings: str, protocol: str, augmentation: str, data: Data) -> bool:
+    if augmentation == WIDE:  # it leads to other people and other sensors: asked there alone
+        return data.wide is None or protocol not in (PARTICIPANTS, REAL) or settings != TUNED
+    if data.name != "simulated" and augmentation == SHIFT and settings == GIVEN:
+        return True
+    return plan.quick and (settings == GIVEN) and method.network
+
+
+def task_of(cell: Cell, tuned: Mapping[str, Values], plan: Plan) -> Task:
+    """What has to be computed for a cell."""
+    method = METHODS[cell.method]
+    values = dict(tuned[cell.method])
+    if cell.settings == GIVEN:
+        assert method.paper is not None
+        values = dict(method.paper[cell.augmentation])
+    early = (cell.settings, cell.augmentation, cell.protocol) == (TUNED, SHIFT, PARTICIPANTS)
+    return task(method, values, cell.augmentation, cell.protocol, cell.data, plan, elapsed=early and method.elapses)
+
+
+def task(
+    method: Method, values: Values, augmentation: str, protocol: str, data: str, plan: Plan,
+    *, people: int = 0, elapsed: bool = False,
+) -> Task:  # fmt: skip
+    """A task with the plan's seed, folds and batches."""
+    chosen = dict(values)
+    if plan.steps is not None and method.network:
+        chosen["steps"] = plan.steps
+    return Task(method.id, values_of(chosen), augmentation, protocol, data, plan.seed, plan.folds, people, elapsed)
+
+
+def right(result: Result) -> NDArray[np.bool_]:
+    """(n,) whether each answer of a result was right."""
+    same: NDArray[np.bool_] = np.equal(result["truth"], result["predicted"])
+    return same
+
+
+def row(cell: Cell, result: Result) -> dict[str, Any]:
+    """A cell as study.json has it."""
+    count = len(GESTURES)
+    confusion = np.zeros((count, count), int)
+    np.add.at(confusion, (result["truth"], result["predicted"]), 1)
+    return {
+        "method": cell.method, "settings": cell.settings, "augmentation": cell.augmentation,
+        "protocol": cell.protocol, "data": cell.data,
+        "n": len(result["truth"]), **summary(right(result), result["person"]),
+        "published": METHODS[cell.method].published.get(cell.augmentation) if cell.data == "simulated" else None,
+        "train": result["train"], "seconds": result["seconds"], "confusion": confusion.tolist(),
+    }  # fmt: skip
+
+
+def copies(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:
+    """How much of the gain by augmentation comes from copies of test gestures in the training set.
+
+    `with_copy` counts test gestures whose very same window is learned from too (a shift of zero), `with_version` those
+    of which any other version is. The gains are of augmentation under the paper's protocol and under the clean one.
+    """
+    out = []
+    for cell, result in found.items():
+        if (cell.protocol, cell.augmentation, cell.data) != (PAPER, SHIFT, "simulated"):
+            continue
+
+        def share(protocol: str, augmentation: str, of: Cell = cell) -> float:
+            return float(right(found[Cell(of.method, of.settings, augmentation, protocol, of.data)]).mean())
+
+        good, same = right(result), np.array(result["same"])
+        out.append(
+            {
+                "method": cell.method,
+                "settings": cell.settings,
+                "test": len(good),
+                "with_copy": int(same.sum()),
+                "with_version": int(np.sum(result["version"])),
+                "right_with_copy": _mean(good[same]),
+                "right_without_copy": _mean(good[~same]),
+                "gain_leaky": round(share(PAPER, SHIFT) - share(PAPER, NONE), 4),
+                "gain_clean": round(share(CLEAN, SHIFT) - share(CLEAN, NONE), 4),
+            }  # fmt: skip
+        )
+    return out
+
+
+def _mean(values: NDArray[np.bool_]) -> float | None:
+    return round(float(values.mean()), 4) if len(values) else None
+
+
+def elapsed_rows(found: Mapping[Cell, Result], points: Sequence[Mapping[str, float]]) -> list[dict[str, Any]]:
+    """Right answers over the course of the gesture, of each network that was asked."""
+    out = []
+    for cell, result in found.items():
+        if result["elapsed"]:
+            columns = [summary(column, result["person"]) for column in zip(*result["elapsed"], strict=True)]
+            shares = {name: [column[name] for column in columns] for name in ("right", "low", "high")}
+            out.append({"method": cell.method, "at": list(points), **shares})
+    return out
+
+
+def calibration(found: Mapping[Cell, Result], bins: int = 10) -> list[dict[str, Any]]:
+    """Confidence against truth, participants held out: expected calibration error (Naeini et al. 2015), equal bins."""
+    out = []
+    for cell, result in found.items():
+        if (cell.settings, cell.augmentation, cell.protocol, cell.data) != (TUNED, SHIFT, PARTICIPANTS, "simulated"):
+            continue
+        sure, good = np.array(result["confidence"]), right(result)
+        at = np.minimum((sure * bins).astype(int), bins - 1)
+        rows, error = [], 0.0
+        for k in np.unique(at):
+            here = at == k
+            confidence, share = float(sure[here].mean()), float(good[here].mean())
+            rows.append({"confidence": round(confidence, 4), "right": round(share, 4), "n": int(here.sum())})
+            error += abs(confidence - share) * here.mean()
+        out.append({"method": cell.method, "bins": rows, "error": round(float(error), 4)})
+    return out

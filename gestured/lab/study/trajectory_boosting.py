@@ -1,0 +1,28 @@
+"""Where the finger went: the trajectory features of the daemon's second opinion, for gradient boosting.
+
+The features are those of `gestured.lab.trajectory` (centroid path at equal distances, turning, straightness, width,
+number of fingers and contacts), computed by the same code that stands in the shipped models' graph.
+"""
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from gestured.lab.dataset import Samples
+from gestured.lab.fit import padded
+from gestured.lab.trajectory import trajectory_features
+
+BATCH = 256
+LONGEST = 80  # frames
+
+
+def trajectory_matrix(samples: Samples) -> NDArray[np.float32]:
+    """(G, F) of all samples; idle frames at the end change nothing, so batches may be padded."""
+    order = np.argsort(samples.lengths(), kind="stable")
+    with torch.no_grad():
+        parts = [
+            trajectory_features(padded(samples, order[i : i + BATCH], LONGEST)).numpy()
+            for i in range(0, len(order), BATCH)
+        ]
+    found = np.concatenate(parts)
+    return np.asarray(found[np.argsort(order, kind="stable")], np.float32)

@@ -1,0 +1,48 @@
+"""Hyperparameters by cross-validation with participants left out, on gestures as they are, without augmentation.
+
+The grids are coarse and small. Networks are compared after fewer batches than they are trained for afterwards.
+What wins without augmentation is used with it too, which the paper does not (its Table IV has two columns).
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gestured.lab.study.cells import Schedule
+from gestured.lab.study.material import NONE, Data
+from gestured.lab.study.methods import METHODS, Values
+from gestured.lab.study.plan import Plan
+from gestured.lab.study.protocols import PARTICIPANTS, Result, Task
+from gestured.lab.study.tables import right, task
+
+
+def tune(plan: Plan, sets: Mapping[str, Data], schedule: Schedule) -> tuple[dict[str, Values], list[dict[str, Any]]]:
+    """The best hyperparameters of each method, and every candidate's figures; the first ones in a quick study."""
+    if plan.quick:
+        return {method.id: method.grid[0] for method in METHODS.values()}, []
+    asked: dict[tuple[str, int], tuple[Values, Task]] = {}
+    for method in METHODS.values():
+        for values in method.grid:
+            shorter = {**values, "steps": plan.tuning_steps} if method.network else values
+            asked[method.id, len(asked)] = values, task(method, shorter, NONE, PARTICIPANTS, "simulated", plan)
+    found = schedule.results([item[1] for item in asked.values()], sets, "hyperparameters")
+    chosen: dict[str, Values] = {}
+    rows = []
+    for method in METHODS.values():
+        candidates: list[dict[str, Any]] = [
+            {"values": dict(values), **_figures(found[of])}
+            for (name, _), (values, of) in asked.items()
+            if name == method.id
+        ]
+        best = max(candidates, key=lambda c: float(c["right"]))
+        chosen[method.id] = best["values"]
+        rows.append({"method": method.id, "candidates": candidates, "chosen": best["values"]})
+    return chosen, rows
+
+
+def _figures(result: Result) -> dict[str, float]:
+    """Share right, and its standard deviation between folds."""
+    good, fold = right(result), np.array(result["fold"])
+    shares = [good[fold == k].mean() for k in np.unique(fold)]
+    return {"right": round(float(good.mean()), 4), "spread": round(float(np.std(shares)), 4)}
