@@ -47,10 +47,21 @@ async def _run(settings: Settings, load: Loader) -> None:
         await service.start()
         _announce(service, ladder.active)
         await service.serve(stop, reload)
-        # The loop gives signals back as it closes; one that is repeated then must not count as a crash.
-        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+        _ignore_signals(loop)
     finally:
         bound.close()
+
+
+def _ignore_signals(loop: asyncio.AbstractEventLoop) -> None:
+    """From here on nothing is left to be asked: a stop that is repeated must not look like a crash.
+
+    Left alone, the loop gives signals their default action back as it closes, which is death.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    for number in SIGNALS:
+        loop.remove_signal_handler(number)
+        signal.signal(number, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _announce(service: Service, model: str) -> None:

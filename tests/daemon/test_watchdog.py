@@ -1,0 +1,85 @@
+"""What is still answered while a model hangs, and what systemd is told then."""
+
+import json
+import os
+import signal
+import socket
+from pathlib import Path
+
+import pytest
+
+from gestured.core.recognizer import FrontEnd
+from gestured.daemon.canary import Canary
+from gestured.daemon.merge import load
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.pipeline import Pipeline
+from gestured.ladder import ladder_for
+from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
+
+ROOT = Path(__file__).resolve().parents[2]
+HANGING = """
+import os
+import gestured.models
+from gestured.core.errors import ModelError
+
+def classify(self, segment):
+    open(os.environ["HANG"]).close()  # a pipe: waits until somebody opens its other end
+    raise ModelError("it hung")
+
+gestured.models.Model.classify = classify
+"""
+
+
+def test_health_and_metrics_answer_while_a_model_hangs_and_the_watchdog_is_not_fed(start, tmp_path: Path) -> None:
+    (tmp_path / "sitecustomize.py").write_text(HANGING)
+    os.mkfifo(tmp_path / "pipe")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
+        supervisor.bind(str(tmp_path / "notify"))
+        supervisor.settimeout(DEADLINE_S)
+        environment = {
+            "NOTIFY_SOCKET": str(tmp_path / "notify"),
+            "WATCHDOG_USEC": "600000",
+            "PYTHONPATH": f"{tmp_path}:{ROOT}",
+            "HANG": str(tmp_path / "pipe"),
+        }
+        daemon: Daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", env=environment)
+        Sensor(daemon, "arm").begin().perform("left")
+        while daemon.get("/healthz")[0] == 200:
+            pass
+        supervisor.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            while True:
+                supervisor.recv(4096)  # what was said before it hung
+        status, body = daemon.get("/readyz")
+        assert status == 503 and "hangs" in json.loads(body)["reason"]
+        assert daemon.metric("gestured_loop_lag_seconds") > 1
+        assert daemon.metric("gestured_sensor_state", sensor="arm", state="stale") == 1
+        with pytest.raises(BlockingIOError):
+            supervisor.recv(4096)
+        with open(tmp_path / "pipe", "w"):  # now it may go on
+            supervisor.setblocking(True)
+            while b"WATCHDOG=1" not in supervisor.recv(4096):
+                pass
+        while daemon.get("/healthz")[0] != 200:
+            pass
+
+
+def test_the_canary_says_when_the_way_of_a_frame_is_broken(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    metrics = Metrics()
+    pipeline = Pipeline(load({"model": str(model)}, {})[0], ladder_for(model), metrics, lambda event: None)
+    canary = Canary(pipeline)
+    assert all(canary.sings() for _ in range(50)) and metrics.internal_errors.total() == 0
+    with monkeypatch.context() as patch:
+        patch.setattr(FrontEnd, "push", lambda self, frame: 1 / 0)
+        assert not canary.sings()
+    assert metrics.internal_errors.total() == 1
+    assert canary.sings()
+
+
+def test_signals_that_come_again_while_it_ends_do_not_make_it_a_crash(start) -> None:
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        daemon = start("--metrics", "127.0.0.1:0")
+        daemon.signal(signal.SIGTERM)
+        while daemon.process.poll() is None:
+            daemon.signal(number)
+        assert daemon.wait() == 0
