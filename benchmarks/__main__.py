@@ -22,6 +22,7 @@ def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
         "sensors": lambda: traffic.sensors(model),
         "recognise": lambda: inside.recognise(model),
         "start": lambda: start.start_and_memory(model),
+        "imports": start.imports,
         "further": lambda: start.further_sensors(model),
         "subscribers": inside.subscribers,
         "ordinary": lambda: side_by_side.ordinary(model),

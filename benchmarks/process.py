@@ -7,15 +7,15 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-PROGRAMS = Path(__file__).parent / "programs"
+ROOT = Path(__file__).parent.parent
 
 
 class Program:
     """One of `programs/`, running; its first line of output is JSON. A context manager."""
 
     def __init__(self, name: str, *arguments: str) -> None:
-        command = [sys.executable, str(PROGRAMS / f"{name}.py"), *arguments]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE)
+        command = [sys.executable, "-m", f"benchmarks.programs.{name}", *arguments]
+        self.process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE)
         assert self.process.stdout is not None
         line = self.process.stdout.readline()
         if not line:

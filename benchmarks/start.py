@@ -48,6 +48,13 @@ def start_and_memory(model: str) -> list[Row]:
     ]  # fmt: skip
 
 
+def imports() -> Row:
+    """MiB that each import adds, one after the other."""
+    with Program("imports") as program:
+        added = ", ".join(f"{name} {mib}" for name, mib in program.ready.items())
+    return Row("resident memory of each import, in this order (MiB)", added, "", "", "", None)
+
+
 def further_sensors(model: str) -> Row:
     """KiB for each sensor more, 9 x 9 at 15 Hz, after three seconds of frames from all of them."""
     with Engine(model, 9, 9, "--max-sensors", str(MORE + 1), "--clock", "sensor") as engine:
