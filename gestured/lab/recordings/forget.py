@@ -60,8 +60,8 @@ def find(participant: str, paths: Sequence[Path]) -> tuple[list[Part], list[str]
     for path in paths:
         if not path.exists():
             raise GesturedError(f"{path}: is not there; nothing was removed")
-    files = [file for path in paths for file in (sorted(path.rglob("*.npz")) if path.is_dir() else [path])]
-    for file in dict.fromkeys(files):
+    files = [file for path in paths for file in (_inside(path) if path.is_dir() else [path])]
+    for file in dict.fromkeys(file.resolve() for file in files):  # a link is not what holds the recordings
         try:
             subjects = read(file).subjects.astype(str)
             own = int((subjects == participant).sum())
@@ -73,6 +73,11 @@ def find(participant: str, paths: Sequence[Path]) -> tuple[list[Part], list[str]
         if own:
             parts.append(Part(file, digest(file), own, len(subjects)))
     return parts, unread
+
+
+def _inside(folder: Path) -> list[Path]:
+    """The folder's files of recordings, and what `write` leaves behind where the power goes."""
+    return sorted([*folder.rglob("*.npz"), *folder.rglob(".*.npz.*")])
 
 
 def _whole(file: Path) -> None:

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -34,10 +35,9 @@ def run(args: argparse.Namespace) -> int:
             raise GesturedError(f"{path}: expected the grid of {args.files[0]}")
         parts.append(recordings)
         left += gone
-    for line in [*refused, *map(str, left[:SHOWN])]:
-        print(line)
-    if len(left) > SHOWN:
-        print(f"and {len(left) - SHOWN} lines more")
+    more = [f"and {len(left) - SHOWN} lines more"] if len(left) > SHOWN else []
+    for line in [*refused, *map(str, left[:SHOWN]), *more]:
+        print(line, file=sys.stderr if args.json else sys.stdout)
     if not parts:
         raise GesturedError("nothing could be imported, so nothing was written")
     together = join(parts)

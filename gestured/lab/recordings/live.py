@@ -158,5 +158,5 @@ class LiveSensor:
             trouble = WHY.get(reasons[0], reasons[0]) if reasons else "not let go"
         start = min(max(first - LEAD_S, self._before), first)
         frames = tuple(frame for frame in self._frames if frame.t >= start)
-        times = [frame.t for frame in frames]
-        return Take(frames, times.index(first), times.index(last), self.front.noise, trouble)
+        marks = np.searchsorted([frame.t for frame in frames], [first, last])
+        return Take(frames, int(marks[0]), min(int(marks[1]), len(frames) - 1), self.front.noise, trouble)

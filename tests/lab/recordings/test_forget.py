@@ -50,6 +50,22 @@ def test_whoever_is_forgotten_is_gone_and_nobody_else(tmp_path: Path, capsys: py
     assert "no recording of 07 was found" in run(capsys, "07", path, "--yes")[1]
 
 
+def test_links_and_what_a_power_cut_left_behind_are_looked_into(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept, links = tmp_path / "kept", tmp_path / "links"
+    kept.mkdir()
+    links.mkdir()
+    write(kept / "07.npz", of("07", "08"))
+    (links / "linked.npz").symlink_to(kept / "07.npz")
+    write(links / "x.npz", of("07", "07"))
+    (links / "x.npz").rename(links / ".x.npz.4711")
+    assert run(capsys, "07", links, "--yes")[0] == 0
+    assert (links / "linked.npz").is_symlink()
+    assert read(kept / "07.npz").subjects.tolist() == ["08"]
+    assert not (links / ".x.npz.4711").exists()
+
+
 def test_numbers_as_subjects_are_found_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(tmp_path / "numbers.npz", example())
     assert run(capsys, "3", tmp_path / "numbers.npz", "--yes")[0] == 0

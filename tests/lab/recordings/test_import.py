@@ -81,8 +81,8 @@ def test_a_file_of_another_form_is_refused_and_the_others_are_taken(
     still = written(tmp_path / "still.csv", csv_lines(idle)[:8])
     out = tmp_path / "out.npz"
     flags = ("--format", "csv", "--participant", "07", "--label", "swipe_left", "--json")
-    status, text, _ = run(capsys, *flags, good, other, still, "--out", out)
-    first, second, figures = text.splitlines()
+    status, figures, text = run(capsys, *flags, good, other, still, "--out", out)
+    first, second = text.splitlines()
     assert status == 0
     assert first.startswith(f"{other}: expected frames, found 0 and 49 lines that are none; line: expected 82 numbers")
     assert second == f"{still}: frames: expected one swipe_left with untouched frames before or after it"
