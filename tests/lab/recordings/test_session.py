@@ -1,0 +1,132 @@
+"""How a session answers to takes and keys, with a scripted person and a sensor that feels what the test says."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from gestured.lab.recordings import session as module
+from gestured.lab.recordings.protocol import order
+from gestured.lab.recordings.quality import Take
+from gestured.lab.recordings.session import Session
+from gestured.lab.recordings.terminal import Terminal
+from gestured.recording import read
+from tests.lab.recordings.test_quality import performed
+
+TRIALS = order("07", 0, ["one_tap"], 1)
+GOOD = replace(performed("one_tap", 900), trouble="")
+
+
+class Script(Terminal):
+    """Types each key when its cue is shown after the one before."""
+
+    def __init__(self, *steps: tuple[str, str]) -> None:
+        self.steps, self.shown, self.since = list(steps), "", ""
+        self._fd, self._pipe = os.pipe()
+
+    def say(self, text: str, end: str = "\n") -> None:
+        self.shown += text + end
+        self.since += text + end
+
+    def key(self) -> str | None:
+        if not self.steps:
+            return "q"
+        cue, typed = self.steps[0]
+        if cue not in self.since:
+            return None
+        del self.steps[0]
+        self.since = ""
+        return typed
+
+    def line(self, prompt: str) -> str:
+        return "yes"
+
+
+class FakeSensor:
+    """Feels the next of `takes` at each `begin`; None is nothing."""
+
+    def __init__(self, *takes: Take | None) -> None:
+        self.takes = list(takes)
+        self.where, self.name, self.rate_hz, self.silent = "127.0.0.1:9000", "armrest", 15.0, False
+        self.front = SimpleNamespace(ready=True, touched=False, sent=(9, 9))
+        self.felt: Take | None = None
+        self._fd, self._pipe = os.pipe()
+        self.socket = SimpleNamespace(fileno=lambda: self._fd)
+
+    def pump(self) -> None:
+        pass
+
+    def begin(self) -> None:
+        self.felt = self.takes.pop(0) if len(self.takes) > 1 else self.takes[0]
+
+    @property
+    def onset(self) -> float | None:
+        return None if self.felt is None else 0.0
+
+    def quiet(self, seconds: float) -> bool:
+        return True
+
+    def take(self) -> Take | None:
+        return self.felt
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(module, "PATIENCE_S", 0.01)
+    yield
+
+
+def run(path: Path, sensor: FakeSensor, *steps: tuple[str, str]) -> Script:
+    script = Script(*steps)
+    Session("07", path, None, sensor, script, 0).run(TRIALS)  # type: ignore[arg-type]
+    assert script.steps == []
+    return script
+
+
+def test_a_whole_protocol_ends_with_thanks(tmp_path: Path) -> None:
+    blocks = [("in place", "\n"), *[("Enter keep", "\n")] * 3] * 3
+    script = run(tmp_path / "07.npz", FakeSensor(GOOD), *blocks)
+    assert script.shown.endswith("All 9 are done. Thank you.\n")
+    kept = read(tmp_path / "07.npz")
+    assert kept.speeds is not None and kept.inclinations is not None
+    found = list(zip(kept.labels.tolist(), kept.speeds.tolist(), kept.inclinations.tolist(), strict=True))
+    assert found == [tuple(trial) for trial in TRIALS]
+
+
+def test_nothing_cannot_be_kept(tmp_path: Path) -> None:
+    script = run(tmp_path / "07.npz", FakeSensor(None), ("in place", "\n"), ("nothing touched", "\n"))
+    assert "Enter keep" not in script.shown
+    assert "Ended with 0 recordings" in script.shown
+    assert not (tmp_path / "07.npz").exists()
+
+
+def test_what_is_no_single_gesture_cannot_be_kept(tmp_path: Path) -> None:
+    twice = replace(GOOD, trouble="2 gestures were seen, expected one")
+    script = run(tmp_path / "07.npz", FakeSensor(twice), ("in place", "\n"), ("NOT GOOD: 2 gestures", "\n"))
+    assert "Enter keep" not in script.shown
+    assert not (tmp_path / "07.npz").exists()
+
+
+def test_a_take_that_is_not_good_may_be_kept_all_the_same(tmp_path: Path) -> None:
+    frames = list(GOOD.frames)
+    frames[GOOD.release] = replace(frames[GOOD.release], lost=2)
+    bad = replace(GOOD, frames=tuple(frames), onset=GOOD.release - 1)
+    script = run(tmp_path / "07.npz", FakeSensor(bad), ("in place", "\n"), ("lost frames: 2 of 4", "\n"))
+    assert "Ended with 1 recordings" in script.shown
+    assert len(read(tmp_path / "07.npz")) == 1
+
+
+def test_the_last_one_that_is_discarded_comes_at_once(tmp_path: Path) -> None:
+    keep, discard = ("Enter keep", "\n"), ("Enter keep", "d")
+    script = run(tmp_path / "07.npz", FakeSensor(GOOD), ("in place", "\n"), keep, keep, discard, discard, keep)
+    assert script.shown.count(f"3/9  {TRIALS[2]}") == 3
+    assert "Ended with 3 recordings" in script.shown
+
+
+def test_a_pause_while_the_verdict_is_shown_throws_the_take_away(tmp_path: Path) -> None:
+    script = run(tmp_path / "07.npz", FakeSensor(GOOD), ("in place", "\n"), ("Enter keep", "p"), ("Paused", "\n"))
+    assert script.shown.count(f"1/9  {TRIALS[0]}") == 2
+    assert "Ended with 0 recordings" in script.shown
