@@ -6,7 +6,7 @@ from .layout import REAL, SIMULATED, figure, small
 from .markup import Markup, join, svg, tag
 from .reading import Row, Study
 
-PANEL, LABELS, LANE = 262.0, 214.0, 9.0  # pixels: one panel, the names before them, one protocol's line
+PANEL, LABELS, LANE = 268.0, 196.0, 9.0  # pixels: one panel, the names before them, one protocol's line
 FORMS = {  # of the protocols: form and colour
     "paper": ("square", "f1 v1"),
     "clean": ("triangle", "f2 v0"),
@@ -29,11 +29,7 @@ def overview(study: Study) -> Markup:
         _panel(study, methods, protocols, name, LABELS + k * PANEL, height, pitch) for k, name in enumerate(found)
     ]
     names = [
-        join(
-            marks.marker(marks.look_of(study, method), 9, 40 + pitch * (k + 0.5)),
-            text(22, 44 + pitch * (k + 0.5), reading.title(study, method), class_="name"),
-        )
-        for k, method in enumerate(methods)
+        text(0, 44 + pitch * (k + 0.5), reading.title(study, method), class_="name") for k, method in enumerate(methods)
     ]
     title = "The published figures and ours, simulated data"
     words = "Right in per cent, published and ours, for each method and protocol; the tables below say the same."
@@ -60,7 +56,7 @@ def _panel(
         Scale(0, len(methods), 40, height - 30),
     )
     plot.add(text(left + 14, 20, reading.AUGMENTATIONS[augmentation], class_="panel"))
-    plot.x_axis(plot.x.ticks(4), lambda share: formats.percent(share, 0), grid=True)
+    plot.x_axis(plot.x.ticks(5), lambda share: formats.percent(share, 0), grid=True)
     for k, method in enumerate(methods):
         if k:
             plot.add(tag("line", x1=plot.x.start, x2=plot.x.end, y1=plot.y(k), y2=plot.y(k), class_="rule"))

@@ -36,7 +36,7 @@ def _reliability(study: Study, row: Row) -> Markup:
     bins = [group for group in row["bins"] if group["n"]]
     total = sum(group["n"] for group in bins) or 1
     if bins:
-        plot.line([(group["confidence"], group["right"]) for group in bins], f"curve {look.classes}")
+        plot.line([(group["confidence"], group["right"]) for group in bins], f"curve thin {look.classes}")
     for group in bins:
         sure, right = formats.percent(group["confidence"]), formats.percent(group["right"])
         words = f"confidence {sure}, right {right}, n = {group['n']}"

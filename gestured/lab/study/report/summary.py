@@ -29,9 +29,9 @@ def findings(study: Study) -> dict[str, Markup]:
 
 
 def compared(study: Study, protocol: str) -> list[Row]:
-    """Our figures, with the paper's settings, that stand against a published one."""
-    rows = reading.cells(study, protocol=protocol, settings="paper", data="simulated")
-    return [row for row in rows if row.get("published") is not None]
+    """Our figures that stand against a published one: with the paper's settings, tuned where there are no others."""
+    rows = reading.cells(study, protocol=protocol, data="simulated")
+    return [row for row in reading.usual(rows) if row.get("published") is not None]
 
 
 def _reproduced(study: Study) -> Markup | None:
@@ -50,14 +50,20 @@ def _reproduced(study: Study) -> Markup | None:
 def _missed(study: Study, word: str, sign: int) -> Markup | None:
     rows = [row for row in compared(study, "participants") if not reading.as_published(row)]
     rows = [row for row in rows if (row["right"] - row["published"]) * sign > 0]
+    rows.sort(key=lambda row: -abs(row["right"] - row["published"]))
     if not rows:
         return None
     told = []
-    for row in sorted(rows, key=lambda row: -abs(row["right"] - row["published"])):
-        name = reading.title(study, row["method"]) + (", augmented" if row["augmentation"] == "shift" else "")
-        change = f"{formats.percent(row['published'], 0)} → {formats.percent(row['right'], 0)}"
-        told.append(join(name, " (", tag("span", change, class_="value"), ")"))
-    return join(f"{word} than published, on people never seen: ", formats.listed(told), ".")
+    for augmentation, words in (("shift", "with augmentation"), ("none", "without")):
+        named = [_change(study, row) for row in rows if row["augmentation"] == augmentation]
+        if named:
+            told.append(join(words, " ", formats.listed(named)))
+    return join(f"{word} than published, on people never seen: ", Markup("; ".join(told)), ".")
+
+
+def _change(study: Study, row: Row) -> Markup:
+    change = f"{formats.percent(row['published'], 0)} → {formats.percent(row['right'], 0)}"
+    return join(reading.title(study, row["method"]), " (", tag("span", change, class_="value"), ")")
 
 
 def from_copies(row: Row) -> float | None:
@@ -70,20 +76,27 @@ def from_copies(row: Row) -> float | None:
 
 def _copies(study: Study) -> Markup | None:
     rows = [row for row in reading.part(study, "copies") if None not in (row.get("gain_leaky"), row.get("gain_clean"))]
+    rows = reading.usual(rows)
     if not rows:
         return None
     before, after = (sum(row[name] for row in rows) / len(rows) for name in ("gain_leaky", "gain_clean"))
-    test, copied = (sum(row[name] for row in rows) for name in ("test", "with_copy"))
+    worth = f"Augmenting before the split is worth {formats.points(before)} points in the mean of {len(rows)} methods; "
+    parts = [worth, f"augmenting only the training part, {formats.points(after)}. "]
     owed = from_copies({"gain_leaky": before, "gain_clean": after})
-    parts = [
-        f"Augmenting before the split is worth {formats.points(before)} points in the mean of {len(rows)} methods; ",
-        f"augmenting only the training part, {formats.points(after)}. ",
-    ]
     if owed is not None:
         much = tag("strong", f"{formats.with_unit(owed, 0)} of the gain")
-        parts.append(join("So ", much, " is owed to copies of test gestures in the training set"))
-        parts.append(f", which {formats.with_unit(copied / test, 0)} of the test gestures have." if test else ".")
+        parts.append(
+            join("So ", much, " is owed to test gestures that are in the training set too: ", _found(rows), ".")
+        )
     return join(*parts)
+
+
+def _found(rows: list[Row]) -> str:
+    """How many of the test gestures are in the training set."""
+    test = sum(row["test"] for row in rows) or 1
+    copied, moved = (sum(row.get(name) or 0 for row in rows) / test for name in ("with_copy", "with_version"))
+    more = f", and {formats.with_unit(moved, 0)} shifted" if moved else ""
+    return f"{formats.with_unit(copied, 0)} of them unchanged{more}"
 
 
 def best(study: Study, paper: bool) -> Row | None:

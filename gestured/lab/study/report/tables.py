@@ -31,6 +31,7 @@ def protocols(study: Study) -> Markup:
 def _augmented(study: Study, augmentation: str) -> Markup:
     rows = reading.cells(study, augmentation=augmentation)
     present = [name for name in reading.PROTOCOLS if any(row["protocol"] == name for row in rows)]
+    floor = reading.floor(study)
     told = any(row.get("published") is not None for row in rows)
     heads = [head("Method"), head("Settings"), *([head("Published")] if told else [])]
     heads += [head(tag("span", name), tag("small", _on(rows, name))) for name in present]
@@ -40,10 +41,12 @@ def _augmented(study: Study, augmentation: str) -> Markup:
             mine = {row["protocol"]: row for row in rows if row["method"] == method and row["settings"] == settings}
             if mine:
                 figure = [published_cell(reading.published(study, method, augmentation))] if told else []
-                shares = _shares(study, method, augmentation, [mine.get(name) for name in present])
+                shares = _shares(study, method, augmentation, [mine.get(name) for name in present], floor)
                 lines.append([row_head(marks.named(study, method)), cell(reading.SETTINGS[settings]), *figure, *shares])
-    words, floor = reading.AUGMENTATIONS[augmentation], formats.percent(reading.floor(study), 0)
-    caption = f"Right in per cent and its 95 % interval over participants, drawn from {floor} to 100"
+    words = reading.AUGMENTATIONS[augmentation]
+    caption = (
+        f"Right in per cent and its 95 % interval over participants, drawn from {formats.percent(floor, 0)} to 100"
+    )
     caption += "; the stroke is the published figure." if told else "."
     title = f"{words[0].upper()}{words[1:]}"
     source = "simulated data, but for “real”" if "real" in present else SIMULATED
@@ -55,57 +58,51 @@ def _on(rows: list[Row], protocol: str) -> str:
     return " and ".join(sorted(data)) + " data"
 
 
-def _shares(study: Study, method: str, augmentation: str, rows: list[Row | None]) -> list[Markup]:
+def _shares(study: Study, method: str, augmentation: str, rows: list[Row | None], floor: float) -> list[Markup]:
     look, figure = marks.look_of(study, method), reading.published(study, method, augmentation)
-    return [share_cell(row, f"f{look.family} v0", figure, reading.floor(study)) for row in rows]
+    return [share_cell(row, f"f{look.family} v0", figure, floor) for row in rows]
 
 
 def copies(study: Study) -> Markup:
     """How much of the gain from augmentation comes from copies of test gestures."""
-    heads = [head("Method"), head("Settings"), head("Test gestures"), head("With a copy in training")]
-    heads += [
-        head("Right with a copy"),
-        head("Right without"),
-        head("Gain, augmented before"),
-        head("Gain, after"),
-        head("From copies, %"),
-        head("Gain, drawn"),
+    rows = reading.part(study, "copies")
+    moved = any(row.get("with_version") is not None for row in rows)
+    names = [
+        "Method",
+        "Settings",
+        "Test gestures",
+        "In training, unchanged",
+        *(["In training, shifted"] if moved else []),
     ]
-    rows, lines = reading.part(study, "copies"), []
+    names += ["Right, if unchanged", "Right, if not", "Gain, augmented before", "Gain, after", "From copies, %"]
     most = max((row["gain_leaky"] or 0.0 for row in rows), default=0.0)
-    for row in rows:
-        owed = from_copies(row)
-        lines.append(
-            [
-                row_head(marks.named(study, row["method"])),
-                cell(reading.SETTINGS[row["settings"]]),
-                cell(formats.count(row["test"]), value=row["test"], class_="number"),
-                cell(
-                    f"{formats.count(row['with_copy'])} ({formats.with_unit(_part(row), 0)})",
-                    value=row["with_copy"],
-                    class_="number",
-                ),
-                _share(row["right_with_copy"]),
-                _share(row["right_without_copy"]),
-                _points(row["gain_leaky"]),
-                _points(row["gain_clean"]),
-                _share(owed),
-                cell(marks.gain(row["gain_leaky"], row["gain_clean"], most)),
-            ]
-        )
+    lines = [
+        [
+            row_head(marks.named(study, row["method"])),
+            cell(reading.SETTINGS[row["settings"]]),
+            cell(formats.count(row["test"]), value=row["test"], class_="number"),
+            *(_of(row.get(name), row["test"]) for name in ("with_copy", *(["with_version"] if moved else []))),
+            *(_share(row[name]) for name in ("right_with_copy", "right_without_copy")),
+            *(_points(row[name]) for name in ("gain_leaky", "gain_clean")),
+            _share(from_copies(row)),
+            cell(marks.gain(row["gain_leaky"], row["gain_clean"], most)),
+        ]
+        for row in rows
+    ]
     return table(
         "How much of the gain from augmentation is copies",
         SIMULATED,
         "Shares in per cent, gains in percentage points against no augmentation. “Before” augments before the split, "
         "as the published figures suggest; “after” only the training part. What is gained before but not after is "
-        "owed to copies: the pale part of the bar.",
-        heads,
+        "owed to copies of the test gestures in the training set, unchanged or shifted: the pale part of the bar.",
+        [*(head(name) for name in names), head("Gain, drawn")],
         lines,
     )
 
 
-def _part(row: Row) -> float | None:
-    return row["with_copy"] / row["test"] if row["test"] else None
+def _of(some: int | None, all_: int) -> Markup:
+    share = f" ({formats.with_unit(some / all_, 0)})" if some is not None and all_ else ""
+    return cell(formats.count(some) + share, value=some, class_="number")
 
 
 def _share(share: float | None) -> Markup:

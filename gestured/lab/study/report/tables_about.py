@@ -28,15 +28,31 @@ def methods(study: Study) -> Markup:
         hyper = about.get("hyperparameters") or {}
         lines.append(
             [
-                row_head(marks.named(study, method)),
+                row_head(
+                    tag(
+                        "span",
+                        marks.swatch(study, method),
+                        tag("span", reading.full_title(study, method)),
+                        class_="named",
+                    )
+                ),
                 cell(about.get("family", ""), class_="short"),
                 cell(about.get("what", ""), class_="prose"),
-                cell(formats.values(hyper.get("paper")), class_="short"),
-                cell(formats.values(hyper.get("tuned")), class_="short"),
+                cell(_settings(hyper.get("paper")), class_="short"),
+                cell(_settings(hyper.get("tuned")), class_="short"),
             ]
         )
     heads = [head("Method"), head("Family"), head("What it does"), head("The paper's settings"), head("Tuned")]
     return table("All methods", "", "All on the front end that the daemon uses.", heads, lines)
+
+
+def _settings(found: Row | None) -> Markup:
+    """Hyperparameters; where they depend on the augmentation, also those that differ from the first ones."""
+    if not found or not all(isinstance(value, dict) for value in found.values()):
+        return formats.values(found)
+    (_, first), *others = found.items()
+    differing = [(name, values) for name, values in others if values != first]
+    return join(formats.values(first), *(join("; ", name, ": ", formats.values(values)) for name, values in differing))
 
 
 def data(study: Study) -> Markup:
