@@ -14,6 +14,7 @@ class Control:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.finished = False  # it was we who ended it
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             self.socket.connect(str(path))
@@ -44,6 +45,14 @@ class Control:
                 yield parsed(line, self.path)
         except ConnectionError:
             return
+
+    def finish(self) -> None:
+        """Ask for no more: what is on its way still comes, then `lines` ends. Any thread may call it."""
+        self.finished = True
+        try:
+            self.socket.shutdown(socket.SHUT_WR)
+        except OSError:
+            pass  # it hung up already
 
     def close(self) -> None:
         """Hang up; a reader in another thread comes to its end."""

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import signal
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -32,6 +33,12 @@ def add_control(parser: argparse.ArgumentParser) -> None:
     """Add `--control` to a subcommand."""
     text = "the daemon's control socket (default: the daemon's own default)"
     parser.add_argument("--control", type=Path, metavar="PATH", help=text)
+
+
+def finish_on_signals(control: Control) -> None:
+    """From now on Ctrl-C and SIGTERM let `control.lines()` end, after what the daemon has said by then."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: control.finish())
 
 
 def connect(args: argparse.Namespace) -> Control:

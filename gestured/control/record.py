@@ -4,7 +4,6 @@ import argparse
 import base64
 import json
 import queue
-import signal
 import sys
 import threading
 import time
@@ -14,7 +13,7 @@ from typing import Any
 
 from gestured.client.control import Control
 from gestured.client.stream import Unreachable
-from gestured.control.address import add_control, connect
+from gestured.control.address import add_control, connect, finish_on_signals
 from gestured.core.errors import GesturedError
 from gestured.tape import Writer, library
 
@@ -48,15 +47,17 @@ def run(args: argparse.Namespace) -> int:
     if args.seconds is not None and not 0 < args.seconds < 1e9:
         raise GesturedError(f"--seconds {args.seconds:g}: expected more than 0")
     library()  # before anything is asked of the daemon
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     with connect(args) as control:
+        finish_on_signals(control)
         scene = control.ask("tap")
         with Writer(args.file, scene, args.max_mib << 20) as tape:
             print(f"recording into {args.file}; Ctrl-C ends", file=sys.stderr, flush=True)
-            end = time.monotonic() + args.seconds if args.seconds else None
+            if args.seconds:
+                timer = threading.Timer(args.seconds, control.finish)
+                timer.daemon = True
+                timer.start()
             keeper = Keeper(tape, scene["epoch_ns"])
-            why = keeper.follow(control, end)
-            size = tape.count, args.file.stat().st_size
+            why = keeper.follow(control)
     summary = {"file": str(args.file), "packets": keeper.packets, "events": keeper.events, "lost": keeper.lost}
     if args.json:
         print(json.dumps(summary | {"ended": why}))
@@ -64,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         lost = f", {keeper.lost} lost: this disk is too slow" if keeper.lost else ""
         print(f"{args.file}: {keeper.packets} packets, {keeper.events} events{lost}; ended: {why}")
     if why == GONE:
-        raise Unreachable(f"the daemon closed the connection; {args.file} is good up to there ({size[0]} messages)")
+        raise Unreachable(f"the daemon closed the connection; {args.file} is good up to there")
     return 1 if keeper.lost else 0
 
 
@@ -92,21 +93,16 @@ class Keeper:
             self._tape.event(self._t_ns, line)
             self.events += 1
 
-    def follow(self, control: Control, end: float | None) -> str:
-        """Keep what comes until `end` (monotonic s); says why it ended."""
-        try:
-            for line in _waiting(control):
-                if line is not None:
-                    self.keep(line)
-                if line is None or time.monotonic() > self._flushed + FLUSH_S:
-                    self._flush()
-                if self._tape.full:
-                    return "the file is as large as it may be"
-                if end is not None and time.monotonic() >= end:
-                    return "as asked"
-        except KeyboardInterrupt:
-            return "as asked"
-        return GONE
+    def follow(self, control: Control) -> str:
+        """Keep what comes, until the daemon hangs up or the file is full; says why it ended."""
+        for line in _waiting(control):
+            if line is not None:
+                self.keep(line)
+            if line is None or time.monotonic() > self._flushed + FLUSH_S:
+                self._flush()
+            if self._tape.full:
+                return "the file is as large as it may be"
+        return "as asked" if control.finished else GONE
 
     _flushed = 0.0
 

@@ -6,6 +6,7 @@ import json
 import re
 import socket
 import sys
+import threading
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -14,7 +15,7 @@ from itertools import groupby
 
 from gestured.client.address import host_port
 from gestured.client.stream import Unreachable
-from gestured.control.address import add_control, connect
+from gestured.control.address import add_control, connect, finish_on_signals
 from gestured.core import osc
 from gestured.core.errors import GesturedError, ProtocolError
 from gestured.core.wire import is_sensor
@@ -22,7 +23,6 @@ from gestured.core.wire import is_sensor
 USUAL = "/{sensor}/pressure"
 LEAST_TAXELS = 4  # 2 x 2
 SEEN = 256  # addresses; what comes after that is counted together
-POLL_S = 0.2
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -64,9 +64,8 @@ def run(args: argparse.Namespace) -> int:
     if not 0 < args.seconds <= 86_400:
         raise GesturedError(f"--seconds {args.seconds:g}: expected more than 0, at most 86400")
     sight = Sight()
-    end = time.monotonic() + args.seconds
     try:
-        for t, source, packet in _listen(args.listen, end) if args.listen else _tap(args, end):
+        for t, source, packet in _listen(args.listen, args.seconds) if args.listen else _tap(args):
             sight.packet(t, source, packet)
     except KeyboardInterrupt:
         pass
@@ -179,35 +178,22 @@ def _sensor(address: str) -> tuple[str, str] | None:
     return pattern, parts[place]
 
 
-def _tap(args: argparse.Namespace, end: float) -> Iterator[tuple[float, str, bytes]]:
+def _tap(args: argparse.Namespace) -> Iterator[tuple[float, str, bytes]]:
     with connect(args) as control:
+        finish_on_signals(control)
         control.ask("tap")
-        control.socket.settimeout(None)
-        _hang_up_at(control.socket, end)
+        timer = threading.Timer(args.seconds, control.finish)
+        timer.daemon = True
+        timer.start()
         for line in control.lines():
             if line["type"] == "packet":
                 host, port = line["source"]
                 yield line["t_ns"] / 1e9, f"{host}:{port}", base64.b64decode(line["data"])
-        if time.monotonic() < end - POLL_S:
+        if not control.finished:
             raise Unreachable("the daemon closed the connection")
 
 
-def _hang_up_at(sock: socket.socket, end: float) -> None:
-    """The reader of `sock` comes to its end then."""
-    import threading
-
-    def hang_up() -> None:
-        try:
-            sock.shutdown(socket.SHUT_RDWR)
-        except OSError:
-            pass
-
-    timer = threading.Timer(max(end - time.monotonic(), 0.0), hang_up)
-    timer.daemon = True
-    timer.start()
-
-
-def _listen(address: tuple[str, int], end: float) -> Iterator[tuple[float, str, bytes]]:
+def _listen(address: tuple[str, int], seconds: float) -> Iterator[tuple[float, str, bytes]]:
     try:
         family, kind, _, _, where = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0]
         receiver = socket.socket(family, kind)
@@ -216,6 +202,7 @@ def _listen(address: tuple[str, int], end: float) -> Iterator[tuple[float, str, 
         hint = "; without --listen I ask the daemon that has it" if error.errno == 98 else ""
         raise GesturedError(f"cannot listen on {address[0]}:{address[1]}: {error.strerror}{hint}") from None
     with receiver:
+        end = time.monotonic() + seconds
         print(f"listening on {address[0]}:{address[1]}", file=sys.stderr, flush=True)
         while (left := end - time.monotonic()) > 0:
             receiver.settimeout(left)

@@ -101,6 +101,7 @@ def status(service: "Service") -> dict[str, Any]:
         "loop_lag_s": round(health.lag_s, 4),
         "internal_errors": metrics.internal_errors.total(),
         "reloads": _by_label(metrics.reloads.values),
+        "taps": service.taps.count,
         "flight_recorder": {"limit_bytes": service.taps.ring_bytes, "held_bytes": service.taps.held_bytes},
     }
 

@@ -36,6 +36,11 @@ class Taps:
         """Whether packets are wanted."""
         return bool(self.ring_bytes or self._live)
 
+    @property
+    def count(self) -> int:
+        """How many live taps there are."""
+        return len(self._live)
+
     def join(self, connection: Connection) -> None:
         """Stream to this connection from now on."""
         self._live.append(connection)

@@ -11,6 +11,9 @@ from typing import Any
 
 import pytest
 
+from tests.daemon import tiny_model
+from tests.daemon.harness import Daemon
+
 ROOT = Path(__file__).resolve().parents[2]
 HELLO = {
     "type": "hello",
@@ -106,3 +109,21 @@ def udp() -> Iterator[socket.socket]:
         receiver.bind(("127.0.0.1", 0))
         receiver.settimeout(30)
         yield receiver
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A real daemon with a small model, the sensor's clock and a flight recorder."""
+    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+    folder = tmp_path_factory.mktemp("daemon")
+    model = tiny_model.make(folder / "tiny.onnx")
+    daemon = Daemon.start(folder, model, "--clock", "sensor", "--flight-recorder", 4)
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+    assert "Traceback" not in daemon.stderr()
+
+
+@pytest.fixture
+def ctl(run: Callable[..., tuple[int, str, str]], daemon: Daemon) -> Callable[..., tuple[int, str, str]]:
+    """Runs gesturectl against that daemon."""
+    return lambda *arguments: run(*arguments, "--control", daemon.ready["control"])

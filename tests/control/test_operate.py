@@ -1,0 +1,206 @@
+"""gesturectl's questions to a real daemon: status, doctor, sniff, emit, reload, recalibrate, shadow."""
+
+import json
+import re
+import socket
+from pathlib import Path
+
+import pytest
+
+from gestured.control.doctor import BUFFER_BYTES, _buffer, _clock, _permissions
+from gestured.control.sniff import Sight, propose
+from gestured.control.status import screen
+from gestured.core import osc
+from tests.daemon import tiny_model
+from tests.daemon.harness import Daemon, Hand, Sensor, blob, counted, floats, ints
+
+
+def test_status_shows_sensors_model_and_answers(ctl, daemon: Daemon) -> None:
+    client = daemon.client()
+    Sensor(daemon, "seat").begin().perform("left")
+    client.events("gesture", "seat")
+    status, out, err = ctl("status")
+    assert status == 0, err
+    assert re.search(r"^seat +ok +15\.\d .* 1  9x9$", out, re.MULTILINE), out
+    assert "model tiny 1" in out and re.search(r"seat +swipe_left +0\.\d\d$", out, re.MULTILINE)
+    found = json.loads(ctl("status", "--json")[1])
+    assert found["sensors"]["seat"]["gestures"] == 1 and found["ready"]["ready"] is True
+
+
+def test_status_of_a_daemon_that_is_not_ready_and_shifted() -> None:
+    status = {
+        "version": "1", "state": "degraded", "uptime_s": 7300.0, "pid": 1, "addresses": {"listen": "a:1"},
+        "ready": {"ready": False, "reason": "no model could classify the last segment"},
+        "model": {"active": "lstm", "asked": "cnn_lstm", "degraded": True, "failures": 2, "version": "1",
+                  "sha256": "ab"},
+        "sensors": {f"s{i}": {"state": "no_data", "rate_hz": 0.0, "jitter_s": 0.0, "bad_taxels": 0, "drift": 0.0,
+                              "grid": "9x9"} for i in range(20)},
+        "answers": {"gestures": {}, "unknown": 3, "cancelled": {"held": 2}}, "recent": [],
+        "input": {"dropped": {"size": 4}, "kernel_drops": 0},
+        "output": {"subscribers": 0, "backlog_bytes": 0, "lines_lost": 0, "evicted": {}},
+        "loop_lag_s": 0.0, "internal_errors": 0, "shadow": None,
+        "shift": {"gestures": 40, "outside": {"strength": 0.5, "area": 0.0}, "unlike": ["strength"]},
+    }  # fmt: skip
+    text = "\n".join(screen(status))
+    assert "not ready: no model could classify" in text and "a fallback for cnn_lstm, 2 failures" in text
+    assert "unlike the training data" in text and "strength 50 %" in text
+    assert "and 8 more" in text and "4 size" in text and "2 held" in text
+
+
+def test_without_a_daemon_each_says_so_in_one_line(run, tmp_path: Path) -> None:
+    for command in (["status"], ["emit", "one_tap"], ["reload"], ["record", tmp_path / "x.mcap"]):
+        status, out, err = run(*command, "--control", tmp_path / "none.ctl")
+        assert status == 1 and out == "" and err.count("\n") == 1
+        assert "no daemon on" in err and "--control" in err
+    assert not (tmp_path / "x.mcap").exists()
+
+
+def test_a_test_event_is_seen_by_a_listener_as_one(ctl, start, daemon: Daemon) -> None:
+    listener = start("listen", "--socket", daemon.socket, "--sensor", "door", "--count", "1")
+    assert b"model tiny" in listener.stderr.readline()
+    status, out, _ = ctl("emit", "swipe_up", "--sensor", "door")
+    assert (status, out) == (0, "published swipe_up of door as #1, marked as a test\n")
+    line, _ = listener.communicate(timeout=30)
+    assert b"swipe_up" in line and line.endswith(b"(test)\n")
+    status, _, err = ctl("emit", "wink")
+    assert status == 1 and "wink" in err and "swipe_up" in err
+
+
+def test_recalibrate_and_reload(ctl, daemon: Daemon) -> None:
+    client = daemon.client()
+    Sensor(daemon, "belt").begin().perform("left")
+    client.events("gesture", "belt")
+    assert "belt" in ctl("recalibrate", "--sensor", "belt")[1]
+    status, _, err = ctl("recalibrate", "--sensor", "nobody")
+    assert status == 1 and "nobody" in err and "belt" in err
+    assert ctl("reload")[1] == "reloaded; tiny answers\n"
+    path = Path(daemon.ready["control"]).with_name("tiny.onnx")
+    good = path.read_bytes()
+    path.write_bytes(good[:500])
+    status, _, err = ctl("reload")
+    path.write_bytes(good)
+    assert status == 1 and str(path) in err and "nothing has changed" in err
+
+
+def test_a_shadow_is_named_by_a_path_that_is_the_clients(ctl, run, start, daemon: Daemon, tmp_path: Path) -> None:
+    tiny_model.make(tmp_path / "next.onnx")
+    begin = start("shadow", "next.onnx", "--control", daemon.ready["control"], cwd=tmp_path)
+    assert b"next in the shadow: 0 segments" in begin.communicate(timeout=60)[0]
+    client = daemon.client()
+    Sensor(daemon, "lid").begin().perform("left", "tap")
+    client.events("gesture", "lid", 2)
+    status, out, _ = ctl("shadow", "--stop")
+    assert status == 0 and "2 segments, 0 failed" in out and "agreement 100.0 %" in out
+    assert ctl("shadow") == (1, "no model runs in the shadow\n", "")
+
+
+def test_sniff_shows_what_reaches_the_daemon_and_what_to_set(start, daemon: Daemon) -> None:
+    sniffer = start("sniff", "--seconds", "60", "--control", daemon.ready["control"], "--json")
+    sensor, hand = Sensor(daemon, "odd"), Hand()
+    with socket.socket(type=socket.SOCK_DGRAM) as sender:
+        sender.connect(daemon.address)
+        while json.loads(_status(daemon))["taps"] == 0:
+            pass
+        for n in range(20):
+            sender.send(floats("/textile/odd/matrix", hand.frame(), n))
+        sender.send(b"rubbish!")
+    sensor.begin()
+    while json.loads(_status(daemon))["sensors"].get("odd") is None:
+        pass
+    sniffer.send_signal(2)
+    out, _ = sniffer.communicate(timeout=30)
+    found = json.loads(out)
+    message = next(m for m in found["messages"] if m["address"] == "/textile/odd/matrix")
+    assert (message["types"], message["count"], len(message["sources"])) == ("f*81", 20, 1)
+    assert found["errors"] == {"not_osc": 1}
+
+
+def _status(daemon: Daemon) -> str:
+    from gestured.client.control import Control
+
+    with Control(Path(daemon.ready["control"])) as control:
+        return json.dumps(control.ask("status"))
+
+
+@pytest.mark.parametrize(
+    ("address", "encode", "proposed"),
+    [
+        ("/arm/pressure", floats, ["the defaults fit what arrives"]),
+        ("/arm/pressure", counted, ["the defaults fit what arrives"]),
+        ("/arm/pressure", blob(">u2"), ["the defaults fit what arrives"]),
+        ("/textile/arm/matrix", ints, ["[addresses]", 'pressure = "/textile/{sensor}/matrix"']),
+        ("/arm", floats, ["[addresses]", 'pressure = "/{sensor}"']),
+    ],
+)
+def test_what_sniff_proposes_is_taken_by_the_daemon(address: str, encode, proposed: list[str]) -> None:
+    from gestured.core.wire import Addresses, Decoder
+
+    sight = Sight()
+    packets = [encode(address, Hand().frame(), n) for n in range(5)]
+    for n, packet in enumerate(packets):
+        sight.packet(n / 15, "127.0.0.1:5", packet)
+    found = propose(list(sight.seen.values()))
+    assert found == proposed
+    pattern = re.findall(r'pressure = "(.*)"', "\n".join(found)) or ["/{sensor}/pressure"]
+    decoder = Decoder(Addresses(pattern[0]), lambda sensor: (9, 9))
+    assert [len(decoder.decode(packet)[0]) for packet in packets] == [1] * 5
+
+
+def test_sniff_proposes_a_grid_and_is_bounded() -> None:
+    sight = Sight()
+    for n in range(1000):
+        sight.packet(n, "a:1", osc.encode_message(f"/s{n}/pressure", "f" * 25, [0.0] * 25))
+    assert len(sight.seen) <= 257 and sum(seen.count for seen in sight.seen.values()) == 1000
+    one = Sight()
+    one.packet(0, "a:1", osc.encode_message("/arm/pressure", "f" * 25, [0.0] * 25))
+    assert propose(list(one.seen.values())) == ["[sensors.arm]", 'grid = "5x5"']
+
+
+def test_sniff_on_a_port_of_its_own(start, udp: socket.socket) -> None:
+    taken = f"127.0.0.1:{udp.getsockname()[1]}"
+    process = start("sniff", "--listen", taken)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 1 and taken.encode() in err and b"Address already in use" in err
+    with socket.socket(type=socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    process = start("sniff", "--listen", f"127.0.0.1:{port}", "--seconds", "0.5", "--json")
+    assert b"listening" in process.stderr.readline()
+    with socket.socket(type=socket.SOCK_DGRAM) as sender:
+        while process.poll() is None:
+            sender.sendto(floats("/textile/arm/matrix", Hand().frame(), 0), ("127.0.0.1", port))
+    out, _ = process.communicate(timeout=30)
+    (message,) = json.loads(out)["messages"]
+    assert (message["address"], message["types"]) == ("/textile/arm/matrix", "f*81") and process.returncode == 0
+
+
+def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon) -> None:
+    client = daemon.client()
+    sensor = Sensor(daemon, "hurt").begin().perform("left")
+    client.events("gesture", "hurt")
+    sensor.sock.send(floats("/hurt/matrix", Hand().frame(), 0))
+    sensor.sock.send(osc.encode_message("/hurt/pressure", "f" * 25, [0.0] * 25))
+    while not {"address", "size"} <= set(json.loads(_status(daemon))["input"]["dropped"]):
+        pass
+    status, out, err = ctl("doctor", "--json")
+    findings = [json.loads(line) for line in out.splitlines()]
+    assert err == "" and status == (1 if any(f["level"] == "bad" for f in findings) else 0)
+    dropped = {f["what"].rsplit(" ", 1)[1]: f["remedy"] for f in findings if "dropped" in f["what"]}
+    assert "[addresses]" in dropped["address"] and "grid" in dropped["size"]
+    assert any(f["level"] == "ok" and "passes its self-test" in f["what"] for f in findings)
+    assert all(f["remedy"] for f in findings if f["level"] != "ok" and "limit" not in f["what"])
+
+
+def test_doctor_without_a_daemon(run, tmp_path: Path) -> None:
+    status, out, _ = run("doctor", "--control", tmp_path / "none.ctl")
+    assert status == 1 and "No such file" in out and "-> start gestured" in out
+
+
+def test_doctor_looks_at_the_machine(tmp_path: Path) -> None:
+    limit = tmp_path / "rmem_max"
+    limit.write_text("212992\n")
+    small = _buffer(limit)
+    limit.write_text(f"{BUFFER_BYTES}\n")
+    assert (small.level, _buffer(limit).level) == ("warn", "ok") and "sysctl" in small.remedy
+    assert (_clock(0.0).level, _clock(1.8e9).level) == ("bad", "ok")
+    assert "no socket" in _permissions(limit).what

@@ -1,0 +1,204 @@
+"""Recordings: what a real daemon hands over, what survives a crash, and what a replay makes of it."""
+
+import json
+import os
+import signal
+import socket
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gestured import recording, tape
+from gestured.control.diff import Answer, Difference, differences
+from gestured.core.errors import RecordingError
+from tests.daemon import tiny_model
+from tests.daemon.harness import Daemon, Sensor
+
+pytest.importorskip("mcap", reason="recordings need the extra [record]")
+
+
+@pytest.fixture
+def recorded(start, daemon: Daemon, tmp_path: Path):
+    """Records what the function does to the daemon, to the end of the file."""
+
+    def record(perform, name: str = "a.mcap", stop: int = signal.SIGINT) -> tuple[Path, bytes]:
+        path = tmp_path / name
+        recorder = start("record", path, "--control", daemon.ready["control"], "--json")
+        assert b"recording into" in recorder.stderr.readline()
+        perform()
+        recorder.send_signal(stop)
+        return path, recorder.communicate(timeout=30)[0]
+
+    return record
+
+
+def gestures(daemon: Daemon, name: str, *directions: str):
+    """Performs them, and waits for what the daemon makes of them."""
+
+    def perform() -> None:
+        client = daemon.client().subscribe("release", sensors=[name])
+        Sensor(daemon, name).begin().perform(*directions)
+        client.events("release", name, len(directions))
+
+    return perform
+
+
+def test_a_recording_holds_every_packet_and_replays_to_the_same_events(recorded, run, daemon, tmp_path) -> None:
+    sent = []
+    original = Sensor.packet
+
+    def packet(self, frame):
+        sent.append(original(self, frame))
+        return sent[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Sensor, "packet", packet)
+        path, said = recorded(gestures(daemon, "rec", "left", "tap", "up"))
+    assert json.loads(said) == {"file": str(path), "packets": len(sent), "events": 9, "lost": 0, "ended": "as asked"}
+    found = tape.read(path)
+    assert found.whole and [p.data for p in found.packets] == sent
+    assert found.scene["model"]["name"] == "tiny" and found.scene["settings"]["clock"] == "sensor"
+    names = [e["gesture"] for e in found.events if e["type"] == "gesture"]
+    assert names == ["swipe_left", "one_tap", "swipe_up"]
+    status, out, err = run("replay", path, "--json")
+    assert status == 0
+    twins = [json.loads(line) for line in out.splitlines()]
+    assert [(e["type"], e["id"]) for e in twins] == [(e["type"], e["id"]) for e in found.events]
+    for event, twin in zip(found.events, twins, strict=True):
+        for key, value in event.items():
+            assert twin[key] == (value if isinstance(value, str) else pytest.approx(value, abs=1e-3)), key
+    status, out, err = run("replay", path, "--diff")
+    assert (status, out) == (0, "") and "3 recorded answers, 0 differences" in err
+
+
+def test_a_replay_with_another_model_shows_what_differs(recorded, run, daemon, tmp_path) -> None:
+    path, _ = recorded(gestures(daemon, "dif", "left", "tap"))
+    names = list(tiny_model.GESTURES)
+    names[0], names[5] = names[5], names[0]  # a tap is a swipe now, and the other way round
+    other = tiny_model.make(tmp_path / "other.onnx", gestures=tuple(names))
+    status, out, err = run("replay", path, "--diff", "--model", other)
+    assert status == 1 and "2 differences" in err
+    lines = [line.split(": ", 1)[0][:1] + line.split(": ", 1)[1].split()[0] for line in out.splitlines()]
+    assert lines == ["-swipe_left", "+one_tap", "-one_tap", "+swipe_left"]
+    status, out, _ = run("replay", path, "--diff", "--model", other, "--json")
+    assert [json.loads(line)["replayed"]["answer"] for line in out.splitlines()] == ["one_tap", "swipe_left"]
+
+
+def test_a_replay_to_a_daemon_gives_the_same_gestures_at_any_speed(recorded, run, daemon) -> None:
+    path, _ = recorded(gestures(daemon, "udp", "left", "up"))
+    client = daemon.client().subscribe("gesture", sensors=["udp"])
+    client.subscribe("status").until(lambda line: line["sensors"]["udp"] == "stale")  # it may change its owner
+    client.subscribe("gesture", sensors=["udp"])
+    status, _, err = run("replay", path, "--to", daemon.ready["listen"], "--speed", "50")
+    assert status == 0 and "sent" in err
+    assert [e["gesture"] for e in client.events("gesture", "udp", 2)] == ["swipe_left", "swipe_up"]
+    with socket.socket(type=socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        nobody = f"127.0.0.1:{free.getsockname()[1]}"
+    status, _, err = run("replay", path, "--to", nobody, "--speed", "1000")
+    assert status == 1 and "nobody listened" in err
+
+
+def test_a_killed_recorder_leaves_what_was_flushed(start, daemon: Daemon, tmp_path: Path) -> None:
+    path = tmp_path / "killed.mcap"
+    recorder = start("record", path, "--control", daemon.ready["control"])
+    assert b"recording into" in recorder.stderr.readline()
+    gestures(daemon, "kill", "left")()
+    while "swipe_left" not in {e.get("gesture") for e in tape.read(path).events}:
+        pass  # a reader sees what was flushed, while it is being written
+    recorder.kill()
+    recorder.wait(30)
+    found = tape.read(path)
+    assert not found.whole and "swipe_left" in {e.get("gesture") for e in found.events}
+
+
+def test_whatever_is_cut_off_the_rest_is_read(recorded, daemon: Daemon, tmp_path: Path) -> None:
+    path, _ = recorded(gestures(daemon, "cut", "left"))
+    data, whole = path.read_bytes(), tape.read(path)
+    short = tmp_path / "short.mcap"
+    read = []
+    for size in range(0, len(data), 97):
+        short.write_bytes(data[:size])
+        try:
+            found = tape.read(short)
+        except RecordingError as error:
+            assert str(short) in str(error)
+            continue
+        assert not found.whole and found.packets == whole.packets[: len(found.packets)]
+        read.append(len(found.packets))
+    assert read and read == sorted(read)
+    random = np.random.default_rng(0)
+    for _ in range(200):  # damage is a sentence, never a traceback
+        damaged = bytearray(data)
+        for at in random.integers(0, len(data), 20):
+            damaged[at] = random.integers(256)
+        short.write_bytes(damaged)
+        try:
+            tape.read(short)
+        except RecordingError as error:
+            assert str(short) in str(error)
+
+
+def test_a_recording_ends_at_its_size_and_never_replaces_a_file(run, start, daemon: Daemon, tmp_path: Path) -> None:
+    path = tmp_path / "full.mcap"
+    recorder = start("record", path, "--control", daemon.ready["control"], "--max-mib", "1", "--json")
+    with socket.socket(type=socket.SOCK_DGRAM) as sender:
+        sender.connect(daemon.address)
+        while recorder.poll() is None:
+            sender.send(os.urandom(8000))  # nonsense is recorded, too
+    summary = json.loads(recorder.communicate()[0])
+    assert summary["ended"] == "the file is as large as it may be"
+    assert path.stat().st_size < 1.5 * (1 << 20) and tape.read(path).whole
+    status, _, err = run("record", path, "--control", daemon.ready["control"])
+    assert status == 1 and str(path) in err and "File exists" in err
+
+
+def test_flag_keeps_the_flight_recorder(ctl, run, daemon: Daemon, tmp_path: Path) -> None:
+    gestures(daemon, "flag", "left")()
+    path = tmp_path / "wrong.mcap"
+    status, out, _ = ctl("flag", path, "--note", "it was a tap")
+    found = tape.read(path)
+    assert status == 0 and f"{path}: {len(found.packets)} packets" in out
+    assert found.scene["note"] == "it was a tap" and len(found.scene["model"]["sha256"]) == 64
+    assert "swipe_left" in {e.get("gesture") for e in found.events}
+    assert run("replay", path, "--diff")[0] in (0, 1)
+
+
+def test_export_gives_the_contracts_npz(recorded, run, daemon: Daemon, tmp_path: Path) -> None:
+    path, _ = recorded(gestures(daemon, "exp", "left", "up"))
+    out = tmp_path / "exp.npz"
+    status, said, _ = run("export", path, out, "--sensor", "exp", "--json")
+    assert status == 0 and json.loads(said)["events"] == 2
+    found = recording.read(out)
+    assert found.labels.tolist() == ["session"] and found.subjects.tolist() == ["exp"]
+    assert found.event_labels.tolist() == ["swipe_left", "swipe_up"]
+    assert found.frames.shape == (30 + 7 + 15 + 7 + 15, 9, 9)
+    assert np.diff(found.times) == pytest.approx(1 / 15, abs=1e-3)
+    status, _, err = run("export", path, tmp_path / "x.npz", "--sensor", "nobody")
+    assert status == 1 and "nobody" in err and not (tmp_path / "x.npz").exists()
+
+
+def test_what_is_no_recording_is_one_sentence(run, tmp_path: Path) -> None:
+    path = tmp_path / "x.mcap"
+    for data in (b"", b"hello", b"\x89MCAP0\r\n", os.urandom(5000)):
+        path.write_bytes(data)
+        status, out, err = run("replay", path)
+        assert status == 1 and out == "" and err.count("\n") == 1 and str(path) in err
+    assert "No such file" in run("replay", tmp_path / "none.mcap")[2]
+
+
+def test_differences_match_contacts_by_sensor_and_onset() -> None:
+    a = Answer("arm", 10.0, "one_tap", 0.9)
+    near = Answer("arm", 10.1, "one_tap", 0.91)
+    other = Answer("arm", 10.1, "unknown", 0.2)
+    elsewhere = Answer("leg", 10.0, "one_tap", 0.9)
+    late = Answer("arm", 12.0, "one_tap", 0.9)
+    unsure = Answer("arm", 10.0, "one_tap", 0.7)
+    assert differences([a], [near]) == []
+    assert differences([a], [other]) == [Difference(a, other)]
+    assert differences([a], [elsewhere]) == [Difference(a, None), Difference(None, elsewhere)]
+    assert differences([a, late], [late, near]) == []
+    assert differences([a], [unsure]) == [Difference(a, unsure)]
+    assert differences([], [a]) == [Difference(None, a)]
+    assert Difference(a, None).words().startswith("- ") and "arm: one_tap 0.900" in Difference(a, None).words()
