@@ -85,7 +85,11 @@ class Session:
 
     def _await_sensor(self) -> None:
         self._terminal.say(f"Waiting for the sensor on {self._sensor.where}; do not touch it.")
-        self._until(lambda: self._sensor.front.ready)
+        while not self._sensor.front.ready:
+            try:
+                self._until(lambda: self._sensor.front.ready)
+            except Paused:  # there is nothing to pause yet
+                pass
         rows, columns = self._sensor.front.sent
         self._terminal.say(f"Sensor {self._sensor.name}: {rows} x {columns} at {self._sensor.rate_hz:.0f} Hz.")
 
@@ -103,7 +107,7 @@ class Session:
                 say(f"\n{number}/{total}  {trial}")
                 answer, take = self._once(trial)
             except Paused:
-                say("Paused. Enter goes on, q quits.")
+                say("\nPaused. Enter goes on, q quits.")
                 while self._key() != "\n":
                     pass
                 continue
@@ -118,9 +122,9 @@ class Session:
         for left_s in range(self._wait_s, 0, -1):
             terminal.say(f"{left_s} ", end="")
             self._until(None, 1.0)
-        if sensor.front.touched:
-            terminal.say("let go of the sensor ", end="")
-            self._until(lambda: not sensor.front.touched)
+        if not self._free():  # or it was moved, and must be learned again
+            terminal.say("do not touch the sensor ", end="")
+            self._until(self._free)
         sensor.begin()
         terminal.say("now!")
         self._until(lambda: sensor.onset is not None, PATIENCE_S)
@@ -134,6 +138,9 @@ class Session:
             key = self._until(None)
             if key in ("r", "d") or (usable and key == "\n"):
                 return key, take
+
+    def _free(self) -> bool:
+        return self._sensor.front.ready and not self._sensor.front.touched
 
     def _show(self, trial: Trial, take: Take | None) -> None:
         if take is None:

@@ -130,3 +130,24 @@ def test_a_pause_while_the_verdict_is_shown_throws_the_take_away(tmp_path: Path)
     script = run(tmp_path / "07.npz", FakeSensor(GOOD), ("in place", "\n"), ("Enter keep", "p"), ("Paused", "\n"))
     assert script.shown.count(f"1/9  {TRIALS[0]}") == 2
     assert "Ended with 0 recordings" in script.shown
+
+
+def test_a_pause_before_the_sensor_is_there_changes_nothing(tmp_path: Path) -> None:
+    sensor = FakeSensor(GOOD)
+    answers = iter([False, False, False])
+    sensor.front = Front(answers)
+    script = run(tmp_path / "07.npz", sensor, ("Waiting for the sensor", "p"), ("in place", "\n"), ("Enter keep", "\n"))
+    assert "Ended with 1 recordings" in script.shown
+
+
+class Front:
+    """Not ready for as many looks as there are answers."""
+
+    touched, sent = False, (9, 9)
+
+    def __init__(self, answers: Iterator[bool]) -> None:
+        self.answers = answers
+
+    @property
+    def ready(self) -> bool:
+        return next(self.answers, True)
