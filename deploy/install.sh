@@ -6,21 +6,23 @@ set -eu
 venv=$1 root=$2 prefix=$3
 python=$("$venv/bin/python" -c 'import sys; print("%s/bin/python%d.%d" % (sys.base_prefix, *sys.version_info[:2]))')
 lib=$prefix/lib/gestured
-share=$root$prefix/share
+share=$prefix/share
 doc=$share/doc/gestured
+units=$prefix/lib/systemd/system
 new=$root$lib.new old=$root$lib.old
 work=$(mktemp -d)
 trap 'rm -rf "$work" "$new"' EXIT
 
-put() {  # put MODE FILE FOLDER/NAME: programs and sockets are where PREFIX says
-    mkdir -p "$(dirname "$3")"
-    sed "s|/usr/bin/gesture|$prefix/bin/gesture|g; s|/usr/share/doc|$prefix/share/doc|g" "$2" >"$3.new"
-    chmod "$1" "$3.new"
-    mv "$3.new" "$3"
+put() {  # put MODE FILE PATH: programs and pages are where PREFIX says
+    mkdir -p "$root$(dirname "$3")"
+    sed "s|/usr/bin/gesture|$prefix/bin/gesture|g; s|/usr/share/doc|$prefix/share/doc|g" "$2" >"$root$3.new"
+    chmod "$1" "$root$3.new"
+    mv "$root$3.new" "$root$3"
+    echo "$3" >>"$work/installed"
 }
 
-keep() {  # keep FILE PATH: an operator's file stays as it is
-    [ -e "$2" ] || put 644 "$1" "$2"
+keep() {  # keep FILE PATH: an operator's file stays as it is, here and by `make uninstall`
+    [ -e "$root$2" ] || { mkdir -p "$root$(dirname "$2")"; cp "$1" "$root$2"; }
 }
 
 # The build leaves files beside its sources, so it gets a copy.
@@ -28,19 +30,18 @@ mkdir "$work/source"
 cp -R pyproject.toml README.md LICENSE NOTICE gestured models "$work/source"
 rm -rf "$new" "$old"
 mkdir -p "$(dirname "$new")"
-"$venv/bin/pip" install --no-compile --target "$new" "$work/source" >"$venv/pip.log" 2>&1 </dev/null || {
+"$venv/bin/pip" install --no-compile --target "$new" "$work/source[record]" >"$venv/pip.log" 2>&1 </dev/null || {
     echo "pip could not install gestured: $(grep -i error "$venv/pip.log" | tail -n 1) (all of it: $venv/pip.log)" >&2
     exit 1
 }
 rm -rf "$new/bin"
 find "$new" -name __pycache__ -type d -prune -exec rm -rf {} +
 "$python" -m compileall -q -j 0 -s "$new" -p "$lib" "$new"
-PYTHONPATH=$new PYTHONDONTWRITEBYTECODE=1 "$python" -m deploy.generate install "$share"
+PYTHONPATH=$new PYTHONDONTWRITEBYTECODE=1 "$python" -m deploy.generate install "$work/share"
 if [ -e "$root$lib" ]; then mv "$root$lib" "$old"; fi
 mv "$new" "$root$lib"
 rm -rf "$old"
 
-mkdir -p "$root$prefix/bin"
 for program in gestured:daemon gesturectl:control; do
     name=${program%:*}
     # No site, no user's folder, no PYTHON* variables; the stack on standard error when a signal kills it.
@@ -53,16 +54,20 @@ from gestured.${program#*:}.cli import main
 
 sys.exit(main())
 END
-    put 755 "$work/$name" "$root$prefix/bin/$name"
+    put 755 "$work/$name" "$prefix/bin/$name"
 done
-
 for unit in systemd/*.service systemd/*.socket; do
-    put 644 "$unit" "$root$prefix/lib/systemd/system/$(basename "$unit")"
+    put 644 "$unit" "$units/$(basename "$unit")"
 done
-put 644 systemd/gestured.sysusers.conf "$root$prefix/lib/sysusers.d/gestured.conf"
-put 644 systemd/gestured.tmpfiles.conf "$root$prefix/lib/tmpfiles.d/gestured.conf"
-for file in systemd/osc-output.conf deploy/gestured.toml LICENSE NOTICE; do
+put 644 systemd/gestured.sysusers.conf "$prefix/lib/sysusers.d/gestured.conf"
+put 644 systemd/gestured.tmpfiles.conf "$prefix/lib/tmpfiles.d/gestured.conf"
+(cd "$work/share" && find . -type f) | while read -r file; do
+    put 644 "$work/share/$file" "$share/${file#./}"
+done
+for file in systemd/osc-output.conf deploy/gestured.toml deploy/prometheus/gestured.rules.yml \
+    deploy/prometheus/prometheus.yml deploy/grafana/dashboards/gestured.json docs/events.schema.json LICENSE NOTICE; do
     put 644 "$file" "$doc/$(basename "$file")"
 done
-keep deploy/gestured.toml "$root/etc/gestured/gestured.toml"
-keep systemd/gestured.default "$root/etc/default/gestured"
+keep deploy/gestured.toml /etc/gestured/gestured.toml
+keep systemd/gestured.default /etc/default/gestured
+mv "$work/installed" "$root$lib/installed"  # what `make uninstall` removes, beside the packages

@@ -1,0 +1,160 @@
+"""The examples marked `run: here`: run against a real daemon, but for the addresses."""
+
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from pythonosc.osc_message import OscMessage
+
+from gestured.client.control import Control
+from gestured.models import shipped
+from tests.daemon.harness import Daemon
+from tests.documents.blocks import ROOT, Block, blocks
+
+WRAPPER = '#!/bin/sh\nPYTHONPATH={root} exec {python} -m gestured.{package} "$@"\n'
+# A phrase that only this example has, and so its name.
+SHELL = ("--count 2", "while read -r line")
+PHRASES = {
+    *SHELL,
+    "across its restarts",
+    "sockaddr_un",
+    "BlockingOSCUDPServer",
+    "OscBundleBuilder",
+    "measure()",
+    "HEADER",
+}
+
+
+def example(phrase: str) -> Block:
+    """The example with a phrase in it."""
+    (found,) = [block for block in blocks("run", "here") if phrase in block.text]
+    return found
+
+
+def test_no_example_is_forgotten():
+    assert {example(phrase) for phrase in PHRASES} == set(blocks("run", "here"))
+
+
+class Place:
+    """A daemon, and the examples' addresses turned into its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port = probe.getsockname()[1]
+        self.daemon = Daemon.start(
+            folder, "cnn_lstm", "--publish", f"osc://127.0.0.1:{self.port}", "--metrics", "127.0.0.1:0"
+        )
+        for program, package in (("gestured", "daemon"), ("gesturectl", "control")):
+            path = folder / program
+            path.write_text(WRAPPER.format(root=ROOT, python=sys.executable, package=package))
+            path.chmod(0o755)
+
+    def here(self, text: str) -> str:
+        """An example with this daemon's addresses."""
+        text = text.replace("/run/gestured/events.sock", str(self.daemon.socket)).replace("9001", str(self.port))
+        return text.replace("9000", str(self.daemon.address[1]))
+
+    @contextmanager
+    def gestures(self) -> Iterator[None]:
+        """Somebody swipes to the left again and again: made-up events, for who subscribes late misses the first."""
+        stop = threading.Event()
+
+        def emit() -> None:
+            with Control(self.daemon.socket.with_suffix(".ctl")) as control:
+                while not stop.wait(0.1):
+                    control.ask("emit", gesture="swipe_left", sensor="armrest")
+
+        thread = threading.Thread(target=emit)
+        thread.start()
+        try:
+            yield
+        finally:
+            stop.set()
+            thread.join()
+
+    def first_line(self, *command: str) -> str:
+        """What a program that never ends prints first."""
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=self.folder) as process:
+            assert process.stdout is not None
+            try:
+                return next(line for line in process.stdout if "swipe" in line)
+            finally:
+                process.kill()
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
+    if not shipped()["cnn_lstm"].exists():
+        pytest.skip(f"{shipped()['cnn_lstm']} is not there")
+    place = Place(tmp_path_factory.mktemp("examples"))
+    yield place
+    assert place.daemon.stop() == 0, place.daemon.stderr()
+
+
+def compiled(place: Place, phrase: str) -> str:
+    """A C++ example as a program; no warning."""
+    if shutil.which("g++") is None:
+        pytest.skip("g++ is not installed")
+    source, program = place.folder / f"{phrase}.cpp", place.folder / phrase
+    source.write_text(place.here(example(phrase).text))
+    command = ["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-o", str(program), str(source)]
+    subprocess.run(command, check=True, timeout=60)
+    return str(program)
+
+
+@pytest.mark.parametrize("phrase", SHELL)
+def test_shell(place: Place, phrase: str):
+    environment = {"PATH": f"{place.folder}:/usr/bin:/bin"}
+    command = ["bash", "-euo", "pipefail", "-c", place.here(example(phrase).text)]
+    with place.gestures():
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment)
+    assert done.returncode == 0, done.stderr
+    assert ("the next track" if "track" in example(phrase).text else "swipe_left") in done.stdout
+
+
+def test_python_subscriber(place: Place):
+    with place.gestures():
+        line = place.first_line(sys.executable, "-c", place.here(example("across its restarts").text))
+    assert line == "armrest swipe_left 1.00 0 missed\n"
+
+
+def test_cpp_subscriber(place: Place):
+    program = compiled(place, "sockaddr_un")
+    with place.gestures():
+        assert place.first_line(program, str(place.daemon.socket)) == "armrest swipe_left 1.0\n"
+
+
+def test_osc_subscriber(place: Place):
+    with place.gestures():
+        line = place.first_line(sys.executable, "-c", place.here(example("BlockingOSCUDPServer").text))
+    assert line.startswith("armrest swipe_left 1.00 ")
+
+
+def test_osc_messages():
+    text = example("OscBundleBuilder").text
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, timeout=30, check=True)
+    assert done.stdout.strip() == text.rstrip().rpartition("# bytes: ")[2]
+
+
+def test_python_sensor(place: Place):
+    before = place.daemon.frames()
+    code = place.here(example("measure()").text)
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=30)
+    while place.daemon.frames() < before + 30:
+        pass
+    assert "armrest" in place.daemon.get("/readyz")[1]
+
+
+def test_cpp_sensor(place: Place):
+    packet = subprocess.run([compiled(place, "HEADER")], capture_output=True, check=True, timeout=30).stdout
+    message = OscMessage(packet)
+    assert (message.address, len(packet)) == ("/armrest/pressure", 192)
+    assert message.params == [bytes(162)]

@@ -1,0 +1,103 @@
+"""docs/events.schema.json and what docs/wire.md shows, held against the daemon's own lines."""
+
+import json
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, get_args
+
+import pytest
+
+from gestured.core import messages
+from gestured.core.events import Cancelled, Event, Gesture, Unknown
+from gestured.core.subscription import parse_subscription
+from gestured.models import shipped
+from tests.daemon.harness import Daemon, Sensor
+from tests.documents.blocks import ROOT, Block, blocks
+
+SCHEMA = json.loads((ROOT / "docs" / "events.schema.json").read_text())
+TYPES = ("onset", "gesture", "unknown", "cancelled", "release", "status")
+
+
+@pytest.fixture(scope="module")
+def valid() -> Any:
+    """Says whether a line is one that the schema allows; unknown keys are an error here."""
+    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    strict = json.loads(json.dumps(SCHEMA))
+    for part in strict["$defs"].values():
+        if "properties" in part:
+            part["additionalProperties"] = False
+    return jsonschema.Draft202012Validator(strict).validate
+
+
+@pytest.mark.parametrize("event", get_args(Event), ids=lambda event: event.__name__)
+def test_the_schema_has_each_key_of_each_event(event: type):
+    part = SCHEMA["$defs"][event.__name__.lower()]
+    keys = {"type", *(field.name for field in fields(event))}
+    assert set(part["required"]) == keys
+    assert set(part["properties"]) - {"test"} == keys
+
+
+def test_the_schema_has_each_reason():
+    """The list beside the field of the event is the one that others keep true."""
+    text = (ROOT / "gestured" / "core" / "events.py").read_text()
+    (line,) = [line for line in text.splitlines() if line.strip().startswith("reason: str")]
+    reasons = [word.strip() for word in line.partition("#")[2].split(",")]
+    assert SCHEMA["$defs"]["cancelled"]["properties"]["reason"]["enum"] == reasons
+    for reason in reasons:
+        assert f"| `{reason}` |" in (ROOT / "docs" / "wire.md").read_text()
+
+
+def test_lines_of_every_kind_are_valid(valid: Any):
+    scores = {"one_tap": 0.3, "swipe_left": 0.7}
+    for event in (
+        Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores),
+        Gesture("a", 1, "swipe_left", 1.0, 1, 0.1, 0.2, 0.4, 3, 0, "m", True, scores),
+        Cancelled("a", 1, "held"),
+    ):
+        valid(json.loads(messages.to_json(event, 1.7e9)))
+    valid(json.loads(messages.hello_json("1", "x", "m", ["one_tap"], {"a": 0})))
+    valid(json.loads(messages.lost_json(3)))
+    valid(json.loads(messages.error_json("no")))
+
+
+@pytest.mark.e2e
+def test_a_daemons_lines_are_valid(valid: Any, tmp_path: Path):
+    if not shipped()["cnn_lstm"].exists():
+        pytest.skip(f"{shipped()['cnn_lstm']} is not there")
+    daemon = Daemon.start(tmp_path, "cnn_lstm", "--clock", "sensor")
+    try:
+        client = daemon.client()
+        client.ask({"subscribe": {"types": list(TYPES)}}).ask(b"rubbish\n")
+        Sensor(daemon, "armrest").begin().perform("left", "tap", "up")
+        lines = [client.hello]
+        while not {line["type"] for line in lines} >= {"error", "onset", "release", "status"}:
+            lines.append(client.line())
+        client.close()
+    finally:
+        daemon.stop()
+    for line in lines:
+        valid(line)
+
+
+@pytest.mark.parametrize("block", blocks("checked", "the schema"), ids=str)
+def test_the_lines_in_the_documents_are_valid(valid: Any, block: Block):
+    for line in block.text.splitlines():
+        valid(json.loads(line))
+
+
+@pytest.mark.parametrize("block", blocks("checked", "the daemon's own parser"), ids=str)
+def test_the_requests_in_the_documents_are_valid(block: Block):
+    for line in block.text.splitlines():
+        parse_subscription(line.encode())
+
+
+@pytest.mark.parametrize("block", blocks("checked", "gestured --explain"), ids=str)
+def test_the_configurations_in_the_documents_are_valid(block: Block, tmp_path: Path):
+    path = tmp_path / "gestured.toml"
+    path.write_text(block.text)
+    command = [sys.executable, "-m", "gestured.daemon", "--config", str(path), "--explain"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,83 @@
+"""Each example says how it is held to the truth, its commands exist, and links lead somewhere."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from gestured.control.cli import parser as gesturectl_parser
+from gestured.daemon.cli import parser as gestured_parser
+from gestured.lab.cli import parser as lab_parser  # imports no torch
+from tests.documents.blocks import ROOT, Block, blocks, documents
+
+CHECKED = {
+    "the schema",  # these three by test_formats.py
+    "the daemon's own parser",
+    "gestured --explain",
+    "the command line",  # below: its programs take it
+}
+PARSERS = {"gestured": gestured_parser(), "gesturectl": gesturectl_parser(), "gestured-lab": lab_parser()}
+
+
+@pytest.mark.parametrize("block", blocks(), ids=str)
+def test_each_example_says_how_it_is_held_to_the_truth(block: Block):
+    match block.kind, block.words:
+        case "run", "here":
+            assert block in HERE
+        case "run", "container":
+            assert block.document in CONTAINER and block.language == "sh"
+        case "run", words:
+            file, _, name = words.partition("::")
+            assert f"def {name}(" in (ROOT / file).read_text()
+        case "checked", words:
+            assert words in CHECKED
+        case "not run", reason:
+            assert reason
+        case _:
+            raise AssertionError(f"{block}: no mark above it; tests/documents/blocks.py says which there are")
+
+
+HERE = blocks("run", "here")  # test_examples.py counts that it runs them all
+CONTAINER = {"docs/operating.md", "docs/troubleshooting.md", "docs/sensors.md", "docs/security.md"}
+
+
+def commands(block: Block) -> list[list[str]]:
+    """Calls of our programs in a shell example."""
+    text = re.sub(r"<<'EOF'.*?^EOF$", "", block.text.replace("\\\n", " "), flags=re.MULTILINE | re.DOTALL)
+    parts = [part.strip() for line in text.splitlines() for part in re.split(r"\|\|?|&&|;", line.split("#")[0])]
+    words = [shlex.split(part.removeprefix("sudo ")) for part in parts if part and "'*" not in part]
+    return [found for found in words if found and found[0] in PARSERS]
+
+
+@pytest.mark.parametrize("block", [block for block in blocks() if block.language == "sh"], ids=str)
+def test_each_command_is_valid(block: Block):
+    for program, *arguments in commands(block):
+        PARSERS[program].parse_args(arguments)
+
+
+def test_each_command_in_the_text_exists():
+    names = {command.prog.split()[-1] for command in subparsers()}
+    for path in documents():
+        for found in re.findall(r"`gesturectl ([a-z]+)", path.read_text()):
+            assert found in names, f"{path.name}: gesturectl {found}"
+
+
+def subparsers():
+    """gesturectl's subcommands."""
+    (action,) = [a for a in PARSERS["gesturectl"]._actions if isinstance(getattr(a, "choices", None), dict)]
+    return action.choices.values()
+
+
+def heads(path: Path) -> set[str]:
+    """The anchors of a document's headings, as GitHub makes them."""
+    found = re.findall(r"^#+ (.*)$", path.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", head.lower()).replace(" ", "-") for head in found}
+
+
+@pytest.mark.parametrize("path", documents(), ids=lambda path: path.name)
+def test_every_link_leads_somewhere(path: Path):
+    for target, anchor in re.findall(r"\]\((?!https?:)([^)#]*)#?([^)]*)\)", path.read_text()):
+        there = path.parent / target if target else path
+        assert there.exists(), target
+        assert not anchor or anchor in heads(there), f"{target}#{anchor}"
