@@ -1,0 +1,107 @@
+"""Too much of everything: packets, clients, requests."""
+
+import json
+import resource
+import socket
+import subprocess
+import sys
+
+import pytest
+
+from tests.daemon.harness import Daemon, Sensor
+from tests.hostile.grammar import TYPES, violations
+from tests.hostile.test_network import play, swipe
+
+
+@pytest.mark.hostile
+@pytest.mark.parametrize(
+    ("kind", "rate"), [("rubbish", 50_000), ("frames", 50_000), ("sensors", 50_000), ("full", 500)]
+)
+def test_a_flood_from_one_source_while_another_sensor_works(start, kind: str, rate: int) -> None:
+    daemon = start("--metrics", "127.0.0.1:0")
+    client = daemon.client().subscribe(*TYPES)
+    sensor = Sensor(daemon, "arm")
+    quiet = [sensor.hand.frame() for _ in range(90)]
+    lines = play(client, [sensor], [quiet])
+    flood = [sys.executable, "-m", "tests.hostile.flood", daemon.ready["listen"], kind, "--rate", str(rate)]
+    with subprocess.Popen([*flood, "--seconds", "12"], stdout=subprocess.DEVNULL) as source:
+        lines += play(client, [sensor], [quiet + quiet])  # what it takes to see that it is a flood
+        for direction in ("left", "right", "left", "right"):
+            lines += play(client, [sensor], [swipe(sensor, direction)])
+            assert daemon.get("/healthz")[0] == 200
+        assert source.poll() is None  # it has not ended before
+    lines += play(client, [sensor], [swipe(sensor, "left") + quiet])
+    held = daemon.metric("gestured_dropped_total", reason="flood")
+    lost = daemon.metric("gestured_kernel_drops_total")
+    assert daemon.stop() == 0
+    lines += client.rest()
+    assert violations(lines) == []
+    gestures = [line["gesture"] for line in lines if line["type"] == "gesture"]
+    assert gestures[-1] == "swipe_left"  # the next good frame counts
+    print(f"{kind}: {held:.0f} packets held back, {lost:.0f} found no room, {len(gestures)} of 5 gestures")
+    if kind != "full":  # those leave the sensor next to nothing of the kernel's buffer
+        assert len(gestures) >= 4
+
+
+def connect(daemon: Daemon) -> socket.socket:
+    sock = socket.socket(socket.AF_UNIX)
+    sock.settimeout(20)
+    sock.connect(str(daemon.socket))
+    return sock
+
+
+@pytest.mark.hostile
+def test_a_thousand_clients_of_which_some_never_read(start) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard < 2048:
+        pytest.skip(f"this test needs 2048 descriptors, there are {hard}")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (2048, hard))
+    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0")
+    readers = [connect(daemon) for _ in range(950)]
+    stalled = [connect(daemon) for _ in range(50)]
+    for sock in stalled:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        sock.sendall(b'{"subscribe":{"types":["gesture","unknown","onset","release","status"]}}\n')
+    sensor = Sensor(daemon, "arm").begin()
+    watch = daemon.client()
+    for _ in range(20):
+        sensor.perform("left", "right", "tap")
+        watch.events("gesture", "arm", 3)
+    assert all(read_until(sock, 60) == list(range(1, 61)) for sock in readers)
+    assert daemon.metric("gestured_clients") == 1001
+    for sock in (*readers, *stalled):
+        sock.close()
+    watch.subscribe("status")
+    while daemon.metric("gestured_clients") > 1:
+        watch.line()
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def read_until(sock: socket.socket, last: int) -> list[int]:
+    """The sequences of a client's gestures, up to `last`."""
+    found: list[int] = []
+    with sock.makefile("rb") as file:
+        while not found or found[-1] < last:
+            line = json.loads(file.readline())
+            if line["type"] == "gesture":
+                found.append(line["sequence"])
+    return found
+
+
+def test_clients_that_send_rubbish_without_end_hold_nobody_up(start) -> None:
+    daemon = start("--clock", "sensor")
+    client = daemon.client()
+    rude = [connect(daemon) for _ in range(20)]
+    for sock in rude:
+        sock.setblocking(False)
+    sensor = Sensor(daemon, "arm").begin()
+    for n in range(1, 11):
+        for sock in rude:  # it does not read the answers either
+            try:
+                sock.send(b'{"subscribe":7}\n' * 1000 if n % 2 else b"[" * 16_000)
+            except BlockingIOError:
+                pass  # the daemon has read as much as is its turn
+        sensor.perform("left")
+        assert client.line()["sequence"] == n
+    for sock in rude:
+        sock.close()
