@@ -35,12 +35,12 @@ NAMES = {method: SHORT.get(method, title) for method, (title, _, _) in METHODS.i
 GROUPS = {
     "gesture": list(GESTURES),
     "speed": ["slow", "normal", "fast"],
-    "inclination": ["0", "1", "2"],
-    "participant": [f"p{k:02d}" for k in range(34)],
-    "hand size": ["small", "medium", "large"],
-    "pressure": ["light", "middle", "firm"],
-    "place": ["middle", "edge", "corner"],
-    "signal to noise": ["below 10", "10 to 20", "20 to 40", "above 40"],
+    "inclination": ["arm pose 1", "arm pose 2", "arm pose 3"],
+    "participant": [f"{k:02d}" for k in range(34)],
+    "hand size": ["low: 9.01 to 11.2 mm", "middle: 11.2 to 12.8 mm", "high: 12.8 to 15.1 mm"],
+    "pressure": ["low: 112 to 391 counts", "middle: 391 to 640 counts", "high: 640 to 1.23e+03 counts"],
+    "place": [f"{part}: 0.123 to 2.34 taxels from the middle" for part in ("low", "middle", "high")],
+    "signal to noise": ["low: 12 to 40.1", "middle: 40.1 to 80.2", "high: 80.2 to 161"],
 }
 
 

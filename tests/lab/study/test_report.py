@@ -267,3 +267,30 @@ def test_words_and_marks_stand_out_from_the_page(scheme: int, page: str) -> None
             assert _contrast(colours[words], colours[ground]) >= 4.5, (words, ground)
     for mark in ("f0", "f1", "f2", "f3", "f4", "deep", "miss"):
         assert _contrast(colours[mark], colours["page"]) >= 3.0, mark
+
+
+def test_own_recordings_have_tables_of_their_own_and_change_no_other_figure(
+    study: Study, page: str, tmp_path: Path
+) -> None:
+    mine = [
+        {**cell, "data": "own", "published": None, "right": 0.1234, "low": 0.1, "high": 0.2}
+        for cell in study["cells"]
+        if (cell["protocol"], cell["augmentation"]) == ("participants", "none")
+    ]
+    with_own = report({**study, "cells": [*mine, *study["cells"]]}, tmp_path)
+    rows = [row for row in read(with_own).rows if "12.3 10.0–20.0" in " ".join(row.split())]
+    assert len(rows) == len(mine) and "Your own recordings" in with_own and "Your own recordings" not in page
+    parts = re.compile(r'<dl class="findings">.*?</dl>', re.DOTALL)
+    assert parts.search(with_own)[0] == parts.search(page)[0]  # type: ignore[index]
+
+
+def test_times_before_the_onset_stay_within_their_drawing(tmp_path: Path) -> None:
+    study = made_study()
+    for signal in [*study["signals"].values(), study["double_tap"]]:
+        signal["times_s"] = [time - 0.3 for time in signal["times_s"]]
+    page = report(study, tmp_path)
+    lines = re.findall(r'<path d="M([^"]*)" class="signal"', page)
+    assert len(lines) == 11
+    for line in lines:
+        assert all(float(point.split()[0]) >= 0 for point in line.split("L"))
+    assert "\u22120.3 s" in page

@@ -21,7 +21,7 @@ DEEPEST = 0.58  # of a colour behind a number that must be read, on a light and 
 def overview(study: Study) -> Markup:
     """Each method a row, each augmentation a panel: the published figure and ours under each protocol."""
     found = [name for name in reading.AUGMENTATIONS if reading.cells(study, augmentation=name)]
-    methods = reading.in_order(study, {row["method"] for row in reading.part(study, "cells")})
+    methods = reading.in_order(study, {row["method"] for row in reading.cells(study)})
     protocols = [name for name in FORMS if reading.cells(study, protocol=name)]
     pitch = LANE * len(protocols) + 15
     height = 44 + pitch * len(methods) + 30
@@ -84,7 +84,7 @@ def _share(plot: Plot, row: Row, y: float, protocol: str, study: Study) -> Marku
 def confusions(study: Study) -> Markup:
     """One small matrix for each method."""
     names: list[str] = list((study.get("about") or {}).get("gestures") or [])
-    methods = reading.in_order(study, {row["method"] for row in reading.part(study, "cells") if row.get("confusion")})
+    methods = reading.in_order(study, {row["method"] for row in reading.cells(study) if row.get("confusion")})
     return tag("div", *(_confusion(study, method, names) for method in methods), class_="multiples")
 
 

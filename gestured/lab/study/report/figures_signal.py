@@ -14,31 +14,35 @@ SIDE = 108.0  # of a snapshot
 def gestures(names: list[str], signals: dict[str, Any]) -> Markup:
     """A card for each gesture: the movement, its name, and the signal of one performance."""
     peak = max((value for signal in signals.values() for value in signal["sum"]), default=1.0)
-    longest = max((signal["times_s"][-1] for signal in signals.values() if signal["times_s"]), default=1.0)
+    moments = [moment for signal in signals.values() for moment in signal["times_s"]]
+    span = (min(moments, default=0.0), max(moments, default=1.0))
     cards = []
     for name in names:
         signal = signals.get(name)
-        drawn = _signal(name, signal, peak, longest) if signal and signal["times_s"] else Markup("")
+        drawn = _signal(name, signal, peak, span) if signal and signal["times_s"] else Markup("")
         cards.append(tag("li", icons.icon(name, 84), tag("span", formats.plain(name), class_="name"), drawn))
     caption = "Dots are fingertips at the beginning; lines lead where they go."
     if signals:
-        caption += f" Below, the raw signal of one performance, summed over the taxels, on one scale ({longest:.1f} s)."
+        caption += " Below, the raw signal of one performance, summed over the taxels, all on one scale."
     return figure(
         "The ten gestures", SIMULATED if signals else "", caption, tag("ul", *cards, class_="cards"), wide=False
     )
 
 
-def _signal(name: str, signal: dict[str, Any], peak: float, longest: float) -> Markup:
+def _signal(name: str, signal: dict[str, Any], peak: float, span: tuple[float, float]) -> Markup:
     low = min(0.0, *signal["sum"])
-    plot = Plot(148, 62, Scale(0.0, longest, 2, 146), Scale(low, peak, 46, 4))
+    plot = Plot(148, 62, Scale(*span, 2, 146), Scale(low, peak, 46, 4))
     points = list(zip(signal["times_s"], signal["sum"], strict=True))
     around = [(points[0][0], low), *points, (points[-1][0], low)]
     plot.add(tag("path", d=polyline(plot.at(around), "")[len('<path d="') :].split('"')[0] + "Z", class_="area"))
     plot.line(points, "signal")
     plot.add(tag("line", x1=2, x2=146, y1=46, y2=46, class_="axis"))
-    plot.add(text(2, 59, "0", class_="tick"), text(146, 59, f"{longest:.1f} s", "end", "tick"))
+    begin, end = (f"{moment:.1f} s".replace("-", "\u2212") for moment in span)
+    plot.add(text(2, 59, begin, class_="tick"), text(146, 59, end, "end", "tick"))
     words = f"{formats.plain(name)}: raw signal summed over the taxels, simulated data"
-    return plot.svg(words, f"{len(points)} frames, {points[-1][0]:.2f} s, highest sum {max(signal['sum']):.0f}.")
+    return plot.svg(
+        words, f"{len(points)} frames, {points[-1][0] - points[0][0]:.2f} s, highest sum {max(signal['sum']):.0f}."
+    )
 
 
 def double_tap(tap: dict[str, Any]) -> Markup:
@@ -51,7 +55,7 @@ def double_tap(tap: dict[str, Any]) -> Markup:
         Scale(min(0.0, *total), max(total) * 1.08, 190, 32),
     )
     plot.y_axis(plot.y.ticks(4), lambda value: f"{value:.0f}", "summed signal, raw counts")
-    plot.x_axis(plot.x.ticks(7), lambda value: f"{value:.2g} s")
+    plot.x_axis(plot.x.ticks(7), lambda value: f"{round(value, 3):g} s".replace("-", "\u2212"))
     plot.line(list(zip(times, total, strict=True)), "signal")
     for moment, value in zip(times, total, strict=True):
         plot.add(tag("circle", cx=plot.x(moment), cy=plot.y(value), r=2.4, class_="sample"))
@@ -64,7 +68,7 @@ def double_tap(tap: dict[str, Any]) -> Markup:
         plot.add(tag("path", d=f"M{x:.1f} {y:.1f}V214L{middle:.1f} 244V256", class_="leader"))
         plot.add(tag("circle", cx=x, cy=y, r=5, class_="moment"))
         plot.add(snapshot(shot["frame"], middle - side / 2, 258, side, peak, f"the frame after {shot['t_s']:.2f} s"))
-        plot.add(text(middle, 258 + side + 18, f"{shot['t_s']:.2f} s", "middle", "tick"))
+        plot.add(text(middle, 258 + side + 18, f"{shot['t_s']:.2f} s".replace("-", "\u2212"), "middle", "tick"))
     return figure(
         "A double tap, frame by frame",
         SIMULATED,

@@ -75,24 +75,21 @@ def _worst(study: Study, rows: list[Row]) -> str:
 
 
 def _by_name(study: Study, kind: str, rows: list[Row], floor: float) -> Markup:
-    """Groups below each other, the methods on lines of their own within each."""
+    """Groups below each other, the methods on lines of their own within each; gestures as icons, else a name above."""
     names = list(dict.fromkeys(str(group["name"]) for row in rows for group in row["groups"]))
-    pitch = 12.0 * len(rows) + 10
-    height = 12 + pitch * len(names) + 30
-    left = 44.0 if kind == "gesture" else 108.0
-    plot = Plot(340, height, Scale(floor, 1.0, left, 326), Scale(0, len(names), 8, height - 30))
-    plot.x_axis(plot.x.ticks(4), lambda share: formats.percent(share, 0), grid=True)
+    icon = kind == "gesture"
+    above, lane = (8.0 if icon else 22.0), 12.0
+    pitch = above + lane * len(rows) + 4
+    height = 8 + pitch * len(names) + 30
+    x = Scale(floor, 1.0, 44 if icon else 14, 326)
+    plot = Plot(340, height, x, Scale(0, len(names), 4, height - 30))
+    plot.x_axis(x.ticks(), lambda share: formats.percent(share, 0), grid=True)
     for k, name in enumerate(names):
-        middle = plot.y(k + 0.5)
-        drawn = (
-            icons.placed(name, 20, middle, 26)
-            if kind == "gesture"
-            else text(left - 10, middle + 4, name, "end", "name")
-        )
-        plot.add(drawn)
-        for lane, row in enumerate(rows):
+        top = plot.y(k)
+        plot.add(icons.placed(name, 20, top + pitch / 2, 26) if icon else text(2, top + 16, name, class_="name"))
+        for line, row in enumerate(rows):
             for group in (group for group in row["groups"] if str(group["name"]) == name):
-                _share(study, plot, row, group, middle + 12 * (lane - (len(rows) - 1) / 2))
+                _share(study, plot, row, group, top + above + lane * (line + 0.5))
     return plot.svg(f"{KINDS.get(kind, kind)}: right in per cent, simulated data", _worst(study, rows))
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from .markup import Markup, join, tag
 
-SIMULATED, REAL, BOTH = "simulated data", "real recordings", "simulated data and real recordings"
+SIMULATED, REAL, OWN = "simulated data", "real recordings", "your own recordings"
 
 
 @dataclass(frozen=True)

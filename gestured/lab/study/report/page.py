@@ -3,7 +3,18 @@
 from importlib.resources import files
 from pathlib import Path
 
-from . import curves, figures_right, figures_signal, figures_time, figures_trust, reading, summary, tables, tables_about
+from . import (
+    curves,
+    figures_right,
+    figures_signal,
+    figures_time,
+    figures_trust,
+    reading,
+    summary,
+    tables,
+    tables_about,
+    tables_right,
+)
 from .layout import Section, absent, folded, paragraph
 from .markup import Markup, join, tag
 from .reading import Study
@@ -108,12 +119,13 @@ def _figures(study: Study) -> Markup:
         tag("h3", "What the protocols are"),
         tag("dl", *explained, class_="protocols"),
         tag("h3", "The tables"),
-        tables.protocols(study),
+        tables_right.protocols(study),
+        tables_right.own(study),
     )
 
 
 def _confusion(study: Study) -> Markup:
-    if not any(row.get("confusion") for row in reading.part(study, "cells")):
+    if not any(row.get("confusion") for row in reading.cells(study)):
         return absent("Confusion matrices were")
     words = "Rows are what was performed, columns what was answered, in per cent of the row; all are in study.json."
     return join(paragraph(words), figures_right.confusions(study))

@@ -13,9 +13,10 @@ FAMILIES = (
     "beyond the paper",
 )
 PROTOCOLS = {
-    "paper": "15 % of the gestures are held out at random, after augmentation, as the published figures suggest. "
-    "The same people, and copies of the test gestures, are in the training set.",
-    "clean": "The same split, made first; only the training part is augmented. The same people are on both sides.",
+    "paper": "15 % of the gestures are held out at random, after augmentation, as the published figures suggest; all "
+    "are brought to one length. The same people, and copies of the test gestures, are in the training set.",
+    "clean": "Split first, 85 to 15; only the training part is augmented, and each gesture keeps its own length. The "
+    "same people are on both sides.",
     "participants": "Whole participants are held out: how well it works for somebody new.",
     "real": "Real recordings of a touchscreen's capacitive sensor, subjects held out in turn.",
     "online": "Continuous sessions of new participants, sent over UDP to a running daemon.",
@@ -65,7 +66,9 @@ def in_order(study: Study, names: set[str]) -> list[str]:
 
 
 def cells(study: Study, **wanted: str) -> list[Row]:
-    return [cell for cell in part(study, "cells") if all(cell.get(key) == value for key, value in wanted.items())]
+    """The cells with these properties; a researcher's own recordings only where `data="own"` asks for them."""
+    rows = [row for row in part(study, "cells") if "data" in wanted or row["data"] != "own"]
+    return [row for row in rows if all(row.get(key) == value for key, value in wanted.items())]
 
 
 def cell(study: Study, method: str, augmentation: str, protocol: str) -> Row | None:

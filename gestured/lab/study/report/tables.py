@@ -1,4 +1,4 @@
-"""The tables of what was measured: the paper's figure beside ours, copies, run time, online sessions."""
+"""The tables of what was measured besides: copies, run time, online sessions; and the cells that tables share."""
 
 from . import formats, marks, reading
 from .layout import SIMULATED, cell, head, row_head, table
@@ -21,46 +21,6 @@ def share_cell(row: Row | None, classes: str, published: float | None = None, lo
 
 def published_cell(share: float | None) -> Markup:
     return cell(formats.percent(share, 0), value=-1.0 if share is None else share, class_="number")
-
-
-def protocols(study: Study) -> Markup:
-    """A table for each augmentation: methods and settings down, protocols across."""
-    return join(*(_augmented(study, name) for name in reading.AUGMENTATIONS if reading.cells(study, augmentation=name)))
-
-
-def _augmented(study: Study, augmentation: str) -> Markup:
-    rows = reading.cells(study, augmentation=augmentation)
-    present = [name for name in reading.PROTOCOLS if any(row["protocol"] == name for row in rows)]
-    floor = reading.floor(study)
-    told = any(row.get("published") is not None for row in rows)
-    heads = [head("Method"), head("Settings"), *([head("Published")] if told else [])]
-    heads += [head(tag("span", name), tag("small", _on(rows, name))) for name in present]
-    lines = []
-    for method in reading.in_order(study, {row["method"] for row in rows}):
-        for settings in ("paper", "tuned"):
-            mine = {row["protocol"]: row for row in rows if row["method"] == method and row["settings"] == settings}
-            if mine:
-                figure = [published_cell(reading.published(study, method, augmentation))] if told else []
-                shares = _shares(study, method, augmentation, [mine.get(name) for name in present], floor)
-                lines.append([row_head(marks.named(study, method)), cell(reading.SETTINGS[settings]), *figure, *shares])
-    words = reading.AUGMENTATIONS[augmentation]
-    caption = (
-        f"Right in per cent and its 95 % interval over participants, drawn from {formats.percent(floor, 0)} to 100"
-    )
-    caption += "; the stroke is the published figure." if told else "."
-    title = f"{words[0].upper()}{words[1:]}"
-    source = "simulated data, but for “real”" if "real" in present else SIMULATED
-    return table(title, source, caption, heads, lines)
-
-
-def _on(rows: list[Row], protocol: str) -> str:
-    data = {row["data"] for row in rows if row["protocol"] == protocol}
-    return " and ".join(sorted(data)) + " data"
-
-
-def _shares(study: Study, method: str, augmentation: str, rows: list[Row | None], floor: float) -> list[Markup]:
-    look, figure = marks.look_of(study, method), reading.published(study, method, augmentation)
-    return [share_cell(row, f"f{look.family} v0", figure, floor) for row in rows]
 
 
 def copies(study: Study) -> Markup:
