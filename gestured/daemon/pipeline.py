@@ -113,7 +113,6 @@ class Pipeline:
                 events = sensor.recognizer.push(Frame(stamp.t, arrival.values, arrival.touches, stamp.lost))
             except Exception:
                 events = self._recover(sensor, stamp.t)
-                frames.add(sensor.label, "internal_error")
             else:
                 taken += 1
             if events:

@@ -1,0 +1,210 @@
+"""What is counted: bounded whatever arrives, and sound."""
+
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gestured.core.events import Cancelled, Event, Gesture, Unknown
+from gestured.core.frames import Frame, Segment
+from gestured.core.recognizer import FrontEnd, Scores
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.reading import STATES, Reading, by_label, together
+from gestured.daemon.shadow import Shadow
+from gestured.daemon.shift import LAST, LEAST, Shift, measured
+from gestured.daemon.vitals import Vitals, faulty
+from tests.daemon.harness import Daemon, Hand, Sensor
+
+ROOT = Path(__file__).resolve().parents[2]
+REASONS = (
+    "not_osc", "address", "types", "truncated", "trailing", "bundle", "oversized", "size", "not_finite",
+    "too_many_touches", "not_allowed", "second_source", "too_many_sensors", "socket_error",
+    "flood",
+)  # fmt: skip
+
+
+def everything() -> Iterator[Event]:
+    for number in range(100):
+        for model in ("cnn_lstm", "lstm", "forest", "mine", "yours"):
+            yield Gesture("s", 1, f"gesture_{number}", number / 100, 1, 0, 1, 2, 3, 0, model, True, {})
+    yield Unknown("s", 1, 0.1, 0, 1, 2, 3, 0, "lstm", False, {})
+    for reason in ("held", "silence", "restart", "glitch", "stuck", "refractory", "model", "internal_error"):
+        yield Cancelled("s", 1, reason)
+
+
+def test_there_are_at_most_200_series_whatever_arrives() -> None:
+    pytest.importorskip("prometheus_client")
+    metrics = Metrics()
+    for event in everything():
+        metrics.event(event, 0.001)
+    names = [f"sensor_{n}" for n in range(500)]
+    for name in names:
+        for result in ("ok", "lost", "late", "duplicate"):
+            metrics.frames.add(metrics.sensor_label(name), result)
+    for reason in REASONS:
+        metrics.dropped.add(reason)
+    for result in ("sent", "refused", "full", "unreachable", "unresolved"):
+        metrics.sent.add(result)
+    for counter, labels in ((metrics.evicted, ("stalled", "too_many")), (metrics.reloads, ("done", "refused"))):
+        for label in labels:
+            counter.add(label)
+    readings = {name: Reading(STATES[n % len(STATES)]) for n, name in enumerate(names)}
+    metrics.sensors = lambda: by_label(readings, metrics.sensor_label)
+    metrics.shift = lambda: {"strength": 0.1, "duration_s": 0.2, "area": 0.3}
+    real = (Path(__file__).parent / "metrics.txt").read_text()
+    gauges = set(re.findall(r"^# TYPE (\S+) ", real, re.MULTILINE))
+    known = set(re.findall(r"^# TYPE (\S+) ", metrics.exposition().decode(), re.MULTILINE))
+    metrics.readings = {name: ("what only a daemon can read", lambda: 1.0) for name in gauges - known}
+    text = metrics.exposition().decode()
+    assert set(re.findall(r"^# TYPE (\S+) ", text, re.MULTILINE)) == gauges
+    series = [line for line in text.splitlines() if not line.startswith("#")]
+    assert len(series) == len({line.rsplit(" ", 1)[0] for line in series}) <= 200
+    assert 'gestured_sensor_state{sensor="other",state="faulty"} 1.0' in series
+    assert 'gestured_frames_total{result="ok",sensor="other"} 492.0' in series
+
+
+def test_every_reason_to_drop_has_its_place_in_that_count() -> None:
+    """A new reason would make another series: the test above must know it."""
+    code = "".join(path.read_text() for path in (ROOT / "gestured").rglob("*.py"))
+    found = set(re.findall(r'(?:ProtocolError|\.drop|_fault|refuse)\(\s*"([a-z_]+)"', code)) - {"subscription"}
+    assert found <= set(REASONS), found - set(REASONS)
+
+
+def test_prometheus_itself_finds_nothing_to_say(shared: Daemon) -> None:
+    if shutil.which("promtool") is None:
+        pytest.skip("promtool is not installed")
+    client = shared.client()
+    Sensor(shared, "checked").begin().perform("left")
+    client.events("gesture", "checked")
+    text = shared.get("/metrics")[1]
+    done = subprocess.run(["promtool", "check", "metrics"], input=text, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+
+
+def test_a_sensors_state_and_rate_are_read_from_outside(shared: Daemon) -> None:
+    pytest.importorskip("prometheus_client")
+    client = shared.client()
+    Sensor(shared, "counting").begin().perform("left")  # the same name as elsewhere: only the first eight have one
+    client.events("gesture", "counting")
+    text = shared.get("/metrics")[1]
+    label = "counting" if 'sensor="counting"' in text else "other"
+    assert f'gestured_sensor_rate_hertz{{sensor="{label}"}}' in text
+    assert shared.metric("gestured_confidence_count") >= 1
+    assert shared.metric("gestured_model_rung") == 0
+
+
+def test_several_sensors_together_are_as_their_worst() -> None:
+    one, other = Reading("ok", 15.0, 0.001, 1, 0.5), Reading("stale", 0.0, 0.1, 2, 3.0)
+    assert together([one, other]) == Reading("stale", 0.0, 0.1, 3, 3.0)
+
+
+def test_jitter_is_none_for_an_even_stream_and_grows_with_an_uneven_one() -> None:
+    even, uneven = Vitals(), Vitals()
+    for n in range(200):
+        even.arrived(n / 15, 1, 15.0)
+        uneven.arrived(n / 15 + (0.02 if n % 2 else 0.0), 1, 15.0)
+    assert even.jitter_s < 1e-9 and uneven.jitter_s == pytest.approx(0.02, rel=0.01)
+
+
+def test_drift_is_the_way_of_the_baseline_in_units_of_noise() -> None:
+    hand, front_end, vitals = Hand(), FrontEnd("a", 9, 9), Vitals()
+    t = 0.0
+    for _ in range(30):
+        front_end.push(Frame(t := t + 1 / 15, hand.frame()))
+    vitals.review(front_end)
+    assert vitals.drift == 0.0
+    for n in range(3000):
+        front_end.push(Frame(t := t + 1 / 15, hand.frame() + n / 300))
+    vitals.review(front_end)
+    assert vitals.drift == pytest.approx(10 / front_end.noise, rel=0.2)
+    vitals.restart()
+    vitals.review(front_end)
+    assert vitals.drift == 0.0 and not faulty(front_end)
+    front_end.conditioner.bad[:21] = True
+    assert faulty(front_end)
+
+
+QUANTILES = {"at": [0.01, 0.5, 0.99], "strength": [10, 50, 100], "duration_s": [0.1, 0.5, 2.0], "area": [0.0, 0.1, 0.3]}
+
+
+def test_gestures_as_in_training_are_no_shift_and_others_are() -> None:
+    shift = Shift(QUANTILES)
+    usual = {"strength": 40.0, "duration_s": 0.4, "area": 0.1}
+    for _ in range(LEAST - 1):
+        shift.add(usual)
+    assert shift.shares() == {} and shift.unlike() == []
+    for _ in range(LAST):
+        shift.add(usual)
+    assert shift.shares() == {"strength": 0.0, "duration_s": 0.0, "area": 0.0}
+    for _ in range(LAST // 4):
+        shift.add(usual | {"strength": 300.0})
+    assert shift.shares()["strength"] == 0.25 and shift.unlike() == ["strength"]
+    assert shift.count == LAST
+    for _ in range(LAST):
+        shift.add(usual)  # what is long ago no longer counts
+    assert shift.unlike() == []
+
+
+@pytest.mark.parametrize(
+    "quantiles",
+    [{}, {"at": []}, {"at": [0.01, 0.99], "strength": "x"}, {"at": 3}, {"at": [0.01, 0.99], "strength": [2, 1]}],
+)
+def test_metadata_that_say_nothing_give_no_verdict(quantiles: dict) -> None:
+    shift = Shift(quantiles)
+    for _ in range(LAST):
+        shift.add({"strength": 1.0, "duration_s": 1.0, "area": 1.0})
+    assert shift.shares() == {} and shift.count == 0
+
+
+def test_what_is_measured_is_what_the_lab_measures_of_its_training_data() -> None:
+    train = pytest.importorskip("gestured.lab.train", reason="needs the lab's packages")
+    from gestured.lab.dataset import WINDOW, Samples
+
+    rng = np.random.default_rng(3)
+    segments = []
+    for _ in range(40):
+        length = int(rng.integers(3, 30))
+        frames = np.zeros((length + 4, 9, 9), np.float32)
+        y, x = np.mgrid[:9, :9]
+        for n in range(length):
+            frames[n + 2] = rng.uniform(20, 90) * np.exp(-((y - 4) ** 2 + (x - 8 * n / length) ** 2) / 2)
+        segments.append(Segment(frames, np.arange(length + 4) / 15, 2, length + 1, 1.5))
+    seen = [measured(segment, WINDOW) for segment in segments]
+    assert {"strength", "duration_s", "area"} == set(seen[0])
+    windows = [WINDOW.apply(segment).astype(np.float16) for segment in segments]
+    offsets = np.cumsum([0, *map(len, windows)], dtype=np.int64)
+    labels, people = np.array(["one_tap"] * len(windows)), np.zeros(len(windows), np.int64)
+    strength = np.array([s["strength"] for s in seen])
+    ours = train.quantiles(Samples(np.concatenate(windows), offsets, labels, labels, people, strength))
+    for name in ("strength", "duration_s", "area"):
+        expected = np.quantile([s[name] for s in seen], train.QUANTILES)
+        assert ours[name] == pytest.approx(expected, rel=0.02, abs=2e-3), name
+
+
+class Fixed:
+    gestures = ("tap", "swipe")
+
+    def __init__(self, *answers: tuple[float, float]) -> None:
+        self.answers = iter(answers)
+
+    def classify(self, segment: Segment) -> Scores:
+        tap, unknown = next(self.answers)
+        return Scores(np.array([tap, 1 - tap], np.float32), unknown, "fixed")
+
+
+def test_a_shadow_counts_where_it_agrees() -> None:
+    segment = Segment(np.zeros((1, 2, 2), np.float32), np.zeros(1), 0, 0, 1.0)
+    shadow = Shadow(Fixed((0.9, 0.0), (0.2, 0.0), (0.9, 0.9), (0.8, 0.0)), "candidate")
+    active = [Scores(np.array(s, np.float32), u, "a") for s, u in (((1, 0), 0), ((1, 0), 0), ((1, 0), 0), ((1, 0), 0))]
+    assert shadow.report()["agreement"] is None
+    for scores in active:
+        shadow.see(segment, scores)
+    report = shadow.report()
+    assert (report["segments"], report["agreement"], report["active_confidence"]) == (4, 0.5, 1.0)
+    assert report["disagreements"] == [
+        {"active": "tap", "candidate": "swipe", "count": 1}, {"active": "tap", "candidate": "unknown", "count": 1},
+    ]  # fmt: skip
