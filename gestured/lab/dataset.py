@@ -223,12 +223,14 @@ def recorded(recordings: "Recordings", seed: int = 0) -> Samples:
 def _recorded(recordings: "Recordings", i: int, seed: int) -> Iterator[Sample]:
     frames, times = recordings.frames_of(i), recordings.times_of(i)
     person = int(recordings.subjects[i])
+    # Marks are frames, and a frame stands for the time around it: a tap of one frame has a duration, too.
+    half = float(np.median(np.diff(times))) / 2 if len(times) > 1 else 0.0
     if recordings.labels[i] == "session":
         of, labels, kinds, onsets, offsets = (
             _needed(recordings, f"event_{name}") for name in ("recording", "labels", "kinds", "onsets", "offsets")
         )
         performed = [
-            Performed(str(labels[k]), str(kinds[k]), person, float(onsets[k]), float(offsets[k]))
+            Performed(str(labels[k]), str(kinds[k]), person, float(onsets[k]) - half, float(offsets[k]) + half)
             for k in np.flatnonzero(of == i)
         ]
         known = [p for p in performed if p.label != "other"]
@@ -239,7 +241,8 @@ def _recorded(recordings: "Recordings", i: int, seed: int) -> Iterator[Sample]:
     first, last = int(_needed(recordings, "onsets")[i]), int(_needed(recordings, "releases")[i])
     frames, times, lead = with_idle(frames, times, first, last, seed + i)
     label, kind = str(recordings.labels[i]), str(_needed(recordings, "kinds")[i])
-    yield from matched(cuts(frames, times), [Performed(label, kind, person, times[first + lead], times[last + lead])])
+    onset, offset = times[first + lead] - half, times[last + lead] + half
+    yield from matched(cuts(frames, times), [Performed(label, kind, person, onset, offset)])
 
 
 def _needed(recordings: "Recordings", field: str) -> NDArray[Any]:

@@ -238,6 +238,18 @@ def test_cut_recordings_are_learned_under_their_own_names() -> None:
         assert found.window(i).max() == pytest.approx(1.0, abs=1e-3)
 
 
+def test_a_tap_of_a_single_frame_is_learned_like_any_other() -> None:
+    """At 15 Hz many are: first and last touched frame are one."""
+    frames = np.random.default_rng(5).normal(100, 2, (20, 9, 9)).astype(np.float32)
+    y, x = np.mgrid[:9, :9]
+    frames[10] += 500 * np.exp(-((y - 4) ** 2 + (x - 5) ** 2) / 2)
+    found = recorded(Recordings(
+        frames, np.arange(20) / 15, np.array([0, 20]), np.array(["one_tap"]), np.array([1]),
+        kinds=np.array(["one_tap"]), onsets=np.array([10]), releases=np.array([10]),
+    ))  # fmt: skip
+    assert found.labels.tolist() == ["one_tap"]
+
+
 def test_recorded_sessions_leave_out_what_nobody_named() -> None:
     kinds = ["swipe_up", "one_tap", "swipe_left", "circle_clockwise"]
     take = session(Participant(73), Sensor.nominal(day=73), generator(73, 4), 40.0, kinds=kinds)
