@@ -12,6 +12,7 @@ library comes with the extra `[record]`.
 import json
 import os
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -90,6 +91,7 @@ class Writer:
         self._events = self._mcap.register_channel(EVENTS, "json", schema)
         self._senders: dict[str, int] = {}
         self._waiting = 0  # bytes that are not in the file yet
+        self._broken = False  # the file took no more
         self.count = 0
         self.flush()
 
@@ -112,23 +114,37 @@ class Writer:
 
     def flush(self) -> None:
         """From here on, what was kept so far survives a crash and a power cut."""
-        try:
+        with self._writing():
             self._mcap.flush()
             os.fsync(self._file.fileno())
-        except OSError as error:
-            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from None
         self._waiting = 0
 
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            self._broken = True
+            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}; good up to there") from None
+
     def _add(self, channel: int, t_ns: int, data: bytes) -> None:
-        self._mcap.add_message(channel, t_ns, data, t_ns)
+        with self._writing():  # a chunk that is full is written now
+            self._mcap.add_message(channel, t_ns, data, t_ns)
         self._waiting += len(data) + 32
         self.count += 1
 
     def close(self) -> None:
-        """Write the index, and close."""
-        if not self._file.closed:
-            self._mcap.finish()
-            self._file.close()
+        """Write the index, and close. A file that took no more is closed as it is."""
+        if self._file.closed:
+            return
+        try:
+            if not self._broken:
+                with self._writing():
+                    self._mcap.finish()
+                    self._file.flush()
+        finally:
+            with suppress(OSError):  # what was refused before is refused again
+                self._file.close()
 
     def __enter__(self) -> "Writer":
         return self

@@ -8,11 +8,12 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from gestured.client.control import Control
-from gestured.client.stream import Unreachable
+from gestured.client.stream import Refused, Unreachable
 from gestured.control.address import add_control, connect, finish_on_signals
 from gestured.core.errors import GesturedError
 from gestured.tape import Writer, library
@@ -116,8 +117,9 @@ def _waiting(control: Control) -> Iterator[dict[str, Any] | None]:
     lines: queue.Queue[dict[str, Any] | None] = queue.Queue(WAITING)
 
     def read() -> None:
-        for line in control.lines():
-            lines.put(line)
+        with suppress(Refused):  # half a line, where one of us closed the connection
+            for line in control.lines():
+                lines.put(line)
         lines.put(None)
 
     threading.Thread(target=read, daemon=True).start()

@@ -1,0 +1,80 @@
+"""Disks that are full, read-only or broken while something is recorded."""
+
+import errno
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from gestured import recording, tape
+from gestured.core.errors import RecordingError
+from tests.daemon.harness import Sensor
+from tests.small_recording import example
+
+SCENE: dict = {"model": {"name": "tiny"}, "settings": {}}
+
+
+def refuses(number: int):
+    def refuse(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    return refuse
+
+
+def test_a_disk_that_is_full_ends_a_recording_with_a_sentence_and_costs_the_daemon_nothing(start, tmp_path) -> None:
+    pytest.importorskip("mcap", reason="recordings need the extra [record]")
+    daemon = start("--clock", "sensor", "--control", tmp_path / "control.sock")
+    path = tmp_path / "drive.mcap"
+    command = [sys.executable, "-m", "gestured.control", "record", path, "--control", daemon.ready["control"]]
+    recorder = subprocess.Popen([*map(str, command)], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert recorder.stderr is not None and "recording into" in recorder.stderr.readline()
+    # A file may not grow beyond this: what a full disk says by ENOSPC is said by EFBIG.
+    resource.prlimit(recorder.pid, resource.RLIMIT_FSIZE, (100_000, 100_000))
+    client = daemon.client()
+    sensor = Sensor(daemon, "arm").begin()
+    while recorder.poll() is None:
+        sensor.perform("left")
+        assert client.line()["gesture"] == "swipe_left"
+    _, said = recorder.communicate()
+    assert recorder.returncode == 1
+    assert len(said.splitlines()) == 1 and str(path) in said and os.strerror(errno.EFBIG) in said
+    found = tape.read(path)
+    assert not found.whole and found.packets  # good up to there
+    sensor.perform("left")
+    assert client.line()["gesture"] == "swipe_left"
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
+def test_a_tape_whose_disk_fails_says_so_and_is_closed(tmp_path: Path, monkeypatch, number: int) -> None:
+    pytest.importorskip("mcap", reason="recordings need the extra [record]")
+    path = tmp_path / "a.mcap"
+    with pytest.raises(RecordingError, match=os.strerror(number)), tape.Writer(path, SCENE, 1 << 30) as writer:
+        writer.packet(1, "127.0.0.1:1", b"one")
+        writer.flush()
+        writer.packet(2, "127.0.0.1:1", b"two")
+        monkeypatch.setattr(os, "fsync", refuses(number))
+        writer.flush()
+    assert tape.read(path).packets[0].data == b"one"
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
+def test_a_recording_is_written_whole_or_the_old_one_stays(tmp_path: Path, monkeypatch, number: int) -> None:
+    path = tmp_path / "a.npz"
+    recording.write(path, example())
+    before = path.read_bytes()
+    monkeypatch.setattr(os, "fsync", refuses(number))
+    with pytest.raises(RecordingError, match=rf"a\.npz: cannot be written: {os.strerror(number)}"):
+        recording.write(path, example())
+    assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
+
+
+def test_a_place_where_nothing_can_be_written_is_named(tmp_path: Path) -> None:
+    place = Path("/proc/sys/no.npz")  # read-only even for root
+    with pytest.raises(RecordingError, match="cannot be written"):
+        recording.write(place, example())
+    with pytest.raises(RecordingError, match="cannot be made"):
+        pytest.importorskip("mcap", reason="recordings need the extra [record]")
+        tape.Writer(place, SCENE, 1 << 20)
