@@ -7,12 +7,12 @@ from .markup import Markup, join, svg, tag
 from .reading import Row, Study
 
 PANEL, LABELS, LANE = 268.0, 196.0, 9.0  # pixels: one panel, the names before them, one protocol's line
-FORMS = {  # of the protocols: form and colour
-    "paper": ("square", "f1 v1"),
-    "clean": ("triangle", "f2 v0"),
-    "participants": ("circle", "f0 v0"),
-    "real": ("star", "f3 v0"),
-    "online": ("diamond", "f4 v0"),
+FORMS = {  # of the protocols: form, colour and words
+    "paper": ("square", "f1 v1", "ours, paper's protocol"),
+    "clean": ("triangle", "f2 v0", "ours, clean"),
+    "participants": ("circle", "f0 v0", "ours, participants held out"),
+    "real": ("star", "f3 v0", "ours, real recordings"),
+    "online": ("diamond", "f4 v0", "ours, online"),
 }
 CELL = 27.0  # of a confusion matrix
 DEEPEST = 0.58  # of a colour behind a number that must be read, on a light and on a dark page
@@ -34,8 +34,7 @@ def overview(study: Study) -> Markup:
     title = "The published figures and ours, simulated data"
     words = "Right in per cent, published and ours, for each method and protocol; the tables below say the same."
     drawing = svg(LABELS + PANEL * len(found) + 4, height, title, words, *names, *panels)
-    entries = [("circle", "published-key", "published (textile, 34 participants)")]
-    entries += [(*FORMS[name], f"ours, {name}" + (" recordings" if name == "real" else "")) for name in protocols]
+    entries = [("bar", "published-key", "published (textile, 34 participants)"), *(FORMS[name] for name in protocols)]
     return figure(
         "Published and measured",
         SIMULATED if "real" not in protocols else "simulated data, but for “real”",
@@ -74,7 +73,7 @@ def _panel(
 
 
 def _share(plot: Plot, row: Row, y: float, protocol: str, study: Study) -> Markup:
-    name, classes = FORMS[protocol]
+    name, classes, _ = FORMS[protocol]
     method, right = reading.title(study, row["method"]), float(row["right"])
     words = f"{method}, {protocol}: {formats.with_unit(right)} ({formats.interval(row)})"
     low, high = (plot.x(end) for end in reading.ends(row))

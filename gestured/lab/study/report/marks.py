@@ -14,6 +14,7 @@ FORMS = {  # around (0, 0), of about the same area
     "triangle": "M0-5.6L5.4 4H-5.4Z",
     "diamond": "M0-6L6 0L0 6L-6 0Z",
     "star": "M0-6L1.8-1.8L6 0L1.8 1.8L0 6L-1.8 1.8L-6 0L-1.8-1.8Z",
+    "bar": "M-2-7H2V7H-2Z",
     "circle": "M-4.8 0A4.8 4.8 0 1 1 4.8 0A4.8 4.8 0 1 1-4.8 0Z",
 }
 FAMILY_FORMS = ("circle", "square", "triangle", "diamond", "star")
