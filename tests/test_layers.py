@@ -16,6 +16,7 @@ LAYERS = {"core": 0, "daemon": 2, "control": 2, "lab": 2}  # everything else is 
 LAB_ONLY = {"torch", "sklearn", "onnx", "joblib", "scipy"}
 ONLY_IN = {
     "onnxruntime": {"gestured/models.py"},
+    "mcap": {"gestured/tape.py"},
     "prometheus_client": {"gestured/daemon/metrics.py", "gestured/daemon/http.py"},
 }
 

@@ -4,6 +4,7 @@ import argparse
 import json
 import os
 import platform
+import socket
 import stat
 import time
 from collections.abc import Callable, Iterator
@@ -84,6 +85,7 @@ def examine(path: Path) -> Iterator[Finding]:
             status = control.ask("status")
     except (Unreachable, Refused) as error:
         yield Finding("bad", f"the daemon cannot be asked: {error}", "is it running? systemctl status gestured")
+        yield _port(("127.0.0.1", 9000))
         yield _model("cnn_lstm", None)
         return
     for look in (_daemon, _ports, _active_model, _input, _sensors, _shift, _output):
@@ -120,6 +122,18 @@ def _buffer(path: Path) -> Finding:
             f"sysctl -w net.core.rmem_max={BUFFER_BYTES}",
         )
     return Finding("ok", f"the kernel grants receive buffers of {most >> 10} KiB")
+
+
+def _port(address: tuple[str, int]) -> Finding:
+    """Whether the daemon could have its usual port."""
+    where = f"udp {address[0]}:{address[1]}"
+    with socket.socket(type=socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(address)
+        except OSError as error:
+            remedy = f"ss -ulpn 'sport = {address[1]}' shows whose it is; end that, or choose another --listen"
+            return Finding("warn", f"{where}: {error.strerror}", remedy)
+    return Finding("ok", f"{where} is free")
 
 
 def _permissions(path: Path) -> Finding:

@@ -32,6 +32,7 @@ from gestured.ladder import Ladder
 
 STATUS_S = 1.0
 DRAIN_S = 0.5
+SHOWN = 4  # sensors in systemd's status line
 
 Loader = Callable[[], Settings]
 
@@ -51,6 +52,7 @@ class Service:
         self.started = time.monotonic()
         self.tasks: set[asyncio.Future[Any]] = set()  # a task that nobody holds may be collected
         self._throttle = Throttle()
+        self._said = ""  # to systemd
         self._reloading = asyncio.Lock()
         self.metrics = Metrics()
         for name in settings.sensors:
@@ -164,7 +166,16 @@ class Service:
         self.pipeline.review()
         self.taps.tick()
         self._listen_in()
-        self.emit(self.health.status(now))
+        status = self.health.status(now)
+        self.emit(status)
+        self._tell_systemd(status)
+
+    def _tell_systemd(self, status: Status) -> None:
+        states = ", ".join(f"{name} {state}" for name, state in list(status.sensors.items())[:SHOWN])
+        words = f"{status.state}: {status.model} answers; sensors: {states or 'none yet'}"
+        if words != self._said:
+            self._said = words
+            systemd.notify(f"STATUS={words}")
 
     async def _finish(self) -> None:
         """Answer what is in flight, give clients a moment to read it, and say goodbye."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gestured.control.doctor import BUFFER_BYTES, _buffer, _clock, _permissions
+from gestured.control.doctor import BUFFER_BYTES, _buffer, _clock, _permissions, _port
 from gestured.control.sniff import Sight, propose
 from gestured.control.status import screen
 from gestured.core import osc
@@ -204,3 +204,7 @@ def test_doctor_looks_at_the_machine(tmp_path: Path) -> None:
     assert (small.level, _buffer(limit).level) == ("warn", "ok") and "sysctl" in small.remedy
     assert (_clock(0.0).level, _clock(1.8e9).level) == ("bad", "ok")
     assert "no socket" in _permissions(limit).what
+    with socket.socket(type=socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        found = _port(taken.getsockname())
+    assert found.level == "warn" and "in use" in found.what and "--listen" in found.remedy

@@ -154,6 +154,20 @@ def test_a_recording_ends_at_its_size_and_never_replaces_a_file(run, start, daem
     assert status == 1 and str(path) in err and "File exists" in err
 
 
+def test_a_recording_whose_daemon_goes_is_good_and_says_so(start, tmp_path: Path) -> None:
+    pytest.importorskip("onnx")
+    daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"), "--clock", "sensor")
+    path = tmp_path / "gone.mcap"
+    recorder = start("record", path, "--control", daemon.ready["control"])
+    assert b"recording into" in recorder.stderr.readline()
+    gestures(daemon, "gone", "left")()
+    assert daemon.stop() == 0
+    _, err = recorder.communicate(timeout=30)
+    assert recorder.returncode == 1 and b"the daemon closed the connection" in err
+    found = tape.read(path)
+    assert found.whole and "swipe_left" in {e.get("gesture") for e in found.events}
+
+
 def test_flag_keeps_the_flight_recorder(ctl, run, daemon: Daemon, tmp_path: Path) -> None:
     gestures(daemon, "flag", "left")()
     path = tmp_path / "wrong.mcap"

@@ -1,6 +1,7 @@
 """The control socket of a real daemon: who may, what is refused, and what each verb does."""
 
 import base64
+import json
 import os
 import socket
 import stat
@@ -231,3 +232,50 @@ def test_the_flight_recorder_gives_what_it_held(daemon: Daemon, start) -> None:
     assert "swipe_left" in {line.get("gesture") for line in lines}
     with Control(Path(start().ready["control"])) as control, pytest.raises(Refused, match="flight_recorder"):
         control.ask("flight")
+
+
+def test_a_tap_that_nobody_reads_loses_packets_is_told_and_holds_nobody_up(start) -> None:
+    daemon = start("--clock", "sensor")
+    with Control(Path(daemon.ready["control"])) as control:
+        control.ask("tap")
+        packet = os.urandom(30_000)
+        with socket.socket(type=socket.SOCK_DGRAM) as sender:
+            sender.connect(daemon.address)
+            with Control(Path(daemon.ready["control"])) as other:
+                for _ in range(10):  # 12 MiB in all: more than is kept for a reader that sleeps
+                    for _ in range(30):
+                        sender.send(packet)
+                    assert other.ask("status")["taps"] == 1
+        client = daemon.client()
+        Sensor(daemon, "arm").begin().perform("left")
+        assert client.events("gesture", "arm")
+        lost = next(line["count"] for line in control.lines() if line["type"] == "lost")
+        assert 0 < lost < 400
+
+
+def test_a_sensor_of_the_file_that_was_never_heard_has_no_data(start, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text("[sensors.door]\ngrid = '5x5'\n")
+    daemon = start("--config", config, "--metrics", "127.0.0.1:0")
+    status = daemon.client().subscribe("status").line()
+    assert (status["state"], status["sensors"]) == ("no_data", {"door": "no_data"})
+    assert daemon.metric("gestured_sensor_state", sensor="door", state="no_data") == 1
+    with Control(Path(daemon.ready["control"])) as control:
+        sensor = control.ask("status")["sensors"]["door"]
+    assert (sensor["state"], sensor["grid"], sensor["rate_hz"]) == ("no_data", "5x5", 0.0)
+
+
+def test_gestures_unlike_those_of_the_training_are_said_to_be(start, tmp_path: Path) -> None:
+    ranges = {"at": [0.01, 0.99], "strength": [1, 1e6], "duration_s": [2.0, 3.0], "area": [0.0, 1.0]}
+    model = tiny_model.make(tmp_path / "slow.onnx", quantiles=json.dumps(ranges))  # knows slow gestures alone
+    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", model=model)
+    client = daemon.client()
+    sensor = Sensor(daemon, "arm").begin()
+    for _ in range(4):
+        sensor.perform(*["left", "right", "up", "down", "left"])
+        client.events("gesture", "arm", 5)
+    assert daemon.metric("gestured_shift_ratio", quantity="duration_s") == 1.0
+    assert daemon.metric("gestured_shift_ratio", quantity="area") == 0.0
+    assert json.loads(daemon.get("/readyz")[1])["shift"] == ["duration_s"]
+    with Control(Path(daemon.ready["control"])) as control:
+        assert control.ask("status")["shift"]["unlike"] == ["duration_s"]

@@ -110,8 +110,11 @@ def test_systemd_is_told(start, tmp_path: Path) -> None:
 
         daemon = start(env={"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "300000"})
         assert supervisor.recv(4096).decode().startswith("READY=1\nSTATUS=")
+        assert until("STATUS=no_data") == "STATUS=no_data: tiny answers; sensors: none yet"
         until("WATCHDOG=1")
         until("WATCHDOG=1")
+        Sensor(daemon, "arm").begin()
+        assert "sensors: arm " in until("STATUS=ok")
         daemon.signal(signal.SIGHUP)
         assert "MONOTONIC_USEC=" in until("RELOADING=1")
         until("READY=1")

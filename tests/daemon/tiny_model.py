@@ -17,7 +17,9 @@ GESTURES = (
 ROWS = COLUMNS = 9
 
 
-def make(path: Path, *, gestures: tuple[str, ...] = GESTURES, version: str = "1", broken: str = "") -> Path:
+def make(
+    path: Path, *, gestures: tuple[str, ...] = GESTURES, version: str = "1", broken: str = "", quantiles: str = "{}"
+) -> Path:
     """Write the model to `path`; `broken` = "self_test" stores other outputs than it gives."""
     import onnx
     from onnx import TensorProto, helper, numpy_helper
@@ -113,7 +115,7 @@ def make(path: Path, *, gestures: tuple[str, ...] = GESTURES, version: str = "1"
             "calibration": "{}",
             "self_test": SelfTest(frames, scores, unknown).to_json(),
             "training_data": hashlib.sha256(b"").hexdigest(),
-            "quantiles": "{}",
+            "quantiles": quantiles,
         },
     )
     path.write_bytes(onnx.load_from_string(model.SerializeToString()).SerializeToString())
