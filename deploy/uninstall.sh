@@ -8,3 +8,4 @@ while read -r file; do
     rm -f "$root$file"
 done <"$root$lib/installed"
 rm -rf "$root$lib"
+rmdir "$root$2/share/doc/gestured"

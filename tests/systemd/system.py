@@ -18,6 +18,7 @@ import pytest
 
 from gestured.client.stream import Stream
 from tests.daemon.harness import Sensor
+from tests.documents.blocks import blocks
 from tests.systemd.container import Container, missing, wait
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -169,3 +170,51 @@ def test_installed_enabled_used_killed_hung_reloaded_and_stopped(box: Container)
     box.run("systemctl", "stop", "gestured.service", *SOCKETS)
     report("SIGTERM, until it has ended", time.monotonic() - begin, 1.0)
     assert box.run("systemctl", "show", "-P", "Result", "gestured").stdout.strip() == "success"
+
+
+def test_what_the_documents_say_is_so(box: Container):
+    """Every example that is marked so, in the order in which a reader meets it."""
+    box.path(CONFIGURATION).write_text("")
+    box.run("systemctl", "start", "gestured.service")
+    for block in blocks("run", "container"):
+        begin = time.monotonic()
+        done = box.run("bash", "-euo", "pipefail", "-c", block.text.replace("sudo ", ""), check=False)
+        assert done.returncode == 0, f"{block}: {done.stdout}{done.stderr}"
+        report(str(block), time.monotonic() - begin)
+    assert box.run("systemctl", "is-active", "gestured.service", *SOCKETS).stdout.split() == ["active"] * 4
+
+
+def as_user(box: Container, *command: str, groups: str) -> "subprocess.CompletedProcess[str]":
+    """Run a command inside as somebody who is nobody."""
+    group = ("--clear-groups",) if not groups else (f"--groups={groups}",)
+    return box.run("setpriv", "--reuid=4000", "--regid=4000", *group, *command, check=False)
+
+
+def test_members_of_the_group_may_and_others_may_not(box: Container):
+    group = box.run("id", "--group", "gestured").stdout.strip()
+    for command in ("status", "reload", "doctor"):
+        stranger = as_user(box, "gesturectl", command, groups="")
+        assert stranger.returncode == 1 and "Permission denied" in stranger.stdout + stranger.stderr
+    for command in ("status", "reload"):
+        member = as_user(box, "gesturectl", command, groups=group)
+        assert member.returncode == 0, member.stdout + member.stderr
+
+
+def test_a_configuration_that_is_refused_at_the_start_is_not_tried_for_ever(box: Container):
+    box.path(CONFIGURATION).write_text("modle = 1\n")
+    assert box.run("systemctl", "restart", "gestured.service", check=False).returncode != 0
+    show = box.run("systemctl", "show", "-P", "ExecMainStatus", "-P", "ActiveState", "gestured").stdout.split()
+    assert sorted(show) == ["2", "failed"]
+    box.path(CONFIGURATION).write_text("")
+    box.run("systemctl", "reset-failed", "gestured*")
+    box.run("systemctl", "start", "gestured.service")
+    box.run("gesturectl", "status")
+
+
+def test_uninstall_leaves_settings_and_nothing_else(box: Container, installed: Path):
+    box.run("systemctl", "disable", "--now", "gestured.service", *SOCKETS)
+    root = installed.parent  # the container has taken usr out of the root
+    assert (root / "usr" / "bin" / "gestured").exists()
+    subprocess.run(["make", "uninstall", f"DESTDIR={root}"], cwd=ROOT, check=True, capture_output=True)
+    assert [path for path in (root / "usr").rglob("*") if not path.is_dir()] == []
+    assert (installed / "etc" / "gestured" / "gestured.toml").exists()
