@@ -72,6 +72,16 @@ def made_study(seed: int = 5) -> Study:
     return study
 
 
+def small_study() -> Study:
+    """A little of every part: quick to draw."""
+    study = made_study()
+    few = ("tp_svm", "lstm", "tcn")
+    cells = [cell for cell in study["cells"] if cell["method"] in few and cell["augmentation"] != "wide"]
+    by = ("gesture", "participant", "place")
+    failures = [row for row in study["failures"] if row["method"] == "lstm" and row["by"] in by]
+    return {**study, "cells": cells, "failures": failures}
+
+
 def empty_study() -> Study:
     """The same with nothing computed, as small as the schema allows."""
     study = made_study()

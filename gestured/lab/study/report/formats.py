@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from .markup import Markup, join, tag
+from .markup import Markup, between, join, tag
 
 NONE = "–"
 THIN = "\u202f"  # a narrow space that does not break
@@ -31,13 +31,11 @@ def interval(row: dict[str, Any]) -> str:
 def duration(microseconds: float | None) -> str:
     if microseconds is None:
         return NONE
-    if microseconds < 1000:
-        return f"{microseconds:.3g}{THIN}µs" if microseconds < 100 else f"{microseconds:.0f}{THIN}µs"
-    return f"{microseconds / 1000:.3g}{THIN}ms" if microseconds < 1e6 else f"{microseconds / 1e6:.3g}{THIN}s"
-
-
-def seconds(value: float | None) -> str:
-    return NONE if value is None else duration(1e6 * value)
+    for unit in ("µs", "ms"):
+        if microseconds < 999.5:
+            return f"{microseconds:.3g}{THIN}{unit}"
+        microseconds /= 1000
+    return f"{microseconds:.3g}{THIN}s"
 
 
 def size(count: float | None) -> str:
@@ -45,8 +43,8 @@ def size(count: float | None) -> str:
     if count is None:
         return NONE
     for unit in ("B", "KiB", "MiB"):
-        if count < 1024:
-            return f"{count:.3g}{THIN}{unit}" if count < 1000 else f"{count:.0f}{THIN}{unit}"
+        if count < 999.5:
+            return f"{count:.3g}{THIN}{unit}"
         count /= 1024
     return f"{count:.3g}{THIN}GiB"
 
@@ -63,20 +61,14 @@ def number(value: Any) -> str:
 def values(mapping: dict[str, Any] | None) -> Markup:
     """Hyperparameters: name and value, each kept together."""
     parts = [tag("span", f"{name} = {number(value)}", class_="value") for name, value in (mapping or {}).items()]
-    return join(*(part if last else join(part, ", ") for last, part in _with_last(parts))) if parts else Markup(NONE)
+    return between(", ", parts) if parts else Markup(NONE)
 
 
 def listed(names: Sequence[str]) -> Markup:
     """a, b and c."""
-    if len(names) < 2:
-        return join(*names)
-    return join(*(join(name, ", ") for name in names[:-2]), names[-2], " and ", names[-1])
+    return between(" and ", [between(", ", names[:-1]), names[-1]]) if len(names) > 1 else join(*names)
 
 
 def plain(gesture: str) -> str:
     """The name of a gesture, as one says it."""
     return gesture.replace("_", " ")
-
-
-def _with_last(parts: list[Markup]) -> list[tuple[bool, Markup]]:
-    return [(k == len(parts) - 1, part) for k, part in enumerate(parts)]

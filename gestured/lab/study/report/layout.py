@@ -44,9 +44,12 @@ def scrolling(title: str, *content: str) -> Markup:
     return tag("div", *content, class_="scroll", tabindex="0", role="region", aria_label=title)
 
 
-def head(*words: str, colspan: int = 1, sort: bool = True) -> Markup:
-    more = {"colspan": str(colspan)} if colspan > 1 else {}
-    return tag("th", *words, scope="col", class_=None if sort and colspan == 1 else "fixed", **more)
+def head(*words: str) -> Markup:
+    return tag("th", *words, scope="col")
+
+
+def heads(*names: str) -> list[Markup]:
+    return [head(name) for name in names]
 
 
 def row_head(*words: str) -> Markup:
@@ -58,9 +61,9 @@ def cell(*words: str, value: float | None = None, class_: str | None = None) -> 
     return tag("td", *words, data_value=None if value is None else repr(float(value)), class_=class_)
 
 
-def table(title: str, source: str, caption: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Markup:
-    """A table in a box that scrolls; `heads` and the cells are made by `head`, `row_head` and `cell`."""
-    top = tag("thead", tag("tr", *heads))
+def table(title: str, source: str, caption: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Markup:
+    """A table in a box that scrolls; what stands in it is made by `head`, `row_head` and `cell`."""
+    top = tag("thead", tag("tr", *columns))
     body = tag("tbody", *(tag("tr", *row) for row in rows))
     words = tag("caption", tag("div", *_caption(title, source, caption)))
     return tag("div", tag("table", words, top, body), class_="scroll", tabindex="0", role="region", aria_label=title)

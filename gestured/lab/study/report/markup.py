@@ -2,6 +2,7 @@
 
 import html
 import re
+from collections.abc import Iterable
 
 NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # what no XML may hold
 EMPTY = {"br", "circle", "col", "line", "meta", "path", "rect"}
@@ -19,6 +20,11 @@ def escape(text: str) -> Markup:
 def join(*parts: str) -> Markup:
     """Pieces one after the other; what is not markup is escaped."""
     return Markup("".join(escape(part) for part in parts))
+
+
+def between(separator: str, parts: Iterable[str]) -> Markup:
+    """Pieces with a separator between them."""
+    return Markup(escape(separator).join(escape(part) for part in parts))
 
 
 def tag(name: str, /, *children: str, **attributes: str | float | None) -> Markup:

@@ -1,7 +1,7 @@
 """The report in a few plain sentences, all computed from the study."""
 
 from . import formats, reading
-from .markup import Markup, join, tag
+from .markup import Markup, between, join, tag
 from .reading import Row, Study
 
 FEW = 20  # gestures: a group smaller than this is not called the weakest
@@ -58,7 +58,7 @@ def _missed(study: Study, word: str, sign: int) -> Markup | None:
         named = [_change(study, row) for row in rows if row["augmentation"] == augmentation]
         if named:
             told.append(join(words, " ", formats.listed(named)))
-    return join(f"{word} than published, on people never seen: ", Markup("; ".join(told)), ".")
+    return join(f"{word} than published, on people never seen: ", between("; ", told), ".")
 
 
 def _change(study: Study, row: Row) -> Markup:

@@ -1,7 +1,7 @@
 """The tables of what was measured besides: copies, run time, online sessions; and the cells that tables share."""
 
 from . import formats, marks, reading
-from .layout import SIMULATED, cell, head, row_head, table
+from .layout import SIMULATED, cell, heads, row_head, table
 from .markup import Markup, join, tag
 from .reading import Row, Study
 from .summary import from_copies
@@ -20,7 +20,7 @@ def share_cell(row: Row | None, classes: str, published: float | None = None, lo
 
 
 def published_cell(share: float | None) -> Markup:
-    return cell(formats.percent(share, 0), value=-1.0 if share is None else share, class_="number")
+    return cell(formats.percent(share, 0), value=-1.0 if share is None else share)
 
 
 def copies(study: Study) -> Markup:
@@ -40,7 +40,7 @@ def copies(study: Study) -> Markup:
         [
             row_head(marks.named(study, row["method"])),
             cell(reading.SETTINGS[row["settings"]]),
-            cell(formats.count(row["test"]), value=row["test"], class_="number"),
+            cell(formats.count(row["test"]), value=row["test"]),
             *(_of(row.get(name), row["test"]) for name in ("with_copy", *(["with_version"] if moved else []))),
             *(_share(row[name]) for name in ("right_with_copy", "right_without_copy")),
             *(_points(row[name]) for name in ("gain_leaky", "gain_clean")),
@@ -55,34 +55,36 @@ def copies(study: Study) -> Markup:
         "Shares in per cent, gains in percentage points against no augmentation. “Before” augments before the split, "
         "as the published figures suggest; “after” only the training part. What is gained before but not after is "
         "owed to copies of the test gestures in the training set, unchanged or shifted: the pale part of the bar.",
-        [*(head(name) for name in names), head("Gain, drawn")],
+        heads(*names, "Gain, drawn"),
         lines,
     )
 
 
 def _of(some: int | None, all_: int) -> Markup:
     share = f" ({formats.with_unit(some / all_, 0)})" if some is not None and all_ else ""
-    return cell(formats.count(some) + share, value=some, class_="number")
+    return cell(formats.count(some) + share, value=some)
 
 
 def _share(share: float | None) -> Markup:
-    return cell(formats.percent(share), value=-1.0 if share is None else share, class_="number")
+    return cell(formats.percent(share), value=-1.0 if share is None else share)
 
 
 def _points(gain: float | None) -> Markup:
-    return cell(formats.NONE if gain is None else formats.points(gain), value=gain, class_="number")
+    return cell(formats.NONE if gain is None else formats.points(gain), value=gain)
 
 
 def run_time(study: Study) -> Markup:
-    heads = [
-        head("Method"),
-        head("Settings"),
-        head("Precision"),
-        head("Right, %"),
-        head("Median"),
-        head("95th percentile"),
+    names = [
+        "Method",
+        "Settings",
+        "Precision",
+        "Right, %",
+        "Median",
+        "95th percentile",
+        "Memory",
+        "File",
+        "On the front",
     ]
-    heads += [head("Memory"), head("File"), head("On the front")]
     lines = []
     for row in sorted(reading.part(study, "run_time"), key=lambda row: row["median_us"]):
         look = marks.look_of(study, row["method"])
@@ -92,48 +94,36 @@ def run_time(study: Study) -> Markup:
                 cell(reading.SETTINGS[row["settings"]]),
                 cell(row["precision"]),
                 share_cell(row, f"f{look.family} v0"),
-                *(
-                    cell(formats.duration(row[name]), value=row[name], class_="number")
-                    for name in ("median_us", "p95_us")
-                ),
-                *(
-                    cell(formats.size(row[name]), value=row[name], class_="number")
-                    for name in ("memory_bytes", "file_bytes")
-                ),
+                *(cell(formats.duration(row[name]), value=row[name]) for name in ("median_us", "p95_us")),
+                *(cell(formats.size(row[name]), value=row[name]) for name in ("memory_bytes", "file_bytes")),
                 cell("yes" if row["front"] else "", value=float(row["front"])),
             ]
         )
-    return table("Run time, memory and size", SIMULATED, "The same points in figures, fastest first.", heads, lines)
+    return table(
+        "Run time, memory and size", SIMULATED, "The same points in figures, fastest first.", heads(*names), lines
+    )
 
 
 def online(study: Study) -> Markup:
-    heads = [
-        head("Method"),
-        head("Gestures"),
-        head("Published"),
-        head("Right, %"),
-        head("Wrong, %"),
-        head("Missed, %"),
-        head("Extra, %"),
-    ]
-    heads += [head("False a minute"), head("Latency, median"), head("95th percentile")]
+    names = ["Method", "Gestures", "Published", "Right, %", "Wrong, %", "Missed, %", "Extra, %"]
+    names += ["False a minute", "Latency, median", "95th percentile"]
     lines = []
     for row in reading.part(study, "online"):
         look, latency = marks.look_of(study, row["method"]), row.get("latency_ms") or {}
         lines.append(
             [
                 row_head(marks.named(study, row["method"])),
-                cell(formats.count(row["gestures"]), value=row["gestures"], class_="number"),
+                cell(formats.count(row["gestures"]), value=row["gestures"]),
                 published_cell(row.get("published")),
                 share_cell(row, f"f{look.family} v0", row.get("published")),
                 *(_share(row[name]) for name in ("wrong", "missed", "extra")),
-                cell(f"{row['false_per_minute']:.2f}", value=row["false_per_minute"], class_="number"),
+                cell(f"{row['false_per_minute']:.2f}", value=row["false_per_minute"]),
                 *(_milliseconds(latency.get(name)) for name in ("p50", "p95")),
             ]
         )
     caption = "Continuous sessions over UDP to a running daemon. Latency is from the finger's lift to the event."
-    return table("Sessions with the running daemon", SIMULATED, caption, heads, lines)
+    return table("Sessions with the running daemon", SIMULATED, caption, heads(*names), lines)
 
 
 def _milliseconds(value: float | None) -> Markup:
-    return cell(formats.NONE if value is None else f"{value:.0f}{formats.THIN}ms", value=value, class_="number")
+    return cell(formats.NONE if value is None else f"{value:.0f}{formats.THIN}ms", value=value)

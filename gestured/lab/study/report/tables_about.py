@@ -1,7 +1,7 @@
 """The tables of what the study is made of: methods, data, tuning, open choices, what was left out, the machine."""
 
 from . import formats, marks, reading
-from .layout import SIMULATED, cell, folded, head, paragraph, row_head, scrolling, table
+from .layout import SIMULATED, cell, folded, heads, paragraph, row_head, scrolling, table
 from .markup import Markup, join, tag
 from .reading import Row, Study
 
@@ -42,8 +42,8 @@ def methods(study: Study) -> Markup:
                 cell(_settings(hyper.get("tuned")), class_="short"),
             ]
         )
-    heads = [head("Method"), head("Family"), head("What it does"), head("The paper's settings"), head("Tuned")]
-    return table("All methods", "", "All on the front end that the daemon uses.", heads, lines)
+    columns = heads("Method", "Family", "What it does", "The paper's settings", "Tuned")
+    return table("All methods", "", "All on the front end that the daemon uses.", columns, lines)
 
 
 def _settings(found: Row | None) -> Markup:
@@ -70,10 +70,10 @@ def data(study: Study) -> Markup:
     for own in found.get("own") or []:
         told = f"{formats.count(own.get('used'))} used of {formats.count(own.get('recordings'))} recordings"
         lines.append([row_head(own["file"]), cell("your own"), cell(formats.NONE), cell(told)])
-    heads = [head("Name"), head("Kind"), head("People"), head("Gestures")]
+    columns = heads("Name", "Kind", "People", "Gestures")
     out = found.get("left_out") or []
     rest = _left_out(out) if out else paragraph("Nothing was left out: every recording was used.")
-    return join(table("What was used", "", "", heads, lines), rest)
+    return join(table("What was used", "", "", columns, lines), rest)
 
 
 def _set(kind: str, row: Row, people: str, told: str) -> list[Markup]:
@@ -87,16 +87,16 @@ def _left_out(rows: list[Row]) -> Markup:
         lines.append(
             [
                 row_head(row["file"]),
-                cell(number, class_="number"),
+                cell(number),
                 cell(row["field"]),
                 cell(row["reason"], class_="prose"),
             ]
         )
-    heads = [head("File"), head("Recording"), head("Field"), head("Reason")]
+    columns = heads("File", "Recording", "Field", "Reason")
     title = f"Left out: {formats.count(len(rows))} " + (
         "recording or file" if len(rows) == 1 else "recordings or files"
     )
-    return table(title, "", "Everything else was used.", heads, lines)
+    return table(title, "", "Everything else was used.", columns, lines)
 
 
 def tuning(study: Study) -> Markup:
@@ -105,7 +105,7 @@ def tuning(study: Study) -> Markup:
     for row in reading.part(study, "tuning"):
         best = next((tried for tried in row["candidates"] if tried["values"] == row["chosen"]), None)
         right = _spread(best) if best else cell(formats.NONE)
-        count = cell(str(len(row["candidates"])), value=len(row["candidates"]), class_="number")
+        count = cell(str(len(row["candidates"])), value=len(row["candidates"]))
         lines.append(
             [
                 row_head(marks.named(study, row["method"])),
@@ -115,19 +115,19 @@ def tuning(study: Study) -> Markup:
             ]
         )
         more.append(_candidates(study, row))
-    heads = [head("Method"), head("Chosen"), head("Right, %"), head("Candidates")]
+    columns = heads("Method", "Chosen", "Right, %", "Candidates")
     caption = "Five-fold cross-validation with participants left out; the mean over the folds, and their spread."
-    return join(table("What was chosen", SIMULATED, caption, heads, lines), folded("All candidates", *more))
+    return join(table("What was chosen", SIMULATED, caption, columns, lines), folded("All candidates", *more))
 
 
 def _candidates(study: Study, row: Row) -> Markup:
     lines = []
     for tried in sorted(row["candidates"], key=lambda tried: -tried["right"]):
         chosen = tried["values"] == row["chosen"]
-        lines.append([row_head(formats.values(tried["values"])), _spread(tried), cell("chosen" if chosen else "")])
+        lines.append([row_head(formats.values(tried["values"])), _spread(tried), cell("yes" if chosen else "")])
     title = f"Candidates for {reading.title(study, row['method'])}"
-    heads = [head("Values"), head("Right, %"), head("")]
-    return table(title, SIMULATED, "", heads, lines)
+    columns = heads("Values", "Right, %", "Chosen")
+    return table(title, SIMULATED, "", columns, lines)
 
 
 def _spread(tried: Row) -> Markup:
@@ -157,9 +157,9 @@ def choices(study: Study) -> Markup:
                 cell(row["effect"], class_="prose"),
             ]
         )
-    heads = [head("Choice"), head("Ours"), head("Alternatives: right, %"), head("Measured with"), head("Effect")]
+    columns = heads("Choice", "Ours", "Alternatives: right, %", "Measured with", "Effect")
     caption = "What the paper does not say, what we took, and what another choice would have given; ours is in bold."
-    return table("Choices that the paper leaves open", SIMULATED, caption, heads, lines)
+    return table("Choices that the paper leaves open", SIMULATED, caption, columns, lines)
 
 
 def _option(option: Row, ours: bool, classes: str) -> Markup:
