@@ -34,7 +34,7 @@ mkdir -p "$(dirname "$new")"
     echo "pip could not install gestured: $(grep -i error "$venv/pip.log" | tail -n 1) (all of it: $venv/pip.log)" >&2
     exit 1
 }
-rm -rf "$new/bin"
+rm -rf "${new:?}/bin"
 find "$new" -name __pycache__ -type d -prune -exec rm -rf {} +
 "$python" -m compileall -q -j 0 -s "$new" -p "$lib" "$new"
 PYTHONPATH=$new PYTHONDONTWRITEBYTECODE=1 "$python" -m deploy.generate install "$work/share"

@@ -69,8 +69,7 @@ def test_a_daemons_lines_are_valid(valid: Any, tmp_path: Path):
         pytest.skip(f"{shipped()['cnn_lstm']} is not there")
     daemon = Daemon.start(tmp_path, "cnn_lstm", "--clock", "sensor")
     try:
-        client = daemon.client()
-        client.ask({"subscribe": {"types": list(TYPES)}}).ask(b"rubbish\n")
+        client = daemon.client().subscribe(*TYPES).ask(b"rubbish\n")
         Sensor(daemon, "armrest").begin().perform("left", "tap", "up")
         lines = [client.hello]
         while not {line["type"] for line in lines} >= {"error", "onset", "release", "status"}:

@@ -59,7 +59,12 @@ def test_exposure(tmp_path: Path, unit: str, dropin: str | None, most: float):
 def test_systemd_finds_nothing_wrong(tmp_path: Path):
     units = [tmp_path / path.name for path in FILES]
     for path in units:  # the program is not installed here
-        path.write_text((UNITS / path.name).read_text().replace("/usr/bin/gestured", sys.executable))
+        path.write_text(
+            (UNITS / path.name)
+            .read_text()
+            .replace("/usr/bin/gesturectl", sys.executable)
+            .replace("/usr/bin/gestured", sys.executable)
+        )
     done = subprocess.run(["systemd-analyze", "verify", "--man=no", *units], capture_output=True, text=True, timeout=60)
     assert (done.returncode, [line for line in done.stderr.splitlines() if str(tmp_path) in line]) == (0, [])
 
