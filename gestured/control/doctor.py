@@ -41,6 +41,7 @@ DROPS = {
     "not_allowed": "its source is not in --allow",
     "second_source": "two senders use one sensor's name: give each sensor a name of its own",
     "too_many_sensors": "more sensors than max_sensors; look for a sender that changes its name",
+    "flood": "a source sends more than the daemon can take, and is held to half a megabyte a second",
     "not_osc": "something else than OSC is sent to this port",
     "not_finite": "frames hold NaN or infinity: look at the sensor's firmware",
 }
