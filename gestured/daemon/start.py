@@ -1,6 +1,7 @@
 """From settings to a daemon that serves: sockets, models, signals, and the line that says so."""
 
 import asyncio
+import faulthandler
 import gc
 import json
 import resource
@@ -24,6 +25,8 @@ def run(settings: Settings, load: Loader) -> None:
     """Run a daemon until it is asked to end. Raises AddressError, ModelError, SettingsError."""
     import uvloop
 
+    if sys.stderr is not None:
+        faulthandler.enable()  # when systemd's watchdog ends a hang (SIGABRT), the log says on which line it hung
     with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
         runner.run(_run(settings, load))
 

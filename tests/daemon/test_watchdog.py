@@ -23,25 +23,26 @@ import gestured.models
 from gestured.core.errors import ModelError
 
 def classify(self, segment):
-    open(os.environ["HANG"]).close()  # a pipe: waits until somebody opens its other end
+    open(os.environ["HANG"]).read()  # a pipe: waits until somebody has opened its other end, and closed it
     raise ModelError("it hung")
 
 gestured.models.Model.classify = classify
 """
 
 
-def test_health_and_metrics_answer_while_a_model_hangs_and_the_watchdog_is_not_fed(start, tmp_path: Path) -> None:
+@pytest.fixture
+def hanging(tmp_path: Path) -> dict[str, str]:
+    """The environment of a daemon whose model hangs until somebody has had `pipe` open for writing."""
     (tmp_path / "sitecustomize.py").write_text(HANGING)
     os.mkfifo(tmp_path / "pipe")
+    return {"PYTHONPATH": f"{tmp_path}:{ROOT}", "HANG": str(tmp_path / "pipe")}
+
+
+def test_health_and_metrics_answer_while_a_model_hangs_and_the_watchdog_is_not_fed(start, hanging, tmp_path) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
         supervisor.bind(str(tmp_path / "notify"))
         supervisor.settimeout(DEADLINE_S)
-        environment = {
-            "NOTIFY_SOCKET": str(tmp_path / "notify"),
-            "WATCHDOG_USEC": "600000",
-            "PYTHONPATH": f"{tmp_path}:{ROOT}",
-            "HANG": str(tmp_path / "pipe"),
-        }
+        environment = hanging | {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "600000"}
         daemon: Daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", env=environment)
         Sensor(daemon, "arm").begin().perform("left")
         while daemon.get("/healthz")[0] == 200:
@@ -56,12 +57,27 @@ def test_health_and_metrics_answer_while_a_model_hangs_and_the_watchdog_is_not_f
         assert daemon.metric("gestured_sensor_state", sensor="arm", state="stale") == 1
         with pytest.raises(BlockingIOError):
             supervisor.recv(4096)
-        with open(tmp_path / "pipe", "w"):  # now it may go on
-            supervisor.setblocking(True)
-            while b"WATCHDOG=1" not in supervisor.recv(4096):
-                pass
+        open(tmp_path / "pipe", "w").close()  # now it may go on
+        supervisor.setblocking(True)
+        while b"WATCHDOG=1" not in supervisor.recv(4096):
+            pass
         while daemon.get("/healthz")[0] != 200:
             pass
+
+
+def test_what_ends_a_hang_finds_out_where_it_hung(start, hanging) -> None:
+    daemon = start("--clock", "sensor", env=hanging)
+    Sensor(daemon, "arm").begin().perform("left")
+    while True:
+        try:
+            pipe = os.open(hanging["HANG"], os.O_WRONLY | os.O_NONBLOCK)  # works only while it waits there
+            break
+        except OSError:
+            pass
+    daemon.signal(signal.SIGABRT)  # as systemd's watchdog does
+    assert daemon.wait() == -signal.SIGABRT
+    os.close(pipe)
+    assert "sitecustomize.py" in daemon.stderr() and "in classify" in daemon.stderr()
 
 
 def test_the_canary_says_when_the_way_of_a_frame_is_broken(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
