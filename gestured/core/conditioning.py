@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.settling import Settling
+from gestured.core.settling import LEAST_STEP, Settling
 
 Array = NDArray[np.float64]
 
@@ -252,7 +252,7 @@ class Conditioner:
         self._shown = raw
         if not changed.size or np.array_equal(raw, np.rint(raw)):
             return
-        unit = max(float(np.abs(changed).min()), 1e-6 * float(np.abs(raw).max()))
+        unit = max(float(np.abs(changed).min()), 1e-6 * float(np.abs(raw).max()), LEAST_STEP)
         if unit < self._unit:
             self._unit = self._step = unit
             self._sigma = np.full_like(self._sigma, unit)

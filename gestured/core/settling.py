@@ -13,6 +13,7 @@ LOOK_S = 0.06  # how often it is looked whether the last second was stable
 SETTLE_FRAMES = 64  # frames kept of that second; faster sensors are thinned out
 PATIENCE_S = 5.0  # a sensor that never settles (hum, a hand that never rests) is used all the same after this
 RESTLESS = 5.0  # a taxel that moves more than this many times the sensor's noise was touched, or is bad
+LEAST_STEP = 1e-35  # counts; its reciprocal must stay a number
 SPIKE = 1000.0  # a frame so many times further off than frames usually jump is a fault of the readout, not idle
 
 
@@ -112,4 +113,4 @@ def quantum(stack: Array, jumps: Array) -> float:
         return 1.0
     seen = jumps[jumps > 0]
     top = float(np.median(np.abs(stack).max(axis=1)))  # of most frames: one spike must not rule
-    return max(float(seen.min()) if seen.size else 0.0, top * 1e-6, 1e-35)
+    return max(float(seen.min()) if seen.size else 0.0, top * 1e-6, LEAST_STEP)

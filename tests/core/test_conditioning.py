@@ -580,6 +580,17 @@ def test_a_clipped_sensor_may_have_any_unit(gain: float) -> None:
         assert softly == []
 
 
+@pytest.mark.parametrize("least", [5e-324, 1e-310, 1e-45])
+def test_the_least_of_all_changes_is_no_unit(least: float) -> None:
+    times, frames = stream(SHAPE, GESTURES, level=0.0, noise=0.0)
+    frames[20, 4, 4] = least  # nothing before it
+    with np.errstate(all="raise", under="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        front_end, events = heard(times, frames)
+    assert kinds(events) == 3 * ONE
+    assert 0.0 < front_end.noise < 1.0
+
+
 @pytest.mark.parametrize("size", [1e6, 1e12, 1e30, -1e12])
 @pytest.mark.parametrize("taxels", [1, 81])
 @pytest.mark.parametrize("moment", [0.4, 1.4, 2.4])  # while it settles, in idle, in a gesture
