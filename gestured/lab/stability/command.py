@@ -10,21 +10,35 @@ from pathlib import Path
 
 import numpy as np
 
+from gestured.lab.stability.extremes import month_table, parts_table, whole_path_table
 from gestured.lab.stability.figure import svg
+from gestured.lab.stability.metamorphic import metamorphic_table
+from gestured.lab.stability.models import models_table
+from gestured.lab.stability.path import segments, simulated
 from gestured.lab.stability.relaxation import filters_table
 from gestured.lab.stability.table import Table
 from gestured.lab.stability.textbook import RANGES, points, textbook_table
+from gestured.models import LADDER, open_model
 
 
 def tables(quick: bool, out: Path | None) -> Iterator[Table]:
     """One after the other, as they are done; `out` is the folder that gets stability.svg."""
     yield filters_table(quick)
     panels = {title: points(low, high, np.float64, quick) for title, (low, high) in RANGES.items()}
-    for title, found in panels.items():
-        yield textbook_table(title, found, points(*RANGES[title], np.float32, quick))
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         (out / "stability.svg").write_text(svg(panels))
+    for title, found in panels.items():
+        yield textbook_table(title, found, points(*RANGES[title], np.float32, quick))
+    models = {name: open_model(name) for name in LADDER}
+    best = models[LADDER[0]]
+    yield parts_table(list(models.values()), quick)
+    yield whole_path_table(best, quick)
+    yield month_table(best, 0.25 if quick else 30.0)
+    window = best.metadata.window
+    some = simulated(10 if quick else 60)
+    yield models_table([window.apply(segment) for _, stream in some for segment in segments(stream)], quick)
+    yield metamorphic_table(models, 10 if quick else 150)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -22,7 +22,7 @@ from gestured.core.conditioning import (
     UNSEEN_S,
     Conditioner,
 )
-from gestured.core.segmentation import ON_SHARE, RECOVERY_S, Segmenter
+from gestured.core.segmentation import AFTER_S, ON_SHARE, RECOVERY_S, Segmenter
 from gestured.lab.stability.table import Cell, Table
 from gestured.simulator.textile import REMANENCE_S, relax
 
@@ -43,6 +43,7 @@ class Filter:
     start: float  # its output at times[0]
     least_s: float = 0.0  # it does not step by less than this ...
     most_s: float = math.inf  # ... nor by more
+    over_s: float = math.inf  # after this it is nothing, by decision
     even: bool = False  # takes frames at one distance only
     dtypes: tuple[Any, ...] = (np.float64, np.float32)  # that its state can have
 
@@ -120,7 +121,14 @@ FILTERS = (
     Filter("baseline after a contact (core/conditioning)", RECOVERY_TAU_S, _baseline(True), 0.0),
     Filter("noise (core/conditioning)", NOISE_TAU_S, _noise, 0.5, REVIEW_S, UNSEEN_S),
     Filter("idle activity (core/conditioning)", NOISE_TAU_S, _usual, 0.0, dtypes=(np.float64,)),
-    Filter("after-effect of a contact (core/segmentation)", RECOVERY_S, _after_effect, 1.0, dtypes=(np.float64,)),
+    Filter(
+        "after-effect of a contact (core/segmentation)",
+        RECOVERY_S,
+        _after_effect,
+        1.0,
+        over_s=AFTER_S,
+        dtypes=(np.float64,),
+    ),
     Filter("Prony branch (simulator/textile)", 1.0, _branch, 0.0, even=True),
     Filter("remanence (simulator/textile)", REMANENCE_S, _remanence, 1.0, even=True),
 )
@@ -170,6 +178,7 @@ def error(filter_: Filter, decade: float | None, dtype: Any, count: int) -> tupl
     if filter_.name in DECAYS:
         inputs[:] = 0.0
     right = exact(times, inputs, filter_.tau_s, filter_.start, filter_.least_s, filter_.most_s)
+    right[times[1:] > filter_.over_s] = 0.0
     found = filter_.run(times, inputs) if filter_.even else filter_.run(times[1:], inputs[1:])
     slack = 4 * float(np.finfo(dtype).eps)
     inside = bool(np.all(np.isfinite(found)) and found.min() >= -slack and found.max() <= 1.0 + slack)
@@ -211,9 +220,10 @@ def filters_table(quick: bool) -> Table:
         ("filter", "state", *(f"1e{d}" for d in DECADES), "mixed", "in range", "us a step"),
         rows,
         (
-            "Errors are shares of the largest exact output. `mixed`: steps of 1e-9 to 1e9 tau in disorder, repeated",
-            "times and gaps of a day. `in range`: finite, never below nor above what came in. `us a step`: with all",
-            "else that the code does with that frame. The noise is looked at every 0.5 s, so that smaller steps add up.",
-            "Remanence below 1e-5 is taken for nothing (see `relax`): that is its error at 1 tau.",
+            "Errors are shares of the largest exact output. `mixed`: steps of 1e-9 to 1e9 tau in disorder,",
+            "repeated times and gaps of a day. `in range`: finite, never below nor above what came in. `us a",
+            "step`: with all else that the code does with that frame. The noise is looked at every 0.5 s:",
+            f"smaller steps add up. The after-effect ends after {AFTER_S:g} s; remanence below 1e-5 is taken for",
+            "nothing, which is its error at 1 tau.",
         ),
     )

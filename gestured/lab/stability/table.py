@@ -1,5 +1,6 @@
 """Tables of figures: printed as Markdown, so that a document can hold what a command has printed."""
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -9,7 +10,7 @@ Cell = str | int | float
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows under a head. A float is shown with two significant digits; `notes` stand below."""
+    """Rows under a head. A float is shown with two significant digits; `notes` stand below, as one paragraph."""
 
     title: str
     head: tuple[str, ...]
@@ -21,7 +22,8 @@ class Table:
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
         lines = [_line(row, widths) for row in cells]
         rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
-        return "\n".join([f"### {self.title}", "", lines[0], rule, *lines[1:], "", *self.notes]).rstrip() + "\n"
+        notes = textwrap.fill(" ".join(self.notes), 118)
+        return "\n".join([f"### {self.title}", "", lines[0], rule, *lines[1:], "", notes, ""])
 
     def plain(self) -> dict[str, Any]:
         """The same as JSON values."""

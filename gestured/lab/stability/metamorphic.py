@@ -1,0 +1,159 @@
+"""What must not change when the input changes so, and what must change with it: the whole path, on simulated gestures.
+
+In the front end the promise is exact: the same segments at the same frames, bit for bit, but for the change itself.
+Where a learned net decides it is a share of labels.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gestured.core.frames import Segment
+from gestured.core.recognizer import Classifier
+from gestured.lab.stability.path import Array, Stream, events, labels, segments, simulated
+from gestured.lab.stability.table import Cell, Table
+
+MIRRORED = {
+    "swipe_left": "swipe_right",
+    "swipe_right": "swipe_left",
+    "circle_clockwise": "circle_counter_clockwise",
+    "circle_counter_clockwise": "circle_clockwise",
+}
+TURNED = {
+    "swipe_left": "swipe_right",
+    "swipe_right": "swipe_left",
+    "swipe_up": "swipe_down",
+    "swipe_down": "swipe_up",
+    "swipe_up_two_fingers": "swipe_down_two_fingers",
+    "swipe_down_two_fingers": "swipe_up_two_fingers",
+}
+GRID_S = 1 / 4096  # times on it can be shifted without rounding
+
+
+@dataclass(frozen=True, slots=True)
+class Property:
+    """A change of what comes in, and what it does to what goes out."""
+
+    name: str
+    times: Callable[[Array], Array] = field(default=lambda times: times)
+    frames: Callable[[Array], Array] = field(default=lambda frames: frames)
+    names: Mapping[str, str] = field(default_factory=dict)  # labels that become others
+    picture: Callable[[Array], Array] = field(default=lambda frames: frames)  # the same change of counts above idle
+    exact: bool = True  # in the front end
+
+    def apply(self, stream: Stream) -> Stream:
+        """The changed stream."""
+        return Stream(self.times(stream.times), self.frames(stream.frames))
+
+    def holds(self, before: list[Segment], after: list[Segment]) -> bool:
+        """Whether the front end's segments are the same ones, changed."""
+        return len(before) == len(after) and all(map(self._same, before, after))
+
+    def _same(self, one: Segment, two: Segment) -> bool:
+        return (
+            (one.first, one.last) == (two.first, two.last)
+            and np.array_equal(self.times(one.times), two.times)
+            and np.array_equal(self.picture(one.frames), two.frames)
+        )
+
+
+def shifted(seconds: float) -> Property:
+    """All times later."""
+    return Property(f"{seconds:g} s later", times=lambda times: times + seconds)
+
+
+def scaled(gain: float) -> Property:
+    """All counts times `gain`; exact for powers of two."""
+    return Property(
+        f"gain {gain:g}",
+        frames=lambda frames: frames * gain,
+        picture=lambda frames: frames * np.float32(gain),
+        exact=float(np.log2(gain)).is_integer(),
+    )
+
+
+def raised(counts: float) -> Property:
+    """A constant added to all counts; exact as long as the baseline's own digits are not rounded away."""
+    return Property(f"{counts:g} counts added", frames=lambda frames: frames + counts, exact=abs(counts) <= 1e4)
+
+
+def _doubled(times: Array) -> Array:
+    middle = times[:-1] + np.diff(times) / 2
+    return np.append(np.stack([times[:-1], middle], axis=1).reshape(-1), times[-1])
+
+
+def mirrored() -> Property:
+    """Left and right swapped."""
+
+    def flip(frames: Array) -> Array:
+        return frames[..., ::-1]
+
+    return Property("mirrored", frames=flip, picture=flip, names=MIRRORED)
+
+
+def turned() -> Property:
+    """Turned by 180 degrees."""
+
+    def turn(frames: Array) -> Array:
+        return frames[..., ::-1, ::-1]
+
+    return Property("turned by 180 degrees", frames=turn, picture=turn, names=TURNED)
+
+
+def doubled() -> Property:
+    """Each frame sent twice, at twice the rate."""
+    return Property(
+        "each frame twice, twice the rate",
+        times=_doubled,
+        frames=lambda frames: np.repeat(frames, 2, axis=0)[:-1],
+        exact=False,
+    )
+
+
+def properties() -> list[Property]:
+    """Those of the table."""
+    gains = [scaled(gain) for gain in (1e-3, 2.0**-10, 0.5, 2.0, 2.0**10, 1e3)]
+    levels = [raised(counts) for counts in (-200.0, 1e4, 6e6)]
+    return [shifted(86_400.0), shifted(2.0**30), *gains, *levels, mirrored(), turned(), doubled()]
+
+
+def on_grid(stream: Stream) -> Stream:
+    """The same with times that can be shifted exactly."""
+    times = np.rint(stream.times / GRID_S) * GRID_S
+    keep = np.append(True, np.diff(times) > 0)
+    return Stream(times[keep], stream.frames[keep])
+
+
+def renamed(found: tuple[str, ...], names: Mapping[str, str]) -> tuple[str, ...]:
+    """Labels as they must be after the change."""
+    return tuple(names.get(label, label) for label in found)
+
+
+def metamorphic_table(models: Mapping[str, Classifier], count: int) -> Table:
+    """Each property on so many simulated gestures: segments that are the same, labels as they must be, by model."""
+    streams = [on_grid(stream) for _, stream in simulated(count)]
+    cut = [segments(stream) for stream in streams]
+    said = {name: [labels(events(stream, model)) for stream in streams] for name, model in models.items()}
+    rows: list[tuple[Cell, ...]] = []
+    for change in properties():
+        after = [change.apply(stream) for stream in streams]
+        same = sum(map(change.holds, cut, (segments(stream) for stream in after)))
+        shares: list[Cell] = []
+        for name, model in models.items():
+            right = [
+                labels(events(stream, model)) == renamed(before, change.names)
+                for stream, before in zip(after, said[name], strict=True)
+            ]
+            shares.append(f"{100 * sum(right) / count:.1f} %")
+        rows.append((change.name, f"{same}/{count}" if change.exact else "-", *shares))
+    return Table(
+        "Symmetries of the whole path",
+        ("change", "segments the same, bit for bit", *models),
+        rows,
+        (
+            f"{count} simulated gestures of ten kinds. The models' columns: share of takes whose answers",
+            "(gesture, unknown or cancelled) are what they were before, with the names that must change",
+            "changed.",
+        ),
+    )

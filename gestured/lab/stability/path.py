@@ -1,0 +1,82 @@
+"""The whole path in one process: frames -> front end -> window -> model -> events; and what to send along it."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.conditioning import Mounting
+from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
+from gestured.core.frames import Frame, Segment
+from gestured.core.recognizer import Classifier, Cut, FrontEnd, Recognizer
+from gestured.simulator import GESTURES, Participant, Sensor, generator, gesture_take
+
+Array = NDArray[Any]
+TAIL_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """What a sensor sends: (n,) times in seconds, (n, R, C) raw counts."""
+
+    times: Array
+    frames: Array
+
+
+def simulated(count: int, seed: int = 41) -> Iterator[tuple[str, Stream]]:
+    """So many simulated gestures, ten kinds in turn, a new person and sensor after each ten."""
+    for k in range(count):
+        kind, person = GESTURES[k % len(GESTURES)], 7000 + seed * 100 + k // len(GESTURES)
+        take = gesture_take(kind, Participant(person), Sensor.nominal(day=person), generator(seed, k))
+        yield kind, Stream(take.sensor_times, take.frames.astype(np.float64))
+
+
+def contacts(stream: Stream, mounting: Mounting | None = None) -> list[Any]:
+    """What the front end makes of it."""
+    front = FrontEnd("stability", *stream.frames.shape[1:], mounting=mounting)
+    return _run(front.push, front.flush, stream)
+
+
+def segments(stream: Stream) -> list[Segment]:
+    """What the front end cuts out of it."""
+    return [found.segment for found in contacts(stream) if isinstance(found, Cut)]
+
+
+def events(stream: Stream, classifier: Classifier, mounting: Mounting | None = None) -> list[Event]:
+    """What a recognizer makes of it."""
+    recognizer = Recognizer(FrontEnd("stability", *stream.frames.shape[1:], mounting=mounting), classifier)
+    return _run(recognizer.push, recognizer.flush, stream)
+
+
+def _run(push: Callable[[Frame], list[Any]], flush: Callable[[float], list[Any]], stream: Stream) -> list[Any]:
+    out: list[Any] = []
+    for t, values in zip(stream.times, stream.frames, strict=True):
+        out += push(Frame(float(t), values))
+    return out + flush(float(stream.times[-1]) + TAIL_S)
+
+
+def labels(found: list[Event]) -> tuple[str, ...]:
+    """What was answered, in order: a gesture, `unknown`, or why it was cancelled."""
+    return tuple(
+        event.gesture if isinstance(event, Gesture) else "unknown" if isinstance(event, Unknown) else event.reason
+        for event in found
+        if isinstance(event, Gesture | Unknown | Cancelled)
+    )
+
+
+def fault(found: list[Event]) -> str:
+    """What breaks the contract in it: each onset has one answer and one release, all numbers are finite; else ''."""
+    order = [event for event in found if not isinstance(event, Release)]
+    releases = [event.id for event in found if isinstance(event, Release)]
+    onsets = [event.id for event in found if isinstance(event, Onset)]
+    if releases != onsets or [type(event) is Onset for event in order] != [True, False] * len(onsets):
+        return "an onset without one answer and one release"
+    for event in found:
+        if isinstance(event, Gesture | Unknown):
+            values = [event.confidence, event.onset, event.offset, *event.scores.values()]
+            if not all(map(math.isfinite, values)) or abs(sum(event.scores.values()) - 1.0) > 1e-3:
+                return "scores that are no probabilities"
+    return ""

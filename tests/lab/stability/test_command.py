@@ -1,0 +1,48 @@
+"""`gestured-lab stability`: its tables, as Markdown and as JSON, and its figure."""
+
+import argparse
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("torch", reason="needs the extra [lab]")
+pytest.importorskip("onnx", reason="needs the extra [lab]")
+pytest.importorskip("sklearn", reason="needs the extra [lab]")
+pytest.importorskip("mpmath", reason="needs the extra [lab]")
+
+from gestured.lab.stability import command
+from gestured.lab.stability.table import Table
+
+TABLE = Table("Errors", ("way", "error", "how many"), [("ours", 1.234e-16, 3), ("theirs", 0.5, 12)], ("A note.",))
+
+
+def test_a_table_is_markdown() -> None:
+    title, empty, head, rule, *rows = str(TABLE).splitlines()
+    assert (title, empty) == ("### Errors", "")
+    assert {len(line) for line in (head, rule, *rows[:2])} == {len(head)}
+    assert [cell.strip() for cell in rows[0].strip("|").split("|")] == ["ours", "1.2e-16", "3"]
+    assert rows[-1] == "A note."
+
+
+def test_tables_are_printed_as_they_are_done_or_as_json(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def tables(quick: bool, out: Path | None) -> Iterator[Table]:
+        assert quick and out is None
+        yield TABLE
+
+    monkeypatch.setattr(command, "tables", tables)
+    assert command.run(argparse.Namespace(quick=True, json=False, out=None)) == 0
+    assert str(TABLE) in capsys.readouterr().out
+    assert command.run(argparse.Namespace(quick=True, json=True, out=None)) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert "cores" in said["measured"]
+    assert said["tables"][0]["rows"][0] == ["ours", 1.234e-16, 3]
+
+
+def test_the_figure_is_written_where_it_is_asked_for(tmp_path: Path) -> None:
+    some = command.tables(quick=True, out=tmp_path / "new")
+    assert [next(some).title.split(":")[0] for _ in range(2)] == ["Filters", "Methods"]
+    assert (tmp_path / "new" / "stability.svg").read_text().startswith("<svg")

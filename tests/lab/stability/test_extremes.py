@@ -1,0 +1,74 @@
+"""What no sensor should send: nothing that is not finite comes out, and a swipe stays a swipe."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch", reason="needs the extra [lab]")
+
+from gestured.core.events import Cancelled, Onset, Release
+from gestured.core.frames import Segment
+from gestured.core.recognizer import Scores
+from gestured.lab.stability.extremes import (
+    Case,
+    judged,
+    month_table,
+    parts_table,
+    streams,
+    swipes,
+    whole_path_table,
+)
+from gestured.lab.stability.path import Stream, fault
+from gestured.models import LADDER, Model, open_model, shipped
+
+
+@pytest.fixture(scope="module")
+def models() -> list[Model]:
+    if not all(path.exists() for path in shipped().values()):
+        pytest.skip("the shipped models are not there")
+    return [open_model(name) for name in LADDER]
+
+
+def test_parts_bear_every_segment(models: list[Model]) -> None:
+    table = parts_table(models, quick=True)
+    assert sum(int(row[1]) for row in table.rows) > 200
+    assert [row for row in table.rows if row[2]] == []
+
+
+def test_the_whole_path_bears_every_stream(models: list[Model]) -> None:
+    table = whole_path_table(models[0], quick=True)
+    assert len(table.rows) > 15
+    assert [row for row in table.rows if row[3]] == []
+    for family, _, share, *_ in table.rows:
+        found, _, asked = str(share).partition("/")
+        assert found == asked or share == "-", family
+
+
+def test_a_day_of_running_means_ends_where_it_began(models: list[Model]) -> None:
+    ((_, frames, heard, off, noise, answer),) = month_table(models[0], 0.05).rows
+    assert (frames, heard, answer) == (4800, 0, "swipe_right")
+    assert float(off) < 5.0
+    assert 0.7 < float(noise) < 1.5
+
+
+class Careless:
+    """Says something that is no probability."""
+
+    gestures = ("swipe_right",)
+
+    def classify(self, segment: Segment) -> Scores:
+        with np.errstate(all="warn"):
+            return Scores(np.array([np.float32(1e30) * np.float32(1e30)]), 0.0, "careless")
+
+
+def test_the_judge_sees_what_is_wrong(models: list[Model]) -> None:
+    """Or the tables above would say nothing."""
+    stream, when = swipes(1)
+    assert judged(Case("", stream, when, alone=True), models[0]) == (1, "")
+    assert judged(Case("", stream, alone=True), models[0])[1] == "answered swipe_right"
+    assert judged(Case("", stream, (0.2,)), models[0]) == (0, "")
+    backwards = Stream(stream.times[::-1], stream.frames)
+    assert judged(Case("", backwards), models[0])[1].startswith("ValueError")
+    assert "overflow" in judged(Case("", stream), Careless())[1]
+    assert fault([Onset("s", 1, 0.0), Release("s", 1, 1.0)])
+    assert fault([Onset("s", 1, 0.0), Cancelled("s", 2, "held")])
+    assert next(streams(quick=True)).swipes

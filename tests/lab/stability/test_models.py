@@ -1,0 +1,66 @@
+"""The shipped models by every way to run them; and that the references are what they claim to be."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch", reason="needs the extra [lab]")
+pytest.importorskip("onnx", reason="needs the extra [lab]")
+pytest.importorskip("sklearn", reason="needs the extra [lab]")
+
+import onnx
+from onnx import TensorProto
+
+from gestured.lab.stability.models import NETS, by_frames, by_onnxruntime, by_reference, by_torch, loaded, widened
+from gestured.lab.stability.path import segments, simulated
+from gestured.models import LADDER, open_model, shipped
+
+TOLERANCE = 2e-6
+
+
+@pytest.fixture(scope="module")
+def windows() -> list[np.ndarray]:
+    if not all(path.exists() for path in shipped().values()):
+        pytest.skip("the shipped models are not there")
+    window = open_model(LADDER[0]).metadata.window
+    return [window.apply(segment) for _, stream in simulated(6) for segment in segments(stream)]
+
+
+@pytest.mark.parametrize("name", NETS)
+def test_every_way_to_run_a_net_gives_the_same(name: str, windows: list[np.ndarray]) -> None:
+    data = shipped()[name].read_bytes()
+    module = loaded(name, data)
+    right = by_reference(data)(windows)
+    assert np.abs(right[:, :-1].sum(axis=1) - 1.0).max() < 1e-9  # it is computed in float64
+    ways = {
+        "as the daemon": by_onnxruntime(data),
+        "a batch": by_onnxruntime(data, batch=True),
+        "two threads": by_onnxruntime(data, threads=2),
+        "torch": by_torch(module),
+        "torch, a batch": by_torch(module, batch=True),
+        "frame by frame": by_frames(module),
+    }
+    for way, run in ways.items():
+        assert np.abs(run(windows) - right).max() < TOLERANCE, way
+
+
+def test_the_forest_walks_as_in_float64(windows: list[np.ndarray]) -> None:
+    from gestured.core.features import touch_pattern
+
+    data = shipped()["touch_pattern_rf"].read_bytes()
+    features = [touch_pattern(window, 15.0) for window in windows]
+    right = by_reference(data)(features)
+    for run in (by_onnxruntime(data), by_onnxruntime(data, batch=True)):
+        assert np.abs(run(features) - right).max() < TOLERANCE
+
+
+def test_a_widened_graph_holds_no_float32() -> None:
+    path = shipped()["lstm"]
+    if not path.exists():
+        pytest.skip(f"{path} is not there")
+    graph = widened(path.read_bytes()).graph
+    tensors = [
+        *graph.initializer,
+        *(a.t for n in graph.node for a in n.attribute if a.type == onnx.AttributeProto.TENSOR),
+    ]
+    assert {tensor.data_type for tensor in tensors} >= {TensorProto.DOUBLE}
+    assert TensorProto.FLOAT not in {tensor.data_type for tensor in tensors}

@@ -1,0 +1,144 @@
+"""What must not change when the input changes, and what must change with it: exactly in front of the models.
+
+The changes and the streams are those of `gestured-lab stability`, which prints the figures; simulated gestures.
+"""
+
+import struct
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gestured.core.conditioning import Mounting
+from gestured.core.wire import Addresses, Decoder
+from gestured.lab.stability.metamorphic import (
+    Property,
+    doubled,
+    mirrored,
+    on_grid,
+    raised,
+    renamed,
+    scaled,
+    shifted,
+    turned,
+)
+from gestured.lab.stability.path import Stream, events, labels, segments, simulated
+from gestured.models import LADDER, Model, open_model, shipped
+
+COUNT = 40
+LEAST = 0.98  # of the labels, where a learned net decides
+numbers = st.integers(0, COUNT - 1)
+changes = st.one_of(
+    st.integers(-(2**40), 2**40).map(lambda n: shifted(n / 4096)),
+    st.integers(-10, 10).map(lambda n: scaled(2.0**n)),
+    st.integers(-200, 10_000).map(raised),
+    st.just(mirrored()),
+    st.just(turned()),
+)
+
+
+@cache
+def streams() -> list[Stream]:
+    return [on_grid(stream) for _, stream in simulated(COUNT)]
+
+
+@cache
+def model(name: str) -> Model:
+    if not shipped()[name].exists():
+        pytest.skip(f"{shipped()[name]} is not there")
+    return open_model(name)
+
+
+@cache
+def said(name: str) -> list[tuple[str, ...]]:
+    return [labels(events(stream, model(name))) for stream in streams()]
+
+
+@settings(max_examples=60, deadline=None)
+@given(numbers, st.lists(changes, min_size=1, max_size=3))
+def test_the_front_end_sees_the_same_segments(number: int, several: list[Property]) -> None:
+    """One after the other, in any order."""
+    stream = streams()[number]
+    before = segments(stream)
+    assert len(before) == 1
+    for change in several:
+        stream = change.apply(stream)
+        after = segments(stream)
+        assert change.holds(before, after), change.name
+        before = after
+
+
+@settings(max_examples=20, deadline=None)
+@given(numbers, st.sampled_from([0, 90, 180, 270]), st.booleans())
+def test_a_sensor_that_is_mounted_otherwise_and_says_so_gives_the_same_events(
+    number: int, rotate: int, mirror: bool
+) -> None:
+    stream = streams()[number]
+    sent = np.rot90(stream.frames, rotate // 90, axes=(1, 2))  # counter-clockwise: the mounting turns it back
+    turned_back = Stream(stream.times, sent[:, :, ::-1] if mirror else sent)
+    net = model(LADDER[0])
+    assert events(turned_back, net, Mounting(rotate, mirror)) == events(stream, net)
+
+
+@pytest.mark.parametrize("name", LADDER[:2])
+@pytest.mark.parametrize(
+    "change",
+    [shifted(86_400.0), scaled(1e-3), scaled(1e3), raised(-200.0), raised(6e6), mirrored(), turned(), doubled()],
+    ids=lambda change: change.name,
+)
+def test_the_nets_say_the_same_or_what_it_became(name: str, change: Property) -> None:
+    net = model(name)
+    right = [
+        labels(events(change.apply(stream), net)) == renamed(before, change.names)
+        for stream, before in zip(streams(), said(name), strict=True)
+    ]
+    assert sum(right) >= LEAST * len(right)
+
+
+# --- on the wire
+
+grids = st.tuples(st.integers(2, 9), st.integers(2, 9))
+
+
+def message(types: str, body: bytes) -> bytes:
+    def text(word: str) -> bytes:
+        return word.encode() + b"\0" * (4 - len(word) % 4)
+
+    return text("/armrest/pressure") + text("," + types) + body
+
+
+def bundle(*messages: bytes) -> bytes:
+    return b"#bundle\0" + struct.pack(">Q", 1) + b"".join(struct.pack(">i", len(m)) + m for m in messages)
+
+
+def blob(data: bytes) -> bytes:
+    return message("b", struct.pack(">i", len(data)) + data + b"\0" * (-len(data) % 4))
+
+
+def decoded(grid: tuple[int, int], *packets: bytes) -> list[np.ndarray]:
+    decoder = Decoder(Addresses(), lambda sensor: grid)
+    found = []
+    for packet in packets:
+        arrivals, errors = decoder.decode(packet)
+        assert errors == []
+        found += [arrival.values for arrival in arrivals]
+    return found
+
+
+@given(grids, st.integers(1, 4), st.integers(0, 2**32 - 1))
+def test_the_form_of_a_frame_on_the_wire_changes_nothing(grid: tuple[int, int], count: int, seed: int) -> None:
+    """Floats, integers, float and integer blobs, in packets of their own or all in one bundle."""
+    counts = np.random.default_rng(seed).integers(0, 65536, (count, *grid))
+    size = grid[0] * grid[1]
+    forms = [
+        [message("f" * size, frame.astype(">f4").tobytes()) for frame in counts],
+        [message("i" * size, frame.astype(">i4").tobytes()) for frame in counts],
+        [blob(frame.astype(">f4").tobytes()) for frame in counts],
+        [blob(frame.astype(">u2").tobytes()) for frame in counts],
+    ]
+    for packets in (*forms, *([bundle(*form)] for form in forms)):
+        found = decoded(grid, *packets)
+        assert len(found) == count
+        assert all(np.array_equal(one, two) for one, two in zip(found, counts, strict=True))
