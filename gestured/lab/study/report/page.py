@@ -5,10 +5,11 @@ from pathlib import Path
 
 from . import (
     curves,
+    figures_calibration,
+    figures_failures,
     figures_right,
     figures_signal,
     figures_time,
-    figures_trust,
     reading,
     summary,
     tables,
@@ -97,8 +98,8 @@ def _sections(study: Study) -> list[Section]:
         "confusion": ("Which gesture for which", "cells", "Confusions were", _confusion),
         "run-time": ("Error against run time", "run_time", "Run times were", _run_time),
         "elapsed": ("Before the gesture has ended", "elapsed", "Error against elapsed time was", curves.elapsed),
-        "failures": ("Where it fails", "failures", "Where the methods fail was", figures_trust.failures),
-        "calibration": ("How sure it is", "calibration", "Calibration was", figures_trust.calibration),
+        "failures": ("Where it fails", "failures", "Where the methods fail was", figures_failures.failures),
+        "calibration": ("How sure it is", "calibration", "Calibration was", figures_calibration.calibration),
         "learning": ("How many people it takes", "learning", "Learning curves were", curves.learning),
         "methods": ("The methods", "methods", "Methods were", tables_about.methods),
         "tuning": ("Tuning", "tuning", "Hyperparameters were", tables_about.tuning),

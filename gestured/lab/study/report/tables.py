@@ -105,10 +105,21 @@ def run_time(study: Study) -> Markup:
 
 
 def online(study: Study) -> Markup:
+    """The sessions with the study's own models, and with the shipped ones where they were played to them too."""
+    caption = "Continuous sessions over UDP to a running daemon. Latency is from the finger's lift to the event. "
+    ours = "The study's models know the ten gestures and nothing else: whatever else is answered counts as extra."
+    tables = [_sessions(study, "online", "The study's models", caption + ours)]
+    if reading.part(study, "online_shipped"):
+        words = "The same sessions with the models that ship with gestured, which reject what they do not know."
+        tables.append(_sessions(study, "online_shipped", "The shipped models", words))
+    return join(*tables)
+
+
+def _sessions(study: Study, part: str, title: str, caption: str) -> Markup:
     names = ["Method", "Gestures", "Published", "Right, %", "Wrong, %", "Missed, %", "Extra, %"]
     names += ["False a minute", "Latency, median", "95th percentile"]
     lines = []
-    for row in reading.part(study, "online"):
+    for row in reading.part(study, part):
         look, latency = marks.look_of(study, row["method"]), row.get("latency_ms") or {}
         lines.append(
             [
@@ -121,8 +132,7 @@ def online(study: Study) -> Markup:
                 *(_milliseconds(latency.get(name)) for name in ("p50", "p95")),
             ]
         )
-    caption = "Continuous sessions over UDP to a running daemon. Latency is from the finger's lift to the event."
-    return table("Sessions with the running daemon", SIMULATED, caption, heads(*names), lines)
+    return table(title, SIMULATED, caption, heads(*names), lines)
 
 
 def _milliseconds(value: float | None) -> Markup:

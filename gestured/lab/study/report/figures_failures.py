@@ -1,8 +1,8 @@
-"""How far the figures carry: how sure the answers are, and where they fail."""
+"""Where the methods fail: by what was done, by whom, how and where."""
 
 from . import formats, icons, marks, reading
 from .chart import Plot, Scale, text
-from .layout import SIMULATED, paragraph, small
+from .layout import SIMULATED, cell, folded, head, paragraph, row_head, small, table
 from .markup import Markup, join, tag
 from .reading import Row, Study
 
@@ -19,53 +19,60 @@ KINDS = {
 }
 
 
-def calibration(study: Study) -> Markup:
-    drawings = [_reliability(study, row) for row in reading.part(study, "calibration")]
-    words = "How often an answer of a given confidence is right; the larger a circle, the more answers. "
-    words += "On the dashed line confidence is what it says; below it, the method is too sure."
-    return join(paragraph(words), tag("div", *drawings, class_="multiples"))
-
-
-def _reliability(study: Study, row: Row) -> Markup:
-    plot = Plot(300, 300, Scale(0.0, 1.0, 46, 286), Scale(0.0, 1.0, 250, 28))
-    shares = [0.0, 0.25, 0.5, 0.75, 1.0]
-    plot.y_axis(shares, lambda share: formats.percent(share, 0), "right, per cent")
-    plot.x_axis(shares, lambda share: formats.percent(share, 0), "confidence, per cent")
-    plot.line([(0.0, 0.0), (1.0, 1.0)], "ideal")
-    look = marks.look_of(study, row["method"])
-    bins = [group for group in row["bins"] if group["n"]]
-    total = sum(group["n"] for group in bins) or 1
-    if bins:
-        plot.line([(group["confidence"], group["right"]) for group in bins], f"curve thin {look.classes}")
-    for group in bins:
-        sure, right = formats.percent(group["confidence"]), formats.percent(group["right"])
-        words = f"confidence {sure}, right {right}, n = {group['n']}"
-        radius = 3 + 9 * (group["n"] / total) ** 0.5
-        x, y = plot.x(group["confidence"]), plot.y(group["right"])
-        drawn = tag("circle", cx=x, cy=y, r=radius, class_=f"bubble {look.classes}")
-        plot.add(tag("g", tag("title", words), drawn))
-    title = reading.title(study, row["method"])
-    words = f"Expected calibration error {formats.with_unit(row['error'])}."
-    return small(title, SIMULATED, words, plot.svg(f"Reliability diagram of {title}, simulated data", words))
-
-
 def failures(study: Study) -> Markup:
+    """The best method of each family drawn, and every method in a table for each way of looking, folded."""
     rows = reading.part(study, "failures")
-    methods = reading.in_order(study, {row["method"] for row in rows})
-    kinds = [*(kind for kind in KINDS if any(row["by"] == kind for row in rows))]
-    kinds += sorted({row["by"] for row in rows} - set(KINDS))
-    floor = reading.below(min(reading.ends(group)[0] for row in rows for group in row["groups"]))
-    drawings = [_groups(study, kind, [row for row in rows if row["by"] == kind], floor) for kind in kinds]
-    words = (
-        "Right in per cent with 95 % intervals, for groups of the gestures of people never seen; one scale throughout."
-    )
-    return join(paragraph(words), marks.key(study, methods), tag("div", *drawings, class_="multiples"))
+    kinds = [*KINDS, *sorted({row["by"] for row in rows} - set(KINDS))]
+    found = {kind: of for kind in kinds if (of := [row for row in rows if row["by"] == kind and row["groups"]])}
+    shown = _best_of_families(study, rows)
+    drawn = {kind: [row for row in of if row["method"] in shown] for kind, of in found.items()}
+    floor = reading.below(min(reading.ends(g)[0] for of in drawn.values() for row in of for g in row["groups"]))
+    words = "Gestures of people never seen, in groups: right in per cent with 95 % intervals, on one scale throughout. "
+    words += "Drawn is the method of each family that is most often right; the tables hold all of them."
+    figures = [_groups(study, kind, of, floor) for kind, of in drawn.items() if of]
+    tables = folded("All methods in figures", *(_table(study, kind, of) for kind, of in found.items()))
+    return join(paragraph(words), marks.key(study, shown), tag("div", *figures, class_="multiples"), tables)
+
+
+def _best_of_families(study: Study, rows: list[Row]) -> list[str]:
+    """Of each family the method with the highest mean over the groups of the first way of looking."""
+    first = [row for row in rows if row["by"] == rows[0]["by"] and row["groups"]]
+    means = {row["method"]: sum(group["right"] for group in row["groups"]) / len(row["groups"]) for row in first}
+    best: dict[int, str] = {}
+    for method in sorted(means, key=lambda name: means[name]):
+        best[reading.family(study, method)] = method
+    return reading.in_order(study, set(best.values()))
+
+
+def _table(study: Study, kind: str, rows: list[Row]) -> Markup:
+    names, of = _names(rows), {row["method"]: row for row in rows}
+    lines = []
+    for method in reading.in_order(study, set(of)):
+        groups = {str(group["name"]): group for group in of[method]["groups"]}
+        lines.append([row_head(marks.named(study, method)), *(_cell(groups.get(name)) for name in names)])
+    heads = [head("Method"), *(head(formats.plain(name)) for name in names)]
+    return table(_title(kind), SIMULATED, "Right in per cent with 95 % intervals.", heads, lines)
+
+
+def _cell(group: Row | None) -> Markup:
+    if group is None:
+        return cell(formats.NONE)
+    share = tag("span", formats.percent(group["right"]), class_="share")
+    return cell(share, " ", tag("span", formats.interval(group), class_="interval"), value=group["right"])
+
+
+def _title(kind: str) -> str:
+    return KINDS.get(kind, f"By {kind}")
+
+
+def _names(rows: list[Row]) -> list[str]:
+    return list(dict.fromkeys(str(group["name"]) for row in rows for group in row["groups"]))
 
 
 def _groups(study: Study, kind: str, rows: list[Row], floor: float) -> Markup:
     many = max(len(row["groups"]) for row in rows) > MANY
     drawing = _ranked(study, kind, rows, floor) if many else _by_name(study, kind, rows, floor)
-    return small(KINDS.get(kind, f"By {kind}"), SIMULATED, _worst(study, rows), drawing)
+    return small(_title(kind), SIMULATED, _worst(study, rows), drawing)
 
 
 def _worst(study: Study, rows: list[Row]) -> str:
@@ -76,7 +83,7 @@ def _worst(study: Study, rows: list[Row]) -> str:
 
 def _by_name(study: Study, kind: str, rows: list[Row], floor: float) -> Markup:
     """Groups below each other, the methods on lines of their own within each; gestures as icons, else a name above."""
-    names = list(dict.fromkeys(str(group["name"]) for row in rows for group in row["groups"]))
+    names = _names(rows)
     icon = kind == "gesture"
     above, lane = (8.0 if icon else 22.0), 12.0
     pitch = above + lane * len(rows) + 4
@@ -90,7 +97,7 @@ def _by_name(study: Study, kind: str, rows: list[Row], floor: float) -> Markup:
         for line, row in enumerate(rows):
             for group in (group for group in row["groups"] if str(group["name"]) == name):
                 _share(study, plot, row, group, top + above + lane * (line + 0.5))
-    return plot.svg(f"{KINDS.get(kind, kind)}: right in per cent, simulated data", _worst(study, rows))
+    return plot.svg(f"{_title(kind)}: right in per cent, simulated data", _worst(study, rows))
 
 
 def _share(study: Study, plot: Plot, row: Row, group: Row, y: float) -> None:
@@ -120,4 +127,4 @@ def _ranked(study: Study, kind: str, rows: list[Row], floor: float) -> Markup:
         for k, group in enumerate(groups):
             words = f"{reading.title(study, row['method'])}, {group['name']}: {formats.with_unit(group['right'])}"
             plot.add(marks.marker(look, plot.x(k + 1.0), plot.y(group["right"]), words, "tiny"))
-    return plot.svg(f"{KINDS.get(kind, kind)}: right in per cent, simulated data", _worst(study, rows))
+    return plot.svg(f"{_title(kind)}: right in per cent, simulated data", _worst(study, rows))
