@@ -3,6 +3,7 @@
 # interpreter that the installed programs run under; its pip is used, nothing of it is installed.
 # The packages get a folder of their own below PREFIX/lib, made beside the one of before, whose place it then takes.
 set -eu
+umask 022
 venv=$1 root=$2 prefix=$3
 python=$("$venv/bin/python" -c 'import sys; print("%s/bin/python%d.%d" % (sys.base_prefix, *sys.version_info[:2]))')
 lib=$prefix/lib/gestured
@@ -65,7 +66,7 @@ put 644 systemd/gestured.tmpfiles.conf "$prefix/lib/tmpfiles.d/gestured.conf"
     put 644 "$work/share/$file" "$share/${file#./}"
 done
 for file in systemd/osc-output.conf deploy/gestured.toml deploy/prometheus/gestured.rules.yml \
-    deploy/prometheus/prometheus.yml deploy/grafana/dashboards/gestured.json docs/events.schema.json LICENSE NOTICE; do
+    deploy/prometheus/prometheus.yml deploy/grafana/dashboards/gestured.json docs/events.schema.json docs/*.md LICENSE NOTICE; do
     put 644 "$file" "$doc/$(basename "$file")"
 done
 keep deploy/gestured.toml /etc/gestured/gestured.toml

@@ -1,6 +1,6 @@
 #!/bin/sh
 # What `make uninstall` runs: deploy/uninstall.sh DESTDIR PREFIX. Removes what `make install` has put there; the
-# configuration in /etc, the account and /var/lib/gestured stay.
+# settings in /etc and the account stay.
 set -eu
 root=$1 lib=$2/lib/gestured
 [ -e "$root$lib/installed" ] || { echo "gestured is not installed in $root$lib" >&2; exit 1; }
