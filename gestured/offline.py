@@ -19,8 +19,7 @@ from gestured.tape import Packet, Tape
 class Scene:
     """The part of a tape's `scene` that decides. Raises RecordingError for one that says something else."""
 
-    def __init__(self, scene: Mapping[str, Any], rows: int, columns: int) -> None:
-        """`rows` x `columns` is the model's grid, which holds where nothing else was set."""
+    def __init__(self, scene: Mapping[str, Any]) -> None:
         settings = scene.get("settings")
         if not isinstance(settings, dict):
             raise RecordingError("scene.settings: expected the daemon's settings")
@@ -28,13 +27,16 @@ class Scene:
             self.gestures: list[str] = [str(name) for name in scene["gestures"]]
             self.addresses = Addresses(settings["addresses"]["pressure"], settings["addresses"]["trajectory"])
             self.stale_s = float(settings["stale_s"])
-            self._grid = (rows, columns) if settings["grid"] is None else tuple(settings["grid"])
+            model = scene["model"]
+            self.sha256 = str(model.get("sha256"))
+            self.ladder: tuple[str, list[str]] = settings["model"], list(settings["fallback"])
+            self._grid = tuple(settings["grid"] or (model["rows"], model["columns"]))
             self._clock = settings["clock"]
             self._sensors: Mapping[str, Any] = dict(settings["sensors"])
             parts: Mapping[str, Any] = dict(settings["per_gesture"])
             self.thresholds = {n: float(p["threshold"]) for n, p in parts.items() if p["threshold"] is not None}
             self.refractory = {n: float(p["refractory_s"]) for n, p in parts.items()}
-            for name in self._sensors:
+            for name in ("", *self._sensors):  # whatever is wrong is found now
                 self.grid(name), self.front_end(name), self.stamper(name)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise RecordingError(
@@ -97,8 +99,13 @@ class Stream:
 class Replay:
     """Plays a tape with a classifier. The events' times count from its first packet, at `epoch` (s since 1970)."""
 
-    def __init__(self, tape: Tape, classifier: Classifier, rows: int, columns: int) -> None:
-        self.scene = Scene(tape.scene, rows, columns)
+    def __init__(self, tape: Tape, scene: Scene, classifier: Classifier) -> None:
+        """Raises RecordingError for a classifier that does not know the gestures that were in use."""
+        self.scene = scene
+        missing = [name for name in self.scene.gestures if name not in classifier.gestures]
+        if missing or not self.scene.gestures:
+            known = ", ".join(classifier.gestures)
+            raise RecordingError(f"gestures: {', '.join(missing) or 'none'} were in use, the model knows {known}")
         self.streams: dict[str, Stream] = {}
         self._start = tape.packets[0].t_ns if tape.packets else 0
         self.epoch = self._start / 1e9

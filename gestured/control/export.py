@@ -59,14 +59,9 @@ def _count(labels: Any) -> int:
     return 0 if labels is None else len(labels)
 
 
-def _scene(found: tape.Tape) -> Scene:
-    rows, columns = next(iter(found.scene.get("grids", {}).values()), (9, 9))
-    return Scene(found.scene, rows, columns)
-
-
 def _arrivals(found: tape.Tape) -> dict[str, list[tuple[float, Arrival]]]:
     """Sensor -> its frames with their arrival in seconds since the epoch."""
-    scene = _scene(found)
+    scene = Scene(found.scene)
     decoder = Decoder(scene.addresses, scene.grid)
     out: dict[str, list[tuple[float, Arrival]]] = {}
     for packet in found.packets:
@@ -77,7 +72,7 @@ def _arrivals(found: tape.Tape) -> dict[str, list[tuple[float, Arrival]]]:
 
 def _stamped(found: tape.Tape, name: str, arrivals: list[tuple[float, Arrival]]) -> Iterator[tuple[float, Arrival]]:
     """The frames that the daemon used, at the times that it gave them."""
-    stamper = _scene(found).stamper(name)
+    stamper = Scene(found.scene).stamper(name)
     last, start = -np.inf, 0
     while start < len(arrivals):
         now = arrivals[start][0]

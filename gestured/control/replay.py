@@ -15,7 +15,7 @@ from gestured.core import messages, osc
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.core.events import Event
 from gestured.ladder import ladder_for
-from gestured.offline import Replay
+from gestured.offline import Replay, Scene
 
 BUNDLE = b"#bundle\0"
 
@@ -70,12 +70,12 @@ def _words(event: Event, epoch: float) -> str:
 
 
 def _offline(found: tape.Tape, model: str | None) -> Replay:
-    known = found.scene.get("model", {})
-    settings = found.scene.get("settings", {})
-    ladder = ladder_for(model or str(settings.get("model")), settings.get("fallback") or None)
-    if model is None and getattr(ladder.model, "sha256", None) != known.get("sha256"):
+    scene = Scene(found.scene)
+    recorded_model, fallback = scene.ladder
+    ladder = ladder_for(model or recorded_model, fallback or None)
+    if model is None and getattr(ladder.model, "sha256", None) != scene.sha256:
         print(f"{ladder.name} is not the file that it was when this was recorded", file=sys.stderr)
-    return Replay(found, ladder, ladder.rows, ladder.columns)
+    return Replay(found, scene, ladder)
 
 
 def _compare(found: tape.Tape, replay: Replay, as_json: bool) -> int:

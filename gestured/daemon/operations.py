@@ -107,8 +107,8 @@ class Operations:
             last, watched.shadow = watched.shadow, None
             return {"shadow": last.report() if last else None}
         opened = await asyncio.to_thread(open_model, model)
-        self._service.pipeline.watched.compare(opened)  # a reload may have come in between
-        return {"shadow": self._service.pipeline.watched.shadow.report()}  # type: ignore[union-attr]
+        shadow = self._service.pipeline.watched.compare(opened)  # not `watched`: a reload may have come in between
+        return {"shadow": shadow.report()}
 
     async def tap(self, connection: Connection) -> Answer:
         """Stream packets and events over this connection from now on."""
@@ -135,8 +135,12 @@ class Operations:
             "version": __version__,
             "instance": self._service.health.instance,
             "epoch_ns": time.time_ns() - time.monotonic_ns(),
-            "model": {"name": pipeline.watched.ladder.active, "sha256": model.sha256},
+            "model": {
+                "name": pipeline.watched.ladder.active,
+                "sha256": model.sha256,
+                "rows": model.rows,
+                "columns": model.columns,
+            },
             "gestures": list(pipeline.gestures),
-            "grids": {name: list(pipeline.grid(name)) for name in pipeline.sensors},
             "settings": settings,
         }

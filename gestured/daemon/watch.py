@@ -29,7 +29,7 @@ class Watched:
             self.shadow.see(segment, scores)
         return scores
 
-    def compare(self, model: Model) -> None:
+    def compare(self, model: Model) -> Shadow:
         """Run a candidate beside the ladder from now on. Raises ModelError for one that knows other gestures."""
         if model.gestures != self.gestures:
             raise ModelError(
@@ -37,3 +37,4 @@ class Watched:
                 f"({', '.join(self.gestures)}), found {', '.join(model.gestures)}"
             )
         self.shadow = Shadow(model, model.name)
+        return self.shadow

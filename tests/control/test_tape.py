@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gestured import recording, tape
+from gestured.control.cli import main
 from gestured.control.diff import Answer, Difference, differences
 from gestured.core.errors import RecordingError
 from tests.daemon import tiny_model
@@ -193,13 +194,44 @@ def test_export_gives_the_contracts_npz(recorded, run, daemon: Daemon, tmp_path:
     assert status == 1 and "nobody" in err and not (tmp_path / "x.npz").exists()
 
 
-def test_what_is_no_recording_is_one_sentence(run, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("settings", None, "settings"),
+        ("gestures", ["wink"], "wink"),
+        ("gestures", [], "none"),
+        ("model", {}, "rows"),
+        ("model", {"rows": 999, "columns": 9}, "999"),
+    ],
+)
+def test_a_scene_that_says_something_else_is_one_sentence(capsys, tmp_path: Path, key: str, value, said: str) -> None:
+    model = tiny_model.make(tmp_path / "tiny.onnx")
+    table = {"pressure": "/{sensor}/pressure", "trajectory": "/{sensor}/trajectory"}
+    settings = {"addresses": table, "stale_s": 1.0, "grid": None, "clock": "arrival", "sensors": {}, "per_gesture": {}}
+    scene = {
+        "settings": settings | {"model": str(model), "fallback": []},
+        "gestures": ["one_tap"],
+        "model": {"rows": 9, "columns": 9},
+    }
+    for name, content, status in (("good", scene, 0), ("bad", scene | {key: value}, 1)):
+        path = tmp_path / f"{name}.mcap"
+        with tape.Writer(path, content, 1 << 20) as writer:
+            writer.packet(10**18, "127.0.0.1:5", b"rubbish!")
+        assert main(["replay", str(path), "--model", str(model)]) == status
+        out, err = capsys.readouterr()
+        assert out == ""
+    assert said in err and err.startswith("gesturectl: ") and err.count("\n") == 1
+
+
+def test_what_is_no_recording_is_one_sentence(capsys, tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
     for data in (b"", b"hello", b"\x89MCAP0\r\n", os.urandom(5000)):
         path.write_bytes(data)
-        status, out, err = run("replay", path)
-        assert status == 1 and out == "" and err.count("\n") == 1 and str(path) in err
-    assert "No such file" in run("replay", tmp_path / "none.mcap")[2]
+        assert main(["replay", str(path)]) == 1
+        out, err = capsys.readouterr()
+        assert out == "" and err.count("\n") == 1 and str(path) in err
+    assert main(["replay", str(tmp_path / "none.mcap")]) == 1
+    assert "No such file" in capsys.readouterr().err
 
 
 def test_differences_match_contacts_by_sensor_and_onset() -> None:

@@ -10,9 +10,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from gestured.client.control import Control
 from gestured.client.stream import Refused, Unreachable
+from gestured.daemon.control import Parameter, Refusal, Verb, parse_request
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
 
@@ -279,3 +282,25 @@ def test_gestures_unlike_those_of_the_training_are_said_to_be(start, tmp_path: P
     assert json.loads(daemon.get("/readyz")[1])["shift"] == ["duration_s"]
     with Control(Path(daemon.ready["control"])) as control:
         assert control.ask("status")["shift"]["unlike"] == ["duration_s"]
+
+
+words = st.sampled_from(["verb", "emit", "gesture", "status"])
+values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.text(max_size=9) | words,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(words, inner, max_size=4),
+)
+
+
+@given(st.binary(max_size=200) | values.map(lambda value: json.dumps(value).encode()))
+def test_any_line_is_a_request_that_fits_the_table_or_is_refused(line: bytes) -> None:
+    async def nothing(connection, **parameters):
+        return {}
+
+    table = {"status": Verb(nothing), "emit": Verb(nothing, {"gesture": Parameter(str, "a name", required=True)})}
+    try:
+        name, parameters = parse_request(line, table)
+    except Refusal as refusal:
+        assert str(refusal)
+    else:
+        assert (name, list(parameters)) in (("status", []), ("emit", ["gesture"]))
+        assert all(isinstance(value, str) for value in parameters.values())
