@@ -4,7 +4,10 @@ import json
 import re
 import shutil
 import signal
+import socket
 import subprocess
+import urllib.parse
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -50,8 +53,8 @@ def test_each_alert_is_tested_where_it_fires_and_where_it_does_not():
 
 
 @pytest.fixture(scope="module")
-def said(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """/metrics of a daemon that has seen a gesture, rubbish, and a reload that it refused."""
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A daemon that has seen a gesture, rubbish, and a reload that it refused."""
     if not shipped()["cnn_lstm"].exists():
         pytest.skip(f"{shipped()['cnn_lstm']} is not there")
     folder = tmp_path_factory.mktemp("metrics")
@@ -67,10 +70,16 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         daemon.signal(signal.SIGHUP)
         while daemon.metric("gestured_reloads_total", result="refused") == 0:
             pass
-        yield daemon.get("/metrics")[1]
+        yield daemon
         with_answer.close()
     finally:
         daemon.stop()
+
+
+@pytest.fixture(scope="module")
+def said(daemon: Daemon) -> str:
+    """Its /metrics."""
+    return daemon.get("/metrics")[1]
 
 
 def known(text: str) -> dict[str, set[str]]:
@@ -137,3 +146,38 @@ def test_prometheus_understands_every_query(tmp_path: Path):
     command = ["promtool", "check", "rules", str(tmp_path / "queries.yml")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.skipif(shutil.which("prometheus") is None, reason="prometheus is not installed")
+def test_a_real_prometheus_scrapes_the_daemon_and_answers_every_query(daemon: Daemon, tmp_path: Path):
+    """With the configuration that is shipped, but for addresses and intervals."""
+    text = (RULES.parent / "prometheus.yml").read_text().replace("127.0.0.1:9108", daemon.ready["metrics"])
+    (tmp_path / "prometheus.yml").write_text(text.replace("15s", "1s"))
+    shutil.copy(RULES, tmp_path)
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    flags = (f"--config.file={tmp_path}/prometheus.yml", f"--storage.tsdb.path={tmp_path}/data")
+    command = ["prometheus", *flags, f"--web.listen-address={address}", "--log.level=error"]
+
+    def ask(query: str) -> list[object]:
+        url = f"http://{address}/api/v1/query?" + urllib.parse.urlencode({"query": query})
+        with urllib.request.urlopen(url, timeout=20) as answer:
+            found: list[object] = json.load(answer)["data"]["result"]
+            return found
+
+    def scraped() -> bool:
+        try:
+            return bool(ask('up{job="gestured"} == 1'))
+        except OSError:  # it has not begun to listen
+            return False
+
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as prometheus:
+        try:
+            while not scraped():
+                assert prometheus.poll() is None
+            answers = {where: ask(query.replace("$__rate_interval", "1m")) for where, query in queries().items()}
+        finally:
+            prometheus.terminate()
+    at_once = [where for where, query in queries().items() if re.fullmatch(r"gestured_\w+(?<!shift_ratio)", query)]
+    assert len(at_once) >= 8 and all(answers[where] for where in at_once), answers
