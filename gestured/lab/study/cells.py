@@ -7,7 +7,7 @@ that collects the results, so that workers on other machines need no common fold
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -25,7 +25,7 @@ from gestured.lab.study.protocols import Result, Task, run
 SHAPING = (  # the rooms whose code decides what a cell's numbers are
     "dataset", "fit", "nets", "trajectory", "study/shifting", "study/wavelets", "study/touch_patterns",
     "study/motion_history", "study/trajectory_boosting", "study/nets", "study/training", "study/methods",
-    "study/material", "study/protocols", "study/elapsed",
+    "study/views", "study/material", "study/protocols", "study/elapsed", "study/run_time", "study/onnx_form", "study/sessions",
 )  # fmt: skip
 
 
@@ -51,6 +51,16 @@ class Schedule:
         """A cell's file."""
         key = json.dumps([code_digest(), data.key, asdict(task)], sort_keys=True)
         return self.cache / "cells" / f"{task.method}-{hashlib.sha256(key.encode()).hexdigest()[:20]}.json"
+
+    def once(self, name: str, key: Sequence[Any], make: Callable[[], Any]) -> Any:
+        """What `make` gives, from its file where it was made before; `key` is what it depends on besides the code."""
+        digest = hashlib.sha256(json.dumps([code_digest(), *key], sort_keys=True, default=str).encode())
+        path = self.cache / "cells" / f"{name}-{digest.hexdigest()[:20]}.json"
+        found = _read(path) if path.exists() else None
+        if found is None:
+            found = json.loads(json.dumps(make()))
+            keep(path, found)
+        return found
 
     def results(self, tasks: Sequence[Task], sets: Mapping[str, Data], title: str) -> dict[Task, Result]:
         """Every task's result, from its file where it was computed before."""

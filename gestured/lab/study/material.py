@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.lab.dataset import Samples, join
-from gestured.lab.study.shifting import copies
+from gestured.lab.study.shifting import THRESHOLD, copies
 from gestured.simulator import GESTURES
 
 NONE, SHIFT, WIDE = "none", "shift", "wide"
@@ -59,12 +59,15 @@ def equal_length(samples: Samples, frames: int) -> Samples:
 
 
 @lru_cache(maxsize=4)
-def pool(data: Data, augmentation: str, frames: int = 0) -> Pool:
-    """The gestures with what an augmentation adds; of equal length where `frames` is not 0."""
+def pool(data: Data, augmentation: str, frames: int = 0, box: float = THRESHOLD) -> Pool:
+    """The gestures with what an augmentation adds; of equal length where `frames` is not 0.
+
+    `box` is the threshold of Algorithm 1's bounding box.
+    """
     count = len(data.gestures)
     parts, source, same = [data.gestures], np.arange(count), np.ones(count, bool)
     if augmentation == SHIFT:
-        made = copies(data.gestures)
+        made = copies(data.gestures, box)
         parts, source, same = [*parts, made.samples], np.append(source, made.source), np.append(same, made.same)
     elif augmentation == WIDE:
         assert data.wide is not None

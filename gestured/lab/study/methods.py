@@ -19,15 +19,10 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
-from gestured.lab.dataset import Samples
-from gestured.lab.study import training
-from gestured.lab.study.motion_history import motion_history_images
-from gestured.lab.study.touch_patterns import touch_pattern_features
+from gestured.lab.study import training, views
 from gestured.lab.study.training import Images, Windows
-from gestured.lab.study.trajectory_boosting import trajectory_matrix
-from gestured.lab.study.wavelets import spatio_temporal_features
+from gestured.lab.study.views import FRAMES, TOUCHES, TRAJECTORIES, WAVELETS, Values, View
 
-Values = Mapping[str, Any]
 Indices = NDArray[np.int64]
 SPATIO_TEMPORAL, TOUCH_PATTERN, HISTORY = "spatio-temporal features", "touch-pattern features", "motion history image"
 RECURRENT, BEYOND = "recurrent", "beyond the paper"
@@ -96,13 +91,11 @@ class Method:
     title: str
     family: str
     what: str  # one sentence
-    prepare: Callable[[Samples, Values, bool], Any]  # samples, hyperparameters, whether padding counts -> inputs
+    view: View
     fit: Callable[[Any, Indices, Indices, int, Values, int], Scorer]  # inputs, chosen, labels, classes, values, seed
     grid: tuple[Values, ...]  # candidates for tuning, whole sets of hyperparameters
     paper: Mapping[str, Values] | None  # by augmentation; None beyond the paper
     published: Mapping[str, float]  # the paper's share right, by augmentation
-    prepared_by: tuple[str, ...] = ()  # the hyperparameters that `prepare` looks at
-    slow: bool = False  # tuned on fewer batches
     published_online: float | None = None
 
     @property
@@ -114,26 +107,6 @@ class Method:
     def elapses(self) -> bool:
         """Whether it can answer after every frame."""
         return self.network and self.family != HISTORY
-
-
-def _wavelets(samples: Samples, values: Values, padded: bool) -> NDArray[np.float32]:
-    return spatio_temporal_features(samples, values["wavelet"], values["level"])
-
-
-def _touches(samples: Samples, values: Values, padded: bool) -> NDArray[np.float32]:
-    return touch_pattern_features(samples, values["features"])
-
-
-def _history(samples: Samples, values: Values, padded: bool) -> Images:
-    return Images(motion_history_images(samples, values["decay_s"]))
-
-
-def _windows(samples: Samples, values: Values, padded: bool) -> Windows:
-    return Windows(samples, padded)
-
-
-def _trajectories(samples: Samples, values: Values, padded: bool) -> NDArray[np.float32]:
-    return trajectory_matrix(samples)
 
 
 KINDS = {
@@ -149,7 +122,7 @@ FOREST = {"trees": 200, "depth": 9}
 
 
 def _classical(
-    prefix: str, family: str, seen: str, prepare: Callable[[Samples, Values, bool], Any], given: Values,
+    prefix: str, family: str, seen: str, view: View, given: Values,
     variants: tuple[Values, ...], settings: Mapping[str, tuple[Values, Values]],
     published: Mapping[str, tuple[float, float]],
 ) -> list[Method]:  # fmt: skip
@@ -163,12 +136,11 @@ def _classical(
                 f"{family}, {title}",
                 family,
                 f"{title.capitalize()} on {seen}.",
-                prepare,
+                view,
                 partial(_estimate, build),
                 tuple({**v, **g} for v in variants for g in grid),
                 {"none": {**given, **plain}, "shift": {**given, **augmented}, "wide": {**given, **plain}},
                 dict(zip(("none", "shift"), published[kind], strict=True)),
-                tuple(given),
                 published_online=0.71 if (prefix, kind) == ("tp", "rf") else None,
             )  # fmt: skip
         )
@@ -176,7 +148,7 @@ def _classical(
 
 
 HAAR = {"wavelet": "haar", "level": 3}
-STEPS = 800  # batches
+STEPS = 600  # batches
 
 
 def _net(
@@ -187,9 +159,9 @@ def _net(
     grid = [{"units": u, "rate": r, "steps": STEPS, **channels} for u in widths for r in rates]
     given = {"units": 32, "rate": rates[0], "steps": STEPS, **channels}
     return Method(
-        kind, title, RECURRENT if published else BEYOND, what, _windows, partial(_sequence, kind), tuple(grid),
+        kind, title, RECURRENT if published else BEYOND, what, FRAMES, partial(_sequence, kind), tuple(grid),
         dict.fromkeys(("none", "shift", "wide"), given) if published else None,
-        {"none": published[0], "shift": published[1]} if published else {}, slow=True,
+        {"none": published[0], "shift": published[1]} if published else {},
         published_online=published[2] if published else None,
     )  # fmt: skip
 
@@ -212,7 +184,7 @@ METHODS: dict[str, Method] = {
     method.id: method
     for method in [
         *_classical(
-            "st", SPATIO_TEMPORAL, "statistics of the wavelet bands of each taxel's signal", _wavelets, HAAR, (HAAR,),
+            "st", SPATIO_TEMPORAL, "statistics of the wavelet bands of each taxel's signal", WAVELETS, HAAR, (HAAR,),
             {
                 "knn": ({"neighbours": 7}, {"neighbours": 7}),
                 "rf": (FOREST, FOREST),
@@ -221,7 +193,7 @@ METHODS: dict[str, Method] = {
             {"knn": (0.62, 0.79), "rf": (0.58, 0.96), "svm": (0.58, 0.98)},
         ),
         *_classical(
-            "tp", TOUCH_PATTERN, "pressure, contact area and duration, without the order of the frames", _touches,
+            "tp", TOUCH_PATTERN, "pressure, contact area and duration, without the order of the frames", TOUCHES,
             {"features": "paper"}, ({"features": "paper"}, {"features": "daemon"}),
             {
                 "knn": ({"neighbours": 4}, {"neighbours": 1}),
@@ -233,8 +205,8 @@ METHODS: dict[str, Method] = {
         Method(
             "mhi_cnn", "CNN on motion history images", HISTORY,
             "Four convolutions with leaky ReLU and two fully connected layers on one image of the whole movement.",
-            _history, _images, tuple(HISTORY_GRID), dict.fromkeys(("none", "shift", "wide"), HISTORY_GRID[2]),
-            {"none": 0.77, "shift": 0.81}, ("decay_s",), slow=True,
+            views.HISTORY, _images, tuple(HISTORY_GRID), dict.fromkeys(("none", "shift", "wide"), HISTORY_GRID[2]),
+            {"none": 0.77, "shift": 0.81},
         ),
         _net("lstm", "LSTM", "An LSTM of 32 units on the 81 taxels of each frame (81 -> 32 -> 10).", (8e-3, 4e-3),
              (32, 64), (0.82, 0.97, 0.89)),
@@ -242,15 +214,15 @@ METHODS: dict[str, Method] = {
              (8e-3, 4e-3), (32,), (0.89, 0.97, 0.93)),
         _net("cnn_gru", "CNN-GRU", "The same convolutions, then gated recurrent units: fewer weights than an LSTM.",
              (8e-3, 4e-3), (32,), None),
-        _net("tcn", "causal TCN", "Dilated causal convolutions over the frames, 15 frames deep, and a running maximum.",
+        _net("tcn", "causal TCN", "Dilated causal convolutions over the frames; each answer sees the last 31 of them.",
              (4e-3, 2e-3), (32,), None),
         _net("transformer", "small transformer", "Two layers of causal self-attention, four heads, 32 wide.",
              (3e-3, 1.5e-3), (32,), None),
         Method(
             "trajectory_gb", "trajectory features, gradient boosting", BEYOND,
             "Gradient boosting on where the centroid went, how it turned and how many fingers there were.",
-            _trajectories, partial(_estimate, _boosting),
-            tuple({"rounds": n, "rate": r, "leaves": 15} for n, r in ((40, 0.2), (80, 0.1))), None, {}, slow=True,
+            TRAJECTORIES, partial(_estimate, _boosting),
+            tuple({"rounds": n, "rate": r, "leaves": 15} for n, r in ((40, 0.2), (80, 0.1))), None, {},
         ),
     ]
 }  # fmt: skip

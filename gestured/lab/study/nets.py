@@ -5,6 +5,8 @@ by construction (every temporal part is causal). The paper gives the LSTM's widt
 layers; the convolutions' widths are left open: ours are 16 and 32 channels of 3 x 3, as in the shipped models.
 """
 
+import math
+
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
@@ -60,9 +62,9 @@ class Recurrent(nn.Module):
 
 
 class CausalConvolutions(nn.Module):
-    """A temporal convolutional network (Bai et al. 2018): residual blocks, dilations 1, 2 and 4; it sees 15 frames."""
+    """A temporal convolutional network (Bai et al. 2018): residual blocks, dilations 1 to 8; it sees 31 frames."""
 
-    DILATIONS = (1, 2, 4)
+    DILATIONS = (1, 2, 4, 8)
 
     def __init__(self, inputs: int, units: int) -> None:
         super().__init__()
@@ -70,19 +72,36 @@ class CausalConvolutions(nn.Module):
         self.blocks = nn.ModuleList(nn.Conv1d(units, units, 3, dilation=d) for d in self.DILATIONS)
 
     def forward(self, x: Tensor) -> Tensor:
-        """(B, T, inputs) -> (B, T, units): at each frame the largest answer so far, so that nothing is forgotten."""
+        """(B, T, inputs) -> (B, T, units)."""
         y: Tensor = self.first(x.transpose(1, 2))
         for dilation, block in zip(self.DILATIONS, self.blocks, strict=True):
             y = y + F.relu(block(F.pad(y, (2 * dilation, 0))))
-        # A running maximum; written with a mask because ONNX has no cumulative maximum.
-        time = y.shape[2]
+        return y.transpose(1, 2)
+
+
+class SelfAttention(nn.Module):
+    """Causal multi-head attention (Vaswani et al. 2017), written out: torch's own freezes its length in ONNX."""
+
+    HEADS = 4
+
+    def __init__(self, units: int) -> None:
+        super().__init__()
+        self.inward, self.outward = nn.Linear(units, 3 * units), nn.Linear(units, units)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(B, T, units) -> (B, T, units)."""
+        batch, time, units = x.shape
+        parts = self.inward(x).reshape(batch, time, 3, self.HEADS, units // self.HEADS).permute(2, 0, 3, 1, 4)
+        query, key, value = parts[0], parts[1], parts[2]  # (B, heads, T, units / heads)
+        weight = query @ key.transpose(2, 3) / math.sqrt(units // self.HEADS)
         later = torch.ones(time, time, dtype=torch.bool).triu(1)
-        spread = y[:, :, None, :].masked_fill(later, -1e9)
-        return spread.amax(3).transpose(1, 2)
+        seen = weight.masked_fill(later, -1e9).softmax(3) @ value
+        out: Tensor = self.outward(seen.transpose(1, 2).reshape(batch, time, units))
+        return out
 
 
 class Attention(nn.Module):
-    """A small transformer: two pre-norm layers of four heads, causal mask, learned places in time."""
+    """A small transformer: two pre-norm layers, learned places in time."""
 
     LONGEST = 128  # frames; later ones share the last place
 
@@ -90,22 +109,22 @@ class Attention(nn.Module):
         super().__init__()
         self.first = nn.Linear(inputs, units)
         self.places = nn.Parameter(0.02 * torch.randn(self.LONGEST, units))
-        self.norms = nn.ModuleList(nn.LayerNorm(units) for _ in range(5))
-        self.attend = nn.ModuleList(nn.MultiheadAttention(units, 4, batch_first=True) for _ in range(2))
-        self.think = nn.ModuleList(
-            nn.Sequential(nn.Linear(units, 2 * units), nn.GELU(), nn.Linear(2 * units, units)) for _ in range(2)
+        self.layers = nn.ModuleList(
+            part
+            for _ in range(2)
+            for part in (
+                nn.Sequential(nn.LayerNorm(units), SelfAttention(units)),
+                nn.Sequential(nn.LayerNorm(units), nn.Linear(units, 2 * units), nn.GELU(), nn.Linear(2 * units, units)),
+            )
         )
+        self.norm = nn.LayerNorm(units)
 
     def forward(self, x: Tensor) -> Tensor:
         """(B, T, inputs) -> (B, T, units)."""
-        time = x.shape[1]
-        y = self.first(x) + self.places[torch.arange(time).clamp(max=self.LONGEST - 1)]
-        mask = torch.ones(time, time, dtype=torch.bool).triu(1)
-        for k in range(2):
-            z = self.norms[2 * k](y)
-            y = y + self.attend[k](z, z, z, attn_mask=mask, need_weights=False)[0]
-            y = y + self.think[k](self.norms[2 * k + 1](y))
-        out: Tensor = self.norms[4](y)
+        y = self.first(x) + self.places[torch.arange(x.shape[1]).clamp(max=self.LONGEST - 1)]
+        for layer in self.layers:
+            y = y + layer(y)
+        out: Tensor = self.norm(y)
         return out
 
 
@@ -137,7 +156,7 @@ def sequence_net(kind: str, units: int, classes: int, channels: int = 16) -> Seq
         temporal = Attention(inputs, units)
     else:
         temporal = Recurrent(inputs, units, kind.removeprefix("cnn_"))
-    return SequenceNet(encoder, temporal, units, classes)
+    return SequenceNet(encoder.to(memory_format=torch.channels_last), temporal, units, classes)  # a quarter faster
 
 
 class HistoryNet(nn.Module):

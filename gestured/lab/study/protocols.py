@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from gestured.lab.study import elapsed
 from gestured.lab.study.material import SHIFT, Data, Pool, pool
 from gestured.lab.study.methods import METHODS, Indices, Scorer
+from gestured.lab.study.shifting import THRESHOLD
 from gestured.lab.study.training import Net
 from gestured.simulator import GESTURES
 
@@ -41,6 +42,8 @@ class Task:
     seed: int
     folds: int
     people: int = 0  # learn from so many participants only; 0: from all that are not held out
+    length: float = LENGTH  # of all windows in the paper's protocol: this quantile of the gestures' lengths
+    box: float = THRESHOLD  # of the peak: what is in Algorithm 1's bounding box
     elapsed: bool = False  # ask the network in the middle of each gesture too
 
 
@@ -49,21 +52,24 @@ def values_of(values: Any) -> tuple[tuple[str, Any], ...]:
     return tuple(sorted(dict(values).items()))
 
 
-def equal_frames(data: Data) -> int:
-    """The length that the paper's protocol brings all windows to."""
-    return int(np.quantile(data.gestures.lengths(), LENGTH))
+def _frames(task: Task, data: Data) -> int:
+    """The length that the paper's protocol brings all windows to; 0: each keeps its own."""
+    return int(np.quantile(data.gestures.lengths(), task.length)) if task.protocol == PAPER else 0
 
 
 @lru_cache(maxsize=6)
-def _inputs(data: Data, augmentation: str, frames: int, method: str, prepared: tuple[tuple[str, Any], ...]) -> Any:
-    return METHODS[method].prepare(pool(data, augmentation, frames).samples, dict(prepared), frames > 0)
+def _inputs(
+    data: Data, augmentation: str, frames: int, box: float, method: str, prepared: tuple[tuple[str, Any], ...]
+) -> Any:
+    return METHODS[method].view.all(pool(data, augmentation, frames, box).samples, dict(prepared), frames > 0)
 
 
 def material(task: Task, data: Data) -> tuple[Pool, Any]:
     """The pool of a task, and its method's view of it."""
-    frames = equal_frames(data) if task.protocol == PAPER else 0
-    prepared = tuple(item for item in task.values if item[0] in METHODS[task.method].prepared_by)
-    return pool(data, task.augmentation, frames), _inputs(data, task.augmentation, frames, task.method, prepared)
+    frames = _frames(task, data)
+    prepared = tuple(item for item in task.values if item[0] in METHODS[task.method].view.by)
+    of = pool(data, task.augmentation, frames, task.box)
+    return of, _inputs(data, task.augmentation, frames, task.box, task.method, prepared)
 
 
 def splits(task: Task, of: Pool) -> Iterator[tuple[Indices, Indices]]:

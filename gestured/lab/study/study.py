@@ -5,6 +5,7 @@ import csv
 import json
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,19 @@ import gestured
 from gestured.core.errors import GesturedError
 from gestured.lab.cli import REAL
 from gestured.lab.dataset import NONE, Samples, simulated
-from gestured.lab.study import cohort, elapsed, own, tables
+from gestured.lab.study import cohort, elapsed, failures, own, signals, tables
 from gestured.lab.study.cells import Schedule
+from gestured.lab.study.choices import choices
+from gestured.lab.study.learning import learning
 from gestured.lab.study.machine import machine
-from gestured.lab.study.material import Data
-from gestured.lab.study.methods import METHODS, Values
+from gestured.lab.study.material import SHIFT, Data
+from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
+from gestured.lab.study.protocols import PARTICIPANTS, Result
+from gestured.lab.study.run_time import measure
+from gestured.lab.study.sessions import online
 from gestured.lab.study.tuning import tune
+from gestured.lab.study.views import Values
 from gestured.simulator import GESTURES
 
 WIDE_SEED = 1  # of the stream that the shipped models learn from as well
@@ -83,9 +90,33 @@ def compute(plan: Plan, schedule: Schedule, folder: Path, recordings: Sequence[P
         "tuning": tuning,
         "elapsed": tables.elapsed_rows(found, elapsed.POINTS),
         "calibration": tables.calibration(found),
+        "choices": [] if plan.quick else choices(plan, tuned, people, sets, schedule),
+        "learning": learning(plan, tuned, sets, schedule),
+        "failures": _failures(found, people),
+        "signals": signals.signals(),
+        "double_tap": signals.double_tap(),
     }  # fmt: skip
+    # What is timed comes last and alone: nothing else of ours runs beside it.
+    simulated_data = sets["simulated"]
+    key = [simulated_data.key, asdict(plan), tuned]
+    study["run_time"] = schedule.once("run-time", key, lambda: measure(plan, tuned, people, simulated_data))
+    models = schedule.cache / "models"
+    played = schedule.once("online", key, lambda: online(plan, tuned, simulated_data, models))
+    study["online"], study["online_shipped"] = played
     study["machine"]["minutes"] = round((time.monotonic() - start) / 60, 1)
     return study
+
+
+def _failures(found: Mapping[tables.Cell, Result], people: cohort.Cohort) -> list[dict[str, Any]]:
+    """Of each method's tuned setting with shifted copies, participants held out."""
+    by = failures.groups(people)
+    return [
+        entry
+        for method in METHODS
+        for entry in failures.failures(
+            method, found[tables.Cell(method, tables.TUNED, SHIFT, PARTICIPANTS, "simulated")], by
+        )
+    ]
 
 
 def _strangers(plan: Plan, schedule: Schedule) -> Samples | None:

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from gestured.lab.study.bootstrap import summary
 from gestured.lab.study.material import AUGMENTATIONS, NONE, SHIFT, WIDE, Data
-from gestured.lab.study.methods import METHODS, Method, Values
+from gestured.lab.study.methods import METHODS, Method
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import CLEAN, PAPER, PARTICIPANTS, REAL, Result, Task, values_of
+from gestured.lab.study.views import Values
 from gestured.simulator import GESTURES
 
 GIVEN, TUNED = "paper", "tuned"
@@ -45,9 +46,9 @@ def wanted(plan: Plan, sets: Mapping[str, Data]) -> list[Cell]:
 def _skipped(plan: Plan, method: Method, settings: str, protocol: str, augmentation: str, data: Data) -> bool:
     if augmentation == WIDE:  # it leads to other people and other sensors: asked there alone
         return data.wide is None or protocol not in (PARTICIPANTS, REAL) or settings != TUNED
-    if data.name != "simulated" and augmentation == SHIFT and settings == GIVEN:
+    if protocol == REAL and (augmentation == SHIFT or settings == GIVEN):
         return True
-    return plan.quick and (settings == GIVEN) and method.network
+    return plan.quick and settings == GIVEN
 
 
 def task_of(cell: Cell, tuned: Mapping[str, Values], plan: Plan) -> Task:
@@ -69,7 +70,9 @@ def task(
     chosen = dict(values)
     if plan.steps is not None and method.network:
         chosen["steps"] = plan.steps
-    return Task(method.id, values_of(chosen), augmentation, protocol, data, plan.seed, plan.folds, people, elapsed)
+    return Task(
+        method.id, values_of(chosen), augmentation, protocol, data, plan.seed, plan.folds, people, elapsed=elapsed
+    )  # fmt: skip
 
 
 def right(result: Result) -> NDArray[np.bool_]:

@@ -26,3 +26,9 @@ def trajectory_matrix(samples: Samples) -> NDArray[np.float32]:
         ]
     found = np.concatenate(parts)
     return np.asarray(found[np.argsort(order, kind="stable")], np.float32)
+
+
+def trajectory_row(window: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(T, R, C) window -> (1, F)."""
+    with torch.no_grad():
+        return np.asarray(trajectory_features(torch.from_numpy(window[None])).numpy(), np.float32)

@@ -5,16 +5,18 @@ What wins without augmentation is used with it too, which the paper does not (it
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.material import NONE, Data
-from gestured.lab.study.methods import METHODS, Values
+from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import PARTICIPANTS, Result, Task
 from gestured.lab.study.tables import right, task
+from gestured.lab.study.views import Values
 
 
 def tune(plan: Plan, sets: Mapping[str, Data], schedule: Schedule) -> tuple[dict[str, Values], list[dict[str, Any]]]:
@@ -25,7 +27,10 @@ def tune(plan: Plan, sets: Mapping[str, Data], schedule: Schedule) -> tuple[dict
     for method in METHODS.values():
         for values in method.grid:
             shorter = {**values, "steps": plan.tuning_steps} if method.network else values
-            asked[method.id, len(asked)] = values, task(method, shorter, NONE, PARTICIPANTS, "simulated", plan)
+            asked[method.id, len(asked)] = (
+                values,
+                replace(task(method, shorter, NONE, PARTICIPANTS, "simulated", plan), folds=plan.tuning_folds),
+            )
     found = schedule.results([item[1] for item in asked.values()], sets, "hyperparameters")
     chosen: dict[str, Values] = {}
     rows = []

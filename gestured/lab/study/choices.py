@@ -1,0 +1,138 @@
+"""What the paper leaves open: our choice, others that it could be, and what it matters.
+
+Each is varied alone, the rest as in the tuned setting; participants held out and no augmentation, except where the
+choice belongs to the paper's protocol (its length of all windows, the bounding box of its Algorithm 1).
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gestured.lab.dataset import WINDOW, Samples
+from gestured.lab.study.bootstrap import summary
+from gestured.lab.study.cells import Schedule
+from gestured.lab.study.cohort import Cohort
+from gestured.lab.study.material import NONE, SHIFT, Data
+from gestured.lab.study.methods import METHODS
+from gestured.lab.study.plan import Plan
+from gestured.lab.study.protocols import LENGTH, PAPER, PARTICIPANTS, Task
+from gestured.lab.study.shifting import THRESHOLD
+from gestured.lab.study.tables import right, task
+from gestured.lab.study.views import Values
+
+WAVELETS, LEVELS = ("haar", "db2", "db4", "sym4"), (1, 2, 3, 4)
+DECAYS_S = {0.0: "the whole gesture", 0.5: "0.5 s", 1.0: "1 s", 2.0: "2 s"}
+CHANNELS = (4, 8)
+AVERAGES = (1, 2, 3, 5)
+BOXES = (0.0, 0.05, 0.2, 0.4)
+LENGTHS = {0.5: "median", 0.9: "90th percentile", 1.0: "longest"}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One thing left open, and a task for each alternative."""
+
+    choice: str
+    ours: str
+    method: str
+    tasks: Mapping[str, Task]
+
+
+def variants(cohort: Cohort) -> dict[str, Data]:
+    """The cohort through other windows: running averages, and other ways to scale pressure."""
+    out = {
+        f"average-{n}": Data.of(f"average-{n}", cohort.windows(replace(WINDOW, smooth_frames=n)))
+        for n in AVERAGES if n != WINDOW.smooth_frames
+    }  # fmt: skip
+    samples = cohort.samples
+    peaks = samples.strength * cohort.noise  # counts
+    by_count = np.repeat(peaks / np.median(peaks), samples.lengths())[:, None, None]
+    own_peak = np.maximum(samples.frames.astype(np.float32).max(axis=(1, 2), keepdims=True), 0.05)
+    out["counts"] = Data.of("counts", _scaled(samples, by_count))
+    out["each frame"] = Data.of("each frame", _scaled(samples, 1 / own_peak))
+    return out
+
+
+def _scaled(samples: Samples, factor: Any) -> Samples:
+    return replace(samples, frames=(samples.frames.astype(np.float32) * factor).astype(np.float16))
+
+
+def wanted(plan: Plan, tuned: Mapping[str, Values]) -> Iterator[Choice]:
+    """Every choice with its tasks."""
+
+    def alone(method: str, data: str = "simulated", **changed: Any) -> Task:
+        return task(METHODS[method], {**tuned[method], **changed}, NONE, PARTICIPANTS, data, plan)
+
+    def leaky(augmentation: str, **changed: Any) -> Task:
+        return replace(task(METHODS["lstm"], tuned["lstm"], augmentation, PAPER, "simulated", plan), **changed)
+
+    yield Choice("wavelet", "haar", "st_rf", {name: alone("st_rf", wavelet=name) for name in WAVELETS})
+    yield Choice("wavelet level", "3", "st_rf", {str(n): alone("st_rf", level=n) for n in LEVELS})
+    decays = {name: alone("mhi_cnn", decay_s=s) for s, name in DECAYS_S.items()}
+    yield Choice("decay of the motion history image", DECAYS_S[0.0], "mhi_cnn", decays)
+    widths = {f"{n} and {2 * n} channels": alone("cnn_lstm", channels=n) for n in CHANNELS}
+    yield Choice("widths of the convolutions", "8 and 16 channels", "cnn_lstm", widths)
+    units = {f"{n} units": alone("lstm", units=n) for n in (16, 32, 64)}
+    yield Choice("width of the recurrent layer", f"{tuned['lstm']['units']} units", "lstm", units)
+    averages = {
+        _frames(n): alone("lstm", "simulated" if n == WINDOW.smooth_frames else f"average-{n}") for n in AVERAGES
+    }
+    yield Choice("length of the running average", _frames(WINDOW.smooth_frames), "lstm", averages)
+    scales = {
+        "gesture's own peak": "simulated",
+        "counts of the sensor": "counts",
+        "each frame's own peak": "each frame",
+    }
+    scaled = {title: alone("lstm", data) for title, data in scales.items()}
+    yield Choice("normalisation of pressure", "gesture's own peak", "lstm", scaled)
+    boxes = {f"above {b:g} of the peak": leaky(SHIFT, box=b) for b in BOXES}
+    yield Choice(
+        "what is in the bounding box (paper's protocol, shifted)", f"above {THRESHOLD:g} of the peak", "lstm", boxes
+    )
+    lengths = {name: leaky(NONE, length=q) for q, name in LENGTHS.items()}
+    yield Choice("length of all windows (paper's protocol)", LENGTHS[LENGTH], "lstm", lengths)
+
+
+def _frames(count: int) -> str:
+    return "none" if count == 1 else f"{count} frames"
+
+
+def choices(
+    plan: Plan, tuned: Mapping[str, Values], cohort: Cohort, sets: Mapping[str, Data], schedule: Schedule
+) -> list[dict[str, Any]]:
+    """The section of study.json."""
+    asked = list(wanted(plan, tuned))
+    tasks = [one for choice in asked for one in choice.tasks.values()]
+    found = schedule.results(tasks, {**sets, **variants(cohort)}, "open choices")
+    out = []
+    for choice in asked:
+        rows = []
+        for value, of in choice.tasks.items():
+            result = found[of]
+            rows.append({"value": value, **summary(right(result), result["person"])})
+        out.append(
+            {
+                "choice": choice.choice,
+                "ours": choice.ours,
+                "alternatives": rows,
+                "method": choice.method,
+                "effect": effect(choice.ours, rows),
+            }  # fmt: skip
+        )
+    return out
+
+
+def effect(ours: str, rows: list[dict[str, Any]]) -> str:
+    """In words: how far the alternatives lie apart, and where ours lies."""
+    best, worst = (pick(rows, key=lambda row: float(row["right"])) for pick in (max, min))
+    own = next(row for row in rows if row["value"] == ours)
+    apart = 100 * (best["right"] - worst["right"])
+    if best["value"] == ours:
+        place = "ours is the best"
+    elif own["high"] >= best["right"]:
+        place = f"{best['value']} is best, within our interval"
+    else:
+        place = f"{best['value']} is {100 * (best['right'] - own['right']):.1f} points better than ours"
+    return f"{apart:.1f} points between best and worst; {place}"

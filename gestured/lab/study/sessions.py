@@ -1,0 +1,120 @@
+"""The online protocol: continuous sessions of new participants over UDP to a real daemon, with the study's own models.
+
+The touch-pattern forest, the LSTM and the CNN-LSTM learn from the whole cohort and its shifted copies, as in the paper,
+are exported, and run by the daemon. They know ten gestures and nothing else: they reject nothing, so
+every non-gesture (a fifth of what is performed) that is answered counts as extra. The shipped models, which do reject,
+play the same sessions for comparison (`shipped`). Each session is another person; the interval is over them.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+import gestured
+from gestured.client.score import Performed, Tally
+from gestured.core.features import feature_names
+from gestured.lab.dataset import WINDOW
+from gestured.lab.export import export_forest, export_net
+from gestured.lab.nets import last_active
+from gestured.lab.online import play, takes
+from gestured.lab.progress import progress
+from gestured.lab.study.bootstrap import interval
+from gestured.lab.study.material import SHIFT, Data, pool
+from gestured.lab.study.methods import METHODS, Estimator
+from gestured.lab.study.plan import Plan
+from gestured.lab.study.training import Net
+from gestured.lab.study.views import Values
+from gestured.simulator import GESTURES, Take
+
+FIRST_PERSON = 900  # the cohort's are 0 to 33
+SPEED = 100.0  # times real time
+PLAYED = ("tp_rf", "lstm", "cnn_lstm")
+SHIPPED = {"tp_rf": "touch_pattern_rf", "lstm": "lstm", "cnn_lstm": "cnn_lstm"}
+CALIBRATION = {"threshold": 0.0}  # nothing is rejected
+
+
+class Answering(nn.Module):
+    """A sequence net as the daemon runs it: probabilities at the last frame with contact, and nothing rejected."""
+
+    def __init__(self, net: nn.Module) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, T, R, C) -> scores (B, G), unknown (B,)."""
+        scores = self.net(frames, last_active(frames)).softmax(1)
+        return scores, 0.0 * scores[:, 0]
+
+
+def export(name: str, values: Values, data: Data, seed: int, path: Path) -> None:
+    """Fit a method to all gestures and their shifted copies, and write it as the daemon takes it."""
+    method, of = METHODS[name], pool(data, SHIFT)
+    if name == "tp_rf":
+        values = {**values, "features": "daemon"}  # the daemon computes these, and no others
+    inputs = method.view.all(of.samples, values, False)
+    model = method.fit(inputs, np.arange(len(of.labels)), of.labels, len(GESTURES), values, seed)
+    common: dict[str, Any] = {
+        "kind": SHIPPED[name], "version": gestured.__version__, "gestures": list(GESTURES), "window": WINDOW,
+        "calibration": CALIBRATION, "training_data": data.gestures.digest(), "quantiles": {},
+    }  # fmt: skip
+    if isinstance(model, Estimator):
+        export_forest(model.fitted, path, features=feature_names(WINDOW.rows, WINDOW.columns), **common)
+    else:
+        assert isinstance(model, Net)
+        torch.set_num_threads(1)
+        export_net(Answering(model.module), path, **common)
+
+
+def score(model: str, sessions: list[Take], title: str) -> dict[str, Any]:
+    """Play every session to a daemon with this model; counts and shares of the gestures that were performed."""
+    rights: list[bool] = []
+    people: list[int] = []
+    counts = dict.fromkeys(("right", "wrong", "missed", "false"), 0)
+    waits: list[float] = []
+    minutes = 0.0
+    for person, take in enumerate(progress(sessions, len(sessions), title)):
+        events, zero, _ = play(model, take, SPEED)
+        tally = Tally()
+        for e in take.events:
+            tally.begin(Performed(e.label, e.kind, zero + e.onset_s, zero + e.offset_s))
+        for event in events:
+            tally.hear(event, event["decided"])
+        tally.settle(float("inf"))
+        for key in counts:
+            counts[key] += tally.counts[key]
+        performed = tally.counts["right"] + tally.counts["wrong"] + tally.counts["missed"]
+        rights += [k < tally.counts["right"] for k in range(performed)]
+        people += [person] * performed
+        waits += tally.latencies
+        minutes += float(take.sensor_times[-1] - take.sensor_times[0]) / 60
+    total = len(rights)
+    right, low, high = interval(rights, people)
+    return {
+        "gestures": total, "right": round(right, 4), "low": round(low, 4), "high": round(high, 4),
+        "wrong": round(counts["wrong"] / total, 4), "missed": round(counts["missed"] / total, 4),
+        "extra": round(counts["false"] / total, 4), "false_per_minute": round(counts["false"] / minutes, 3),
+        "latency_ms": {f"p{q}": round(1000 * float(np.quantile(waits, q / 100))) if waits else None for q in (50, 95)},
+    }  # fmt: skip
+
+
+def online(
+    plan: Plan, tuned: dict[str, Values], data: Data, folder: Path
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """The study's models, and the shipped ones."""
+    if not plan.minutes:
+        return [], []
+    sessions = [take for _, take in takes(plan.minutes, 0.0, FIRST_PERSON)]
+    folder.mkdir(parents=True, exist_ok=True)
+    ours, shipped = [], []
+    for name in PLAYED:
+        path = folder / f"{name}.onnx"
+        export(name, tuned[name], data, plan.seed, path)
+        published = METHODS[name].published_online
+        ours.append({"method": name, **score(str(path), sessions, f"sessions, {name}"), "published": published})
+        shipped.append(
+            {"method": name, **score(SHIPPED[name], sessions, f"sessions, shipped {name}"), "published": published}
+        )
+    return ours, shipped
