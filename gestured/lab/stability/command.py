@@ -34,7 +34,7 @@ def tables(quick: bool, out: Path | None) -> Iterator[Table]:
     best = models[LADDER[0]]
     yield parts_table(list(models.values()), quick)
     yield whole_path_table(best, quick)
-    yield month_table(best, 0.25 if quick else 30.0)
+    yield month_table(best, 0.1 if quick else 30.0)
     window = best.metadata.window
     some = simulated(10 if quick else 60)
     yield models_table([window.apply(segment) for _, stream in some for segment in segments(stream)], quick)

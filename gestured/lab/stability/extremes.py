@@ -278,7 +278,7 @@ def _scores(model: Model, segment: Segment) -> bool:
 
 
 def month_table(classifier: Classifier, days: float) -> Table:
-    """Idle for so many days, a frame every 0.9 s, the baseline in slow waves; then a swipe."""
+    """Idle for so many days, a frame every 0.9 s (a whole second is silence), in slow waves; then a swipe."""
     step, swing = 0.9, 50.0
     times = np.arange(int(days * 86_400 / step)) * step + 2.0
     rng = np.random.default_rng(30)
