@@ -3,8 +3,11 @@
 import base64
 import json
 import os
+import re
 import socket
 import stat
+import subprocess
+import sys
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +19,7 @@ from hypothesis import strategies as st
 from gestured.client.control import Control
 from gestured.client.stream import Refused, Unreachable
 from gestured.daemon.control import Parameter, Refusal, Verb, parse_request
+from gestured.daemon.operations import verbs
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
 
@@ -304,3 +308,19 @@ def test_any_line_is_a_request_that_fits_the_table_or_is_refused(line: bytes) ->
     else:
         assert (name, list(parameters)) in (("status", []), ("emit", ["gesture"]))
         assert all(isinstance(value, str) for value in parameters.values())
+
+
+DOCUMENT = (Path(__file__).resolve().parents[2] / "docs" / "control.md").read_text()
+
+
+def test_the_table_of_verbs_in_the_documents(daemon: Daemon) -> None:
+    rows = re.findall(r"^\| `(\w+)` \| (.*?) \|", DOCUMENT, re.MULTILINE)
+    described = {verb: tuple(re.findall(r"`(\w+)`", keys)) for verb, keys in rows}
+    assert described == {name: tuple(verb.parameters) for name, verb in verbs(None).items()}
+
+
+def test_the_example_in_the_documents(daemon: Daemon) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", DOCUMENT, re.DOTALL)
+    code = code.replace("/run/gestured/events.ctl", daemon.ready["control"])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30)
+    assert done.stdout.split()[1:] == ["tiny"], done.stderr
