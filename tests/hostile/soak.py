@@ -4,7 +4,8 @@ Without a flag: ten minutes in real time, 20 sensors at 15 Hz. `--compressed`: 2
 clock, as fast as it goes. Simulated people touch the sensors all the time; between two readings a client comes and
 goes, metrics are scraped, and the daemon reloads. Latency is from the arrival of the frame that decided to the
 event's arrival at a client (compressed: the daemon's CPU time a frame, since the time that a frame waits in the
-queue is ours). "Slope" is the least-squares line through the readings after the first fifth of the time.
+queue is ours). "Waiting" is the time in which the daemon could have run and others had the processor. "Slope" is the
+least-squares line through the readings after the first fifth of the time.
 """
 
 import argparse
@@ -40,6 +41,7 @@ class Reading:
     descriptors: int
     threads: int
     cpu_s: float
+    waited_s: float  # for a processor that others had
     frames: int
     latencies_ms: list[float] = field(default_factory=list)  # of the events since the reading before
 
@@ -48,7 +50,7 @@ class Watch:
     """Reads a daemon's /proc, and its events in a thread."""
 
     def __init__(self, daemon: Daemon) -> None:
-        self.daemon, self.readings = daemon, [Reading(0, 0, 0, 0, 0, 0)]
+        self.daemon, self.readings = daemon, [Reading(0, 0, 0, 0, 0, 0, 0)]
         self.lines: list[dict] = []
         self._latencies: list[float] = []
         self._client = daemon.client().subscribe(*TYPES)
@@ -71,6 +73,7 @@ class Watch:
         visitor.close()
         status = dict(line.split(":", 1) for line in (proc / "status").read_text().splitlines())
         ticks = (proc / "stat").read_text().rsplit(")", 1)[1].split()
+        waited = int((proc / "schedstat").read_text().split()[1]) / 1e9
         latencies, self._latencies = self._latencies, []
         self.readings.append(
             Reading(
@@ -79,6 +82,7 @@ class Watch:
                 len(list((proc / "fd").iterdir())),
                 int(status["Threads"]),
                 (int(ticks[11]) + int(ticks[12])) / CLOCK_HZ,
+                waited,
                 frames,
                 latencies,
             )  # fmt: skip
@@ -127,14 +131,15 @@ def real_time(watch: Watch, hours: float, sensors: int) -> None:
 def report(watch: Watch, is_compressed: bool) -> int:
     """Print what the readings say; 1 where something grew or broke."""
     readings = watch.readings
-    print("hours  MiB     fds  threads  frames     us CPU/frame  p50 ms  p99 ms")
+    print("hours  MiB     fds  threads  frames     us CPU/frame  us waiting/frame  p50 ms  p99 ms")
     for before, now in zip(readings, readings[1:], strict=False):
-        cost = 1e6 * (now.cpu_s - before.cpu_s) / max(1, now.frames - before.frames)
+        frames = max(1, now.frames - before.frames)
+        cost, waited = 1e6 * (now.cpu_s - before.cpu_s) / frames, 1e6 * (now.waited_s - before.waited_s) / frames
         p50, p99 = np.quantile(now.latencies_ms or [np.nan], [0.5, 0.99])
         shown = "     -       -" if is_compressed else f"{p50:6.2f}  {p99:6.2f}"
         print(
             f"{now.hours:5.2f}  {now.resident:6.2f}  {now.descriptors:3d}  {now.threads:7d}  {now.frames:9d}"
-            f"  {cost:12.1f}  {shown}"
+            f"  {cost:12.1f}  {waited:16.1f}  {shown}"
         )
     steady = readings[1 + len(readings) // 5 :]
     slope = float(np.polyfit([r.hours for r in steady], [r.resident for r in steady], 1)[0])
