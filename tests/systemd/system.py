@@ -23,6 +23,7 @@ from tests.systemd.container import Container, missing, wait
 
 ROOT = Path(__file__).resolve().parents[2]
 EVENTS = "/run/gestured/events.sock"
+METRICS = "http://127.0.0.1:9108/metrics"
 CONFIGURATION = "/etc/gestured/gestured.toml"
 SOCKETS = ("gestured-osc.socket", "gestured-events.socket", "gestured-metrics.socket")
 BUSY = 1.5  # processes that want to run, for each core
@@ -92,8 +93,7 @@ class Vehicle:
 
     def frames(self, sensor: str) -> int:
         """Frames of a sensor that this start of the daemon has seen, whatever became of them."""
-        url = "http://127.0.0.1:9108/metrics"
-        text = self.box.call(lambda: urllib.request.urlopen(url, timeout=20).read().decode())
+        text = self.box.call(lambda: urllib.request.urlopen(METRICS, timeout=20).read().decode())
         lines = [line for line in text.splitlines() if line.startswith("gestured_frames_total{")]
         return round(sum(float(line.split()[-1]) for line in lines if f'sensor="{sensor}"' in line))
 
@@ -185,6 +185,8 @@ def test_what_the_documents_say_is_so(box: Container):
         begin = time.monotonic()
         done = box.run("bash", "-euo", "pipefail", "-c", block.text.replace("sudo ", ""), check=False)
         assert done.returncode == 0, f"{block}: {done.stdout}{done.stderr}"
+        if " mask " in block.text:
+            assert box.run("curl", "--silent", METRICS, check=False).returncode != 0
         report(str(block), time.monotonic() - begin)
     assert box.run("systemctl", "is-active", "gestured.service", *SOCKETS).stdout.split() == ["active"] * 4
 
