@@ -30,7 +30,7 @@ class Scale:
         """Round values within the scale: powers of ten with 2 and 5 between them where there is room, or steps."""
         if self.log:
             decades = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
-            leads = (1, 2, 5) if len(decades) <= 3 else (1,)
+            leads = (1, 2, 5) if self.high < 500 * self.low else (1,)
             values = [lead * 10.0**power for power in decades for lead in leads]
         else:
             step = step_of(self.high - self.low, count)

@@ -9,7 +9,7 @@ from .reading import Row, Study
 
 WIDTH, TOP, BOTTOM = 960.0, 36.0, 336.0
 NAMES = 235.0  # pixels to the right of the lines, for the names at their ends
-AFTER = 1.6  # the width of one second after the end, on the axis of shares
+AFTER = 2.4  # the width of one second after the end, on the axis of shares
 
 
 def elapsed(study: Study) -> Markup:

@@ -6,7 +6,7 @@ from .layout import SIMULATED, cell, folded, head, paragraph, row_head, small, t
 from .markup import Markup, join, tag
 from .reading import Row, Study
 
-MANY = 12  # groups; more are drawn in order of their figure instead of by name
+MANY = 10  # groups; more are drawn in order of their figure instead of by name
 KINDS = {
     "gesture": "By gesture",
     "participant": "By participant",

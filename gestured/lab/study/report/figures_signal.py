@@ -13,24 +13,23 @@ SIDE = 108.0  # of a snapshot
 
 def gestures(names: list[str], signals: dict[str, Any]) -> Markup:
     """A card for each gesture: the movement, its name, and the signal of one performance."""
-    peak = max((value for signal in signals.values() for value in signal["sum"]), default=1.0)
     moments = [moment for signal in signals.values() for moment in signal["times_s"]]
     span = (min(moments, default=0.0), max(moments, default=1.0))
     cards = []
     for name in names:
         signal = signals.get(name)
-        drawn = _signal(name, signal, peak, span) if signal and signal["times_s"] else Markup("")
+        drawn = _signal(name, signal, span) if signal and signal["times_s"] else Markup("")
         cards.append(tag("li", icons.icon(name, 84), tag("span", formats.plain(name), class_="name"), drawn))
     caption = "Dots are fingertips at the beginning; lines lead where they go."
     if signals:
-        caption += " Below, the raw signal of one performance, summed over the taxels, all on one scale."
+        caption += " Below, the raw signal of one performance, summed over the taxels: one time scale for all, each its own height."
     return figure(
         "The ten gestures", SIMULATED if signals else "", caption, tag("ul", *cards, class_="cards"), wide=False
     )
 
 
-def _signal(name: str, signal: dict[str, Any], peak: float, span: tuple[float, float]) -> Markup:
-    low = min(0.0, *signal["sum"])
+def _signal(name: str, signal: dict[str, Any], span: tuple[float, float]) -> Markup:
+    low, peak = min(0.0, *signal["sum"]), max(signal["sum"])
     plot = Plot(148, 62, Scale(*span, 2, 146), Scale(low, peak, 46, 4))
     points = list(zip(signal["times_s"], signal["sum"], strict=True))
     around = [(points[0][0], low), *points, (points[-1][0], low)]
@@ -40,9 +39,7 @@ def _signal(name: str, signal: dict[str, Any], peak: float, span: tuple[float, f
     begin, end = (f"{moment:.1f} s".replace("-", "\u2212") for moment in span)
     plot.add(text(2, 59, begin, class_="tick"), text(146, 59, end, "end", "tick"))
     words = f"{formats.plain(name)}: raw signal summed over the taxels, simulated data"
-    return plot.svg(
-        words, f"{len(points)} frames, {points[-1][0] - points[0][0]:.2f} s, highest sum {max(signal['sum']):.0f}."
-    )
+    return plot.svg(words, f"{len(points)} frames, {points[-1][0] - points[0][0]:.2f} s, highest sum {peak:.0f}.")
 
 
 def double_tap(tap: dict[str, Any]) -> Markup:
