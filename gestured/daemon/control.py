@@ -84,10 +84,13 @@ class Connection:
     def __init__(self, writer: asyncio.StreamWriter) -> None:
         self._writer = writer
         self.lost = 0  # lines that found no room
+        self._over = False
 
     def send(self, line: bytes) -> bool:
         """Send a line, or count it as lost where too much waits already; never blocks."""
-        if self._writer.is_closing() or self._writer.transport.get_write_buffer_size() > BACKLOG_BYTES:
+        if self.closed:
+            return False
+        if self._writer.transport.get_write_buffer_size() > BACKLOG_BYTES:
             self.lost += 1
             return False
         self._writer.write(line)
@@ -104,8 +107,12 @@ class Connection:
 
     @property
     def closed(self) -> bool:
-        """Whether the operator has gone."""
-        return self._writer.is_closing()
+        """Whether the operator has gone, or wants no more."""
+        return self._over or self._writer.is_closing()
+
+    def end(self) -> None:
+        """Send nothing more; what is on its way still goes."""
+        self._over = True
 
 
 class ControlServer:
@@ -153,6 +160,7 @@ class ControlServer:
                 writer.write(_refusal(f"a request has at most {MAX_LINE} bytes"))
                 return
             if not line:
+                connection.end()
                 return
             if line.strip():
                 # On its way before what the verb streams after it.

@@ -237,14 +237,13 @@ class Service:
         if not test:
             self.metrics.event(event, self.pipeline.watched.ladder.last_run_s)
             self.health.note(event)
-            self.taps.event(event, epoch)
         elif isinstance(event, Gesture):
             self.metrics.tests.add()
         self.recent.note(event, epoch, test)
         if not isinstance(event, Status):
             name = getattr(event, "gesture", None)
             log.debug(messages.event_type(event), sensor=event.sensor, id=event.id, gesture=name)
-        sinks: tuple[Sink, ...] = (self.clients, *self._osc)
+        sinks: tuple[Sink, ...] = (self.clients, self.taps, *self._osc)
         for sink in sinks:
             try:
                 sink.publish(event, epoch, test=test)

@@ -3,7 +3,6 @@
 from collections import Counter
 from typing import Any
 
-from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Classifier, Scores
 
@@ -21,11 +20,11 @@ class Shadow:
         self._pairs: Counter[tuple[str, str]] = Counter()
 
     def see(self, segment: Segment, active: Scores) -> None:
-        """Let the candidate answer, too; never raises."""
+        """Let the candidate answer, too; whatever it dies of is a failure of its own."""
         self.segments += 1
         try:
             ours, theirs = (answer(self.candidate, s) for s in (active, self.candidate.classify(segment)))
-        except ModelError:
+        except Exception:
             self.failed += 1
             return
         self._confidence[0] += ours[1]

@@ -54,9 +54,9 @@ class Taps:
             if self.ring_bytes:
                 self._keep(t_ns, len(packet) + OVERHEAD_BYTES, (t_ns, source, packet))
 
-    def event(self, event: Event, epoch: float) -> None:
-        """An event, in the order in which it came of the packets; the status is no consequence of one."""
-        if self.active and not isinstance(event, Status):
+    def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
+        """A sink: events as they come of the packets. The status and a test come of none."""
+        if self.active and not test and not isinstance(event, Status):
             line = messages.to_json(event, epoch)
             self._stream(line)
             if self.ring_bytes:

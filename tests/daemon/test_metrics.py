@@ -17,6 +17,8 @@ from gestured.daemon.reading import STATES, Reading, by_label, together
 from gestured.daemon.shadow import Shadow
 from gestured.daemon.shift import LAST, LEAST, Shift, measured
 from gestured.daemon.vitals import Vitals, faulty
+from gestured.daemon.watch import Watched
+from gestured.ladder import ladder_for
 from tests.daemon.harness import Daemon, Hand, Sensor
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -192,7 +194,7 @@ class Fixed:
         self.answers = iter(answers)
 
     def classify(self, segment: Segment) -> Scores:
-        tap, unknown = next(self.answers)
+        tap, unknown = next(self.answers)  # in the end a StopIteration: any bug
         return Scores(np.array([tap, 1 - tap], np.float32), unknown, "fixed")
 
 
@@ -201,10 +203,23 @@ def test_a_shadow_counts_where_it_agrees() -> None:
     shadow = Shadow(Fixed((0.9, 0.0), (0.2, 0.0), (0.9, 0.9), (0.8, 0.0)), "candidate")
     active = [Scores(np.array(s, np.float32), u, "a") for s, u in (((1, 0), 0), ((1, 0), 0), ((1, 0), 0), ((1, 0), 0))]
     assert shadow.report()["agreement"] is None
-    for scores in active:
+    for scores in [*active, active[0]]:
         shadow.see(segment, scores)
     report = shadow.report()
-    assert (report["segments"], report["agreement"], report["active_confidence"]) == (4, 0.5, 1.0)
+    assert (report["segments"], report["failed"]) == (5, 1)
+    assert (report["agreement"], report["active_confidence"]) == (0.5, 1.0)
     assert report["disagreements"] == [
         {"active": "tap", "candidate": "swipe", "count": 1}, {"active": "tap", "candidate": "unknown", "count": 1},
     ]  # fmt: skip
+
+
+def test_what_looks_on_cannot_prevent_an_answer(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    frames = np.zeros((6, 9, 9), np.float32)
+    frames[1:5, 4, 4] = 50
+    segment = Segment(frames, np.arange(6) / 15, 1, 4, 1.0)
+    watched = Watched(ladder_for(model))
+    expected = watched.classify(segment)
+    watched.shadow = Shadow(Fixed(), "candidate")
+    monkeypatch.setattr(Shadow, "see", lambda self, segment, scores: 1 / 0)
+    answer = watched.classify(segment)
+    assert np.array_equal(answer.values, expected.values) and answer.unknown == expected.unknown
