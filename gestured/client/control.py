@@ -8,12 +8,15 @@ from typing import Any
 
 from gestured.client.stream import Refused, Unreachable, parsed
 
+PATIENCE_S = 20.0  # a reload opens and tests a model; everything else takes milliseconds
+
 
 class Control:
     """One connection; a context manager. Raises Unreachable where no daemon answers."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, patience_s: float = PATIENCE_S) -> None:
+        """`patience_s` is how long an answer may take."""
+        self.path, self._patience_s = path, patience_s
         self.finished = False  # it was we who ended it
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
@@ -25,13 +28,19 @@ class Control:
         self._lines = self.socket.makefile("rb")
 
     def ask(self, verb: str, **parameters: object) -> dict[str, Any]:
-        """What the daemon answers. Raises Refused with its reason."""
+        """What the daemon answers. Raises Refused with its reason, Unreachable where no answer comes."""
         request = {"verb": verb} | parameters
         try:
             self.socket.sendall(json.dumps(request).encode() + b"\n")
         except OSError:
             pass  # it hung up; what it said before that is worth more
-        answer = next(self.lines(), None)
+        self.socket.settimeout(self._patience_s)
+        try:
+            answer = next(self.lines(), None)
+        except TimeoutError:
+            said = f"does not answer within {self._patience_s:g} s: it hangs, or the machine is very busy"
+            raise Unreachable(f"the daemon on {self.path} {said}") from None
+        self.socket.settimeout(None)
         if answer is None:
             raise Unreachable(f"the daemon on {self.path} closed the connection")
         if answer.get("ok") is not True:

@@ -85,7 +85,7 @@ def examine(path: Path) -> Iterator[Finding]:
         with Control(path) as control:
             status = control.ask("status")
     except (Unreachable, Refused) as error:
-        yield Finding("bad", f"the daemon cannot be asked: {error}", "is it running? systemctl status gestured")
+        yield Finding("bad", f"the daemon cannot be asked: {error}", "does it run? systemctl status gestured")
         yield _port(("127.0.0.1", 9000))
         yield _model("cnn_lstm", None)
         return

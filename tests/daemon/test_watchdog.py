@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from gestured.client.control import Control
+from gestured.client.stream import Unreachable
 from gestured.core.recognizer import FrontEnd
 from gestured.daemon.canary import Canary
 from gestured.daemon.merge import load
@@ -54,6 +56,9 @@ def test_health_and_metrics_answer_while_a_model_hangs_and_the_watchdog_is_not_f
         status, body = daemon.get("/readyz")
         assert status == 503 and "hangs" in json.loads(body)["reason"]
         assert daemon.metric("gestured_loop_lag_seconds") > 1
+        with Control(Path(daemon.ready["control"]), patience_s=0.1) as control:
+            with pytest.raises(Unreachable, match="hangs"):
+                control.ask("status")
         assert daemon.metric("gestured_sensor_state", sensor="arm", state="stale") == 1
         with pytest.raises(BlockingIOError):
             supervisor.recv(4096)
