@@ -22,7 +22,9 @@ def gestures(names: list[str], signals: dict[str, Any]) -> Markup:
         cards.append(tag("li", icons.icon(name, 84), tag("span", formats.plain(name), class_="name"), drawn))
     caption = "Dots are fingertips at the beginning; lines lead where they go."
     if signals:
-        caption += " Below, the raw signal of one performance, summed over the taxels: one time scale for all, each its own height."
+        caption += (
+            " Below, the raw signal of one performance, summed over the taxels: one time scale, each its own height."
+        )
     return figure(
         "The ten gestures", SIMULATED if signals else "", caption, tag("ul", *cards, class_="cards"), wide=False
     )

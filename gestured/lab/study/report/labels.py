@@ -19,7 +19,7 @@ def place_names(
     What lies in the `taken` boxes is not covered. A name that was moved gets a line to its point. A name that
     finds no place is left to the mark's own title.
     """
-    covered = list(taken)
+    covered, written = list(taken), []
     for k in sorted(range(len(names)), key=lambda k: (not first[k], places[k])):
         width, (x, y) = LETTER * len(names[k]) * (1.08 if first[k] else 1.0), places[k]
         for away, box in _around(x, y, width):
@@ -27,8 +27,9 @@ def place_names(
                 covered.append(box)
                 if away:
                     _lead(plot, (x, y), box)
-                plot.add(_name(names[k], x, box, "name front-name" if first[k] else "name"))
+                written.append(_name(names[k], x, box, "name front-name" if first[k] else "name"))
                 break
+    plot.add(*written)  # after all lines, so that none crosses a name
 
 
 def _around(x: float, y: float, width: float) -> Iterator[tuple[float, Box]]:
