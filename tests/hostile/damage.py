@@ -200,14 +200,18 @@ def main() -> int:
     bench = Bench(args.model)
     people = range(FIRST, FIRST + args.people)
     takes, idle = [take(person) for person in people], [take(person, touched=False) for person in people]
-    found = [measure(name, takes, idle, bench).figures() for name in args.fault or FAULTS]
+    found = []
+    for name in args.fault or FAULTS:
+        found.append(measure(name, takes, idle, bench).figures())
+        if not args.json:  # row by row: it takes a while
+            if len(found) == 1:
+                print("| " + " | ".join(found[0]) + " |\n|" + "---|" * len(found[0]))
+            print(
+                "| " + " | ".join("-" if value is None else str(value) for value in found[-1].values()) + " |",
+                flush=True,
+            )
     if args.json:
         print(json.dumps(found, indent=2))
-    else:
-        print("simulated people and sensor; shares in %")
-        print("| " + " | ".join(found[0]) + " |\n|" + "---|" * len(found[0]))
-        for figures in found:
-            print("| " + " | ".join("-" if value is None else str(value) for value in figures.values()) + " |")
     return int(any(figures["of nobody"] or figures["unended"] for figures in found))
 
 

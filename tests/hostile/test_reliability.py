@@ -1,0 +1,33 @@
+"""The table of faults is true: its tests and metrics exist, and every fault that is measured has its figures."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.hostile.faults import FAULTS
+
+TESTS = Path(__file__).parents[1]
+TEXT = (TESTS.parent / "docs" / "reliability.md").read_text()
+METRICS = {*re.findall(r"^# TYPE (\S+)", (TESTS / "daemon" / "metrics.txt").read_text(), re.MULTILINE)}
+ROWS = [line for line in TEXT.split("\n## ")[0].splitlines() if line.startswith("| ")][1:]
+
+
+@pytest.mark.parametrize("row", ROWS, ids=[row[2:40] for row in ROWS])
+def test_each_fault_has_a_promise_a_test_and_a_metric(row: str) -> None:
+    _, promise, tests, metrics = row.strip("| ").split(" | ")
+    assert promise
+    names = re.findall(r"`([a-z_/]+\.py)::(\w+)`( \(slow\))?", tests)
+    assert names
+    for file, name, slow in names:
+        code = (TESTS / file).read_text()
+        assert f"\ndef {name}(" in code
+        before = code[: code.index(f"\ndef {name}(")].rsplit("\n\n\n", 1)[1:]
+        assert bool(slow) == any("mark.hostile" in lines for lines in before), name
+    for metric in re.findall(r"`(gestured_\w+)`", metrics):
+        assert metric in METRICS
+
+
+def test_each_fault_that_is_measured_has_its_figures() -> None:
+    table = TEXT.split("<!-- damage: begin -->")[1].split("<!-- damage: end -->")[0]
+    assert set(FAULTS) <= set(re.findall(r"^\| ([^|]+?) \|", table, re.MULTILINE))
