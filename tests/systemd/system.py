@@ -4,6 +4,7 @@ One test, because each step stands on the one before; it prints what it measured
 """
 
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -27,7 +28,7 @@ METRICS = "http://127.0.0.1:9108/metrics"
 CONFIGURATION = "/etc/gestured/gestured.toml"
 SOCKETS = ("gestured-osc.socket", "gestured-events.socket", "gestured-metrics.socket")
 BUSY = 1.5  # processes that want to run, for each core
-FRAMES = 300
+FRAMES = 800  # 8 s: longer than the reloads take
 RATE_HZ = 100.0
 RELOADS = (  # a configuration, and why it is refused
     ('model = "lstm"\nmodle = 1\n', "did you mean model?"),
@@ -205,6 +206,23 @@ def test_members_of_the_group_may_and_others_may_not(box: Container):
     for command in ("status", "reload"):
         member = as_user(box, "gesturectl", command, groups=group)
         assert member.returncode == 0, member.stdout + member.stderr
+
+
+def bound(port: int) -> socket.socket:
+    """A UDP socket that waits for the daemon's OSC."""
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.settimeout(20)
+    sock.bind(("127.0.0.1", port))
+    return sock
+
+
+def test_with_its_drop_in_the_service_sends_osc(box: Container):
+    (block,) = [block for block in blocks("run", "container") if "osc-output.conf" in block.text]
+    with box.call(lambda: bound(9001)) as receiver:
+        box.path(CONFIGURATION).write_text('publish = ["osc://127.0.0.1:9001"]\n')
+        box.run("bash", "-euo", "pipefail", "-c", block.text.replace("sudo ", ""))
+        box.run("gesturectl", "emit", "swipe_left")
+        wait("the event over OSC", lambda: b"swipe_left" in receiver.recv(65536))
 
 
 def test_a_configuration_that_is_refused_at_the_start_is_not_tried_for_ever(box: Container):
