@@ -79,11 +79,10 @@ def loaded(name: str, data: bytes) -> Judged:
         "net.lstm.bias_hh_l0": gates(np.split(bias, 2)[1]),
         "decision.share": np.array(_shares(proto, found), np.float32),
     }
-    classes, perceptron = len(found["net.head.bias"]), found["trajectory.perceptron.mean"]
+    classes = len(found["net.head.bias"])
     gestures = proto.graph.output[0].type.tensor_type.shape.dim[1].dim_value
     rows, columns = (dim.dim_value for dim in proto.graph.input[0].type.tensor_type.shape.dim[2:])
     module = Judged(NETS[name](rows, columns, classes), TrajectoryNet(rows, columns, classes), Decision(gestures))
-    assert len(perceptron) == len(module.state_dict()["trajectory.perceptron.mean"])
     state |= {key: found[key] for key in module.state_dict() if key in found}
     module.load_state_dict({key: torch.from_numpy(np.array(value)) for key, value in state.items()})
     return module.eval()
@@ -104,8 +103,8 @@ def by_reference(data: bytes) -> Way:
 
 def by_onnxruntime(data: bytes, threads: int = 1, batch: bool = False) -> Way:
     """As the daemon does; or on more threads, or all at once."""
+    model = Model(data, "stability")  # also sees to it that onnxruntime is imported without its telemetry
     if threads == 1:
-        model = Model(data, "stability")
 
         def run(values: NDArray[np.float32]) -> Scores:
             return _joined(*model.run(values))
