@@ -10,6 +10,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +26,12 @@ from gestured.lab.study.protocols import Result, Task, run
 SHAPING = (  # the rooms whose code decides what a cell's numbers are
     "dataset", "fit", "nets", "trajectory", "study/shifting", "study/wavelets", "study/touch_patterns",
     "study/motion_history", "study/trajectory_boosting", "study/nets", "study/training", "study/methods",
-    "study/views", "study/material", "study/protocols", "study/elapsed", "study/run_time", "study/onnx_form", "study/sessions",
+    "study/views", "study/material", "study/protocols", "study/elapsed", "study/run_time", "study/onnx_form",
+    "study/sessions",
 )  # fmt: skip
 
 
+@cache
 def code_digest() -> str:
     """Of everything that shapes a cell, besides its data and its task."""
     lab = Path(str(gestured.lab.__file__)).parent

@@ -156,7 +156,8 @@ def sequence_net(kind: str, units: int, classes: int, channels: int = 16) -> Seq
         temporal = Attention(inputs, units)
     else:
         temporal = Recurrent(inputs, units, kind.removeprefix("cnn_"))
-    return SequenceNet(encoder.to(memory_format=torch.channels_last), temporal, units, classes)  # a quarter faster
+    encoder.to(memory_format=torch.channels_last)  # type: ignore[call-overload]  # a quarter faster
+    return SequenceNet(encoder, temporal, units, classes)
 
 
 class HistoryNet(nn.Module):

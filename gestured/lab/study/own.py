@@ -63,14 +63,15 @@ def own(paths: Sequence[Path]) -> Own:
         try:
             found, bad = read_what_is_good(path)
             left += [{"file": str(path), "recording": b.recording, "field": b.field, "reason": b.reason} for b in bad]
-            samples = _gestures(found, path, names, left)
+            dropped = {b.recording for b in bad if b.recording is not None}
+            places = [i for i in range(len(found) + len(dropped)) if i not in dropped]
+            samples = _gestures(found, path, places, names, left)
         except RecordingError as error:
             left.append({"file": str(path), "recording": None, "field": "", "reason": str(error)})
             files.append({"file": str(path), "recordings": 0, "used": 0})
             continue
         parts.append(samples)
-        recordings = len(found) + sum(b.recording is not None for b in bad)
-        files.append({"file": str(path), "recordings": recordings, "used": len(samples)})
+        files.append({"file": str(path), "recordings": len(found) + len(dropped), "used": len(samples)})
     together = join(parts) if parts else None
     if paths and (together is None or len(np.unique(together.people)) < FEWEST):
         reasons = "; ".join(["found too few", *(str(entry["reason"]) for entry in left[:3])])
@@ -78,8 +79,10 @@ def own(paths: Sequence[Path]) -> Own:
     return Own(together, files, left)
 
 
-def _gestures(found: Recordings, path: Path, names: dict[str, int], left: list[dict[str, Any]]) -> Samples:
-    """What the front end cuts of a file's recordings of known gestures."""
+def _gestures(
+    found: Recordings, path: Path, places: list[int], names: dict[str, int], left: list[dict[str, Any]]
+) -> Samples:
+    """What the front end cuts of a file's recordings of known gestures; `places` are their indices in the file."""
     people = [names.setdefault(str(subject), len(names)) for subject in found.subjects]
     kinds = found.labels if found.kinds is None else found.kinds
     found = replace(found, subjects=np.array(people, np.int64), kinds=kinds)
@@ -89,6 +92,6 @@ def _gestures(found: Recordings, path: Path, names: dict[str, int], left: list[d
             chosen.append(i)
         elif label != NONE:
             reason = f"labels: expected one of the ten gestures, {NONE} or session, found {label}"
-            left.append({"file": str(path), "recording": i, "field": "labels", "reason": reason})
+            left.append({"file": str(path), "recording": places[i], "field": "labels", "reason": reason})
     samples = recorded(found.take(chosen))
     return samples.take(np.isin(samples.labels, GESTURES))

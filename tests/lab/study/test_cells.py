@@ -1,0 +1,104 @@
+"""Checkpoints: what is computed is not computed again; and the same numbers on a cluster."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("torch")
+pytest.importorskip("pywt")
+
+from gestured.core.errors import GesturedError  # noqa: E402
+from gestured.lab.study import cells  # noqa: E402
+from gestured.lab.study.cells import Schedule  # noqa: E402
+from gestured.lab.study.protocols import CLEAN, PARTICIPANTS  # noqa: E402
+from tests.lab.study.material_made import data  # noqa: E402
+from tests.lab.study.test_protocols import task  # noqa: E402
+
+TASKS = [task(CLEAN), task(PARTICIPANTS), task(PARTICIPANTS, "none")]
+
+
+def without_time(found: dict[object, dict[str, object]]) -> list[dict[str, object]]:
+    return [{**found[one], "seconds": 0} for one in TASKS]
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Computes in this process: starting others takes longer than the work."""
+    real = cells.Parallel
+    monkeypatch.setattr(cells, "Parallel", lambda n_jobs, **more: real(n_jobs=1, **more))
+
+
+def test_a_second_run_computes_nothing(tmp_path: Path, here: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    sets = {"simulated": data()}
+    first = Schedule(tmp_path, 1).results(TASKS, sets, "cells")
+    monkeypatch.setattr(cells, "_compute", lambda *_: pytest.fail("computed again"))
+    assert Schedule(tmp_path, 1).results(TASKS, sets, "cells") == first
+
+
+def test_what_was_finished_before_an_interruption_is_kept(
+    tmp_path: Path, here: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sets, whole = {"simulated": data()}, cells._compute
+    left = iter([whole, whole])
+
+    def interrupted(*arguments: object) -> object:
+        step = next(left, None)
+        if step is None:
+            raise KeyboardInterrupt
+        return step(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(cells, "_compute", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        Schedule(tmp_path, 1).results(TASKS, sets, "cells")
+    kept = list(tmp_path.glob("cells/*.json"))
+    assert kept and all(json.loads(path.read_text()) for path in kept)
+    monkeypatch.setattr(cells, "_compute", whole)
+    assert len(Schedule(tmp_path, 1).results(TASKS, sets, "cells")) == len(TASKS)
+
+
+def test_a_damaged_checkpoint_is_made_again(tmp_path: Path, here: None) -> None:
+    sets, schedule = {"simulated": data()}, Schedule(tmp_path, 1)
+    first = schedule.results(TASKS[:1], sets, "cells")
+    schedule.path(TASKS[0], sets["simulated"]).write_text("{")
+    second = schedule.results(TASKS[:1], sets, "cells")
+    assert {**second[TASKS[0]], "seconds": 0} == {**first[TASKS[0]], "seconds": 0}
+
+
+def test_other_data_are_other_checkpoints(tmp_path: Path) -> None:
+    schedule = Schedule(tmp_path, 1)
+    assert schedule.path(TASKS[0], data(4)) != schedule.path(TASKS[0], data(5))
+
+
+@pytest.fixture
+def cluster() -> Iterator[str]:
+    """A real scheduler and two workers, each a process of its own."""
+    pytest.importorskip("distributed", reason="distributed is not installed: pip install 'gestured[cluster]'")
+    programs = []
+    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
+    scheduler = subprocess.Popen([*dask, "--no-dashboard"], stderr=subprocess.PIPE, text=True)
+    programs.append(scheduler)
+    assert scheduler.stderr is not None
+    address = next(line.split()[-1] for line in scheduler.stderr if "Scheduler at:" in line)
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
+    programs += [subprocess.Popen([*worker, "--no-nanny"], stderr=subprocess.DEVNULL) for _ in range(2)]
+    yield address
+    for program in reversed(programs):
+        program.terminate()
+        program.wait(20)
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_the_same_numbers(tmp_path: Path, cluster: str) -> None:
+    sets = {"simulated": data()}
+    alone = dict(cells._compute(one, sets["simulated"]) for one in TASKS)
+    together = Schedule(tmp_path / "together", 1, cluster).results(TASKS, sets, "cells")
+    assert without_time(together) == without_time(alone)  # type: ignore[arg-type]
+
+
+def test_without_a_scheduler_one_sentence_says_so(tmp_path: Path) -> None:
+    with pytest.raises(GesturedError, match="--cluster"):
+        Schedule(tmp_path, 1, "tcp://127.0.0.1:9").results(TASKS[:1], {"simulated": data()}, "cells")

@@ -1,0 +1,70 @@
+"""A researcher's own recordings: what is used, and what is left out and named."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+pytest.importorskip("pywt")
+
+from gestured.core.errors import GesturedError  # noqa: E402
+from gestured.lab.study.own import own  # noqa: E402
+from gestured.recording import Recordings, write  # noqa: E402
+from gestured.simulator import Participant, Sensor, generator, gesture_take  # noqa: E402
+
+
+def recordings(people: tuple[str, ...], labels: tuple[str, ...] = ("swipe_up", "one_tap")) -> Recordings:
+    """One simulated performance of each gesture by each person, as a collector writes them."""
+    takes = [
+        gesture_take(label, Participant(7 + k), Sensor.nominal(day=7 + k), generator(5, k, n))
+        for k in range(len(people)) for n, label in enumerate(labels)
+    ]  # fmt: skip
+    return Recordings(
+        np.concatenate([t.frames for t in takes]),
+        np.concatenate([t.times for t in takes]),
+        np.concatenate([[0], np.cumsum([len(t.frames) for t in takes])]).astype(np.int64),
+        np.array([t.label for t in takes]),
+        np.repeat(people, len(labels)),
+        onsets=np.array([np.searchsorted(t.times, t.events[0].onset_s) for t in takes]),
+        releases=np.array([np.searchsorted(t.times, t.events[0].offset_s) for t in takes]),
+    )
+
+
+def test_one_name_is_one_participant_across_files(tmp_path: Path) -> None:
+    write(tmp_path / "a.npz", recordings(("anna", "07")))
+    write(tmp_path / "b.npz", recordings(("anna",)))
+    found = own([tmp_path / "a.npz", tmp_path / "b.npz"])
+    assert found.samples is not None
+    assert sorted(found.samples.people.tolist()) == [0, 0, 0, 0, 1, 1]
+    assert [entry["used"] for entry in found.files] == [4, 2] and not found.left_out
+
+
+def test_a_bad_recording_is_left_out_and_named_and_the_rest_is_used(tmp_path: Path) -> None:
+    good = recordings(("anna", "berta"))
+    labels = good.labels.astype("U40")
+    labels[3] = "waving"
+    times = good.times.copy()
+    times[good.offsets[2] + 1] = np.nan
+    path = tmp_path / "a.npz"
+    bad = replace(good, labels=labels, times=times)
+    np.savez(path, **{name: value for name, value in vars(bad).items() if value is not None})
+    found = own([path])
+    assert found.files == [{"file": str(path), "recordings": 4, "used": 2}]
+    assert {(entry["recording"], entry["field"]) for entry in found.left_out} == {(2, "times"), (3, "labels")}
+    assert all(str(path) == entry["file"] and entry["reason"] for entry in found.left_out)
+
+
+def test_what_cannot_be_read_is_named_and_too_little_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "x.npz").write_text("no recording")
+    write(tmp_path / "a.npz", recordings(("anna", "berta")))
+    found = own([tmp_path / "x.npz", tmp_path / "a.npz"])
+    assert found.left_out[0]["file"].endswith("x.npz") and len(found.files) == 2
+    with pytest.raises(GesturedError, match=r"--recordings: expected .* at least 2 participants.*x\.npz"):
+        own([tmp_path / "x.npz"])
+
+
+def test_no_recordings_is_nothing() -> None:
+    found = own([])
+    assert found.samples is None and not found.files and not found.left_out
