@@ -58,7 +58,9 @@ soak: .venv-dev/.dev  ## a day compressed, then ten minutes of 20 sensors in rea
 	@.venv-dev/bin/python -m tests.hostile.soak
 
 install: PYTHON := $(or $(PYTHON),/usr/bin/python3)
-install: build/install/.ready  ## into DESTDIR, below PREFIX=/usr, for PYTHON=/usr/bin/python3: programs, units, pages
+install:  ## into DESTDIR, below PREFIX=/usr, for PYTHON=/usr/bin/python3: programs, units, pages
+	@rm -rf build/install && mkdir -p build  # the interpreter may be another one than the last time
+	$(call venv,build/install)
 	@deploy/install.sh build/install "$(DESTDIR)" "$(PREFIX)"
 
 uninstall:  ## remove what `make install` has put there; settings and account stay
@@ -94,11 +96,6 @@ define install
 	else echo "pip could not install $(2): $$(grep -i error $(1)/pip.log | tail -n 1) (all of it: $(1)/pip.log)" >&2; fi; \
 	exit 1; }
 endef
-
-build/install/.ready: Makefile
-	@mkdir -p build
-	$(call venv,build/install)
-	@touch $@
 
 .venv/.runtime: pyproject.toml
 	$(call venv,.venv)
