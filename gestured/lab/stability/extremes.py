@@ -5,12 +5,13 @@ right. Every warning counts as a fault.
 """
 
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from gestured.core.events import Event, Gesture
+from gestured.core.events import Event, Gesture, Onset
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment
 from gestured.core.recognizer import Classifier, FrontEnd, Recognizer
@@ -283,34 +284,35 @@ def month_table(classifier: Classifier, days: float) -> Table:
     times = np.arange(int(days * 86_400 / step)) * step + 2.0
     rng = np.random.default_rng(30)
     front = FrontEnd("stability", 9, 9)
+    recognizer = Recognizer(front, classifier)
     for k in range(30):
-        front.push(Frame(k / 15, LEVEL + NOISE * rng.standard_normal((9, 9))))
-    heard = 0
+        recognizer.push(Frame(k / 15, LEVEL + NOISE * rng.standard_normal((9, 9))))
+    heard: Counter[type] = Counter()
     for part in np.array_split(times, max(len(times) // 10_000, 1)):
         noise = NOISE * rng.standard_normal((len(part), 9, 9))
         noise += LEVEL + swing * np.sin(2 * np.pi * part / 86_400.0)[:, None, None]
         for t, frame in zip(part, noise, strict=True):
-            heard += len(front.push(Frame(float(t), frame)))
+            heard.update(map(type, recognizer.push(Frame(float(t), frame))))
     end = float(times[-1])
     level = LEVEL + swing * float(np.sin(2 * np.pi * end / 86_400.0))
     off, *_ = front.conditioner.deviation(np.full(81, level))
     after, _ = swipes(1, level=level)
-    recognizer = Recognizer(front, classifier)
     found: list[Event] = []
     for t, frame in zip(after.times + end + 0.1, after.frames, strict=True):
         found += recognizer.push(Frame(float(t), frame))
     found += recognizer.flush(end + 10.0)
     return Table(
         "Running means after a long time idle",
-        ("days", "frames", "events", "baseline off by (noise)", "noise found / true", "then a swipe is"),
+        ("days", "frames", "contacts", "gestures", "baseline off by (noise)", "noise found / true", "then a swipe is"),
         [
             (
                 days,
                 len(times),
-                heard,
-                np.abs(off).max() / NOISE,
+                heard[Onset],
+                heard[Gesture],
+                float(np.abs(off).max() / NOISE),
                 front.noise / NOISE,
-                " ".join(labels(found)) or "missed",
+                " ".join(labels(found)),
             )
         ],
         (

@@ -44,8 +44,8 @@ def test_the_whole_path_bears_every_stream(models: list[Model]) -> None:
 
 
 def test_a_day_of_running_means_ends_where_it_began(models: list[Model]) -> None:
-    ((_, frames, heard, off, noise, answer),) = month_table(models[0], 0.05).rows
-    assert (frames, heard, answer) == (4800, 0, "swipe_right")
+    ((_, frames, contacts, gestures, off, noise, answer),) = month_table(models[0], 0.05).rows
+    assert (frames, contacts, gestures, answer) == (4800, 0, 0, "swipe_right")
     assert float(off) < 5.0
     assert 0.7 < float(noise) < 1.5
 
