@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     with connect(args) as control:
         scene = control.ask("flight")
         with Writer(path, scene | {"note": args.note}, LIMIT_BYTES) as tape:
-            keeper = Keeper(tape, scene["epoch_ns"])
+            keeper = Keeper(tape, scene)
             for line in control.lines():
                 if line["type"] == "end":
                     break

@@ -16,6 +16,8 @@ from gestured.client.control import Control
 from gestured.client.stream import Refused, Unreachable
 from gestured.control.address import add_control, connect, finish_on_signals
 from gestured.core.errors import GesturedError
+from gestured.core.wire import Decoder
+from gestured.offline import Scene
 from gestured.tape import Writer, library
 
 FLUSH_S = 1.0  # what a crash or a power cut costs
@@ -57,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
                 timer = threading.Timer(args.seconds, control.finish)
                 timer.daemon = True
                 timer.start()
-            keeper = Keeper(tape, scene["epoch_ns"])
+            keeper = Keeper(tape, scene)
             why = keeper.follow(control)
     summary = {"file": str(args.file), "packets": keeper.packets, "events": keeper.events, "lost": keeper.lost}
     if args.json:
@@ -76,9 +78,13 @@ GONE = "the daemon went"
 class Keeper:
     """Puts the lines of a tap into a tape."""
 
-    def __init__(self, tape: Writer, epoch_ns: int) -> None:
-        self._tape, self._epoch_ns = tape, epoch_ns
+    def __init__(self, tape: Writer, scene: Mapping[str, Any]) -> None:
+        """`scene` is what the daemon said of itself."""
+        self._tape, self._epoch_ns = tape, scene["epoch_ns"]
+        known = Scene(scene)
+        self._decoder = Decoder(known.addresses, known.grid, keep_touches=False)
         self._t_ns = time.time_ns()
+        self._flushed = 0.0
         self.packets = self.events = self.lost = 0
 
     def keep(self, line: Mapping[str, Any]) -> None:
@@ -86,7 +92,10 @@ class Keeper:
         if line["type"] == "packet":
             self._t_ns = line["t_ns"] + self._epoch_ns
             host, port = line["source"]
-            self._tape.packet(self._t_ns, f"{host}:{port}", base64.b64decode(line["data"]))
+            packet = base64.b64decode(line["data"])
+            self._tape.packet(self._t_ns, f"{host}:{port}", packet)
+            for arrival in self._decoder.decode(packet)[0]:
+                self._tape.picture(self._t_ns, arrival.sensor, arrival.values)
             self.packets += 1
         elif line["type"] == "lost":
             self.lost += line["count"]
@@ -104,8 +113,6 @@ class Keeper:
             if self._tape.full:
                 return "the file is as large as it may be"
         return "as asked" if control.finished else GONE
-
-    _flushed = 0.0
 
     def _flush(self) -> None:
         self._tape.flush()

@@ -1,5 +1,6 @@
 """Recordings: what a real daemon hands over, what survives a crash, and what a replay makes of it."""
 
+import base64
 import json
 import os
 import signal
@@ -13,6 +14,7 @@ from gestured import recording, tape
 from gestured.control.cli import main
 from gestured.control.diff import Answer, Difference, differences
 from gestured.core.errors import RecordingError
+from gestured.core.wire import Addresses, Decoder
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor
 
@@ -60,6 +62,9 @@ def test_a_recording_holds_every_packet_and_replays_to_the_same_events(recorded,
     found = tape.read(path)
     assert found.whole and [p.data for p in found.packets] == sent
     assert found.scene["model"]["name"] == "tiny" and found.scene["settings"]["clock"] == "sensor"
+    pictures = list(_pictures(path, "/rec/pressure"))
+    ((frame,), _) = Decoder(Addresses(), lambda sensor: (9, 9)).decode(sent[40])
+    assert len(pictures) == len(sent) and np.array_equal(pictures[40], frame.values)
     names = [e["gesture"] for e in found.events if e["type"] == "gesture"]
     assert names == ["swipe_left", "one_tap", "swipe_up"]
     status, out, err = run("replay", path, "--json")
@@ -71,6 +76,18 @@ def test_a_recording_holds_every_packet_and_replays_to_the_same_events(recorded,
             assert twin[key] == (value if isinstance(value, str) else pytest.approx(value, abs=1e-3)), key
     status, out, err = run("replay", path, "--diff")
     assert (status, out) == (0, "") and "3 recorded answers, 0 differences" in err
+
+
+def _pictures(path: Path, topic: str):
+    """The frames as a viewer of the library sees them, knowing nothing of ours."""
+    from mcap.reader import make_reader
+
+    with path.open("rb") as file:
+        for schema, _, message in make_reader(file).iter_messages(topics=[topic]):
+            picture = json.loads(message.data)
+            assert (schema.name, picture["encoding"]) == ("foxglove.RawImage", "32FC1")
+            values = np.frombuffer(base64.b64decode(picture["data"]), "<f4")
+            yield values.reshape(picture["height"], picture["width"])
 
 
 def test_a_replay_with_another_model_shows_what_differs(recorded, run, daemon, tmp_path) -> None:
