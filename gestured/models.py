@@ -25,9 +25,13 @@ from gestured.core.features import feature_names, touch_pattern
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Scores
 from gestured.model_file import Metadata, inspect, read_bytes
+from gestured.run_limit import limited
 
 LADDER = ("cnn_lstm", "lstm", "touch_pattern_rf")  # the shipped models, best first
 TOLERANCE = 1e-3  # of the self-test: other processors round differently, another model is further off
+RUN_S = 1.5  # for one segment; it takes some milliseconds
+SELF_TEST_S = 10.0
+BATCH_S = 3600.0  # for any number of segments at once
 OPENING_BYTES = 512 << 20  # of address space that opening and self-testing may take; a shipped one needs 30 MiB
 
 
@@ -71,19 +75,28 @@ class Model:
             count = len(self.gestures)
             return Scores(np.full(count, 1.0 / count, np.float32), 1.0, self.name)
         try:
-            scores, unknown = self.run(window[np.newaxis])
+            scores, unknown = self.run(window[np.newaxis], RUN_S)
         except ValueError as error:
             raise ModelError(f"{self.name}: {error}") from None
         return Scores(scores[0], float(unknown[0]), self.name, threshold=self.threshold)
 
-    def run(self, batch: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def run(
+        self, batch: NDArray[np.float32], limit_s: float = BATCH_S
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """(B, T, R, C) windows or (B, F) features -> scores (B, G), unknown (B,).
 
-        ValueError where the model fails or what it gives are no probabilities.
+        ValueError where the model fails, takes longer than `limit_s`, or what it gives are no probabilities.
         """
+        import onnxruntime
+
+        options = onnxruntime.RunOptions()
+        options.log_severity_level = 4
         try:
-            scores, unknown = self._session.run(("scores", "unknown"), {self._input: batch})
+            with limited(options, limit_s):
+                scores, unknown = self._session.run(("scores", "unknown"), {self._input: batch}, options)
         except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
+            if options.terminate:
+                raise ValueError(f"was ended after {limit_s:g} s, in which it did not answer") from None
             raise ValueError(f"onnxruntime cannot run it: {_brief(error)}") from None
         expected = (len(batch), len(self.gestures))
         if scores.shape != expected or unknown.shape != expected[:1]:
@@ -132,7 +145,7 @@ class Model:
         if test.values.ndim != rank or test.scores.shape != expected:
             raise ValueError(f"self-test: expected scores {expected} of a {rank}-dimensional input")
         try:
-            scores, unknown = self.run(test.values)
+            scores, unknown = self.run(test.values, SELF_TEST_S)
         except ValueError as error:
             raise ValueError(f"self-test: {error}") from None
         difference = float(max(np.abs(scores - test.scores).max(), np.abs(unknown - test.unknown).max()))

@@ -130,6 +130,21 @@ def test_a_model_that_failed_is_tried_again(start, model: Path, tmp_path: Path) 
     assert seen[-1]["model"] == "bad"
 
 
+def test_a_model_that_hangs_is_ended_and_hands_over_to_the_next(start, model: Path, tmp_path: Path) -> None:
+    bad = bad_models.hanging(model, tmp_path / "bad.onnx")
+    daemon = start("--fallback", model, "--clock", "sensor", "--metrics", "127.0.0.1:0", model=bad)
+    client = daemon.client().subscribe(*TYPES)
+    sensor = Sensor(daemon, "arm").begin()
+    press(sensor)
+    sensor.perform("left")
+    lines = client.until(lambda line: line["type"] == "release" and line["id"] == 2)
+    assert violations(lines) == []
+    answers = [(line["model"], line["degraded"]) for line in lines if line["type"] in ("gesture", "unknown")]
+    assert answers == [("tiny", True), ("tiny", True)]
+    assert daemon.get("/healthz")[0] == 200 and daemon.metric("gestured_model_failures_total") == 1
+    assert "did not answer" in daemon.stderr()
+
+
 @pytest.mark.parametrize("how", ["replaced", "truncated", "removed"])
 def test_a_model_file_that_changes_under_a_running_daemon(start, model: Path, tmp_path: Path, how: str) -> None:
     path = tmp_path / "mine.onnx"
