@@ -1,5 +1,6 @@
 """The table of faults is true: its tests and metrics exist, and every fault that is measured has its figures."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -20,10 +21,9 @@ def test_each_fault_has_a_promise_a_test_and_a_metric(row: str) -> None:
     names = re.findall(r"`([a-z_/]+\.py)::(\w+)`( \(slow\))?", tests)
     assert names
     for file, name, slow in names:
-        code = (TESTS / file).read_text()
-        assert f"\ndef {name}(" in code
-        before = code[: code.index(f"\ndef {name}(")].rsplit("\n\n\n", 1)[1:]
-        assert bool(slow) == any("mark.hostile" in lines for lines in before), name
+        found = [node for node in ast.parse((TESTS / file).read_text()).body if getattr(node, "name", "") == name]
+        assert isinstance(found[0], ast.FunctionDef), name
+        assert bool(slow) == any("mark.hostile" in ast.unparse(mark) for mark in found[0].decorator_list), name
     for metric in re.findall(r"`(gestured_\w+)`", metrics):
         assert metric in METRICS
 
