@@ -148,7 +148,7 @@ def _classical(
 
 
 HAAR = {"wavelet": "haar", "level": 3}
-STEPS = 600  # batches
+STEPS = 800  # batches
 
 
 def _net(
@@ -215,9 +215,9 @@ METHODS: dict[str, Method] = {
         _net("cnn_gru", "CNN-GRU", "The same convolutions, then gated recurrent units: fewer weights than an LSTM.",
              (8e-3, 4e-3), (32,), None),
         _net("tcn", "causal TCN", "Dilated causal convolutions over the frames; each answer sees the last 31 of them.",
-             (4e-3, 2e-3), (32,), None),
+             (8e-3, 4e-3), (32,), None),
         _net("transformer", "small transformer", "Two layers of causal self-attention, four heads, 32 wide.",
-             (3e-3, 1.5e-3), (32,), None),
+             (5e-3, 2.5e-3), (32,), None),
         Method(
             "trajectory_gb", "trajectory features, gradient boosting", BEYOND,
             "Gradient boosting on where the centroid went, how it turned and how many fingers there were.",
