@@ -1,0 +1,43 @@
+"""The study from end to end on very little: every section is there, and a second run is the same."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+pytest.importorskip("pywt")
+
+from gestured.lab import cli  # noqa: E402
+from gestured.lab.dataset import TRIALS  # noqa: E402
+from gestured.lab.study.methods import METHODS  # noqa: E402
+from gestured.lab.study.plan import Plan  # noqa: E402
+
+SECTIONS = (
+    "about", "machine", "data", "methods", "cells", "copies", "tuning", "choices", "run_time", "elapsed", "learning",
+    "calibration", "failures", "signals", "double_tap", "online",
+)  # fmt: skip
+LEFT = ("tp_knn", "lstm")
+
+
+@pytest.mark.slow
+def test_a_small_study_has_every_section_and_is_the_same_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in set(METHODS) - set(LEFT):
+        monkeypatch.delitem(METHODS, name)
+    few = [t.index for t in TRIALS if t.participant < 3 and t.speed == "normal" and t.inclination == 1]
+    monkeypatch.setattr(Plan, "trials", lambda self: np.array(few, np.int64))
+    (tmp_path / "none").mkdir()
+    where = ["--cache", str(tmp_path / "cache"), "--real", str(tmp_path / "none"), "--jobs", "1"]
+    for out in ("first", "second"):
+        assert cli.main(["study", "--quick", "--out", str(tmp_path / out), *where]) == 0
+    first, second = (json.loads((tmp_path / out / "study.json").read_text()) for out in ("first", "second"))
+    assert set(SECTIONS) <= set(first)
+    assert {(c["method"], c["protocol"]) for c in first["cells"]} == {
+        (m, p) for m in LEFT for p in ("paper", "clean", "participants")
+    }
+    assert all(0 <= c["low"] <= c["right"] <= c["high"] <= 1 for c in first["cells"])
+    assert first["data"]["simulated"]["cut"] + first["data"]["simulated"]["lost"] == len(few)
+    assert {**second, "about": 0, "machine": 0} == {**first, "about": 0, "machine": 0}
+    assert (tmp_path / "first" / "cells.csv").read_text().count("\n") == len(first["cells"]) + 1
+    assert list((tmp_path / "first").glob("*.html"))
