@@ -66,7 +66,10 @@ def bind_all(settings: Settings, passed: Sequence[tuple[str, socket.socket]]) ->
         if "control" in given:
             control = Listener(given["control"])
         else:
-            control = UnixListener(settings.control or control_beside(path), "control")
+            beside = settings.control or control_beside(path)
+            if beside == path:
+                raise AddressError(f"control: {path} is the event socket, choose another path with --control")
+            control = UnixListener(beside, "control")
     except AddressError:
         for sock in opened:
             sock.close()

@@ -113,11 +113,11 @@ def udp() -> Iterator[socket.socket]:
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """A real daemon with a small model, the sensor's clock and a flight recorder."""
+    """A real daemon with a small model, the sensor's clock and a flight recorder. No sensor is stale soon: machines are busy."""
     pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
     folder = tmp_path_factory.mktemp("daemon")
     model = tiny_model.make(folder / "tiny.onnx")
-    daemon = Daemon.start(folder, model, "--clock", "sensor", "--flight-recorder", 4)
+    daemon = Daemon.start(folder, model, "--clock", "sensor", "--flight-recorder", 4, "--stale-s", 30)
     yield daemon
     assert daemon.stop() == 0, daemon.stderr()
     assert "Traceback" not in daemon.stderr()

@@ -195,7 +195,9 @@ def test_explain_says_what_is_loaded_and_what_is_left_out(model: Path, tmp_path:
         "--gestures",
         "swipe_left,swipe_right",
     )
-    full = run("--model", model, *flags, "--explain")[1]
+    full = run("--model", model, *flags, "--flight-recorder", "4", "--explain")[1]
+    assert "flight recorder: flight_recorder is 0" in minimal
+    assert "flight recorder: the last 30 s of packets, at most 4 MiB" in full
     assert "osc://127.0.0.1:9:" in full
     assert "waiting for a second tap: double_tap is not in use" in full and "no --metrics" not in full
     assert "gestures: command line" in full
