@@ -113,7 +113,7 @@ def udp() -> Iterator[socket.socket]:
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """A real daemon with a small model, the sensor's clock and a flight recorder. No sensor is stale soon: machines are busy."""
+    """A real daemon with a small model, the sensor's clock and a flight recorder; no sensor falls silent soon."""
     pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
     folder = tmp_path_factory.mktemp("daemon")
     model = tiny_model.make(folder / "tiny.onnx")
