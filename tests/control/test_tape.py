@@ -5,6 +5,7 @@ import json
 import os
 import signal
 import socket
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -251,6 +252,13 @@ def test_what_is_no_recording_is_one_sentence(capsys, tmp_path: Path) -> None:
         assert out == "" and err.count("\n") == 1 and str(path) in err
     assert main(["replay", str(tmp_path / "none.mcap")]) == 1
     assert "No such file" in capsys.readouterr().err
+
+
+def test_without_the_extra_it_says_what_to_install(capsys, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "mcap", None)
+    for command in (["record", "x.mcap"], ["flag", "x.mcap"], ["replay", "x.mcap"], ["export", "x.mcap", "x.npz"]):
+        assert main(command) == 1
+        assert "pip install 'gestured[record]'" in capsys.readouterr().err
 
 
 def test_differences_match_contacts_by_sensor_and_onset() -> None:
