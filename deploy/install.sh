@@ -45,9 +45,9 @@ rm -rf "$old"
 
 for program in gestured:daemon gesturectl:control; do
     name=${program%:*}
-    # No site, no user's folder, no PYTHON* variables; the stack on standard error when a signal kills it.
+    # No site, no user's folder, no PYTHON* variables: it runs with what was installed with it.
     cat >"$work/$name" <<END
-#!$python -ISXfaulthandler
+#!$python -IS
 import sys
 
 sys.path.insert(0, "$lib")

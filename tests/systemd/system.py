@@ -156,6 +156,7 @@ def test_installed_enabled_used_killed_hung_reloaded_and_stopped(box: Container)
     report("kill -9, until it answers again, worst of 3", max(killed))
     report("a hang, until it answers again", harmed(vehicle, "SIGSTOP"), 5.0)
     assert "Watchdog timeout" in vehicle.log()
+    assert "most recent call first" in vehicle.log()  # on which line it hung
 
     # A bad reload changes nothing, a good one the model; neither loses a frame or a subscriber.
     instance, sensor = vehicle.instance(), vehicle.sensor("reload")
