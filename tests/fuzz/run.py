@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 STALL_S = 0.020
-MAX_BYTES = {"decoder": 4096, "request": 8192, "model": 16_384}
+MAX_BYTES = {"decoder": 2048, "request": 8192, "model": 16_384}
 INPUTS, SLOWEST_S, STALLS = range(3)  # what the two processes share
 
 
