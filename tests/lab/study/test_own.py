@@ -42,7 +42,7 @@ def test_one_name_is_one_participant_across_files(tmp_path: Path) -> None:
 
 
 def test_a_bad_recording_is_left_out_and_named_and_the_rest_is_used(tmp_path: Path) -> None:
-    good = recordings(("anna", "berta"))
+    good = recordings(("anna", "berta", "carla"))
     labels = good.labels.astype("U40")
     labels[3] = "waving"
     times = good.times.copy()
@@ -51,7 +51,7 @@ def test_a_bad_recording_is_left_out_and_named_and_the_rest_is_used(tmp_path: Pa
     bad = replace(good, labels=labels, times=times)
     np.savez(path, **{name: value for name, value in vars(bad).items() if value is not None})
     found = own([path])
-    assert found.files == [{"file": str(path), "recordings": 4, "used": 2}]
+    assert found.files == [{"file": str(path), "recordings": 6, "used": 4}]
     assert {(entry["recording"], entry["field"]) for entry in found.left_out} == {(2, "times"), (3, "labels")}
     assert all(str(path) == entry["file"] and entry["reason"] for entry in found.left_out)
 
