@@ -7,6 +7,8 @@ import json
 import resource
 import signal
 import sys
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from gestured.daemon import log as logging
@@ -40,7 +42,7 @@ async def _run(settings: Settings, load: Loader) -> None:
         lambda _, what: throttle.error("a bug in a callback", what["message"], exc_info=what.get("exception"))
     )
     for number, asked in zip(SIGNALS, (stop, stop, reload), strict=True):
-        loop.add_signal_handler(number, asked.set)
+        _when(number, partial(loop.call_soon_threadsafe, asked.set))
     _raise_descriptor_limit()
     bound = bind_all(settings, systemd.passed_sockets())
     try:
@@ -50,21 +52,18 @@ async def _run(settings: Settings, load: Loader) -> None:
         await service.start()
         _announce(service, ladder.active)
         await service.serve(stop, reload)
-        _ignore_signals(loop)
+        for number in SIGNALS:  # nothing is left to be asked: a stop that is repeated must not look like a crash
+            signal.signal(number, signal.SIG_IGN)
     finally:
         bound.close()
 
 
-def _ignore_signals(loop: asyncio.AbstractEventLoop) -> None:
-    """From here on nothing is left to be asked: a stop that is repeated must not look like a crash.
+def _when(number: signal.Signals, act: Callable[[], object]) -> None:
+    """Act on a signal. Not by the loop's own means: those give a signal its default action, which is death, as they go.
 
-    Left alone, the loop gives signals their default action back as it closes, which is death.
+    A signal that comes in that moment may find a thread that does not block it, and there are some.
     """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    for number in SIGNALS:
-        loop.remove_signal_handler(number)
-        signal.signal(number, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    signal.signal(number, lambda *_: act())
 
 
 def _announce(service: Service, model: str) -> None:
