@@ -69,10 +69,11 @@ def further_sensors(model: str) -> Row:
 def _heard(engine: Engine, names: list[str]) -> int:
     """Send three seconds of frames from each sensor; KiB once the daemon has them all."""
     stream = Stream(engine.socket, {"types": ["status"]})
+    epoch = time.time()
     for k in range(45):
         for n, name in enumerate(names):
             sensor = Sensor(engine.listen, Form(name))
-            sensor.socket.send(sensor.form.packet(Frame(0.0, idle(n, 45)[k]), k, sensor.epoch))
+            sensor.socket.send(sensor.form.packet(Frame(0.0, idle(n, 45)[k]), k, epoch + k / 15))
             sensor.close()
     for event in stream:
         if event["type"] == "status" and len(event["sensors"]) >= len(names):

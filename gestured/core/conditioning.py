@@ -71,7 +71,7 @@ class Conditioner:
         self.ready = False
         self._settling = Settling()
         self._provisional = False  # the baseline is doubtful: take the next stable second instead
-        self._baseline: Array = np.zeros(rows * columns)
+        self.baseline: Array = np.zeros(rows * columns)  # (N,) counts; replaced, never changed in place
         self._sigma: Array = np.ones(rows * columns)
         self._weight: Array = np.ones(rows * columns)  # 1 / noise, 0 for bad taxels
         self._stuck = np.zeros(rows * columns, dtype=bool)
@@ -110,7 +110,7 @@ class Conditioner:
         """(N,) raw counts -> (N,) counts above the baseline; activity and the lowest taxel in units of noise."""
         if self._unit > 0:
             self._learn_unit(raw)
-        d = raw - self._baseline
+        d = raw - self.baseline
         scaled = d * self._weight
         return d, self.activity(scaled), float(scaled.min())
 
@@ -144,7 +144,7 @@ class Conditioner:
         learned = self._settling.push(t, raw, patience=not self.ready)
         if learned is None:
             return False
-        self._baseline, self._sigma, self._stuck = learned.baseline, learned.noise, learned.constant
+        self.baseline, self._sigma, self._stuck = learned.baseline, learned.noise, learned.constant
         self._fine, self._step = learned.fine, learned.step
         self._unit, self._shown = math.inf if learned.still else 0.0, raw
         self._frozen[:] = False
@@ -153,7 +153,7 @@ class Conditioner:
         self._tracked = self._reviewed = t
         self._scale, self._usual = 1.0, 0.0
         self._review()
-        scaled = (learned.frames - self._baseline) * self._weight
+        scaled = (learned.frames - self.baseline) * self._weight
         self._usual = float(np.median([self.activity(row) for row in scaled]))
         self._review()
         return True
@@ -188,7 +188,7 @@ class Conditioner:
                 (self._tracked - t) / NOISE_TAU_S
             )
             if not burst:
-                self._baseline = self._baseline + d * -math.expm1((self._tracked - t) / tau)
+                self.baseline = self.baseline + d * -math.expm1((self._tracked - t) / tau)
             if t - self._reviewed >= REVIEW_S:
                 seen = np.minimum(np.abs(d), 4 * self._sigma) * 1.2533
                 sigma = self._sigma + (seen - self._sigma) * -math.expm1((self._reviewed - t) / NOISE_TAU_S)

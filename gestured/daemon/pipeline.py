@@ -267,7 +267,7 @@ class Pipeline:
 def _reading(sensor: Sensor, state: str) -> Reading:
     front_end, vitals = sensor.recognizer.front_end, sensor.vitals
     rate = 0.0 if state in SILENT else front_end.rate_hz
-    return Reading(state, rate, vitals.jitter_s, front_end.bad_taxels, vitals.drift)
+    return Reading(state, rate, vitals.jitter_s, front_end.bad_taxels, vitals.drift(front_end))
 
 
 def _alike(one: FrontEnd, other: FrontEnd) -> bool:

@@ -13,7 +13,6 @@ class Vitals:
 
     def __init__(self) -> None:
         self.jitter_s = 0.0
-        self.drift = 0.0  # median taxel's way from the first baseline, in units of noise
         self._last: float | None = None
         self._first: NDArray[np.float64] | None = None
 
@@ -24,14 +23,16 @@ class Vitals:
         self._last = now
 
     def review(self, front_end: FrontEnd) -> None:
-        """Compare the baseline with the first one that was learned."""
-        if not front_end.ready:
-            return
-        # What an empty frame would deviate by is the baseline, turned over.
-        baseline = -front_end.conditioner.deviation(np.zeros(front_end.rows * front_end.columns))[0]
-        if self._first is None or self._first.shape != baseline.shape:
-            self._first = baseline
-        self.drift = float(np.median(np.abs(baseline - self._first))) / max(front_end.noise, 1e-30)
+        """Keep the first baseline that was learned."""
+        if self._first is None and front_end.ready:
+            self._first = front_end.conditioner.baseline
+
+    def drift(self, front_end: FrontEnd) -> float:
+        """The median taxel's way from the first baseline, in units of noise."""
+        if self._first is None or not front_end.ready or self._first.shape != front_end.conditioner.baseline.shape:
+            return 0.0
+        way = np.abs(front_end.conditioner.baseline - self._first)
+        return float(np.median(way)) / max(front_end.noise, 1e-30)
 
     def silent(self) -> None:
         """The sensor has fallen silent: the next interval says nothing of its jitter."""
@@ -39,7 +40,7 @@ class Vitals:
 
     def restart(self) -> None:
         """The sensor is learned anew."""
-        self._first, self.drift = None, 0.0
+        self._first = None
 
 
 def faulty(front_end: FrontEnd) -> bool:

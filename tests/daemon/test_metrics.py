@@ -118,16 +118,34 @@ def test_drift_is_the_way_of_the_baseline_in_units_of_noise() -> None:
     for _ in range(30):
         front_end.push(Frame(t := t + 1 / 15, hand.frame()))
     vitals.review(front_end)
-    assert vitals.drift == 0.0
+    assert vitals.drift(front_end) == 0.0
     for n in range(3000):
         front_end.push(Frame(t := t + 1 / 15, hand.frame() + n / 300))
     vitals.review(front_end)
-    assert vitals.drift == pytest.approx(10 / front_end.noise, rel=0.2)
+    assert vitals.drift(front_end) == pytest.approx(10 / front_end.noise, rel=0.2)
     vitals.restart()
     vitals.review(front_end)
-    assert vitals.drift == 0.0 and not faulty(front_end)
+    assert vitals.drift(front_end) == 0.0 and not faulty(front_end)
     front_end.conditioner.bad[:21] = True
     assert faulty(front_end)
+
+
+def contacts(*, watched: bool) -> list[str]:
+    """What a sensor without any noise, in fractions of one, makes of a touch after five seconds."""
+    front_end, vitals = FrontEnd("armrest", 9, 9), Vitals()
+    y, x = np.mgrid[:9, :9]
+    touch = 0.37 + np.round(0.5 * np.exp(-((y - 4) ** 2 + (x - 4) ** 2) / 2), 2)
+    found = []
+    for k in range(120):
+        found += front_end.push(Frame(k / 15, touch if 75 <= k < 90 else np.full((9, 9), 0.37)))
+        if watched and k % 15 == 0:
+            vitals.review(front_end)
+            vitals.drift(front_end)
+    return [type(event).__name__ for event in found]
+
+
+def test_looking_at_a_sensor_changes_nothing() -> None:
+    assert contacts(watched=True) == contacts(watched=False) != []
 
 
 QUANTILES = {"at": [0.01, 0.5, 0.99], "strength": [10, 50, 100], "duration_s": [0.1, 0.5, 2.0], "area": [0.0, 0.1, 0.3]}

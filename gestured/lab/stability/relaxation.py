@@ -54,7 +54,7 @@ def _conditioner(dtype: Any) -> Conditioner:
     for k in range(16):
         made.settle(k / 15 - 1.0, np.zeros(9))
     assert made.ready
-    made._baseline = made._baseline.astype(dtype)
+    made.baseline = made.baseline.astype(dtype)
     made._sigma = np.full(9, 0.75, dtype)
     made._tracked, made._reviewed, made._usual = 0.0, 0.0, 0.0
     return made
@@ -67,7 +67,7 @@ def _baseline(recovering: bool) -> Run:
             raw = np.full(9, x)
             d, *_ = made.deviation(raw)
             made.idle(float(t), raw, d, 0.0, sunken=False, burst=False, recovering=recovering)
-            out[k] = made._baseline[0]
+            out[k] = made.baseline[0]
         return out
 
     return run
