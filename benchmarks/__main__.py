@@ -19,7 +19,7 @@ def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
         "decode": inside.decode,
         "datagrams": lambda: traffic.datagrams(model),
         "latency": lambda: latency.latency(model),
-        "sensors": lambda: traffic.sensors(model),
+        "sensors": lambda: [traffic.sensors(model, 1000), traffic.sensors(model, 500)],
         "recognise": lambda: inside.recognise(model),
         "start": lambda: start.start_and_memory(model),
         "imports": start.imports,
