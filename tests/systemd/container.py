@@ -28,11 +28,11 @@ def missing() -> str | None:
     return None
 
 
-def wait(what: str, condition: Callable[[], Any]) -> Any:
+def wait(what: str, condition: Callable[[], Any], found_instead: Callable[[], object] = str) -> Any:
     """Ask until the answer is true; there is no message to wait for from a systemd that boots."""
     end = time.monotonic() + DEADLINE_S
     while not (found := condition()):
-        assert time.monotonic() < end, f"{what}: not within {DEADLINE_S:.0f} s"
+        assert time.monotonic() < end, f"{what}: not within {DEADLINE_S:.0f} s {found_instead()}"
         time.sleep(0.02)
     return found
 

@@ -132,7 +132,11 @@ def harmed(vehicle: Vehicle, number: str) -> float:
     assert vehicle.instance() != before
     seconds = time.monotonic() - begin
     sender.join()
-    wait("frames that were sent meanwhile", lambda: vehicle.frames(number) == sensor.count)
+    wait(
+        f"all {sensor.count} frames that were sent meanwhile",
+        lambda: vehicle.frames(number) == sensor.count,
+        lambda: f"but {vehicle.frames(number)}; the service said: {vehicle.log()[-2000:]}",
+    )
     return seconds
 
 
