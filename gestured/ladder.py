@@ -68,7 +68,6 @@ class Ladder:
         self.slow_s, self.slow_runs, self.retry_after = slow_s, slow_runs, retry_after
         self._clock = clock
         self._report = report or (lambda sentence: None)
-        self.last_run_s = 0.0  # of the rung that answered
         self.failures = 0  # how often a rung was put aside
         self._active, opened = self._first_open()
         self.gestures: tuple[str, ...] = tuple(opened.gestures)
@@ -129,8 +128,7 @@ class Ladder:
             if rung is not self._active:
                 self._report(f"{rung.name} answers now")
                 self._active = rung
-            self.last_run_s = took
-            return replace(scores, degraded=scores.degraded or self.degraded)
+            return replace(scores, degraded=scores.degraded or self.degraded, took_s=took)
         raise ModelError(f"no model could classify: {', '.join(rung.name for rung in self.rungs)}")
 
     def _first_open(self) -> tuple[Rung, Classifier]:

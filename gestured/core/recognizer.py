@@ -1,7 +1,7 @@
 """The one path from frames to events: conditioning, segmentation, classification, decision."""
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,6 +16,7 @@ from gestured.core.segmentation import TOUCHED, Action, Phase, Segmenter, Timing
 
 LARGEST = float(np.finfo(np.float32).max)  # counts; also what a frame on the wire can hold
 LEAD_S = 0.15  # quiet frames kept before an onset: at 15 Hz two of them
+DRAFT_S = 0.085  # quiet for so long, all that a window takes in is there; the wait goes on to see the finger stay off
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +28,12 @@ class Scores:
     model: str
     degraded: bool = False  # a fallback answered
     threshold: float = 0.5  # confidence from which the model's calibration has it published
+    took_s: float = 0.0  # s that the model ran
+
+    @property
+    def confidence(self) -> float:
+        """Of the best gesture."""
+        return float(self.values.max()) * (1.0 - self.unknown)
 
 
 class Classifier(Protocol):
@@ -75,6 +82,8 @@ class FrontEnd:
         self.segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
         self._mounted = self.mounting != Mounting()
         self._kept: deque[Kept] = deque()
+        self._made: tuple[Segment, NDArray[np.bool_]] | None = None  # the last one, and the bad taxels bridged in it
+        self.draft: Segment | None = None  # made by the last push: what will be cut if the finger stays off
         self.segments = 0  # so far; their ids
         self._last: float | None = None
         self._interval = 0.0
@@ -112,6 +121,7 @@ class FrontEnd:
         """
         t = frame.t
         out: list[Contact] = []
+        self.draft = None
         values = self.mounting.frame(frame.values) if self._mounted else frame.values
         raw = values.astype(np.float64).reshape(-1)
         if not np.abs(raw).max() <= LARGEST:
@@ -151,6 +161,8 @@ class FrontEnd:
             out += self._act(action, t)
         if segmenter.phase in TOUCHED:
             conditioner.busy(t, raw, d)
+            if segmenter.let_go() and t - segmenter.last_touched >= DRAFT_S:
+                self._make_draft(segmenter.onset, segmenter.last_touched)
             return out
         while kept[0][0] < t - LEAD_S:
             kept.popleft()
@@ -204,8 +216,9 @@ class FrontEnd:
 
     def _closed(self, t: float, onset: float, offset: float) -> list[Contact]:
         release = Release(self.sensor, self.segments, offset)
-        if offset - onset + self._interval < self.timing.glitch_s:  # the longest that it can have lasted
+        if self._glitch(onset, offset):
             return [Cancelled(self.sensor, self.segments, "glitch"), release]
+        self.conditioner.inspect(np.array([k[1] for k in self._kept if onset <= k[0] <= offset]))
         segment = self._segment(onset, offset)
         if float(segment.frames.max()) < self.segmenter.off * segment.noise:  # nothing is left without its bad taxels
             return [Cancelled(self.sensor, self.segments, "stuck"), release]
@@ -217,18 +230,34 @@ class FrontEnd:
             return [release]
         return [Cancelled(self.sensor, self.segments, reason), release]
 
+    def _glitch(self, onset: float, offset: float) -> bool:
+        """Whether the longest that a contact can have lasted is shorter than any finger's."""
+        return offset - onset + self._interval < self.timing.glitch_s
+
+    def _make_draft(self, onset: float, offset: float) -> None:
+        before = self._made
+        if not self._glitch(onset, offset):
+            segment = self._segment(onset, offset)
+            self.draft = segment if self._made is not before else None
+
     def _segment(self, onset: float, offset: float) -> Segment:
+        """The frames of a contact: made once, unless a taxel has turned out to be bad since."""
+        if self._made is not None:
+            made, bad = self._made
+            if (made.onset, made.offset) == (onset, offset) and np.array_equal(bad, self.conditioner.bad):
+                return made
         times = np.array([k[0] for k in self._kept])
         stack = np.array([k[1] for k in self._kept])
         first = int(np.searchsorted(times, onset))
         last = int(np.searchsorted(times, offset))
-        self.conditioner.inspect(stack[first : last + 1])
         frames = np.clip(self.conditioner.bridge(stack), -LARGEST, LARGEST).astype(np.float32)
         touches: tuple[tuple[Touch, ...], ...] = ()
         if any(k[2] for k in self._kept):
             touches = tuple(tuple(self._mount(touch) for touch in k[2]) for k in self._kept)
         lost = sum(k[3] for k in list(self._kept)[first + 1 : last + 1])
-        return Segment(frames, times, first, last, self.conditioner.noise, lost, touches)
+        segment = Segment(frames, times, first, last, self.conditioner.noise, lost, touches)
+        self._made = segment, self.conditioner.bad
+        return segment
 
     def _mount(self, touch: Touch) -> Touch:
         return Touch(touch.id, *self.mounting.point(touch.x, touch.y, *self.sent))
@@ -240,6 +269,10 @@ class Recognizer:
     `gestures` restricts the answer to a subset; what falls to the others is not given to those that are left.
     `thresholds` are the confidences below which a gesture is unknown, where not the model's own is to hold.
     `refractory` are the seconds in which the same gesture is not published again.
+    `witness` is told of each segment that was decided, and of its scores.
+
+    The classifier is asked while the segmenter still waits whether the finger stays off: once it is sure, the answer
+    is there. Where the finger comes back, that answer is thrown away.
     """
 
     def __init__(
@@ -251,6 +284,7 @@ class Recognizer:
         thresholds: Mapping[str, float] | None = None,
         refractory: Mapping[str, float] | None = None,
         sequence: int = 0,
+        witness: Callable[[Segment, Scores], None] | None = None,
     ) -> None:
         self.front_end = front_end
         self.classifier = classifier
@@ -259,10 +293,14 @@ class Recognizer:
         self._thresholds = dict(thresholds or {})
         self._refractory = dict(refractory or {})
         self._last_offset: dict[str, float] = {}
+        self._witness = witness
+        self._scored: tuple[Segment, Scores] | None = None
 
     def push(self, frame: Frame) -> list[Event]:
         """Take one frame, give what it decides; see `FrontEnd.push`."""
         found = self.front_end.push(frame)
+        if self.front_end.draft is not None:
+            self._look_ahead(self.front_end.draft)
         return self._name(found) if found else []
 
     def flush(self, t: float) -> list[Event]:
@@ -276,12 +314,26 @@ class Recognizer:
     def _name(self, found: list[Contact]) -> list[Event]:
         return [self._decide(x) if isinstance(x, Cut) else x for x in found]
 
+    def _look_ahead(self, draft: Segment) -> None:
+        try:
+            self._scores(draft)
+        except ModelError:
+            pass  # it is asked again when the segment is cut
+
+    def _scores(self, segment: Segment) -> Scores:
+        """Raises ModelError."""
+        if self._scored is None or self._scored[0] is not segment:
+            self._scored = segment, self.classifier.classify(segment)
+        return self._scored[1]
+
     def _decide(self, cut: Cut) -> Gesture | Unknown | Cancelled:
         sensor, segment = self.front_end.sensor, cut.segment
         try:
-            answer = self.classifier.classify(segment)
+            answer = self._scores(segment)
         except ModelError:
             return Cancelled(sensor, cut.id, "model")
+        if self._witness is not None:
+            self._witness(segment, answer)
         scores = {
             gesture: float(value)
             for gesture, value in zip(self.classifier.gestures, answer.values, strict=True)

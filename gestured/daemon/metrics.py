@@ -87,10 +87,9 @@ class Metrics:
         self.active_model: Callable[[], str] = str
         self._named: set[str] = set()
 
-    def event(self, event: Event, run_s: float) -> None:
-        """Count an event; `run_s` is what the classifier took for it."""
+    def event(self, event: Event) -> None:
+        """Count an event."""
         if isinstance(event, Gesture | Unknown):
-            self.inference.observe(run_s, event.model)
             self.latency.observe(event.decided - event.offset)
             if event.degraded:
                 self.degraded.add()

@@ -13,8 +13,8 @@ from typing import Literal
 
 from gestured.core.conditioning import Mounting
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
-from gestured.core.frames import Frame
-from gestured.core.recognizer import FrontEnd, Recognizer
+from gestured.core.frames import Frame, Segment
+from gestured.core.recognizer import FrontEnd, Recognizer, Scores
 from gestured.core.segmentation import Timing
 from gestured.core.stamping import Stamper
 from gestured.core.wire import Arrival
@@ -237,7 +237,12 @@ class Pipeline:
             thresholds={name: part.threshold for name, part in parts.items() if part.threshold is not None},
             refractory={name: part.refractory_s for name, part in parts.items()},
             sequence=sequence,
+            witness=self._decided,
         )
+
+    def _decided(self, segment: Segment, scores: Scores) -> None:
+        self._metrics.inference.observe(scores.took_s, scores.model)
+        self.watched.note(segment, scores)
 
     def _publish(self, sensor: Sensor, events: Sequence[Event]) -> None:
         for event in events:
@@ -248,6 +253,7 @@ class Pipeline:
             elif isinstance(event, Release):
                 sensor.open = None
             self._emit(event)
+        self.watched.look_on()
 
     def _recover(self, sensor: Sensor, t: float) -> list[Event]:
         """After a bug: start that sensor clean, and end what its consumers believe to be open."""

@@ -235,7 +235,7 @@ class Service:
         """Count an event and give it to every sink; a test's is no answer of a model."""
         epoch = time.time() - time.monotonic()
         if not test:
-            self.metrics.event(event, self.pipeline.watched.ladder.last_run_s)
+            self.metrics.event(event)
             self.health.note(event)
         elif isinstance(event, Gesture):
             self.metrics.tests.add()

@@ -54,6 +54,6 @@ class Shadow:
 
 def answer(model: Classifier, scores: Scores) -> tuple[str, float]:
     """(gesture or "unknown", confidence of the best gesture) by the model's own calibration."""
-    best = int(scores.values.argmax())
-    confidence = float(scores.values[best]) * (1.0 - scores.unknown)
-    return (model.gestures[best] if confidence >= scores.threshold else UNKNOWN), confidence
+    confidence = scores.confidence
+    best = model.gestures[int(scores.values.argmax())]
+    return (best if confidence >= scores.threshold else UNKNOWN), confidence

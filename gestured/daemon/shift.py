@@ -1,12 +1,15 @@
 """Distribution shift: do the gestures of this deployment look like those that the model was trained on?
 
-The model's metadata say between which values the middle 98 % of its training gestures lay, for strength, duration
-and area. Of the last LAST gestures we count how many lie outside. In training it is 2 %; one person's are no sample
-of all people, so nothing is said below UNLIKELY. (A test of the whole distribution, such as the population stability
-index, would call every single driver a shift: one hand varies less than a population's. The range does not.)
+The model's metadata say between which values the middle 98 % of its training gestures lay (`measures`, and the
+strength), and with which confidence it answered people whom it had not seen. Of the last LAST gestures we count how
+many lie outside, or below the confidence. In training it is 2 %, or 1; one person's are no sample of all people, so
+nothing is said below UNLIKELY. Of all segments we count how many were unknown; touches that are no gestures are among
+them, so nothing is said below MANY. (A test of the whole distribution, such as the population stability index, would
+call every single driver a shift: one hand varies less than a population's. The range does not.)
 Memory is LAST numbers a quantity.
 """
 
+import math
 from collections import deque
 from collections.abc import Mapping
 from typing import Any
@@ -14,53 +17,63 @@ from typing import Any
 import numpy as np
 
 from gestured.core.frames import Segment
+from gestured.core.measures import MEASURES, measures
+from gestured.core.recognizer import Scores
 from gestured.core.window import Window
 
 LAST = 100  # gestures
 LEAST = 20  # before which nothing is said
 UNLIKELY = 0.2  # share outside; with 2 % expected, 4 of 20 come by chance once in 1700 times (binomial)
-ACTIVE, COVERED = 0.15, 0.2  # of the segment's peak, as the lab measures its training data
-QUANTITIES = ("strength", "duration_s", "area")
+MANY = 0.5  # share of segments that are unknown
+UNKNOWN = "unknown"
+QUANTITIES = ("strength", *MEASURES, "confidence")
 
 
 class Shift:
     """What came, held against a model's `quantiles` (metadata); knows nothing where they say nothing."""
 
-    def __init__(self, quantiles: Mapping[str, Any]) -> None:
+    def __init__(self, quantiles: Mapping[str, Any], window: Window | None = None) -> None:
+        self._window = window
         self.ranges = {name: found for name in QUANTITIES if (found := _range(quantiles, name)) is not None}
-        self._outside: dict[str, deque[bool]] = {name: deque(maxlen=LAST) for name in self.ranges}
+        names = [*self.ranges, *([UNKNOWN] if _mostly_known(quantiles) else [])]
+        self._outside: dict[str, deque[bool]] = {name: deque(maxlen=LAST) for name in names}
+
+    def see(self, segment: Segment, scores: Scores) -> None:
+        """A segment was decided. What a fallback says of it is not what the quantiles are about."""
+        if self._window is None or not self._outside or scores.degraded:
+            return
+        known = scores.confidence >= scores.threshold
+        if UNKNOWN in self._outside:
+            self._outside[UNKNOWN].append(not known)
+        if known:
+            self.add(measured(segment, self._window) | {"confidence": scores.confidence})
 
     def add(self, seen: Mapping[str, float]) -> None:
-        """One gesture's quantities, as `measured` gives them."""
+        """One gesture's quantities."""
         for name, (low, high) in self.ranges.items():
             self._outside[name].append(not low <= seen[name] <= high)
 
     @property
     def count(self) -> int:
         """Gestures that are counted now."""
-        return max((len(outside) for outside in self._outside.values()), default=0)
+        return max((len(self._outside[name]) for name in self.ranges), default=0)
 
     def shares(self) -> dict[str, float]:
-        """Share outside the training range for each quantity; empty before there were LEAST gestures."""
+        """Share outside the training range for each quantity, share of `unknown`; empty before there were LEAST."""
         return {
             name: sum(tuple(outside)) / len(outside) for name, outside in self._outside.items() if len(outside) >= LEAST
         }
 
     def unlike(self) -> list[str]:
         """The quantities that do not look like the training data."""
-        return [name for name, share in self.shares().items() if share >= UNLIKELY]
+        return [name for name, share in self.shares().items() if share >= (MANY if name == UNKNOWN else UNLIKELY)]
 
 
 def measured(segment: Segment, window: Window) -> dict[str, float]:
-    """Strength (peak over noise), duration_s and area (share of the grid) of a segment, as in the lab's `quantiles`."""
+    """Strength (peak over the sensor's noise) of a segment, and its `measures`."""
     touched = segment.frames[segment.first : segment.last + 1]
-    frames = window.apply(segment)
-    active = frames[frames.max(axis=(1, 2)) >= ACTIVE] if len(frames) else frames
-    return {
-        "strength": float(touched.max()) / max(segment.noise, 1e-30),
-        "duration_s": len(active) / window.rate_hz,
-        "area": float((active >= COVERED).mean()) if len(active) else 0.0,
-    }
+    strength = float(touched.max()) / max(segment.noise, 1e-30)
+    return {"strength": strength} | measures(window.apply(segment), window.rate_hz)
 
 
 def _range(quantiles: Mapping[str, Any], name: str) -> tuple[float, float] | None:
@@ -70,4 +83,11 @@ def _range(quantiles: Mapping[str, Any], name: str) -> tuple[float, float] | Non
         low, high = (float(values[np.flatnonzero(at == q)[0]]) for q in (0.01, 0.99))
     except (KeyError, ValueError, IndexError, TypeError):
         return None
+    if name == "confidence":
+        high = math.inf  # surer than in training is no fault
     return (low, high) if low <= high else None
+
+
+def _mostly_known(quantiles: Mapping[str, Any]) -> bool:
+    share = quantiles.get(UNKNOWN)
+    return isinstance(share, int | float) and 0 <= share < MANY

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from gestured.lab.nets import Decision
 
-LOST = 0.025  # share of the validation gestures that the threshold may cost
+LOST = 0.03  # share of the validation gestures that the threshold may cost
 
 
 def fit_decision(first: Tensor, second: Tensor, labels: NDArray[np.int64], gestures: int) -> Decision:

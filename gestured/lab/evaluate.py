@@ -123,7 +123,7 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: Data) -> dict[s
             part = Calibrated(
                 {n: x[torch.from_numpy(keep)] for n, x in calibrated.logits.items()}, calibrated.labels[keep]
             )
-            module, calibration = judged(trained, name, part)
+            module, calibration, _ = judged(trained, name, part)
             with torch.no_grad():
                 out = module.decision(*(trained.held_out[n][torch.from_numpy(held)] for n in (name, "trajectory")))
             scores[held], unknown[held] = out[0].numpy(), out[1].numpy()

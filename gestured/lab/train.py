@@ -20,6 +20,7 @@ from torch import Tensor, nn
 
 import gestured
 from gestured.core.features import feature_names
+from gestured.core.measures import MEASURES, measures
 from gestured.lab.dataset import OTHERS, TRIALS, WINDOW, Samples, join, recorded, simulated
 from gestured.lab.decide import fit_decision, threshold
 from gestured.lab.export import export_forest, export_net, write_manifest
@@ -165,24 +166,29 @@ def calibration_set(trained: Trained, data: Data, plan: Plan) -> Calibrated:
     return Calibrated({name: x[torch.from_numpy(usable)] for name, x in found.items()}, labels[usable])
 
 
-def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged, dict[str, Any]]:
-    """A network with its second opinion and their calibration."""
+def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged, dict[str, Any], dict[str, Any]]:
+    """A network with its second opinion, their calibration, and how it answers then (`answers`)."""
     first, second = calibrated.logits[name], calibrated.logits["trajectory"]
     decision = fit_decision(first, second, calibrated.labels, len(GESTURES))
     with torch.no_grad():
         scores, unknown = decision(first, second)
-    least = threshold(scores.numpy(), unknown.numpy(), calibrated.labels < len(GESTURES))
+    known = calibrated.labels < len(GESTURES)
+    least = threshold(scores.numpy(), unknown.numpy(), known)
     calibration = {
         "temperature": (1 / decision.share.clamp(min=1e-6)).tolist(),  # of the network and of the trajectory net
         "unknown_weight": decision.weight.tolist(),
         "unknown_bias": float(decision.bias),
         "threshold": least,
     }
-    return Judged(trained.nets[name], trained.nets["trajectory"], decision).eval(), calibration
+    module = Judged(trained.nets[name], trained.nets["trajectory"], decision).eval()
+    return module, calibration, answers(scores.numpy().max(axis=1) * (1 - unknown.numpy()), known, least)
 
 
-def grow_forest(data: Data, plan: Plan, jobs: int) -> tuple[RandomForestClassifier, dict[str, Any]]:
-    """The touch-pattern forest of the paper's Table IV (200 trees, depth 9), with a class for what is no gesture."""
+def grow_forest(data: Data, plan: Plan, jobs: int) -> tuple[RandomForestClassifier, dict[str, Any], dict[str, Any]]:
+    """The touch-pattern forest of the paper's Table IV (200 trees, depth 9), with a class for what is no gesture.
+
+    Gives what `judged` gives.
+    """
     wide = len(data.teach) - data.nominal  # the cohort stands at the end
     chosen = np.random.default_rng(plan.fit.seed).choice(wide, min(plan.forest, wide), replace=False)
     parts = [data.teach.take(np.concatenate([chosen, np.arange(wide, len(data.teach))]))]
@@ -197,7 +203,10 @@ def grow_forest(data: Data, plan: Plan, jobs: int) -> tuple[RandomForestClassifi
     forest.fit(samples.features(), classes, sample_weight=weights)
     labels = np.minimum(_classes(data.calibrate), len(GESTURES))
     chances = forest.predict_proba(data.calibrate.features())
-    return forest, _forest_calibration(chances, labels)
+    calibration = _forest_calibration(chances, labels)
+    scores, unknown = forest_outputs(chances, len(GESTURES), calibration)
+    confidence = scores.max(axis=1) * (1 - unknown)
+    return forest, calibration, answers(confidence, labels < len(GESTURES), calibration["threshold"])
 
 
 def _classes(samples: Samples) -> NDArray[np.int64]:
@@ -233,14 +242,20 @@ QUANTILES = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
 def quantiles(samples: Samples) -> dict[str, Any]:
     """What the training gestures looked like, to compare a deployment with."""
     known = samples.take(samples.labels != "none")
-    pressed = [known.window(i) for i in range(len(known))]
-    active = [w[w.max(axis=(1, 2)) >= 0.15] for w in pressed]
-    values = {
-        "strength": known.strength,  # peak over the sensor's noise
-        "duration_s": np.array([len(w) for w in active]) / WINDOW.rate_hz,
-        "area": np.array([(w >= 0.2).mean() if len(w) else 0.0 for w in active]),  # share of the grid
-    }
-    return {"at": list(QUANTILES)} | {n: np.quantile(v, QUANTILES).round(4).tolist() for n, v in values.items()}
+    found = [measures(known.window(i), WINDOW.rate_hz) for i in range(len(known))]
+    values = {"strength": known.strength} | {name: np.array([one[name] for one in found]) for name in MEASURES}
+    return {"at": list(QUANTILES)} | {name: _at(value) for name, value in values.items()}
+
+
+def _at(values: NDArray[np.floating]) -> list[float]:
+    """The values at `QUANTILES`, of which one number has at least four digits."""
+    return [float(f"{value:.5g}") for value in np.quantile(values, QUANTILES)]
+
+
+def answers(confidence: NDArray[np.floating], known: NDArray[np.bool_], least: float) -> dict[str, Any]:
+    """How a model answers gestures of people whom it has not seen: confidence where it answers, and how often not."""
+    given = confidence[known]
+    return {"confidence": _at(given[given >= least]), "unknown": round(float((given < least).mean()), 4)}
 
 
 def train(plan: Plan, out: Path, cache: Path, real: Path | None, jobs: int) -> Data:
@@ -252,15 +267,18 @@ def train(plan: Plan, out: Path, cache: Path, real: Path | None, jobs: int) -> D
     digest = hashlib.sha256((data.teach.digest() + (data.real.digest() if data.real else "")).encode()).hexdigest()
     common: dict[str, Any] = {
         "version": gestured.__version__, "gestures": list(GESTURES), "window": WINDOW,
-        "training_data": digest, "quantiles": quantiles(data.teach), "learned_from": origins(_real_files(real)),
+        "training_data": digest, "learned_from": origins(_real_files(real)),
     }  # fmt: skip
+    seen = quantiles(data.teach)
     out.mkdir(parents=True, exist_ok=True)
     for name in ("cnn_lstm", "lstm"):
-        module, calibration = judged(trained, name, calibrated)
-        export_net(module, out / f"{name}.onnx", kind=name, calibration=calibration, **common)
-    forest, calibration = grow_forest(data, plan, jobs)
+        module, calibration, answered = judged(trained, name, calibrated)
+        common |= {"kind": name, "calibration": calibration, "quantiles": seen | answered}
+        export_net(module, out / f"{name}.onnx", **common)
+    forest, calibration, answered = grow_forest(data, plan, jobs)
+    common |= {"kind": "touch_pattern_rf", "calibration": calibration, "quantiles": seen | answered}
     features: Sequence[str] = feature_names(WINDOW.rows, WINDOW.columns)
     path = out / "touch_pattern_rf.onnx"
-    export_forest(forest, path, kind="touch_pattern_rf", calibration=calibration, features=features, **common)
+    export_forest(forest, path, features=features, **common)
     write_manifest(out, {})
     return data

@@ -17,6 +17,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unkn
 from gestured.core.frames import Frame, Segment
 from gestured.core.recognizer import Contact, Cut, FrontEnd, Recognizer, Scores
 from gestured.core.segmentation import Timing
+from gestured.core.window import Window
 from tests.scenario import Player, parse
 
 GESTURES = ("tap", "left", "right")
@@ -34,6 +35,7 @@ def says(*values: float, unknown: float = 0.0, threshold: float = 0.5) -> Scores
     return Scores(np.array(values, dtype=np.float32), unknown, "fake", threshold=threshold)
 
 
+DOUBLE = ("quiet for 1500ms", TAP, "quiet for 150ms", TAP, "quiet for 900ms")
 SURE = says(0.9, 0.06, 0.04)
 
 
@@ -67,6 +69,65 @@ def answers(events: Sequence[Event]) -> list[Event]:
 
 def swipes(count: int, pause: str = "600ms") -> list[Frame]:
     return frames("quiet for 1500ms", *[SWIPE, f"quiet for {pause}"] * count)
+
+
+# --- when the classifier is asked
+
+
+@pytest.mark.parametrize("lines", [(SWIPE,), (TAP,), (TAP, "quiet for 150ms", TAP)])
+def test_the_answer_is_there_before_the_wait_is_over(lines: tuple[str, ...]) -> None:
+    classifier = Fake()
+    subject = recognizer(classifier)
+    asked = []
+    for frame in frames("quiet for 1500ms", *lines, "quiet for 900ms"):
+        events = answers(subject.push(frame))
+        if events:
+            assert asked[-1] == len(classifier.seen) == len(lines) // 2 + 1  # nothing is asked when it is decided
+        asked.append(len(classifier.seen))
+    assert asked[-1] == len(lines) // 2 + 1
+
+
+def test_a_finger_that_comes_back_is_answered_by_all_that_it_did() -> None:
+    tap, both = SURE, says(0, 0, 1)
+    classifier = Fake([tap, both])
+    (answer,) = answers(run(recognizer(classifier), frames(*DOUBLE)))
+    assert isinstance(answer, Gesture) and answer.gesture == "right"
+    first, second = classifier.seen
+    assert first.onset == second.onset == answer.onset and first.offset < second.offset == answer.offset
+
+
+def test_what_is_asked_ahead_is_what_is_cut() -> None:
+    """A window ends 0.07 s after the last touched frame: no frame that comes later is in it."""
+    window = Window(9, 9, 15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
+    for line in (SWIPE, TAP, "move 1,1 to 7,7 0.5 in 700ms"):
+        stream = frames("quiet for 1500ms", line, "quiet for 900ms")
+        classifier, front_end = Fake(), FrontEnd("armrest", 9, 9)
+        run(recognizer(classifier), stream)
+        (segment,) = [x.segment for frame in stream for x in front_end.push(frame) if isinstance(x, Cut)]
+        (asked,) = classifier.seen
+        (longer,) = cut_late(stream)
+        assert np.array_equal(asked.frames, segment.frames)
+        assert np.array_equal(window.apply(asked), window.apply(longer))
+        assert len(longer.frames) > len(asked.frames) or line != TAP
+
+
+def cut_late(stream: Sequence[Frame]) -> list[Segment]:
+    """Segments with all frames up to their cut."""
+    front_end = FrontEnd("armrest", 9, 9)
+    found = []
+    for frame in stream:
+        front_end._made = None
+        found += [x.segment for x in front_end.push(frame) if isinstance(x, Cut)]
+    return found
+
+
+def test_a_witness_is_told_of_what_was_decided_alone() -> None:
+    told: list[tuple[Segment, Scores]] = []
+    classifier = Fake([SURE, says(0, 0, 1)])
+    events = run(recognizer(classifier, witness=lambda *what: told.append(what)), frames(*DOUBLE))
+    ((segment, scores),) = told
+    assert segment is classifier.seen[1] and scores.values[2] == 1
+    assert [segment.offset] == [event.offset for event in answers(events)]
 
 
 # --- what is decided
@@ -147,7 +208,8 @@ def test_what_is_unknown_has_no_refractory_time() -> None:
 
 
 def test_a_model_that_fails_costs_one_segment() -> None:
-    subject = recognizer(Fake([ModelError("broken"), SURE]))
+    """It is asked ahead, and once more when the segment is cut."""
+    subject = recognizer(Fake([ModelError("broken"), ModelError("broken"), SURE]))
     events = run(subject, swipes(2))
     assert [type(event) for event in events] == [Onset, Cancelled, Release, Onset, Gesture, Release]
     assert events[1] == Cancelled("armrest", 1, "model")

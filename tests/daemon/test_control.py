@@ -287,7 +287,7 @@ def test_gestures_unlike_those_of_the_training_are_said_to_be(start, tmp_path: P
     daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", model=model)
     client = daemon.client()
     sensor = Sensor(daemon, "arm").begin()
-    for _ in range(4):
+    for _ in range(5):  # one more than must be: what is looked at comes after its event
         sensor.perform(*["left", "right", "up", "down", "left"])
         client.events("gesture", "arm", 5)
     assert daemon.metric("gestured_shift_ratio", quantity="duration_s") == 1.0

@@ -11,7 +11,9 @@ import pytest
 
 from gestured.core.events import Cancelled, Event, Gesture, Unknown
 from gestured.core.frames import Frame, Segment
+from gestured.core.measures import MEASURES
 from gestured.core.recognizer import FrontEnd, Scores
+from gestured.core.window import Window
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.reading import STATES, Reading, by_label, together
 from gestured.daemon.shadow import Shadow
@@ -21,6 +23,7 @@ from gestured.daemon.watch import Watched
 from gestured.ladder import ladder_for
 from tests.daemon.harness import Daemon, Hand, Sensor
 
+WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 ROOT = Path(__file__).resolve().parents[2]
 REASONS = (
     "not_osc", "address", "types", "truncated", "trailing", "bundle", "oversized", "size", "not_finite",
@@ -42,7 +45,7 @@ def test_there_are_at_most_200_series_whatever_arrives() -> None:
     pytest.importorskip("prometheus_client")
     metrics = Metrics()
     for event in everything():
-        metrics.event(event, 0.001)
+        metrics.event(event)
     names = [f"sensor_{n}" for n in range(500)]
     for name in names:
         for result in ("ok", "lost", "late", "duplicate"):
@@ -56,7 +59,7 @@ def test_there_are_at_most_200_series_whatever_arrives() -> None:
             counter.add(label)
     readings = {name: Reading(STATES[n % len(STATES)]) for n, name in enumerate(names)}
     metrics.sensors = lambda: by_label(readings, metrics.sensor_label)
-    metrics.shift = lambda: {"strength": 0.1, "duration_s": 0.2, "area": 0.3}
+    metrics.shift = lambda: dict.fromkeys(("strength", *MEASURES, "confidence", "unknown"), 0.1)
     real = (Path(__file__).parent / "metrics.txt").read_text()
     gauges = set(re.findall(r"^# TYPE (\S+) ", real, re.MULTILINE))
     known = set(re.findall(r"^# TYPE (\S+) ", metrics.exposition().decode(), re.MULTILINE))
@@ -148,25 +151,54 @@ def test_looking_at_a_sensor_changes_nothing() -> None:
     assert contacts(watched=True) == contacts(watched=False) != []
 
 
-QUANTILES = {"at": [0.01, 0.5, 0.99], "strength": [10, 50, 100], "duration_s": [0.1, 0.5, 2.0], "area": [0.0, 0.1, 0.3]}
+QUANTILES = {
+    "at": [0.01, 0.5, 0.99],
+    "strength": [10, 50, 100],
+    "duration_s": [0.1, 0.5, 2.0],
+    "confidence": [0.5, 0.9, 0.99],
+    "unknown": 0.02,
+}
 
 
 def test_gestures_as_in_training_are_no_shift_and_others_are() -> None:
     shift = Shift(QUANTILES)
-    usual = {"strength": 40.0, "duration_s": 0.4, "area": 0.1}
+    usual = {"strength": 40.0, "duration_s": 0.4, "area": 0.1, "confidence": 1.0}  # surer than ever is no fault
     for _ in range(LEAST - 1):
         shift.add(usual)
     assert shift.shares() == {} and shift.unlike() == []
     for _ in range(LAST):
         shift.add(usual)
-    assert shift.shares() == {"strength": 0.0, "duration_s": 0.0, "area": 0.0}
+    assert shift.shares() == {"strength": 0.0, "duration_s": 0.0, "confidence": 0.0}
     for _ in range(LAST // 4):
         shift.add(usual | {"strength": 300.0})
     assert shift.shares()["strength"] == 0.25 and shift.unlike() == ["strength"]
     assert shift.count == LAST
     for _ in range(LAST):
-        shift.add(usual)  # what is long ago no longer counts
-    assert shift.unlike() == []
+        shift.add(usual | {"confidence": 0.4})  # what is long ago no longer counts
+    assert shift.unlike() == ["confidence"]
+
+
+def decided(confidence: float, *, degraded: bool = False) -> tuple[Segment, Scores]:
+    frames = np.zeros((8, 9, 9), np.float32)
+    frames[1:7, 4, 4] = 50
+    scores = Scores(np.array([confidence, 0], np.float32), 0.0, "m", degraded, threshold=0.5)
+    return Segment(frames, np.arange(8) / 15, 1, 6, 1.0), scores
+
+
+def test_more_unknown_than_known_is_a_shift_and_a_fallback_says_nothing() -> None:
+    shift = Shift(QUANTILES, WINDOW)
+    for n in range(LAST):
+        shift.see(*decided(0.9 if n % 5 else 0.4))
+        shift.see(*decided(0.1, degraded=True))
+    assert shift.shares()["unknown"] == 0.2 and shift.unlike() == []
+    assert shift.shares()["confidence"] == shift.shares()["duration_s"] == 0.0
+    for n in range(LAST):
+        shift.see(*decided(0.9 if n % 2 else 0.4))
+    assert shift.unlike() == ["unknown"]
+    silent = Shift(QUANTILES | {"unknown": 0.7}, WINDOW)  # a model that mostly says unknown
+    for _ in range(LAST):
+        silent.see(*decided(0.4))
+    assert silent.shares() == {}
 
 
 @pytest.mark.parametrize(
@@ -194,13 +226,13 @@ def test_what_is_measured_is_what_the_lab_measures_of_its_training_data() -> Non
             frames[n + 2] = rng.uniform(20, 90) * np.exp(-((y - 4) ** 2 + (x - 8 * n / length) ** 2) / 2)
         segments.append(Segment(frames, np.arange(length + 4) / 15, 2, length + 1, 1.5))
     seen = [measured(segment, WINDOW) for segment in segments]
-    assert {"strength", "duration_s", "area"} == set(seen[0])
+    assert {"strength", *MEASURES} == set(seen[0])
     windows = [WINDOW.apply(segment).astype(np.float16) for segment in segments]
     offsets = np.cumsum([0, *map(len, windows)], dtype=np.int64)
     labels, people = np.array(["one_tap"] * len(windows)), np.zeros(len(windows), np.int64)
     strength = np.array([s["strength"] for s in seen])
     ours = train.quantiles(Samples(np.concatenate(windows), offsets, labels, labels, people, strength))
-    for name in ("strength", "duration_s", "area"):
+    for name in ("strength", *MEASURES):
         expected = np.quantile([s[name] for s in seen], train.QUANTILES)
         assert ours[name] == pytest.approx(expected, rel=0.02, abs=2e-3), name
 
@@ -239,5 +271,8 @@ def test_what_looks_on_cannot_prevent_an_answer(model: Path, monkeypatch: pytest
     expected = watched.classify(segment)
     watched.shadow = Shadow(Fixed(), "candidate")
     monkeypatch.setattr(Shadow, "see", lambda self, segment, scores: 1 / 0)
-    answer = watched.classify(segment)
-    assert np.array_equal(answer.values, expected.values) and answer.unknown == expected.unknown
+    for _ in range(2):
+        answer = watched.classify(segment)
+        assert np.array_equal(answer.values, expected.values) and answer.unknown == expected.unknown
+        watched.note(segment, answer)
+        watched.look_on()
