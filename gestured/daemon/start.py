@@ -8,6 +8,7 @@ import resource
 import signal
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
@@ -36,6 +37,8 @@ def run(settings: Settings, load: Loader) -> None:
 async def _run(settings: Settings, load: Loader) -> None:
     """Bind, open, serve. What cannot be had ends it before it says that it is ready."""
     loop = asyncio.get_running_loop()
+    _abort(signal.SIG_BLOCK)  # in the threads that are made from here on, so that it finds this one
+    loop.set_default_executor(ThreadPoolExecutor(initializer=_abort, initargs=(signal.SIG_BLOCK,)))
     stop, reload = asyncio.Event(), asyncio.Event()
     throttle = Throttle()
     loop.set_exception_handler(
@@ -50,12 +53,22 @@ async def _run(settings: Settings, load: Loader) -> None:
         service = Service(settings, ladder, bound, load)
         gc.freeze()  # what the start has made stays: later collections need not walk through it
         await service.start()
+        _abort(signal.SIG_UNBLOCK)
         _announce(service, ladder.active)
         await service.serve(stop, reload)
         for number in SIGNALS:  # nothing is left to be asked: a stop that is repeated must not look like a crash
             signal.signal(number, signal.SIG_IGN)
     finally:
         bound.close()
+
+
+def _abort(how: int) -> None:
+    """Block or unblock, in this thread, the signal with which systemd ends a hang.
+
+    It is for the loop's thread: taken by another one, a process that was stopped, and is woken to be ended, would read
+    what waits in its sockets first, and that is the next start's.
+    """
+    signal.pthread_sigmask(how, [signal.SIGABRT])
 
 
 def _when(number: signal.Signals, act: Callable[[], object]) -> None:

@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import signal
 import socket
 import subprocess
 import sys
@@ -9,8 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from gestured.client.control import Control
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
 
+UNIT = Path(__file__).resolve().parents[2] / "systemd" / "gestured.service"
 # As systemd does: the sockets from descriptor 3 on, and LISTEN_PID set by the process itself after its fork.
 ACTIVATE = """
 import os, sys
@@ -26,7 +30,9 @@ os.execv(sys.executable, [sys.executable, "-m", "gestured.daemon", *sys.argv[3:]
 class Activated(Daemon):
     """A daemon that is given sockets by name."""
 
-    def __init__(self, folder: Path, *flags: object, sockets: dict[str, socket.socket], **more: object) -> None:
+    def __init__(
+        self, folder: Path, *flags: object, sockets: dict[str, socket.socket], env: dict[str, str] | None = None
+    ) -> None:
         fds = [sock.fileno() for sock in sockets.values()]
         clean = {key: value for key, value in os.environ.items() if not key.startswith("GESTURED_")}
         arguments = [",".join(map(str, fds)), ":".join(sockets), *map(str, flags)]
@@ -34,7 +40,7 @@ class Activated(Daemon):
         with self.stderr_path.open("ab") as errors:
             command = [sys.executable, "-c", ACTIVATE, *arguments]
             self.process = subprocess.Popen(
-                command, stdout=subprocess.PIPE, stderr=errors, env=clean, text=True, pass_fds=fds
+                command, stdout=subprocess.PIPE, stderr=errors, env=clean | (env or {}), text=True, pass_fds=fds
             )
 
 
@@ -82,6 +88,27 @@ def test_sockets_are_taken_by_name_and_survive_a_restart(model: Path, tmp_path: 
     finally:
         daemon.stop()
     assert "Traceback" not in daemon.stderr()
+
+
+def test_what_is_sent_while_it_is_stopped_is_the_next_starts(model: Path, tmp_path: Path, passed) -> None:
+    environment = dict(re.findall(r"^Environment=(\w+)=(\w+)$", UNIT.read_text(), re.MULTILINE))
+    daemon = Activated.start(tmp_path, model, "--clock", "sensor", sockets=passed, env=environment)
+    client = daemon.client()
+    sensor = Sensor(daemon, "arm").begin().perform("left")
+    client.events("gesture", "arm")
+    daemon.get("/metrics")
+    with Control(Path(daemon.ready["control"])) as control:
+        control.ask("reload")  # now every thread that it may have is there
+    daemon.signal(signal.SIGSTOP)
+    os.waitid(os.P_PID, daemon.process.pid, os.WSTOPPED)
+    sent = [sensor.packet(frame) for frame in sensor.hand.idle(3.0)]
+    for packet in sent:
+        sensor.sock.send(packet)
+    daemon.signal(signal.SIGABRT)  # as systemd's watchdog does: ended, and woken for it
+    daemon.signal(signal.SIGCONT)
+    assert daemon.wait() == -signal.SIGABRT
+    passed["osc"].settimeout(DEADLINE_S)
+    assert [passed["osc"].recv(65536) for _ in sent] == sent
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ import pytest
 from gestured.client.stream import Stream
 from tests.daemon.harness import Sensor
 from tests.documents.blocks import blocks
-from tests.systemd.container import Container, missing, wait
+from tests.systemd.container import DEADLINE_S, Container, missing, wait
 
 ROOT = Path(__file__).resolve().parents[2]
 EVENTS = "/run/gestured/events.sock"
@@ -80,7 +80,9 @@ class Vehicle:
 
     def stream(self, *types: str) -> Stream:
         """A new subscriber; it waits until the daemon answers."""
-        return Stream(self.box.path(EVENTS), {"types": list(types or ("gesture",))})
+        stream = Stream(self.box.path(EVENTS), {"types": list(types or ("gesture",))})
+        stream.socket.settimeout(DEADLINE_S)
+        return stream
 
     def instance(self) -> str:
         """Which start of the daemon answers."""
