@@ -7,6 +7,7 @@ any time between frames: `-expm1(-dt / tau)`, never `dt / tau`.
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,13 @@ class Mounting:
         if self.rotate == 270:
             return rows - 1 - y, x
         return x, y
+
+
+class Inspection(NamedTuple):
+    """Of one contact."""
+
+    still: NDArray[np.bool_]  # (N,) taxels that did not change
+    pressed: NDArray[np.bool_]  # (N,) taxels whose neighbours were pressed
 
 
 class Conditioner:
@@ -217,14 +225,18 @@ class Conditioner:
             self._frozen = frozen
             self._review()
 
-    def inspect(self, frames: Array) -> None:
-        """Look at a finished contact (T, N), not yet bridged: a taxel that stood still under pressure is stuck."""
+    def inspect(self, frames: Array) -> Inspection:
+        """Look at a contact (T, N), not yet bridged."""
         if len(frames) < 2:
-            return
+            return Inspection(np.ones(frames.shape[1], dtype=bool), np.zeros(frames.shape[1], dtype=bool))
         peaks = frames.max(axis=0)
         around = _neighbour_mean(peaks.reshape(self.rows, self.columns), np.ones((self.rows, self.columns), dtype=bool))
         still = np.ptp(frames, axis=0) == 0
-        pressed = around.ravel() > max(0.4 * float(peaks.max()), 8 * self.noise)
+        return Inspection(still, around.ravel() > max(0.4 * float(peaks.max()), 8 * self.noise))
+
+    def judge(self, seen: Inspection) -> None:
+        """The contact that was inspected is over: a taxel that stood still under pressure, twice, is stuck."""
+        still, pressed = seen
         self._strikes[pressed & still] += 1
         self._strikes[~still] = 0
         stuck = (self._stuck & still) | (self._strikes >= STRIKES)

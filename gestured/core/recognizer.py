@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.conditioning import Conditioner, Mounting
+from gestured.core.conditioning import Conditioner, Inspection, Mounting
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.frames import Frame, Segment, Touch
@@ -55,6 +55,15 @@ class Cut:
     decided: float  # s, the frame that completed it
 
 
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """A segment as it was made, perhaps before it was cut."""
+
+    segment: Segment
+    bad: NDArray[np.bool_]  # (N,) taxels that are bridged in it
+    inspection: Inspection
+
+
 Contact = Onset | Cut | Cancelled | Release
 Kept = tuple[float, NDArray[np.float64], tuple[Touch, ...], int]  # t, (N,) counts above the baseline, touches, lost
 
@@ -82,7 +91,7 @@ class FrontEnd:
         self.segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
         self._mounted = self.mounting != Mounting()
         self._kept: deque[Kept] = deque()
-        self._made: tuple[Segment, NDArray[np.bool_]] | None = None  # the last one, and the bad taxels bridged in it
+        self._made: _Made | None = None
         self.draft: Segment | None = None  # made by the last push: what will be cut if the finger stays off
         self.segments = 0  # so far; their ids
         self._last: float | None = None
@@ -218,8 +227,8 @@ class FrontEnd:
         release = Release(self.sensor, self.segments, offset)
         if self._glitch(onset, offset):
             return [Cancelled(self.sensor, self.segments, "glitch"), release]
-        self.conditioner.inspect(np.array([k[1] for k in self._kept if onset <= k[0] <= offset]))
-        segment = self._segment(onset, offset)
+        self.conditioner.judge(self._make(onset, offset).inspection)
+        segment = self._make(onset, offset).segment
         if float(segment.frames.max()) < self.segmenter.off * segment.noise:  # nothing is left without its bad taxels
             return [Cancelled(self.sensor, self.segments, "stuck"), release]
         return [Cut(self.segments, segment, t), release]
@@ -237,14 +246,14 @@ class FrontEnd:
     def _make_draft(self, onset: float, offset: float) -> None:
         before = self._made
         if not self._glitch(onset, offset):
-            segment = self._segment(onset, offset)
-            self.draft = segment if self._made is not before else None
+            made = self._make(onset, offset)
+            self.draft = made.segment if made is not before else None
 
-    def _segment(self, onset: float, offset: float) -> Segment:
-        """The frames of a contact: made once, unless a taxel has turned out to be bad since."""
-        if self._made is not None:
-            made, bad = self._made
-            if (made.onset, made.offset) == (onset, offset) and np.array_equal(bad, self.conditioner.bad):
+    def _make(self, onset: float, offset: float) -> _Made:
+        """The segment of a contact: made once, unless a taxel has turned out to be bad since."""
+        made = self._made
+        if made is not None and (made.segment.onset, made.segment.offset) == (onset, offset):
+            if np.array_equal(made.bad, self.conditioner.bad):
                 return made
         times = np.array([k[0] for k in self._kept])
         stack = np.array([k[1] for k in self._kept])
@@ -256,8 +265,9 @@ class FrontEnd:
             touches = tuple(tuple(self._mount(touch) for touch in k[2]) for k in self._kept)
         lost = sum(k[3] for k in list(self._kept)[first + 1 : last + 1])
         segment = Segment(frames, times, first, last, self.conditioner.noise, lost, touches)
-        self._made = segment, self.conditioner.bad
-        return segment
+        inspection = self.conditioner.inspect(stack[first : last + 1])
+        self._made = made = _Made(segment, self.conditioner.bad, inspection)
+        return made
 
     def _mount(self, touch: Touch) -> Touch:
         return Touch(touch.id, *self.mounting.point(touch.x, touch.y, *self.sent))

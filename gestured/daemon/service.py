@@ -239,10 +239,6 @@ class Service:
             self.health.note(event)
         elif isinstance(event, Gesture):
             self.metrics.tests.add()
-        self.recent.note(event, epoch, test)
-        if not isinstance(event, Status):
-            name = getattr(event, "gesture", None)
-            log.debug(messages.event_type(event), sensor=event.sensor, id=event.id, gesture=name)
         sinks: tuple[Sink, ...] = (self.clients, self.taps, *self._osc)
         for sink in sinks:
             try:
@@ -250,3 +246,7 @@ class Service:
             except Exception:  # a bug in one sink is not the others' business
                 self.metrics.internal_errors.add()
                 self._throttle.error("a bug in a sink", type(sink).__name__)
+        self.recent.note(event, epoch, test)
+        if not isinstance(event, Status):
+            name = getattr(event, "gesture", None)
+            log.debug(messages.event_type(event), sensor=event.sensor, id=event.id, gesture=name)
