@@ -5,10 +5,15 @@ import json
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from gestured import models
 from gestured.models import LADDER
 from tests.small_model import build
+
+# No test asserts a time, and on a loaded machine Hypothesis' own limits would be one.
+settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any machine")
 
 
 @pytest.fixture
