@@ -136,6 +136,8 @@ def _fields(data: bytes, at: int, end: int) -> Iterator[tuple[int, int, int, int
 
 
 def _varint(data: bytes, at: int, end: int) -> tuple[int, int]:
+    if at < end and data[at] < 0x80:  # most are a single byte
+        return data[at], at + 1
     value = 0
     for shift in range(0, 70, 7):
         if at >= end:

@@ -1,1 +1,6 @@
 """The daemon: asyncio around one pure recognizer per sensor. `gestured.daemon.cli:main` starts it."""
+
+import os
+
+# Before numpy is imported: its BLAS starts a thread for every core otherwise, and no matrix here is large.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -5,8 +5,6 @@ merged first and validated once, as a whole; an error names the key, the value, 
 was expected. pydantic-settings would do the merging for 105 ms more at every start.
 """
 
-import difflib
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,6 +18,8 @@ ENVIRONMENT = "GESTURED_"
 
 
 def _from_file(path: str) -> dict[str, Any]:
+    import tomllib
+
     try:
         found = tomllib.loads(Path(path).read_text("utf-8"))
     except OSError as error:
@@ -49,6 +49,8 @@ def _from_environment(environ: Mapping[str, str]) -> dict[str, str]:
 
 
 def _unknown(key: str, known: tuple[str, ...]) -> str:
+    import difflib
+
     near = difflib.get_close_matches(key, known, 1)
     return f"unknown key, did you mean {near[0]}?" if near else f"unknown key, expected one of {', '.join(known)}"
 

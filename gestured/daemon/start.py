@@ -15,7 +15,7 @@ from typing import Any
 from gestured.daemon import log as logging
 from gestured.daemon import systemd
 from gestured.daemon.bound import bind_all
-from gestured.daemon.ladder import open_ladder
+from gestured.daemon.ladder import Opening
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.service import Loader, Service
 from gestured.daemon.settings import Settings
@@ -24,18 +24,18 @@ DESCRIPTORS = 4096  # for 1024 clients; the usual soft limit is 1024 in all
 SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 
-def run(settings: Settings, load: Loader) -> None:
+def run(settings: Settings, load: Loader, opening: Opening) -> None:
     """Run a daemon until it is asked to end. Raises AddressError, ModelError, SettingsError."""
     import uvloop
 
     if sys.stderr is not None:
         faulthandler.enable()  # when systemd's watchdog ends a hang (SIGABRT), the log says on which line it hung
     with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-        runner.run(_run(settings, load))
+        runner.run(_run(settings, load, opening))
 
 
-async def _run(settings: Settings, load: Loader) -> None:
-    """Bind, open, serve. What cannot be had ends it before it says that it is ready."""
+async def _run(settings: Settings, load: Loader, opening: Opening) -> None:
+    """Bind, take the models, serve. What cannot be had ends it before it says that it is ready."""
     loop = asyncio.get_running_loop()
     _abort(signal.SIG_BLOCK)  # in the threads that are made from here on, so that it finds this one
     loop.set_default_executor(ThreadPoolExecutor(initializer=_abort, initargs=(signal.SIG_BLOCK,)))
@@ -49,12 +49,11 @@ async def _run(settings: Settings, load: Loader) -> None:
     _raise_descriptor_limit()
     bound = bind_all(settings, systemd.passed_sockets())
     try:
-        ladder = open_ladder(settings)
-        service = Service(settings, ladder, bound, load)
+        service = Service(settings, opening.take(), bound, load)
         gc.freeze()  # what the start has made stays: later collections need not walk through it
         await service.start()
         _abort(signal.SIG_UNBLOCK)
-        _announce(service, ladder.active)
+        _announce(service)
         await service.serve(stop, reload)
         for number in SIGNALS:  # nothing is left to be asked: a stop that is repeated must not look like a crash
             signal.signal(number, signal.SIG_IGN)
@@ -79,7 +78,8 @@ def _when(number: signal.Signals, act: Callable[[], object]) -> None:
     signal.signal(number, lambda *_: act())
 
 
-def _announce(service: Service, model: str) -> None:
+def _announce(service: Service) -> None:
+    model = service.pipeline.watched.ladder.active
     where = {key: value for key, value in service.addresses().items() if value is not None}
     control = where.pop("control")
     ready: dict[str, Any] = {"type": "ready", **where, "model": model, "control": control}

@@ -63,6 +63,12 @@ def test_no_scene_loads_what_belongs_to_training(start: Start, scene: str) -> No
     assert "numpy" in imported(daemon)  # so that an empty report does not pass
 
 
+def test_numpy_brings_no_threads_and_no_random_numbers(start: Start) -> None:
+    daemon = used(start)
+    assert count(daemon, "task") == 2  # the loop, and what ends a run of a model that takes too long
+    assert "numpy.random" not in daemon.stderr()
+
+
 def test_the_metrics_library_comes_with_metrics_alone(start: Start) -> None:
     assert "prometheus_client" not in imported(used(start, "--publish", "osc://127.0.0.1:9"))
 
