@@ -37,9 +37,9 @@ class Timing:
 OFF_SHARE = 0.12  # of the contact's peak: below it the finger is off (textile recovers slowly)
 ON_SHARE = 0.20  # of the last contact's peak: what a new contact must exceed while the textile recovers
 RECOVERY_S = 1.0
-AFTER_S = (
-    8.0  # then nothing is left of a contact, however large a spike it was: a firm finger has faded below the noise
-)
+AFTER_S = 8.0  # then nothing is left of a contact: a firm finger has faded below the noise
+SPIKE = 4.0  # a peak that one frame alone reached counts for so many times the next highest frame at most,
+FIRM = 8.0  # which is taken to be so many times `on`: a tap may be a single frame
 
 
 class Phase(Enum):
@@ -125,7 +125,7 @@ class Segmenter:
         self.earlier = self.split_onset = 0.0  # s, when its first contact was last touched; its onset, once split off
         self._began = 0.0  # s, of the contact
         self._contacts = 0
-        self._peak = 0.0
+        self._peak = self._second = 0.0  # the highest activity, and the next highest
         self._closed = -math.inf  # s, when the last contact was over
         self._quiet_since: float | None = None
         self._box: tuple[float, float, float, float] | None = None  # where the contact's centroid went
@@ -149,11 +149,12 @@ class Segmenter:
                 self._contacts = 1 if before is Phase.IDLE else self._contacts + 1
                 self.earlier = self.last_touched
             if before is Phase.IDLE:
-                self.onset, self._peak = t, 0.0
+                self.onset, self._peak, self._second = t, 0.0, 0.0
             elif self._contacts == 1 and self._peak < OFF_SHARE * activity:
                 # What came before was too faint to belong to this contact: a hover, or noise.
                 self.onset = self._began = t
                 self._box, self._widest = None, 0.0
+            self._second = max(self._second, min(self._peak, activity))
             self._peak = max(self._peak, activity)
             self.last_touched = t
             self._quiet_since = None
@@ -185,11 +186,18 @@ class Segmenter:
         return t - self._closed < RECOVERY_S
 
     def after_effect(self, t: float) -> float:
-        """Activity that a contact may leave behind, now: textile comes back slowly, or swings below its baseline."""
+        """Activity that a contact may leave behind, now: textile comes back slowly, or swings below its baseline.
+
+        One frame that is beyond all others is a fault of the readout, and leaves nothing behind; but the rest of the
+        contact in which it came is no new one.
+        """
         past = 0.0 if self.phase is not Phase.IDLE else self._closed - t
         if past < -AFTER_S:
             return 0.0
-        return ON_SHARE * self._peak * math.exp(past / RECOVERY_S)
+        peak = self._peak
+        if past < -RECOVERY_S:
+            peak = min(peak, SPIKE * max(self._second, FIRM * self.on))
+        return ON_SHARE * peak * math.exp(past / RECOVERY_S)
 
     def let_go(self) -> bool:
         """Whether a finger was already off when the stream ended: what is open may then be decided."""
