@@ -13,7 +13,7 @@ from gestured.control.shadow import words as shadow_words
 
 CLEAR = "\x1b[2J\x1b[H"
 PERIOD_S = 1.0
-NAMES = {"strength": "strength", "duration_s": "duration", "area": "area"}
+NAMES = {"duration_s": "duration", "unknown": "answered by unknown"}
 SENSORS = 12  # lines; what is more is counted
 
 
@@ -106,7 +106,7 @@ def _shift(shift: dict[str, Any]) -> str:
         return f"nothing to say yet ({shift['gestures']} gestures)"
     shares = ", ".join(f"{NAMES.get(name, name)} {100 * share:.0f} %" for name, share in shift["outside"].items())
     verdict = "unlike the training data" if shift["unlike"] else "as in training"
-    return f"{verdict}; outside its range (2 % expected) in {shift['gestures']} gestures: {shares}"
+    return f"{verdict}; outside its range (2 % expected) in the last {shift['gestures']} gestures: {shares}"
 
 
 def _span(seconds: float) -> str:
