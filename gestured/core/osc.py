@@ -35,7 +35,8 @@ _SCALARS = {"i": "i", "f": "f", "d": "d", "h": "q", "t": "Q"}
 _ARRAYS = {"i": np.dtype(">i4"), "f": np.dtype(">f4")}
 _RUNS = tuple(tag * RUN for tag in _ARRAYS)
 _PLACED = ("", "s", "r", "sr", "b", "sb")  # what has a place in a layout: scalars, a run, a blob that is not empty
-_MAX_LAYOUTS = 256
+_LAYOUTS_BYTES = 8 << 20  # for the layouts that are remembered: 10,000 sensors of 9 x 9 floats
+_PLACE_BYTES = 500  # what Python takes for a place, beside its head, address and type tags
 
 
 class Message(NamedTuple):
@@ -69,6 +70,7 @@ _new = tuple.__new__  # Message(...) takes twice the time
 _frombuffer = np.frombuffer
 # By bytes of the first head: a packet's length, and its messages. Bounded: hostile senders invent layouts.
 _layouts: dict[bytes, tuple[int, list[_Place]]] = {}
+_room = _LAYOUTS_BYTES  # that is left
 
 
 def decode(data: bytes, errors: list[ProtocolError] | None = None) -> list[Message]:
@@ -100,10 +102,18 @@ def decode(data: bytes, errors: list[ProtocolError] | None = None) -> list[Messa
             raise
         errors.append(error)
     if 0 < len(places) == len(messages) and not errors:  # nothing else is in it: no string, no inner bundle
-        if len(_layouts) >= _MAX_LAYOUTS:
-            _layouts.clear()
-        _layouts[key] = (len(data), places)
+        _remember(key, len(data), places)
     return messages
+
+
+def _remember(key: bytes, size: int, places: list[_Place]) -> None:
+    global _room
+    cost = sum(_PLACE_BYTES + 3 * len(head) for _, head, *_ in places)
+    if cost > _room:
+        _layouts.clear()
+        _room = _LAYOUTS_BYTES
+    _room -= cost
+    _layouts[key] = (size, places)
 
 
 def _read_places(data: bytes, places: list[_Place], bundled: bool) -> list[Message] | None:

@@ -21,7 +21,7 @@ MAX_NAME = 64
 _NAME = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-")
 # By bytes of a value; a quotient that is none of them is no size of a blob.
 _BLOBS: dict[float, np.dtype[Any]] = {4: np.dtype(">f4"), 2: np.dtype(">u2"), 1: np.dtype(">u1")}
-_MAX_ROUTES = 256
+_MAX_ROUTES = 4096  # one or two for each sensor; fewer than there are sensors would be as good as none
 _MAX_PENDING = 256
 
 

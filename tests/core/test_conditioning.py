@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gestured.core.conditioning import Mounting
+from gestured.core.conditioning import BLOB, BLOB_GAIN, COMMON, Conditioner, Mounting, _median
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment, Touch
@@ -251,6 +251,32 @@ def test_the_noise_is_what_an_idle_taxel_shows(rate: float, noise: float, level:
             shown = float(np.median(counts.std(axis=0)))
             assert events == [] and front_end.bad_taxels == 0
             assert shown / 1.5 < front_end.noise < max(shown, step) * 1.5  # below one step it cannot be known
+
+
+@given(
+    shape=st.tuples(st.integers(2, 20), st.integers(2, 20)),
+    seed=st.integers(0, 999),
+    exponent=st.integers(-30, 30),
+    coarse=st.booleans(),
+)
+def test_activity_is_the_strongest_spot_beyond_what_all_taxels_share(
+    shape: Shape, seed: int, exponent: int, coarse: bool
+) -> None:
+    scaled = np.random.default_rng(seed).normal(1, 4, shape) * 10.0**exponent
+    scaled = np.rint(scaled) if coarse else scaled
+    side, middle, _ = BLOB
+    rows, columns = (middle * np.eye(n) + side * (np.eye(n, k=1) + np.eye(n, k=-1)) for n in shape)
+    spots = rows @ scaled @ columns / sum(b * b for b in BLOB)
+    common = np.clip(np.sort(scaled, axis=None)[scaled.size // 2], -COMMON, COMMON)
+    expected = max(scaled.max() - common, spots.max() - common * BLOB_GAIN)
+    activity, lowest = Conditioner(*shape).activity(scaled.ravel())
+    assert activity == pytest.approx(expected, rel=1e-9, abs=1e-9 * abs(scaled).max())
+    assert lowest == scaled.min()
+
+
+@given(st.lists(st.floats(0, 1e30), min_size=1, max_size=100))
+def test_the_median_is_numpys(values: list[float]) -> None:
+    assert _median(np.array(values)) == np.median(values)
 
 
 def test_the_noise_follows_a_sensor_that_becomes_noisier() -> None:
@@ -603,6 +629,31 @@ def test_one_spike_is_forgotten(size: float, taxels: int, moment: float) -> None
     late = [event for event in events if isinstance(event, Cut) and event.segment.onset > 12.0]
     assert len(late) == 3
     assert front_end.noise == pytest.approx(2.0, rel=0.3)
+
+
+@pytest.mark.parametrize("size", [1e4, 1e12, 1e30])
+@pytest.mark.parametrize("in_gesture", [False, True])
+def test_after_a_spike_touches_count_within_three_seconds(size: float, in_gesture: bool) -> None:
+    """One odd number must not make a sensor deaf."""
+    pause = [quiet(3.0), *GESTURES]
+    times, frames = stream(SHAPE, [quiet(2), swipe(SHAPE, row=4), *pause] if in_gesture else [quiet(2.5), *pause])
+    frames[np.searchsorted(times, 2.4), 3, 4] += size
+    _, events = heard(times, frames)
+    follow_rules(events)
+    late = [event for event in events if isinstance(event, Cut) and event.segment.onset > times[-1] - 8.0]
+    assert len(late) == 3
+
+
+def test_a_spike_does_not_make_saturated_taxels_faulty() -> None:
+    """A taxel that stands still at the sensor's limit is pressed hard, whatever one odd number said before."""
+    press = (2.0, lambda share: finger(4, 4, SHAPE))
+    times, frames = stream(SHAPE, [quiet(2), swipe(SHAPE, row=4), quiet(12), press, quiet(2)])
+    frames = np.minimum(frames, 380.0)
+    frames[np.searchsorted(times, 2.4), 3, 4] = 1e12
+    front_end = FrontEnd("s", *SHAPE)
+    for t, frame in zip(times, frames, strict=True):
+        front_end.push(Frame(float(t), frame))
+        assert front_end.bad_taxels == 0
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300, -1e300])

@@ -2,6 +2,7 @@
 
 import math
 import struct
+import tracemalloc
 from collections.abc import Iterator
 
 import numpy as np
@@ -182,11 +183,34 @@ def test_the_same_head_with_other_sizes_is_read_anew() -> None:
         assert caught.value.reason == reason
 
 
-def test_known_layouts_are_bounded_and_do_not_mix_up_sensors() -> None:
+def test_known_layouts_do_not_mix_up_sensors_and_a_thousand_of_them_are_known() -> None:
     for n in range(3000):
-        (message,) = osc.decode(osc.encode_message(f"/s{n % 700}/pressure", "ffff", (np.full(4, n),)))
-        assert message.address == f"/s{n % 700}/pressure" and list(flat(message.args)) == [n] * 4
-    assert len(osc._layouts) <= osc._MAX_LAYOUTS
+        (message,) = osc.decode(osc.encode_message(f"/s{n % 1000}/pressure", "ffff", (np.full(4, n),)))
+        assert message.address == f"/s{n % 1000}/pressure" and list(flat(message.args)) == [n] * 4
+    assert len(osc._layouts) >= 1000
+
+
+def _invented(n: int) -> bytes:
+    """A packet that nobody has sent before: long in its address, its type tags or its number of messages."""
+    if n % 3 == 0:
+        return osc.encode_message(f"/{n}" + "x" * 240, "b", (b"x",))
+    if n % 3 == 1:
+        return osc.encode_message(f"/{n}", "i" * 4000, (np.arange(4000),))
+    return osc.encode_bundle([osc.encode_message(f"/{n}", "f", (1.0,))] * 200)
+
+
+def test_invented_layouts_take_no_more_memory_than_was_given_to_them() -> None:
+    osc._layouts.clear()
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        for n in range(2000):
+            osc.decode(_invented(n))
+        held = tracemalloc.get_traced_memory()[0] - before
+    finally:
+        tracemalloc.stop()
+        osc._layouts.clear()
+    assert held <= osc._LAYOUTS_BYTES
 
 
 def test_a_bad_message_does_not_lose_its_siblings() -> None:
