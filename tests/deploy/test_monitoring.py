@@ -93,6 +93,7 @@ def known(text: str) -> dict[str, set[str]]:
     for counter in vars(Metrics()).values():
         if isinstance(counter, Counter):
             found[counter.name + "_total"] |= set(counter.labels)
+    found["gestured_shift_ratio"].add("quantity")  # says nothing before there were twenty gestures
     return found
 
 
