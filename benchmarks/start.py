@@ -18,16 +18,16 @@ MORE = 200  # further sensors
 
 
 def start_and_memory(model: str) -> list[Row]:
-    """Seconds from exec to ready, and resident memory then."""
+    """Seconds from exec to ready, and resident memory once one sensor has been heard."""
     path = str(shipped().get(model, model))
     open_model(path)  # one warm-up: the files are in the page cache
     memory: dict[str, list[float]] = {"ours": [], "bare": []}
 
     def ours() -> float:
         begin = time.monotonic()
-        with Engine(model, 9, 9) as engine:
+        with Engine(model, 9, 9, "--clock", "sensor") as engine:
             took = time.monotonic() - begin
-            memory["ours"].append(resident_kib(engine.pid))
+            memory["ours"].append(_heard(engine, ["first"]))
         return took
 
     def bare() -> float:
@@ -43,7 +43,7 @@ def start_and_memory(model: str) -> list[Row]:
     return [
         Row("start to ready", f"{np.median(a):.2f} s", f"{np.median(b):.2f} s ({what})", str(seconds), "<= 1.5",
             seconds.median <= 1.5),
-        Row("resident memory, no sensor yet", f"{np.median(memory['ours']) / 1024:.1f} MiB",
+        Row("resident memory, one sensor", f"{np.median(memory['ours']) / 1024:.1f} MiB",
             f"{np.median(memory['bare']) / 1024:.1f} MiB ({what})", str(kib), "<= 1.3", kib.median <= 1.3),
     ]  # fmt: skip
 

@@ -79,12 +79,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             print(describe(settings, sources))
             return 0
-        from gestured.daemon.ladder import Opening
-
-        opening = Opening(settings)  # before the import of all the rest, so that both go on at the same time
         from gestured.daemon.start import run
 
-        run(settings, lambda: load(given, os.environ)[0], opening)
+        run(settings, lambda: load(given, os.environ)[0])
     except GesturedError as error:
         print(f"gestured: {error}", file=sys.stderr)
         return 2 if isinstance(error, SettingsError) else 3 if isinstance(error, ModelError) else 4

@@ -1,7 +1,5 @@
 """The models that a configuration asks for."""
 
-import threading
-
 from gestured.core.errors import ModelError, SettingsError
 from gestured.daemon.log import log
 from gestured.daemon.settings import Settings
@@ -37,28 +35,3 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
     if settings.gestures == ():
         raise SettingsError("gestures: an empty list, expected at least one gesture")
     return ladder
-
-
-class Opening:
-    """`open_ladder` in a thread: onnxruntime's part of it, which is most, leaves Python to others meanwhile."""
-
-    def __init__(self, settings: Settings) -> None:
-        """Begins."""
-        self._outcome: Ladder | BaseException
-        self._thread = threading.Thread(target=self._open, args=(settings,), name="opening models")
-        self._thread.start()
-
-    def _open(self, settings: Settings) -> None:
-        try:
-            self._outcome = open_ladder(settings)
-        except BaseException as error:
-            self._outcome = error
-
-    def take(self) -> Ladder:
-        """Wait for the ladder, once: it is the caller's alone, so that a reload lets it go. Raises as `open_ladder`."""
-        self._thread.join()
-        outcome = self._outcome
-        del self._outcome
-        if isinstance(outcome, BaseException):
-            raise outcome
-        return outcome

@@ -15,7 +15,7 @@ from typing import Any
 from gestured.daemon import log as logging
 from gestured.daemon import systemd
 from gestured.daemon.bound import bind_all
-from gestured.daemon.ladder import Opening
+from gestured.daemon.ladder import open_ladder
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.service import Loader, Service
 from gestured.daemon.settings import Settings
@@ -24,18 +24,18 @@ DESCRIPTORS = 4096  # for 1024 clients; the usual soft limit is 1024 in all
 SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 
-def run(settings: Settings, load: Loader, opening: Opening) -> None:
+def run(settings: Settings, load: Loader) -> None:
     """Run a daemon until it is asked to end. Raises AddressError, ModelError, SettingsError."""
     import uvloop
 
     if sys.stderr is not None:
         faulthandler.enable()  # when systemd's watchdog ends a hang (SIGABRT), the log says on which line it hung
     with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-        runner.run(_run(settings, load, opening))
+        runner.run(_run(settings, load))
 
 
-async def _run(settings: Settings, load: Loader, opening: Opening) -> None:
-    """Bind, take the models, serve. What cannot be had ends it before it says that it is ready."""
+async def _run(settings: Settings, load: Loader) -> None:
+    """Bind, open, serve. What cannot be had ends it before it says that it is ready."""
     loop = asyncio.get_running_loop()
     _abort(signal.SIG_BLOCK)  # in the threads that are made from here on, so that it finds this one
     loop.set_default_executor(ThreadPoolExecutor(initializer=_abort, initargs=(signal.SIG_BLOCK,)))
@@ -49,7 +49,7 @@ async def _run(settings: Settings, load: Loader, opening: Opening) -> None:
     _raise_descriptor_limit()
     bound = bind_all(settings, systemd.passed_sockets())
     try:
-        service = Service(settings, opening.take(), bound, load)
+        service = Service(settings, open_ladder(settings), bound, load)  # it alone holds them: a reload lets them go
         gc.freeze()  # what the start has made stays: later collections need not walk through it
         await service.start()
         _abort(signal.SIG_UNBLOCK)
