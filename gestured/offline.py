@@ -1,14 +1,15 @@
 """A tape through the same code as in the daemon, without one: decode, stamp, recognise, event for event."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
 from gestured.core.conditioning import Mounting
-from gestured.core.errors import RecordingError
-from gestured.core.events import Event
-from gestured.core.frames import Frame
-from gestured.core.recognizer import Classifier, FrontEnd, Recognizer
+from gestured.core.errors import ModelError, RecordingError
+from gestured.core.events import Event, Onset
+from gestured.core.frames import Frame, Segment
+from gestured.core.recognizer import Classifier, FrontEnd, Recognizer, Scores
 from gestured.core.segmentation import Timing
 from gestured.core.stamping import Stamper
 from gestured.core.wire import Addresses, Arrival, Decoder
@@ -69,6 +70,17 @@ class Scene:
         return Stamper(clock)
 
 
+class Mute:
+    """A `Classifier` that has no answers: for what can be said of the frames alone."""
+
+    def __init__(self, gestures: Sequence[str]) -> None:
+        self.gestures = tuple(gestures)
+
+    def classify(self, segment: Segment) -> Scores:
+        """Raises ModelError."""
+        raise ModelError("it has no answers")
+
+
 class Stream:
     """One sensor's."""
 
@@ -82,18 +94,34 @@ class Stream:
             thresholds=scene.thresholds,
             refractory=scene.refractory,
         )
-        self.ready: float | None = None  # s, when it was first known
+        self.stamps: list[tuple[float, float]] = []  # s: when a frame arrived, and when it was felt
+        self.onsets: list[float] = []  # s
+        self._learned: list[tuple[float, float]] = []  # s: since when it was new, and from when on it was known
+
+    def knew(self, t: float) -> bool:
+        """Whether the idle sensor had been learned by `t` s, so that a touch could be told from it."""
+        since = [known for new, known in self._learned if new <= t]
+        return bool(since) and since[-1] <= t
 
     def take(self, arrivals: Sequence[Arrival], now: float) -> Iterator[Event]:
         """Push frames that were found waiting at `now` s."""
+        for event in self._push(arrivals, now):
+            if isinstance(event, Onset):
+                self.onsets.append(event.onset)
+            yield event
+
+    def _push(self, arrivals: Sequence[Arrival], now: float) -> Iterator[Event]:
         for arrival, stamp in zip(arrivals, self.stamper.stamp(arrivals, now), strict=True):
             if stamp.dropped:
                 continue
+            self.stamps.append((now, stamp.t))
             if stamp.restarted:
                 yield from self.recognizer.reset()
+            if stamp.restarted or not self._learned:
+                self._learned.append((stamp.t, math.inf))
             yield from self.recognizer.push(Frame(stamp.t, arrival.values, arrival.touches, stamp.lost))
-            if self.ready is None and self.recognizer.front_end.ready:
-                self.ready = stamp.t
+            if self._learned[-1][1] == math.inf and self.recognizer.front_end.ready:
+                self._learned[-1] = (self._learned[-1][0], stamp.t)
 
 
 class Replay:

@@ -1,14 +1,19 @@
 """What a recording's events and those of its replay have in common, and where they differ."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from gestured.core.events import Cancelled, Event, Gesture, Onset, Unknown
+from gestured import tape
 
 ONSET_S = 0.25  # answers whose onsets lie closer are about the same contact
 CONFIDENCE = 0.05  # what a baseline learned at another moment may change
+STOPWATCH_S = 1e6  # times below are no dates
+
+Line = Mapping[str, Any]  # of the event stream; its times are the recording's
+Knew = Callable[[str, float], bool]  # whether a sensor's idle state was known at a time (s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,13 +21,15 @@ class Answer:
     """What became of one contact."""
 
     sensor: str
-    onset: float  # s since the epoch
+    onset: float  # s since the epoch, or on a stopwatch
     name: str  # a gesture, "unknown", or "cancelled: " and the reason
     confidence: float | None
 
     def words(self) -> str:
         """For a person."""
-        clock = datetime.fromtimestamp(self.onset).strftime("%H:%M:%S.%f")[:-3]
+        clock = f"{self.onset:.3f} s"
+        if self.onset >= STOPWATCH_S:
+            clock = datetime.fromtimestamp(self.onset).strftime("%H:%M:%S.%f")[:-3]
         sure = "" if self.confidence is None else f" {self.confidence:.3f}"
         return f"{clock} {self.sensor}: {self.name}{sure}"
 
@@ -40,38 +47,43 @@ class Difference:
         return "\n".join(f"{sign} {answer.words()}" for sign, answer in sides if answer is not None)
 
 
-def recorded(lines: Iterable[Mapping[str, Any]]) -> list[Answer]:
+class Verdict(NamedTuple):
+    """What a comparison found."""
+
+    compared: str  # how many of what
+    skipped: int  # of them, since the sensor was not known again
+    differences: list[Difference]
+
+
+class Recorded:
+    """What `gesturectl record` or `flag` wrote. Raises RecordingError."""
+
+    def __init__(self, path: Path) -> None:
+        self.tape = tape.read(path)
+
+    def compare(self, lines: Iterable[Line], knew: Knew) -> Verdict:
+        """Hold the events of a replay against those that were recorded."""
+        before = answers(self.tape.events)
+        usable = [answer for answer in before if knew(answer.sensor, answer.onset)]
+        # A daemon that knew the sensor from before answers earlier: that was not asked.
+        after = [answer for answer in answers(lines) if knew(answer.sensor, answer.onset)]
+        return Verdict(f"{len(usable)} recorded answers", len(before) - len(usable), differences(usable, after))
+
+
+def answers(lines: Iterable[Line]) -> list[Answer]:
     """The answers among the lines of an event stream."""
     onsets: dict[tuple[str, int], float] = {}
-    answers = []
+    found = []
     for line in lines:
         key = line.get("sensor", ""), line.get("id", 0)
         if line["type"] == "onset":
             onsets[key] = line["onset"]
         elif line["type"] in ("gesture", "unknown"):
             name = line.get("gesture", "unknown")
-            answers.append(Answer(key[0], line["onset"], name, line["confidence"]))
+            found.append(Answer(key[0], line["onset"], name, line["confidence"]))
         elif line["type"] == "cancelled" and key in onsets:
-            answers.append(Answer(key[0], onsets[key], f"cancelled: {line['reason']}", None))
-    return answers
-
-
-def replayed(events: Iterable[Event], epoch: float) -> list[Answer]:
-    """The same of events; stream time + `epoch` s = time since the Unix epoch."""
-    onsets: dict[tuple[str, int], float] = {}
-    answers = []
-    for event in events:
-        match event:
-            case Onset():
-                onsets[event.sensor, event.id] = event.onset + epoch
-            case Gesture():
-                answers.append(Answer(event.sensor, event.onset + epoch, event.gesture, event.confidence))
-            case Unknown():
-                answers.append(Answer(event.sensor, event.onset + epoch, "unknown", event.confidence))
-            case Cancelled():
-                onset = onsets[event.sensor, event.id]
-                answers.append(Answer(event.sensor, onset, f"cancelled: {event.reason}", None))
-    return answers
+            found.append(Answer(key[0], onsets[key], f"cancelled: {line['reason']}", None))
+    return found
 
 
 def differences(before: Iterable[Answer], after: Iterable[Answer]) -> list[Difference]:

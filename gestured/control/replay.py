@@ -2,22 +2,27 @@
 
 import argparse
 import json
-import socket
+import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable
+from contextlib import closing
 from pathlib import Path
 
-from gestured import tape
 from gestured.client.address import host_port
-from gestured.control.diff import differences, recorded, replayed
-from gestured.core import messages, osc
+from gestured.control.address import default_socket
+from gestured.control.diff import Answer, Knew, Line, Recorded
+from gestured.control.labelled import Labelled
+from gestured.control.listen import readable
+from gestured.control.sending import Hearing, retimed, send
+from gestured.core import messages
 from gestured.core.errors import GesturedError, RecordingError
-from gestured.core.events import Event
-from gestured.ladder import ladder_for
-from gestured.offline import Replay, Scene
+from gestured.core.wire import is_sensor
+from gestured.ladder import Ladder, ladder_for
+from gestured.offline import Mute, Replay, Scene
 
-BUNDLE = b"#bundle\0"
+MODEL = "cnn_lstm"  # for a file that names none
+Source = Recorded | Labelled
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -25,108 +30,128 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
     parser = commands.add_parser(
         "replay",
         help="play a recording again",
-        description="Send the packets of a recording to a daemon (--to), or run them through the same code here and\n"
-        "print the events. --diff compares these with the recorded ones, and ends with status 1 where\n"
-        "they differ. What was being touched before the sensor was known again is not compared.\n"
-        "At another speed than 1, packets without a time tag get one: the daemon needs clock = sensor.",
+        description="Run a recording through the daemon's own code here and print the events, or send it to a\n"
+        "daemon (--to). --diff compares the events with the recorded ones, those of a labelled .npz with\n"
+        "its labels, and ends with status 1 where they differ. What was touched before the sensor was\n"
+        "known again is not compared.\n"
+        'At another speed than 1 the daemon must run with clock = "sensor" (gestured --clock sensor): by the\n'
+        "time of arrival all would be too fast.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl replay drive.mcap --diff --model candidate.onnx\n"
-        "  gesturectl replay drive.mcap --to 127.0.0.1:9000 --speed 10",
+        "  gesturectl replay drive.mcap --to 127.0.0.1:9000 --diff\n"
+        "  gesturectl replay 07.npz --to 127.0.0.1:9000 --speed 10 --diff",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="what gesturectl record or flag wrote")
-    way = parser.add_mutually_exclusive_group()
-    way.add_argument("--to", type=host_port, metavar="HOST:PORT", help="send it to the daemon that listens there")
-    way.add_argument("--diff", action="store_true", help="compare with the recorded events")
+    parser.add_argument("file", type=Path, metavar="FILE", help="what gesturectl record or flag wrote, or an .npz")
+    parser.add_argument("--to", type=host_port, metavar="HOST:PORT", help="send it to the daemon that listens there")
+    parser.add_argument("--diff", action="store_true", help="compare with the recorded events, or the labels")
     parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="with --to: so many times as fast")
-    parser.add_argument("--model", metavar="MODEL", help="here: another model than the recorded one")
+    parser.add_argument(
+        "--socket",
+        type=Path,
+        metavar="PATH",
+        help="with --to and --diff: that daemon's event socket (default: its own)",
+    )
+    parser.add_argument("--model", metavar="MODEL", help="without --to: another model than the recorded one")
+    parser.add_argument("--sensor", default="recording", metavar="NAME", help="the sensor's name, for an .npz")
     parser.add_argument("--json", action="store_true", help="print events, or differences, as JSON lines")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Send it, or play it here; 1 where a comparison finds differences."""
-    if not 0 < args.speed <= 1000:
-        raise GesturedError(f"--speed {args.speed:g}: expected more than 0, at most 1000")
-    found = tape.read(args.file)
-    if not found.whole:
+    _check(args)
+    source: Source = Labelled(args.file, args.sensor) if args.file.suffix == ".npz" else Recorded(args.file)
+    if not source.tape.whole:
         print(f"{args.file}: writing was cut off; what is there is played", file=sys.stderr)
-    if not found.packets:
+    if not source.tape.packets:
         raise RecordingError(f"{args.file}: holds no packets")
-    if args.to is not None:
-        return _send(found, args.to, args.speed)
-    replay = _offline(found, args.model)
+    if args.to is None:
+        return _here(args, source)
     if args.diff:
-        return _compare(found, replay, args.json)
-    for event in replay.events():
-        line = messages.to_json(event, replay.epoch).decode().rstrip("\n")
-        print(line if args.json else _words(event, replay.epoch), flush=True)
+        return _there(args, source)
+    _send(args, source)
     return 0
 
 
-def _words(event: Event, epoch: float) -> str:
-    from gestured.control.listen import readable
+def _check(args: argparse.Namespace) -> None:
+    if not 0 < args.speed <= 1000:
+        raise GesturedError(f"--speed {args.speed:g}: expected more than 0, at most 1000")
+    if not is_sensor(args.sensor):
+        raise GesturedError(f"--sensor {args.sensor!r}: expected 1 to 64 of A-Z a-z 0-9 _ -")
+    if args.to is None and (args.speed != 1 or args.socket is not None):
+        raise GesturedError("--speed and --socket are for a daemon: name it with --to HOST:PORT")
+    if args.to is not None and args.model is not None:
+        raise GesturedError("--model is for a replay here; the daemon of --to has its own")
 
-    return readable(json.loads(messages.to_json(event, epoch)))
+
+def _here(args: argparse.Namespace, source: Source) -> int:
+    """Without a daemon."""
+    scene, ladder = _opened(source, args.model)
+    replay = Replay(source.tape, scene, ladder)
+    lines = (json.loads(messages.to_json(event, replay.epoch)) for event in replay.events())
+    if args.diff:
+        return _compare(args, source, list(lines), _knew(replay))
+    for line in lines:
+        print(json.dumps(line) if args.json else readable(line), flush=True)
+    return 0
 
 
-def _offline(found: tape.Tape, model: str | None) -> Replay:
-    scene = Scene(found.scene)
+def _opened(source: Source, model: str | None) -> tuple[Scene, Ladder]:
+    if isinstance(source, Labelled):
+        ladder = ladder_for(model or MODEL, None)
+        return Scene(source.scene(ladder.gestures)), ladder
+    scene = Scene(source.tape.scene)
     recorded_model, fallback = scene.ladder
     ladder = ladder_for(model or recorded_model, fallback or None)
     if model is None and getattr(ladder.model, "sha256", None) != scene.sha256:
         print(f"{ladder.name} is not the file that it was when this was recorded", file=sys.stderr)
-    return Replay(found, scene, ladder)
+    return scene, ladder
 
 
-def _compare(found: tape.Tape, replay: Replay, as_json: bool) -> int:
-    after = replayed(replay.events(), replay.epoch)
-    ready = {name: s.ready + replay.epoch for name, s in replay.streams.items() if s.ready is not None}
-    before = recorded(found.events)
-    usable = [a for a in before if a.onset >= ready.get(a.sensor, float("inf"))]
-    found_different = differences(usable, after)
-    for difference in found_different:
-        if as_json:
+def _there(args: argparse.Namespace, source: Source) -> int:
+    """To a daemon, whose events are compared."""
+    # Which gestures there are is the daemon's business.
+    scene = Scene(source.scene(("none",))) if isinstance(source, Labelled) else Scene(source.tape.scene)
+    rehearsal = Replay(source.tape, scene, Mute(scene.gestures))  # when sensors are known, and contacts begin
+    for _ in rehearsal.events():
+        pass
+    with closing(Hearing(args.socket or default_socket(os.environ), frozenset(rehearsal.streams))) as hearing:
+        sent = _send(args, source)
+        heard = hearing.all(time.time())
+    status = _compare(args, source, retimed(heard, sent, source.tape, rehearsal), _knew(rehearsal))
+    if status and args.speed != 1:
+        print(f'at --speed {args.speed:g} that daemon must run with clock = "sensor"; does it?', file=sys.stderr)
+    return status
+
+
+def _send(args: argparse.Namespace, source: Source) -> list[float]:
+    """When each packet was sent. Raises GesturedError where nobody listens."""
+    sent, unheard = send(source.tape, args.to, args.speed)
+    where = f"{args.to[0]}:{args.to[1]}"
+    if unheard:
+        raise GesturedError(f"nobody listened on {where} for {unheard} of {len(sent)} packets")
+    print(f"sent {len(sent)} packets to {where}", file=sys.stderr)
+    return sent
+
+
+def _knew(replay: Replay) -> Knew:
+    return lambda sensor, t: sensor in replay.streams and replay.streams[sensor].knew(t - replay.epoch)
+
+
+def _compare(args: argparse.Namespace, source: Source, lines: Iterable[Line], knew: Knew) -> int:
+    compared, skipped, differences = source.compare(lines, knew)
+    for difference in differences:
+        if args.json:
             sides = {"recorded": difference.recorded, "replayed": difference.replayed}
-            print(json.dumps({k: v and {"sensor": v.sensor, "onset": v.onset, "answer": v.name,
-                                        "confidence": v.confidence} for k, v in sides.items()}))  # fmt: skip
+            print(json.dumps({side: answer and _as_dict(answer) for side, answer in sides.items()}))
         else:
             print(difference.words())
-    skipped = f", {len(before) - len(usable)} before the sensor was known" if len(usable) < len(before) else ""
-    print(f"{len(usable)} recorded answers{skipped}, {len(found_different)} differences", file=sys.stderr)
-    return 1 if found_different else 0
+    early = f", {skipped} before the sensor was known" if skipped else ""
+    print(f"{compared}{early}, {len(differences)} differences", file=sys.stderr)
+    return 1 if differences else 0
 
 
-def _send(found: tape.Tape, to: tuple[str, int], speed: float) -> int:
-    """Each sender of the tape gets a socket of its own: a sensor belongs to its source."""
-    try:
-        family, kind, _, _, where = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
-    except OSError as error:
-        raise GesturedError(f"cannot send to {to[0]}:{to[1]}: {error.strerror or error}") from None
-    senders: dict[tuple[str, int], socket.socket] = {}
-    unheard = 0
-    try:
-        for packet, data in _paced(found, speed):
-            if packet.source not in senders:
-                senders[packet.source] = socket.socket(family, kind)
-                senders[packet.source].connect(where)
-            try:
-                senders[packet.source].send(data)
-            except ConnectionRefusedError:
-                unheard += 1
-    finally:
-        for sender in senders.values():
-            sender.close()
-    lost = f"; nobody listened for {unheard} of them" if unheard else ""
-    print(f"sent {len(found.packets)} packets to {to[0]}:{to[1]}{lost}", file=sys.stderr)
-    return 1 if unheard else 0
-
-
-def _paced(found: tape.Tape, speed: float) -> Iterator[tuple[tape.Packet, bytes]]:
-    """Packets at their times; at another pace they say themselves when they were felt."""
-    first, start = found.packets[0].t_ns, time.monotonic()
-    for packet in found.packets:
-        wait = start + (packet.t_ns - first) / 1e9 / speed - time.monotonic()
-        if wait > 0:
-            time.sleep(wait)
-        tagged = speed != 1 and not packet.data.startswith(BUNDLE)
-        yield packet, osc.encode_bundle([packet.data], packet.t_ns / 1e9) if tagged else packet.data
+def _as_dict(answer: Answer) -> dict[str, object]:
+    return {
+        "sensor": answer.sensor, "onset": answer.onset, "answer": answer.name, "confidence": answer.confidence,
+    }  # fmt: skip

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -12,7 +13,7 @@ from typing import Any
 import pytest
 
 from tests.daemon import tiny_model
-from tests.daemon.harness import Daemon
+from tests.daemon.harness import Daemon, Sensor
 
 ROOT = Path(__file__).resolve().parents[2]
 HELLO = {
@@ -127,3 +128,29 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
 def ctl(run: Callable[..., tuple[int, str, str]], daemon: Daemon) -> Callable[..., tuple[int, str, str]]:
     """Runs gesturectl against that daemon."""
     return lambda *arguments: run(*arguments, "--control", daemon.ready["control"])
+
+
+@pytest.fixture
+def recorded(start, daemon: Daemon, tmp_path: Path):
+    """Records what the function does to the daemon, to the end of the file."""
+
+    def record(perform, name: str = "a.mcap", stop: int = signal.SIGINT) -> tuple[Path, bytes]:
+        path = tmp_path / name
+        recorder = start("record", path, "--control", daemon.ready["control"], "--json")
+        assert b"recording into" in recorder.stderr.readline()
+        perform()
+        recorder.send_signal(stop)
+        return path, recorder.communicate(timeout=30)[0]
+
+    return record
+
+
+def gestures(daemon: Daemon, name: str, *directions: str):
+    """Performs them, and waits for what the daemon makes of them."""
+
+    def perform() -> None:
+        client = daemon.client().subscribe("release", sensors=[name])
+        Sensor(daemon, name).begin().perform(*directions)
+        client.events("release", name, len(directions))
+
+    return perform

@@ -3,7 +3,6 @@
 import base64
 import json
 import os
-import signal
 import socket
 import sys
 from pathlib import Path
@@ -16,36 +15,11 @@ from gestured.control.cli import main
 from gestured.control.diff import Answer, Difference, differences
 from gestured.core.errors import RecordingError
 from gestured.core.wire import Addresses, Decoder
+from tests.control.conftest import gestures
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor
 
 pytest.importorskip("mcap", reason="recordings need the extra [record]")
-
-
-@pytest.fixture
-def recorded(start, daemon: Daemon, tmp_path: Path):
-    """Records what the function does to the daemon, to the end of the file."""
-
-    def record(perform, name: str = "a.mcap", stop: int = signal.SIGINT) -> tuple[Path, bytes]:
-        path = tmp_path / name
-        recorder = start("record", path, "--control", daemon.ready["control"], "--json")
-        assert b"recording into" in recorder.stderr.readline()
-        perform()
-        recorder.send_signal(stop)
-        return path, recorder.communicate(timeout=30)[0]
-
-    return record
-
-
-def gestures(daemon: Daemon, name: str, *directions: str):
-    """Performs them, and waits for what the daemon makes of them."""
-
-    def perform() -> None:
-        client = daemon.client().subscribe("release", sensors=[name])
-        Sensor(daemon, name).begin().perform(*directions)
-        client.events("release", name, len(directions))
-
-    return perform
 
 
 def test_a_recording_holds_every_packet_and_replays_to_the_same_events(recorded, run, daemon, tmp_path) -> None:
@@ -102,23 +76,6 @@ def test_a_replay_with_another_model_shows_what_differs(recorded, run, daemon, t
     assert lines == ["-swipe_left", "+one_tap", "-one_tap", "+swipe_left"]
     status, out, _ = run("replay", path, "--diff", "--model", other, "--json")
     assert [json.loads(line)["replayed"]["answer"] for line in out.splitlines()] == ["one_tap", "swipe_left"]
-
-
-def test_a_replay_to_a_daemon_gives_the_same_gestures_at_any_speed(recorded, run, daemon, tmp_path) -> None:
-    path, _ = recorded(gestures(daemon, "udp", "left", "up"))
-    other = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"), "--clock", "sensor")
-    try:
-        client = other.client()
-        status, _, err = run("replay", path, "--to", other.ready["listen"], "--speed", "50")
-        assert status == 0 and "sent" in err
-        assert [e["gesture"] for e in client.events("gesture", "udp", 2)] == ["swipe_left", "swipe_up"]
-    finally:
-        assert other.stop() == 0
-    with socket.socket(type=socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        nobody = f"127.0.0.1:{free.getsockname()[1]}"
-    status, _, err = run("replay", path, "--to", nobody, "--speed", "1000")
-    assert status == 1 and "nobody listened" in err
 
 
 def test_a_killed_recorder_leaves_what_was_flushed(start, daemon: Daemon, tmp_path: Path) -> None:

@@ -1,0 +1,121 @@
+"""Labelled recordings (.npz) as something to play, and their labels as the answers that are expected."""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from gestured import recording
+from gestured.client.score import Outcome, Performed, Tally
+from gestured.client.sensor import Form
+from gestured.control.diff import STOPWATCH_S, Answer, Difference, Knew, Line, Verdict
+from gestured.core.errors import RecordingError
+from gestured.core.stamping import Stamper
+from gestured.core.wire import Addresses
+from gestured.tape import Packet, Tape
+
+PAUSE_S = 3.0  # between two recordings: whatever is open is answered
+SESSION = "session"
+SOURCE = ("127.0.0.1", 9)  # of all its packets
+DIFFERENT = ("wrong", "missed", "false")
+
+
+class Labelled:
+    """A file in the contract's form, played as one sensor, one recording after the other. Raises RecordingError.
+
+    Before each recording the frame counter leaps, as that of a sensor which starts anew: each is learned by itself.
+    """
+
+    def __init__(self, path: Path, sensor: str) -> None:
+        self._path, self._sensor = path, sensor
+        self._found = found = recording.read(path)
+        spans = [found.times_of(g) for g in range(len(found))]
+        lengths = [float(times[-1] - times[0]) + PAUSE_S for times in spans]
+        self._first = np.array([times[0] for times in spans])  # (G,) s, as in the file
+        begin = float(self._first[0]) if spans and self._first[0] >= STOPWATCH_S else 0.0
+        self._start = begin + np.cumsum([0.0, *lengths])[:-1]  # (G,) s, as it is played
+        self.tape = Tape({}, tuple(self._packets()), (), whole=True)
+
+    def scene(self, gestures: Iterable[str]) -> dict[str, object]:
+        """What a tape would say of itself: the defaults, and the sensor's own clock."""
+        rows, columns = self._found.frames.shape[1:]
+        addresses = Addresses()
+        settings = {
+            "addresses": {"pressure": addresses.pressure, "trajectory": addresses.trajectory},
+            "model": "", "fallback": [], "grid": [rows, columns], "clock": "sensor", "stale_s": 1.0,
+            "sensors": {}, "per_gesture": {},
+        }  # fmt: skip
+        return {"gestures": list(gestures), "settings": settings, "model": {"rows": rows, "columns": columns}}
+
+    def compare(self, lines: Iterable[Line], knew: Knew) -> Verdict:
+        """Hold the events of a replay against the labels."""
+        performed = list(self._performed())
+        asked = {id(one) for one in performed if knew(self._sensor, one.onset)}
+        tally = Tally(waiting=performed)
+        outcomes = [tally.hear(line, line["decided"]) for line in lines if line["type"] in ("gesture", "unknown")]
+        outcomes += tally.settle(float("inf"))
+        found = [
+            outcome
+            for outcome in outcomes
+            if outcome is not None
+            and outcome.verdict in DIFFERENT
+            and (outcome.performed is None or id(outcome.performed) in asked)
+        ]
+        found.sort(key=_moment)
+        skipped = len(performed) - len(asked)
+        return Verdict(f"{len(asked)} labels", skipped, [self._difference(outcome) for outcome in found])
+
+    def _packets(self) -> Iterator[Packet]:
+        found = self._found
+        form = Form(self._sensor, "ints" if np.can_cast(found.frames.dtype, np.int32) else "floats")
+        counter = 0
+        for g, (start, first) in enumerate(zip(self._start, self._first, strict=True)):
+            counter += Stamper.LEAP
+            for frame in found.stream(g):
+                counter += 1
+                t = float(start + (frame.t - first))
+                wrapped = (counter + 2**31) % 2**32 - 2**31  # an int32
+                yield Packet(round(1e9 * t), SOURCE, form.packet(frame, wrapped, t))
+
+    def _performed(self) -> Iterator[Performed]:
+        """What the labels say, in the times of playing."""
+        found = self._found
+        for g, label in enumerate(found.labels.tolist()):
+            if label != SESSION:
+                times = found.times_of(g)
+                first = 0 if found.onsets is None else int(found.onsets[g])
+                last = -1 if found.releases is None else int(found.releases[g])
+                kind = label if found.kinds is None else str(found.kinds[g])
+                yield self._played(g, label, kind, float(times[first]), float(times[last]))
+            elif found.event_recording is None:
+                raise RecordingError(
+                    f"{self._path}: event_labels: recording {g} is a session whose events are not known"
+                )
+        if found.event_recording is not None:
+            columns = (found.event_labels, found.event_kinds, found.event_onsets, found.event_offsets)
+            rows = zip(found.event_recording.tolist(), *(c.tolist() for c in columns if c is not None), strict=True)
+            for g, label, kind, onset, offset in rows:
+                yield self._played(g, label, kind, onset, offset)
+
+    def _played(self, g: int, label: str, kind: str, onset: float, offset: float) -> Performed:
+        later = float(self._start[g] - self._first[g])
+        return Performed(label, kind, onset + later, offset + later)
+
+    def _difference(self, outcome: Outcome) -> Difference:
+        performed, event = outcome.performed, outcome.event
+        before = after = None
+        if performed is not None:
+            before = self._answer(performed.onset, performed.label, None)
+        if event is not None:
+            after = self._answer(event["onset"], event["gesture"], event["confidence"])
+        elif performed is not None and performed.unknown:
+            after = self._answer(performed.onset, "unknown", None)
+        return Difference(before, after)
+
+    def _answer(self, t: float, name: str, confidence: float | None) -> Answer:
+        g = max(int(np.searchsorted(self._start, t, "right")) - 1, 0)
+        return Answer(f"recording {g}", float(t - self._start[g] + self._first[g]), name, confidence)
+
+
+def _moment(outcome: Outcome) -> float:
+    return outcome.performed.onset if outcome.performed else float((outcome.event or {})["onset"])

@@ -1,0 +1,170 @@
+"""A tape to a daemon over UDP, and what the daemon makes of it."""
+
+import queue
+import socket
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.client.stream import Stream, Unreachable
+from gestured.control.diff import ONSET_S, Line
+from gestured.core import osc
+from gestured.core.errors import GesturedError
+from gestured.core.stamping import Stamper
+from gestured.offline import Replay
+from gestured.tape import Packet, Tape
+
+Times = NDArray[np.float64]
+
+BUNDLE = b"#bundle\0"
+PATIENCE_S = 10.0  # a daemon says something once a second
+SILENT = ("stale", "no_data")  # states of a sensor that nobody feeds
+CONTACTS = 1000  # enough to tell
+TYPES = ("onset", "gesture", "unknown", "cancelled", "release", "status")
+TIMES = ("onset", "offset", "decided")
+
+
+def send(found: Tape, to: tuple[str, int], speed: float) -> tuple[list[float], int]:
+    """When each packet was sent (s since the epoch), and how many were refused by a closed port.
+
+    Each sender of the tape gets a socket of its own: a sensor belongs to its source.
+    """
+    try:
+        family, kind, _, _, where = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
+    except OSError as error:
+        raise GesturedError(f"cannot send to {to[0]}:{to[1]}: {error.strerror or error}") from None
+    senders: dict[tuple[str, int], socket.socket] = {}
+    sent: list[float] = []
+    unheard = 0
+    try:
+        for packet, data in _paced(found, speed):
+            if packet.source not in senders:
+                senders[packet.source] = socket.socket(family, kind)
+                senders[packet.source].connect(where)
+            try:
+                senders[packet.source].send(data)
+            except ConnectionRefusedError:
+                unheard += 1
+            sent.append(time.time())
+    finally:
+        for sender in senders.values():
+            sender.close()
+    return sent, unheard
+
+
+def _paced(found: Tape, speed: float) -> Iterator[tuple[Packet, bytes]]:
+    """Packets at their times; at another pace they say themselves when they were felt."""
+    first, start = found.packets[0].t_ns, time.monotonic()
+    for packet in found.packets:
+        wait = start + (packet.t_ns - first) / 1e9 / speed - time.monotonic()
+        if wait > 0:
+            time.sleep(wait)
+        tagged = speed != 1 and not packet.data.startswith(BUNDLE)
+        yield packet, osc.encode_bundle([packet.data], packet.t_ns / 1e9) if tagged else packet.data
+
+
+def retimed(heard: Sequence[Line], sent: Sequence[float], found: Tape, rehearsal: Replay) -> list[Line]:
+    """What a daemon said, in the recording's time: what was `found` was `sent` at these times (s since the epoch).
+
+    A daemon's times of a sensor run on from whatever it heard of that sensor before, so where they begin is found by
+    laying its onsets over those of the same frames in `rehearsal`, which must have been played to its end.
+    """
+    arrivals = [packet.t_ns / 1e9 - rehearsal.epoch for packet in found.packets]
+    tables = {}
+    for name, stream in rehearsal.streams.items():
+        arrived, felt = np.array(stream.stamps).T
+        told, waited = np.diff(felt), np.diff(np.interp(arrived, arrivals, sent))
+        steps = np.where(told <= Stamper.MAX_STEP_S, told, waited)  # no longer ones are believed
+        played = np.concatenate([[0.0], np.cumsum(steps)])
+        here = np.interp(stream.onsets, felt, played)
+        there = np.array([line["onset"] for line in heard if line["type"] == "onset" and line["sensor"] == name])
+        tables[name] = played + _shift(here, there), felt + rehearsal.epoch
+    return [
+        {**line, **{k: float(np.interp(line[k], *tables[line["sensor"]])) for k in TIMES if k in line}}
+        for line in heard
+    ]
+
+
+def _shift(here: Times, there: Times) -> float:
+    """Seconds by which most of `there` (M,) follow `here` (N,); 0 where one is empty."""
+    apart = np.sort(np.subtract.outer(there[:CONTACTS], here[:CONTACTS]).ravel())
+    if not len(apart):
+        return 0.0
+    alike = np.searchsorted(apart, apart + ONSET_S, "right") - np.arange(len(apart))
+    first = int(alike.argmax())
+    return float(np.median(apart[first : first + alike[first]]))
+
+
+class Hearing:
+    """What the daemon on an event socket says of some sensors; a thread reads. Raises Unreachable, GesturedError."""
+
+    def __init__(self, path: Path, sensors: frozenset[str]) -> None:
+        """Begins once nobody else feeds these sensors."""
+        self._sensors = sensors
+        self._stream = Stream(path, {"types": TYPES})
+        self._heard: queue.Queue[dict[str, Any] | None] = queue.Queue()
+        threading.Thread(target=self._read, daemon=True).start()
+        end = time.monotonic() + PATIENCE_S
+        while sensors & set(self._stream.hello["sensors"]) and (live := self._live()):
+            if time.monotonic() > end:
+                self.close()
+                raise GesturedError(f"{', '.join(live)}: is being sent to that daemon already; end that first")
+
+    def all(self, since: float) -> list[dict[str, Any]]:
+        """The lines of these sensors, once all that was sent before `since` (s since the epoch) was answered."""
+        found: list[dict[str, Any]] = []
+        open_contacts: set[tuple[str, int]] = set()
+        while True:
+            line = self._next()
+            if line["type"] == "lost":
+                raise GesturedError("events were lost: this machine is too slow for that --speed")
+            if line["type"] == "status":
+                if line["time"] >= since and not open_contacts:
+                    self._expect(line["sensors"])
+                    return found
+            elif line.get("sensor") in self._sensors and not line.get("test"):
+                key = line["sensor"], line["id"]
+                if line["type"] == "onset":
+                    open_contacts.add(key)
+                elif line["type"] == "release":
+                    open_contacts.discard(key)
+                found.append(line)
+
+    def close(self) -> None:
+        """Hang up."""
+        self._stream.close()
+
+    def _live(self) -> list[str]:
+        """The sensors that the next status has as being fed."""
+        while (line := self._next())["type"] != "status":
+            pass
+        return sorted(name for name in self._sensors if line["sensors"].get(name, SILENT[0]) not in SILENT)
+
+    def _expect(self, states: Mapping[str, str]) -> None:
+        deaf = sorted(self._sensors - set(states))
+        if deaf:
+            raise GesturedError(
+                f"the daemon on {self._stream.path} took no frame of {', '.join(deaf)}: "
+                "is it the one that listens there, and with that grid? gesturectl doctor says what it dropped"
+            )
+
+    def _read(self) -> None:
+        try:
+            for line in self._stream:
+                self._heard.put(line)
+        finally:
+            self._heard.put(None)
+
+    def _next(self) -> dict[str, Any]:
+        try:
+            line = self._heard.get(timeout=PATIENCE_S)
+        except queue.Empty:
+            raise Unreachable(f"the daemon on {self._stream.path} says nothing for {PATIENCE_S:g} s") from None
+        if line is None:
+            raise Unreachable(f"the daemon on {self._stream.path} closed the connection")
+        return line

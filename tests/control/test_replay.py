@@ -1,0 +1,194 @@
+"""`gesturectl replay`: to a daemon and here, held against what was recorded or labelled."""
+
+import json
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gestured import recording
+from gestured.control.cli import main
+from gestured.recording import Recordings
+from tests.control.conftest import gestures
+from tests.daemon import tiny_model
+from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor
+
+LEAD_S = 1.6  # untouched; 24 frames
+
+
+@pytest.fixture
+def serve(tmp_path: Path):
+    """Starts daemons of one's own; gives the flags with which replay finds them."""
+    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+    daemons = []
+
+    def start(*flags: object, gestures: tuple[str, ...] = tiny_model.GESTURES) -> tuple[str, ...]:
+        folder = tmp_path / str(len(daemons))
+        folder.mkdir()
+        daemons.append(Daemon.start(folder, tiny_model.make(folder / "tiny.onnx", gestures=gestures), *flags))
+        return "--to", daemons[-1].ready["listen"], "--socket", str(daemons[-1].socket)
+
+    yield start
+    for daemon in daemons:
+        assert daemon.stop() == 0, daemon.stderr()
+
+
+@pytest.fixture
+def replay(capsys: pytest.CaptureFixture[str]):
+    """`gesturectl replay`: exit status, standard output, standard error."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        capsys.readouterr()
+        return main(["replay", *map(str, arguments)]), *capsys.readouterr()
+
+    return run
+
+
+def mixed_up() -> tuple[str, ...]:
+    """The gestures of a model to which a tap is a swipe, and the other way round."""
+    names = list(tiny_model.GESTURES)
+    names[0], names[5] = names[5], names[0]
+    return tuple(names)
+
+
+def said(out: str) -> list[str]:
+    """Sign and answer of each line of differences."""
+    return [line[0] + line.rpartition(": ")[2].split()[0] for line in out.splitlines()]
+
+
+def test_what_a_daemon_answers_is_compared_with_what_was_recorded(recorded, replay, daemon: Daemon, serve) -> None:
+    pytest.importorskip("mcap", reason="recordings need the extra [record]")
+    path, _ = recorded(gestures(daemon, "cmp", "left", "tap", "up"))
+    same = serve("--clock", "sensor")
+    for _ in range(2):  # the second time it knows the sensor, whose clock is far ahead
+        status, out, err = replay(path, *same, "--speed", 50, "--diff")
+        assert (status, out) == (0, "") and "3 recorded answers, 0 differences" in err
+    other = serve("--clock", "sensor", gestures=mixed_up())
+    status, out, err = replay(path, *other, "--speed", 50, "--diff")
+    assert status == 1 and said(out) == ["-swipe_left", "+one_tap", "-one_tap", "+swipe_left"]
+
+
+def labelled(path: Path, *performed: tuple[str, list[Frame]], lead_s: float = LEAD_S) -> Path:
+    """A file of cut gestures: label, and what a hand did between idle frames."""
+    hand, frames, times, offsets = Hand(), [], [], [0]
+    for _, touched in performed:
+        part = [*hand.idle(lead_s), *touched, *hand.idle(1.0)]
+        frames += part
+        times.append(100.0 + np.arange(len(part)) / RATE_HZ)
+        offsets.append(offsets[-1] + len(part))
+    first = round(lead_s * RATE_HZ)
+    made = Recordings(
+        frames=np.array(frames).astype(np.uint16),
+        times=np.concatenate(times),
+        offsets=np.array(offsets, np.int64),
+        labels=np.array([label for label, _ in performed]),
+        subjects=np.array(["07"] * len(performed)),
+        onsets=np.full(len(performed), first),
+        releases=np.array([first + len(touched) - 1 for _, touched in performed]),
+    )
+    recording.write(path, made)
+    return path
+
+
+@pytest.fixture
+def wrongly(tmp_path: Path) -> Path:
+    """One right label, one wrong one, one gesture where none should be."""
+    hand = Hand()
+    swipe: Callable[[str], list[Frame]] = hand.swipe
+    return labelled(
+        tmp_path / "w.npz", ("swipe_left", swipe("left")), ("swipe_up", swipe("down")), ("none", swipe("right"))
+    )
+
+
+def test_labels_are_compared_here_and_at_a_daemon(replay, serve, wrongly: Path, tmp_path: Path) -> None:
+    model = tiny_model.make(tmp_path / "tiny.onnx")
+    there = (*serve("--clock", "sensor"), "--speed", 50)
+    for way in (("--model", model), there):
+        status, out, err = replay(wrongly, *way, "--diff")
+        assert (status, said(out)) == (1, ["-swipe_up", "+swipe_down", "-none", "+swipe_right"]), err
+        assert "3 labels, 2 differences" in err
+        assert [line.split()[1:5] for line in out.splitlines()][:2] == [["101.600", "s", "recording", "1:"]] * 2
+    status, out, _ = replay(wrongly, "--model", model, "--diff", "--json")
+    assert [json.loads(line)["recorded"]["sensor"] for line in out.splitlines()] == ["recording 1", "recording 2"]
+    status, out, _ = replay(wrongly, "--model", model, "--sensor", "arm", "--json")
+    events = [json.loads(line) for line in out.splitlines()]
+    assert {event["sensor"] for event in events} == {"arm"}
+    assert [e["gesture"] for e in events if e["type"] == "gesture"] == ["swipe_left", "swipe_down", "swipe_right"]
+
+
+def test_by_the_time_of_arrival_a_daemon_says_the_same_in_real_time(replay, serve, tmp_path: Path) -> None:
+    path = labelled(tmp_path / "a.npz", ("swipe_left", Hand().swipe("left")))
+    there = serve("--clock", "arrival")
+    status, out, err = replay(path, *there, "--diff")
+    assert (status, out) == (0, "") and "1 labels, 0 differences" in err
+    status, out, err = replay(path, *there, "--diff", "--speed", 100)
+    assert status == 1 and 'must run with clock = "sensor"' in err
+
+
+def test_what_is_touched_before_the_sensor_can_be_known_is_not_compared(replay, tmp_path: Path) -> None:
+    path = labelled(tmp_path / "s.npz", *(("one_tap", Hand().swipe("left")),) * 2, lead_s=0.5)
+    status, out, err = replay(path, "--model", tiny_model.make(tmp_path / "tiny.onnx"), "--diff")
+    assert (status, out) == (0, "") and "0 labels, 2 before the sensor was known, 0 differences" in err
+
+
+def test_a_session_with_a_long_pause_is_compared_event_by_event(replay, serve, tmp_path: Path) -> None:
+    hand = Hand()
+    parts = [hand.idle(2.0) + hand.swipe("left") + hand.idle(1.5), hand.idle(1.0) + hand.swipe("up") + hand.idle(1.0)]
+    times = [np.arange(len(parts[0])) / RATE_HZ, 60.0 + np.arange(len(parts[1])) / RATE_HZ]
+    onsets = np.array([2.0, 61.0])
+    made = Recordings(
+        frames=np.array(parts[0] + parts[1]),
+        times=np.concatenate(times),
+        offsets=np.array([0, len(parts[0]) + len(parts[1])], np.int64),
+        labels=np.array(["session"]),
+        subjects=np.array([1]),
+        event_recording=np.array([0, 0]),
+        event_labels=np.array(["swipe_left", "swipe_up"]),
+        event_kinds=np.array(["swipe_left", "swipe_up"]),
+        event_onsets=onsets,
+        event_offsets=onsets + 0.4,
+    )
+    path = tmp_path / "session.npz"
+    recording.write(path, made)
+    status, out, err = replay(path, *serve("--clock", "sensor"), "--speed", 200, "--diff")
+    assert (status, out) == (0, "") and "2 labels, 0 differences" in err
+
+
+def test_a_daemon_that_cannot_be_compared_with_is_one_sentence(replay, serve, daemon: Daemon, wrongly: Path) -> None:
+    with socket.socket(type=socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        nobody = f"127.0.0.1:{free.getsockname()[1]}"
+    for way in ((), ("--socket", daemon.socket, "--diff")):
+        status, _, err = replay(wrongly, "--to", nobody, "--speed", 1000, *way)
+        assert status == 1 and "nobody listened" in err
+    _, listen, *_ = there = serve("--clock", "sensor")[:2]
+    status, _, err = replay(wrongly, *there, "--speed", 100, "--socket", daemon.socket, "--diff")
+    assert status == 1 and f"{daemon.socket} took no frame of recording" in err
+    status, _, err = replay(wrongly, *there, "--socket", daemon.folder / "none.sock", "--diff")
+    assert status == 1 and "No such file" in err
+
+
+def test_a_sensor_that_is_there_already_is_left_alone(replay, daemon: Daemon, wrongly: Path, monkeypatch) -> None:
+    monkeypatch.setattr("gestured.control.sending.PATIENCE_S", 1.5)
+    Sensor(daemon, "live").begin()
+    daemon.client().subscribe("status").until(lambda line: line.get("sensors", {}).get("live") == "ok")
+    flags = ["--to", daemon.ready["listen"], "--socket", str(daemon.socket), "--diff", "--sensor", "live"]
+    status, _, err = replay(wrongly, *flags)
+    assert status == 1 and "live: is being sent to that daemon already" in err
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (("--speed", "2"), "--to HOST:PORT"),
+        (("--socket", "x.sock"), "--to HOST:PORT"),
+        (("--to", "127.0.0.1:1", "--model", "lstm"), "the daemon of --to has its own"),
+        (("--to", "127.0.0.1:1", "--speed", "0"), "--speed 0"),
+        (("--sensor", "a/b"), "--sensor 'a/b'"),
+    ],
+)
+def test_flags_that_do_not_go_together_are_one_sentence(replay, wrongly: Path, flags: tuple[str, ...], words) -> None:
+    status, out, err = replay(wrongly, *flags)
+    assert (status, out) == (1, "") and words in err and err.count("\n") == 1
