@@ -13,6 +13,7 @@ def install(share: Path) -> None:
         put(share / "man" / f"man{name[-1]}" / name, text)
     for program in found:
         put(share / "bash-completion" / "completions" / program.name, completion.bash(program))
+        put(share / "zsh" / "vendor-completions" / f"_{program.name}", completion.zsh(program))
         put(share / "fish" / "vendor_completions.d" / f"{program.name}.fish", completion.fish(program))
 
 

@@ -1,5 +1,6 @@
-"""Completions for bash and fish."""
+"""Completions for bash, zsh and fish."""
 
+import re
 from collections.abc import Iterator
 
 from deploy.generate.programs import Option, Program
@@ -80,6 +81,49 @@ def _fish_flags(program: Program) -> Iterator[str]:
         if long:
             value = f" -x -a {_quoted(' '.join(option.choices))}" if option.choices else " -r" if option.metavar else ""
             yield f"-l {long[0]}{value} -d {_quoted(option.help)}"
+
+
+def zsh(program: Program) -> str:
+    """A zsh completion with the words of the help."""
+    function = "_" + program.name
+    lines = [f"#compdef {program.name}", f"# zsh completion for {program.name}, made from its help", f"{function}() {{"]
+    if not program.commands:
+        lines.append(_arguments(program))
+    else:
+        found = [(command.name.split()[-1], command) for command in program.commands]
+        lines += [
+            "local curcontext=$curcontext state line",
+            _arguments(program, "-C", "'1: :->command'", "'*:: :->rest'"),
+            "case $state in",
+            "command)",
+            "local -a commands=(",
+            *(_literal(f"{name}:{command.summary}") for name, command in found),
+            ")",
+            "_describe command commands ;;",
+            "rest)",
+            "case $line[1] in",
+            *(f"{name})\n{_arguments(command)} ;;" for name, command in found),
+            "esac ;;",
+            "esac",
+        ]
+    return "\n".join([*lines, "}", f'{function} "$@"']) + "\n"
+
+
+def _arguments(program: Program, *first: str) -> str:
+    """A call of zsh's _arguments: each flag with its words and its kind of value, then what stands by itself."""
+    specs = list(first)
+    for option in program.options:
+        kind = f"({' '.join(option.choices)})" if option.choices else "_files" if takes_path(option) else " "
+        value = f":{option.metavar.replace(':', '')}:{kind}" if option.metavar else ""
+        words = re.sub(r"[\[\]\\]", r"\\\g<0>", " ".join(option.help.split()))
+        specs += [_literal(f"*{flag}[{words}]{value}" if value else f"{flag}[{words}]") for flag in option.flags]
+        if not option.flags:
+            specs.append(_literal(value))
+    return "_arguments " + " \\\n    ".join(specs)
+
+
+def _literal(text: str) -> str:
+    return "'" + text.replace("'", "'\\''") + "'"
 
 
 def _quoted(text: str) -> str:

@@ -25,7 +25,8 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         epilog="examples:\n  gesturectl listen --types gesture,unknown\n"
         "  gesturectl listen --json --gesture swipe_left --count 1",
     )
-    parser.add_argument("--socket", type=Path, help="the daemon's event socket (default: the daemon's own default)")
+    text = "the daemon's event socket (default: the daemon's own default)"
+    parser.add_argument("--socket", type=Path, metavar="PATH", help=text)
     parser.add_argument("--types", type=_types, help=f"comma-separated, of {', '.join(TYPES)} (default: gesture)")
     parser.add_argument("--sensor", action="append", metavar="NAME", help="only this sensor; may be repeated")
     parser.add_argument("--gesture", action="append", metavar="NAME", help="only this gesture; may be repeated")
