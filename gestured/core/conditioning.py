@@ -86,10 +86,11 @@ class Conditioner:
         self._frozen = np.zeros(rows * columns, dtype=bool)
         self._still_since = np.full(rows * columns, math.inf)  # s
         self._previous: Array = np.zeros(rows * columns)  # raw counts
-        self._rail = -math.inf  # the largest raw count seen under a touch
+        self._rail = -math.inf  # the largest raw count that two frames under a touch have reached
         self._step = 0.0  # counts, one quantisation step: below it noise cannot be known
         self._unit = 0.0  # counts, the smallest change that a sensor has shown which stood still when it was learned
         self._shown: Array = np.zeros(rows * columns)  # raw counts of its last frame
+        self.lively = False  # whether no two frames of the idle sensor were the same
         self._fine = False  # whether a finger's tremble shows in the last digit
         self._strikes = np.zeros(rows * columns, dtype=np.int64)
         self.bad = np.zeros(rows * columns, dtype=bool)
@@ -157,6 +158,7 @@ class Conditioner:
             return False
         self.baseline, self._sigma, self._stuck = learned.baseline, learned.noise, learned.constant
         self._fine, self._step = learned.fine, learned.step
+        self.lively = bool(np.diff(learned.frames, axis=0).any(axis=1).all())
         self._unit, self._shown = math.inf if learned.still else 0.0, raw
         self._frozen[:] = False
         self._provisional = not learned.stable
@@ -218,11 +220,11 @@ class Conditioner:
     def _freeze(self, t: float, raw: Array, d: Array) -> None:
         """A finger trembles; what stays pressed to the last digit, below the sensor's limit, is a fault."""
         changed = raw != self._previous
-        self._previous = raw
+        last, self._previous = self._previous, raw
         self._still_since = np.where(changed, t, np.minimum(self._still_since, t))
         if not self._fine:
             return
-        self._rail = max(self._rail, float(raw.max()))
+        self._rail = max(self._rail, min(float(raw.max()), float(last.max())))  # one frame alone may be a spike
         frozen = (t - self._still_since >= FROZEN_S) & (d > 3 * self._sigma) & (raw < self._rail)
         if (frozen != self._frozen).any():
             self._frozen = frozen

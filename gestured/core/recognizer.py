@@ -1,5 +1,7 @@
 """The one path from frames to events: conditioning, segmentation, classification, decision."""
 
+import math
+from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +18,8 @@ from gestured.core.segmentation import TOUCHED, Action, Phase, Segmenter, Timing
 
 LARGEST = float(np.finfo(np.float32).max)  # counts; also what a frame on the wire can hold
 LEAD_S = 0.15  # quiet frames kept before an onset: at 15 Hz two of them
+HOLE_S = 0.25  # without a frame, or so many of the sensor's intervals: who knows what the finger did meanwhile
+HOLE_FRAMES = 2.5
 DRAFT_S = 0.085  # quiet for so long, all that a window takes in is there; the wait goes on to see the finger stay off
 
 
@@ -53,6 +57,7 @@ class Cut:
     id: int
     segment: Segment
     decided: float  # s, the frame that completed it
+    hole_s: float = 0.0  # the longest time from one frame to the next until then
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +70,8 @@ class _Made:
 
 
 Contact = Onset | Cut | Cancelled | Release
-Kept = tuple[float, NDArray[np.float64], tuple[Touch, ...], int]  # t, (N,) counts above the baseline, touches, lost
+# t, (N,) counts above the baseline, touches, lost, whether it is no repetition of the last one
+Kept = tuple[float, NDArray[np.float64], tuple[Touch, ...], int, bool]
 
 
 class FrontEnd:
@@ -95,6 +101,7 @@ class FrontEnd:
         self.draft: Segment | None = None  # made by the last push: what will be cut if the finger stays off
         self.segments = 0  # so far; their ids
         self._last: float | None = None
+        self._shown = b""  # by the last frame
         self._interval = 0.0
         self._shifted: float | None = None  # s, since when the frames lie far below the baseline
 
@@ -117,6 +124,11 @@ class FrontEnd:
     def bad_taxels(self) -> int:
         """How many taxels are bridged from their neighbours."""
         return int(np.count_nonzero(self.conditioner.bad))
+
+    @property
+    def interval_s(self) -> float:
+        """Seconds from frame to frame as they come, 0 before it is known."""
+        return self._interval
 
     @property
     def rate_hz(self) -> float:
@@ -164,7 +176,9 @@ class FrontEnd:
             for action in segmenter.flush(t):
                 out += self._act(action, t)
         kept = self._kept
-        kept.append((t, d, frame.touches, frame.lost))
+        shown, self._shown = self._shown, raw.tobytes()
+        fresh = shown != self._shown or not conditioner.lively
+        kept.append((t, d, frame.touches, frame.lost, fresh))
         place = conditioner.place(d) if activity >= segmenter.off else None
         for action in segmenter.push(t, activity, place):
             out += self._act(action, t)
@@ -231,7 +245,7 @@ class FrontEnd:
         segment = self._make(onset, offset).segment
         if float(segment.frames.max()) < self.segmenter.off * segment.noise:  # nothing is left without its bad taxels
             return [Cancelled(self.sensor, self.segments, "stuck"), release]
-        return [Cut(self.segments, segment, t), release]
+        return [Cut(self.segments, segment, t, self._hole(onset, t)), release]
 
     def _cancel(self, reason: str) -> list[Contact]:
         release = Release(self.sensor, self.segments, self.segmenter.last_touched)
@@ -268,6 +282,15 @@ class FrontEnd:
         inspection = self.conditioner.inspect(stack[first : last + 1])
         self._made = made = _Made(segment, self.conditioner.bad, inspection)
         return made
+
+    def _hole(self, onset: float, t: float) -> float:
+        """The longest time in s in which a finger may have moved unseen, from the last quiet frame before the onset until
+        `t`; infinite where nobody saw it come. Of a sensor that says no more nobody knows, and it counts for nothing."""
+        seen = [k[0] for k in self._kept if k[4]]
+        if t == self._last:
+            seen.append(t)
+        before = bisect_left(seen, onset) - 1
+        return float(np.diff(seen[before:]).max()) if before >= 0 else math.inf
 
     def _mount(self, touch: Touch) -> Touch:
         return Touch(touch.id, *self.mounting.point(touch.x, touch.y, *self.sent))
@@ -352,7 +375,8 @@ class Recognizer:
         best = max(scores, key=scores.__getitem__)
         confidence = scores[best] * (1.0 - answer.unknown)
         frames = segment.last - segment.first + 1
-        if not confidence >= self._thresholds.get(best, answer.threshold):
+        whole = cut.hole_s <= max(HOLE_S, HOLE_FRAMES * self.front_end.interval_s)
+        if not whole or not confidence >= self._thresholds.get(best, answer.threshold):
             return Unknown(
                 sensor, cut.id, confidence, segment.onset, segment.offset, cut.decided,
                 frames, segment.lost, answer.model, answer.degraded, scores,

@@ -130,6 +130,63 @@ def test_a_witness_is_told_of_what_was_decided_alone() -> None:
     assert [segment.offset] == [event.offset for event in answers(events)]
 
 
+# --- what nobody saw
+
+
+SLOW_SWIPE = ("quiet for 1500ms", "move 4,1 to 4,7 0.8 in 800ms", "quiet for 900ms")
+
+
+def touched(stream: Sequence[Frame]) -> tuple[int, int]:
+    """First and last frame of the one contact."""
+    (cut,) = [x for x in cut_out(stream) if isinstance(x, Cut)]
+    times = [frame.t for frame in stream]
+    return times.index(cut.segment.onset), times.index(cut.segment.offset)
+
+
+def cut_out(stream: Sequence[Frame]) -> list[Contact]:
+    front_end = FrontEnd("armrest", 9, 9)
+    return [x for frame in stream for x in front_end.push(frame)]
+
+
+@pytest.mark.parametrize("where", [-4, 0, 3, 9, 11])  # frames from the onset; the last touched one is the eleventh
+@pytest.mark.parametrize(("lost", "kind"), [(2, Gesture), (5, Unknown)])
+def test_a_gesture_with_a_hole_is_unknown(where: int, lost: int, kind: type) -> None:
+    stream = frames(*SLOW_SWIPE)
+    at = touched(stream)[0] + where
+    (answer,) = answers(run(recognizer(Fake()), stream[:at] + stream[at + lost :]))
+    assert isinstance(answer, kind)
+
+
+def test_a_hole_while_a_second_tap_is_waited_for() -> None:
+    stream = frames("quiet for 1500ms", TAP, "quiet for 900ms")
+    at = touched(stream)[1] + 3
+    (answer,) = answers(run(recognizer(Fake()), stream[:at] + stream[at + 4 :]))
+    assert isinstance(answer, Unknown)
+
+
+@pytest.mark.parametrize("where", [-4, 0, 3, 9])
+def test_a_sensor_that_repeats_itself_has_seen_nothing(where: int) -> None:
+    stream = frames(*SLOW_SWIPE)
+    at = touched(stream)[0] + where
+    for n in range(at + 1, at + 6):
+        stream[n] = replace(stream[n], values=stream[at].values)
+    assert not [event for event in run(recognizer(Fake()), stream) if isinstance(event, Gesture)]
+
+
+def test_a_slow_sensor_has_no_holes() -> None:
+    stream = frames("quiet for 1500ms", "move 4,1 to 4,7 0.8 in 1500ms", "quiet for 1500ms")[::3]
+    (answer,) = answers(run(recognizer(Fake()), stream))
+    assert isinstance(answer, Gesture)
+
+
+def test_a_sensor_that_says_no_more_once_the_finger_is_off_is_answered() -> None:
+    stream = frames(*SLOW_SWIPE)
+    end = touched(stream)[1] + 2
+    subject = recognizer(Fake())
+    events = run(subject, stream[:end]) + subject.flush(stream[end - 1].t + 5.0)
+    assert [type(event) for event in answers(events)] == [Gesture]
+
+
 # --- what is decided
 
 
