@@ -16,7 +16,8 @@ from gestured.client.sensor import Form
 from gestured.core import messages, osc
 from gestured.core.events import Gesture
 from gestured.core.frames import Frame
-from gestured.core.recognizer import Cut, FrontEnd, Recognizer
+from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.recognizer import Recognizer
 from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.clients import EventServer
 from gestured.daemon.metrics import Metrics

@@ -9,7 +9,8 @@ from gestured.core.conditioning import Mounting
 from gestured.core.errors import ModelError, RecordingError
 from gestured.core.events import Event, Onset
 from gestured.core.frames import Frame, Segment
-from gestured.core.recognizer import Classifier, FrontEnd, Recognizer, Scores
+from gestured.core.front_end import FrontEnd
+from gestured.core.recognizer import Classifier, Recognizer, Scores
 from gestured.core.segmentation import Timing
 from gestured.core.stamping import Stamper
 from gestured.core.wire import Addresses, Arrival, Decoder

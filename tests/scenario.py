@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Frame, Segment
-from gestured.core.recognizer import Contact, Cut, FrontEnd
+from gestured.core.front_end import Contact, Cut, FrontEnd
 
 Finger = tuple[float, float, float]  # row, column, amplitude
 Fingers = Callable[[float], list[Finger]]  # by the share of a step's time that has passed

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Frame
-from gestured.core.recognizer import Contact, Cut
+from gestured.core.front_end import Contact, Cut
 from tests.scenario import Player, Scenario, ScenarioError, load, parse
 
 SCENARIOS = sorted((Path(__file__).parent / "scenarios").glob("*.txt"))

@@ -14,7 +14,7 @@ from typing import Any
 
 import gestured
 from gestured.client.control import Control
-from gestured.client.stream import Refused, Unreachable
+from gestured.client.lines import Refused, Unreachable
 from gestured.control.address import add_control, default_control
 from gestured.core.errors import ModelError
 from gestured.models import check

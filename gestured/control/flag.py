@@ -5,7 +5,7 @@ import json
 from datetime import datetime
 from pathlib import Path
 
-from gestured.client.stream import Unreachable
+from gestured.client.lines import Unreachable
 from gestured.control.address import add_control, connect
 from gestured.control.record import Keeper
 from gestured.tape import Writer, library

@@ -8,7 +8,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from gestured.client.stream import Refused, Stream, Unreachable
+from gestured.client.lines import Refused, Unreachable
+from gestured.client.stream import Stream
 from gestured.control.address import default_socket
 
 TYPES = ("gesture", "unknown", "cancelled", "onset", "release", "status")

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from gestured.client.control import Control
-from gestured.client.stream import Refused, Unreachable
+from gestured.client.lines import Refused, Unreachable
 from gestured.control.address import add_control, connect, finish_on_signals
 from gestured.core.errors import GesturedError
 from gestured.core.wire import Decoder

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.client.stream import Stream, Unreachable
+from gestured.client.lines import Unreachable
+from gestured.client.stream import Stream
 from gestured.control.diff import ONSET_S, Line
 from gestured.core import osc
 from gestured.core.errors import GesturedError

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from itertools import groupby
 
 from gestured.client.address import host_port
-from gestured.client.stream import Unreachable
+from gestured.client.lines import Unreachable
 from gestured.control.address import add_control, connect, finish_on_signals
 from gestured.core import osc
 from gestured.core.errors import GesturedError, ProtocolError

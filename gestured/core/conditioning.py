@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.settling import LEAST_STEP, Settling
+from gestured.core.settling import LEAST_STEP, Settling, median
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ class Conditioner:
         self._frozen = np.zeros(rows * columns, dtype=bool)
         self._still_since = np.full(rows * columns, math.inf)  # s
         self._previous: Array = np.zeros(rows * columns)  # raw counts
-        self._rail = -math.inf  # the largest raw count that two frames under a touch have reached
+        self._rail = -math.inf  # the largest raw count seen under a touch
         self._step = 0.0  # counts, one quantisation step: below it noise cannot be known
         self._unit = 0.0  # counts, the smallest change that a sensor has shown which stood still when it was learned
         self._shown: Array = np.zeros(rows * columns)  # raw counts of its last frame
@@ -167,7 +167,7 @@ class Conditioner:
         self._scale, self._usual = 1.0, 0.0
         self._review()
         scaled = (learned.frames - self.baseline) * self._weight
-        self._usual = float(np.median([self.activity(row)[0] for row in scaled]))
+        self._usual = float(median(np.array([self.activity(row)[0] for row in scaled])))
         self._review()
         return True
 
@@ -220,11 +220,11 @@ class Conditioner:
     def _freeze(self, t: float, raw: Array, d: Array) -> None:
         """A finger trembles; what stays pressed to the last digit, below the sensor's limit, is a fault."""
         changed = raw != self._previous
-        last, self._previous = self._previous, raw
+        self._previous = raw
         self._still_since = np.where(changed, t, np.minimum(self._still_since, t))
         if not self._fine:
             return
-        self._rail = max(self._rail, min(float(raw.max()), float(last.max())))  # one frame alone may be a spike
+        self._rail = max(self._rail, float(raw.max()))
         frozen = (t - self._still_since >= FROZEN_S) & (d > 3 * self._sigma) & (raw < self._rail)
         if (frozen != self._frozen).any():
             self._frozen = frozen
@@ -277,7 +277,7 @@ class Conditioner:
 
     def _review(self) -> None:
         """Weights, the sensor's noise and its bad taxels from what is known of each taxel."""
-        self.noise = _median(self._sigma)
+        self.noise = float(median(self._sigma))
         self.bad = self._stuck | self._frozen | (self._sigma > NOISY * self.noise)
         if self.bad.all():
             self.bad = np.zeros_like(self.bad)
@@ -291,13 +291,6 @@ def _blob(size: int) -> Array:
     side, middle, _ = BLOB
     band = middle * np.eye(size) + side * (np.eye(size, k=1) + np.eye(size, k=-1))
     return np.asarray(band / math.sqrt(sum(b * b for b in BLOB)))
-
-
-def _median(values: Array) -> float:
-    """Of (N,) numbers, as `numpy.median` has it, at an eighth of its price: it is made for larger arrays."""
-    ordered = np.sort(values)
-    middle = ordered.size // 2
-    return ordered.item(middle) if ordered.size % 2 else (ordered.item(middle - 1) + ordered.item(middle)) / 2
 
 
 def _neighbour_mean(grid: NDArray[np.floating], good: NDArray[np.bool_]) -> Array:

@@ -5,7 +5,7 @@ from random import Random  # numpy's own is 2 MiB that nothing else here needs
 import numpy as np
 
 from gestured.core.frames import Frame
-from gestured.core.recognizer import FrontEnd
+from gestured.core.front_end import FrontEnd
 from gestured.daemon.pipeline import Pipeline
 
 SIDE = 4  # taxels

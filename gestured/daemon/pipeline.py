@@ -14,7 +14,8 @@ from typing import Literal
 from gestured.core.conditioning import Mounting
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.frames import Frame, Segment
-from gestured.core.recognizer import FrontEnd, Recognizer, Scores
+from gestured.core.front_end import FrontEnd
+from gestured.core.recognizer import Recognizer, Scores
 from gestured.core.segmentation import Timing
 from gestured.core.stamping import Stamper
 from gestured.core.wire import Arrival

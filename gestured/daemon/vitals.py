@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.recognizer import FrontEnd
+from gestured.core.front_end import FrontEnd
 
 FAULTY = 0.25  # of the taxels bad: what is bridged between them is guesswork
 

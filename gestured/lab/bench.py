@@ -17,7 +17,8 @@ from gestured.client.engine import Engine
 from gestured.core.errors import GesturedError
 from gestured.core.events import Gesture, Unknown
 from gestured.core.frames import Frame
-from gestured.core.recognizer import FrontEnd, Recognizer
+from gestured.core.front_end import FrontEnd
+from gestured.core.recognizer import Recognizer
 from gestured.lab.online import play
 from gestured.models import open_model
 from gestured.simulator import Participant, Sensor, Take, generator, session

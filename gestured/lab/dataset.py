@@ -21,7 +21,7 @@ import gestured.simulator
 from gestured.core.errors import RecordingError
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment
-from gestured.core.recognizer import Cut, FrontEnd
+from gestured.core.front_end import Cut, FrontEnd
 from gestured.core.window import Window
 from gestured.lab.progress import progress
 from gestured.simulator import (

@@ -11,8 +11,9 @@ import pytest
 
 from gestured.core.events import Cancelled, Event, Gesture, Unknown
 from gestured.core.frames import Frame, Segment
+from gestured.core.front_end import FrontEnd
 from gestured.core.measures import MEASURES
-from gestured.core.recognizer import FrontEnd, Scores
+from gestured.core.recognizer import Scores
 from gestured.core.window import Window
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.reading import STATES, Reading, by_label, together

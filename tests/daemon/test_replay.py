@@ -8,8 +8,9 @@ import pytest
 
 from gestured.core.events import Event
 from gestured.core.frames import Frame
+from gestured.core.front_end import FrontEnd
 from gestured.core.messages import event_type
-from gestured.core.recognizer import FrontEnd, Recognizer
+from gestured.core.recognizer import Recognizer
 from gestured.models import open_model
 from tests.daemon import harness
 from tests.daemon.harness import Daemon, Hand, Sensor

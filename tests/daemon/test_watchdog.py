@@ -10,7 +10,7 @@ import pytest
 
 from gestured.client.control import Control
 from gestured.client.stream import Unreachable
-from gestured.core.recognizer import FrontEnd
+from gestured.core.front_end import FrontEnd
 from gestured.daemon.canary import Canary
 from gestured.daemon.merge import load
 from gestured.daemon.metrics import Metrics

@@ -19,7 +19,8 @@ from typing import Any
 
 from gestured.core.events import Cancelled, Gesture, Onset, Unknown
 from gestured.core.frames import Frame, Segment
-from gestured.core.recognizer import Cut, FrontEnd, Recognizer
+from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.recognizer import Recognizer
 from tests.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
 
 SEEN = 4.0  # times the noise

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from gestured.core.frames import Frame, Segment
-from gestured.core.recognizer import FrontEnd, Recognizer, Scores
+from gestured.core.front_end import FrontEnd
+from gestured.core.recognizer import Recognizer, Scores
 from gestured.lab import dataset
 from gestured.lab.dataset import (
     OTHERS,

@@ -11,7 +11,7 @@ import numpy as np
 from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Frame
-from gestured.core.recognizer import Contact, Cut, FrontEnd
+from gestured.core.front_end import Contact, Cut, FrontEnd
 from gestured.core.stamping import Stamper
 from gestured.core.wire import Addresses, Arrival, Decoder
 from gestured.lab.recordings.quality import Take

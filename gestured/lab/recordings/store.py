@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame, Segment
-from gestured.core.recognizer import Cut, FrontEnd
+from gestured.core.front_end import Cut, FrontEnd
 from gestured.lab.dataset import with_idle
 from gestured.recording import Recordings
 from gestured.recording_check import EVENTS, FINGERS

@@ -14,7 +14,8 @@ import numpy as np
 from gestured.core.events import Event, Gesture, Onset
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment
-from gestured.core.recognizer import Classifier, FrontEnd, Recognizer
+from gestured.core.front_end import FrontEnd
+from gestured.core.recognizer import Classifier, Recognizer
 from gestured.core.window import Window
 from gestured.lab.dataset import WINDOW
 from gestured.lab.stability.path import Array, Stream, events, fault, labels

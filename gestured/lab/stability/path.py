@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from gestured.core.conditioning import Mounting
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.frames import Frame, Segment
-from gestured.core.recognizer import Classifier, Cut, FrontEnd, Recognizer
+from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.recognizer import Classifier, Recognizer
 from gestured.simulator import GESTURES, Participant, Sensor, generator, gesture_take
 
 Array = NDArray[Any]

@@ -1,0 +1,265 @@
+"""Conditioning and segmentation of one sensor: frames in, segments out."""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.conditioning import Conditioner, Inspection, Mounting
+from gestured.core.events import Cancelled, Onset, Release
+from gestured.core.frames import Frame, Segment, Touch
+from gestured.core.segmentation import TOUCHED, Action, Phase, Segmenter, Timing
+
+LARGEST = float(np.finfo(np.float32).max)  # counts; also what a frame on the wire can hold
+LEAD_S = 0.15  # quiet frames kept before an onset: at 15 Hz two of them
+DRAFT_S = 0.085  # quiet for so long, all that a window takes in is there; the wait goes on to see the finger stay off
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """A segment that is complete and waits for its name."""
+
+    id: int
+    segment: Segment
+    decided: float  # s, the frame that completed it
+    hole_s: float = 0.0  # the longest time from one frame to the next until then
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """A segment as it was made, perhaps before it was cut."""
+
+    segment: Segment
+    bad: NDArray[np.bool_]  # (N,) taxels that are bridged in it
+    inspection: Inspection
+
+
+Contact = Onset | Cut | Cancelled | Release
+# t, (N,) counts above the baseline, touches, lost, whether it is no repetition of the last one
+Kept = tuple[float, NDArray[np.float64], tuple[Touch, ...], int, bool]
+
+
+class FrontEnd:
+    """Frames of one sensor in, segments out. `rows` x `columns` is the grid as sent, before mounting."""
+
+    def __init__(
+        self,
+        sensor: str,
+        rows: int,
+        columns: int,
+        *,
+        mounting: Mounting | None = None,
+        wait_for_double_tap: bool = True,
+        timing: Timing | None = None,
+    ) -> None:
+        self.sensor = sensor
+        self.sent = (rows, columns)
+        self.mounting = mounting or Mounting()
+        self.rows, self.columns = self.mounting.shape(rows, columns)
+        self.timing = timing or Timing()
+        self.conditioner = Conditioner(self.rows, self.columns)
+        travel = self.timing.tap_travel * min(self.rows, self.columns)
+        self.segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
+        self._mounted = self.mounting != Mounting()
+        self._kept: deque[Kept] = deque()
+        self._made: _Made | None = None
+        self.draft: Segment | None = None  # made by the last push: what will be cut if the finger stays off
+        self.segments = 0  # so far; their ids
+        self._last: float | None = None
+        self._shown = b""  # by the last frame
+        self._interval = 0.0
+        self._shifted: float | None = None  # s, since when the frames lie far below the baseline
+
+    @property
+    def ready(self) -> bool:
+        """Whether the idle sensor is known, so that a touch can be told from it."""
+        return self.conditioner.ready
+
+    @property
+    def touched(self) -> bool:
+        """Whether a contact is going on, given up or not."""
+        return self.segmenter.phase is not Phase.IDLE
+
+    @property
+    def noise(self) -> float:
+        """Counts, one standard deviation of the median taxel."""
+        return self.conditioner.noise
+
+    @property
+    def bad_taxels(self) -> int:
+        """How many taxels are bridged from their neighbours."""
+        return int(np.count_nonzero(self.conditioner.bad))
+
+    @property
+    def interval_s(self) -> float:
+        """Seconds from frame to frame as they come, 0 before it is known."""
+        return self._interval
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames a second as they come, 0 before it is known."""
+        return 1.0 / self._interval if self._interval > 0 else 0.0
+
+    def push(self, frame: Frame) -> list[Contact]:
+        """Take one frame; its time must lie after the last one's (ValueError), its grid must be the sensor's.
+
+        One with a value that is not finite, or beyond float32, is passed over as if it had been lost.
+        """
+        t = frame.t
+        out: list[Contact] = []
+        self.draft = None
+        values = self.mounting.frame(frame.values) if self._mounted else frame.values
+        raw = values.astype(np.float64).reshape(-1)
+        if not np.abs(raw).max() <= LARGEST:
+            return out
+        if self._last is not None:
+            step = t - self._last
+            if not step > 0:
+                raise ValueError(f"frame times must increase: {t} s after {self._last} s")
+            if step > self.timing.stale_s:
+                out = self.flush(t)
+            else:
+                self._interval += (step - self._interval) * (0.05 if self._interval else 1.0)
+        self._last = t
+        conditioner, segmenter = self.conditioner, self.segmenter
+        if not conditioner.ready:
+            conditioner.settle(t, raw)
+            return out
+        d, activity, lowest = conditioner.deviation(raw)
+        sunken = lowest < -segmenter.on
+        level = max(segmenter.on, segmenter.after_effect(t)) if sunken else segmenter.on
+        burst = lowest < -level
+        if burst and conditioner.shifted(d, level):
+            # Interference passes and its frames are lost; a sensor that restarted, or a hand that left, stays so.
+            self._shifted = t if self._shifted is None else self._shifted
+            if t - self._shifted >= self.timing.shift_s:
+                out += self._restart(keep=True)
+            conditioner.settle(t, raw)
+            return out
+        self._shifted = None
+        if segmenter.phase is not Phase.IDLE:
+            for action in segmenter.flush(t):
+                out += self._act(action, t)
+        kept = self._kept
+        shown, self._shown = self._shown, raw.tobytes()
+        fresh = shown != self._shown or not conditioner.lively
+        kept.append((t, d, frame.touches, frame.lost, fresh))
+        place = conditioner.place(d) if activity >= segmenter.off else None
+        for action in segmenter.push(t, activity, place):
+            out += self._act(action, t)
+        if segmenter.phase in TOUCHED:
+            conditioner.busy(t, raw, d)
+            if segmenter.let_go() and t - segmenter.last_touched >= DRAFT_S:
+                self._make_draft(segmenter.onset, segmenter.last_touched)
+            return out
+        while kept[0][0] < t - LEAD_S:
+            kept.popleft()
+        if segmenter.phase is Phase.IDLE:
+            conditioner.idle(t, raw, d, activity, sunken=sunken, burst=burst, recovering=segmenter.recovering(t))
+        else:
+            conditioner.settle(t, raw)  # what stays on the sensor becomes part of its baseline
+        return out
+
+    def flush(self, t: float) -> list[Contact]:
+        """The stream paused or ended at `t` s: close what is open."""
+        out: list[Contact] = []
+        if self._last is not None:
+            t = min(t, self._last + self.timing.stale_s)  # it was over then, whenever one asks
+        if self.touched:
+            for action in self.segmenter.flush(t):
+                out += self._act(action, t)
+        if self.touched:
+            out += self._act(Action.CLOSE, t) if self.segmenter.let_go() else self._cancel("silence")
+        self.segmenter.reset()
+        self._kept.clear()
+        self.conditioner.doubt()
+        return out
+
+    def reset(self) -> list[Contact]:
+        """The sensor restarted: start clean and learn the idle sensor anew; an open contact is cancelled."""
+        return self._restart(keep=False)
+
+    def _restart(self, *, keep: bool) -> list[Contact]:
+        out = self._cancel("restart") if self.touched else []
+        self.segmenter.reset()
+        self.conditioner.reset(keep=keep)
+        self._kept.clear()
+        self._shifted = None
+        return out
+
+    def _act(self, action: Action, t: float) -> list[Contact]:
+        offset = self.segmenter.last_touched
+        if action is Action.OPEN:
+            self.segments += 1
+            return [Onset(self.sensor, self.segments, t)]
+        if action is Action.HELD:
+            return [Cancelled(self.sensor, self.segments, "held")]
+        if action is Action.LEFT:
+            return [Release(self.sensor, self.segments, offset)]
+        if action is Action.SPLIT:
+            first = self._closed(t, self.segmenter.split_onset, self.segmenter.earlier)
+            self.segments += 1
+            return [*first, Onset(self.sensor, self.segments, self.segmenter.onset)]
+        return self._closed(t, self.segmenter.onset, offset)
+
+    def _closed(self, t: float, onset: float, offset: float) -> list[Contact]:
+        release = Release(self.sensor, self.segments, offset)
+        if self._glitch(onset, offset):
+            return [Cancelled(self.sensor, self.segments, "glitch"), release]
+        self.conditioner.judge(self._make(onset, offset).inspection)
+        segment = self._make(onset, offset).segment
+        if float(segment.frames.max()) < self.segmenter.off * segment.noise:  # nothing is left without its bad taxels
+            return [Cancelled(self.sensor, self.segments, "stuck"), release]
+        return [Cut(self.segments, segment, t, self._hole(onset, t)), release]
+
+    def _cancel(self, reason: str) -> list[Contact]:
+        release = Release(self.sensor, self.segments, self.segmenter.last_touched)
+        if self.segmenter.phase is Phase.SPENT:  # has been cancelled already
+            return [release]
+        return [Cancelled(self.sensor, self.segments, reason), release]
+
+    def _glitch(self, onset: float, offset: float) -> bool:
+        """Whether the longest that a contact can have lasted is shorter than any finger's."""
+        return offset - onset + self._interval < self.timing.glitch_s
+
+    def _make_draft(self, onset: float, offset: float) -> None:
+        before = self._made
+        if not self._glitch(onset, offset):
+            made = self._make(onset, offset)
+            self.draft = made.segment if made is not before else None
+
+    def _make(self, onset: float, offset: float) -> _Made:
+        """The segment of a contact: made once, unless a taxel has turned out to be bad since."""
+        made = self._made
+        if made is not None and (made.segment.onset, made.segment.offset) == (onset, offset):
+            if np.array_equal(made.bad, self.conditioner.bad):
+                return made
+        times = np.array([k[0] for k in self._kept])
+        stack = np.array([k[1] for k in self._kept])
+        first = int(np.searchsorted(times, onset))
+        last = int(np.searchsorted(times, offset))
+        frames = np.clip(self.conditioner.bridge(stack), -LARGEST, LARGEST).astype(np.float32)
+        touches: tuple[tuple[Touch, ...], ...] = ()
+        if any(k[2] for k in self._kept):
+            touches = tuple(tuple(self._mount(touch) for touch in k[2]) for k in self._kept)
+        lost = sum(k[3] for k in list(self._kept)[first + 1 : last + 1])
+        segment = Segment(frames, times, first, last, self.conditioner.noise, lost, touches)
+        inspection = self.conditioner.inspect(stack[first : last + 1])
+        self._made = made = _Made(segment, self.conditioner.bad, inspection)
+        return made
+
+    def _hole(self, onset: float, t: float) -> float:
+        """The longest time in s in which a finger may have moved unseen, from before the onset to `t`.
+
+        Infinite where nobody saw it come. Of a sensor that says no more nobody knows, and that counts for nothing.
+        """
+        seen = [k[0] for k in self._kept if k[4]]
+        if t == self._last:
+            seen.append(t)
+        before = int(np.searchsorted(seen, onset)) - 1
+        return float(np.diff(seen[before:]).max()) if before >= 0 else math.inf
+
+    def _mount(self, touch: Touch) -> Touch:
+        return Touch(touch.id, *self.mounting.point(touch.x, touch.y, *self.sent))
