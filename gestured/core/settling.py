@@ -84,7 +84,7 @@ def _idle(stack: Array) -> Learned:
     rough = jumps.mean(axis=0) / 1.128
     # Where idle taxels are clipped at zero, most of them seem quieter than they are: the upper quartile knows better.
     clipped = np.count_nonzero((stack == stack.min()).sum(axis=0) >= 2) * 4 >= rough.size
-    pooled = float(np.quantile(rough[rough > 0], 0.75 if clipped else 0.5)) if rough.any() else 0.0
+    pooled = _quantile(rough[rough > 0], 0.75 if clipped else 0.5) if rough.any() else 0.0
     step = quantum(stack, jumps)
     floor = max(pooled, step)  # below one step noise cannot be known: one step stands for it
     spread = np.abs(stack - baseline).mean(axis=0) * 1.2533
@@ -112,6 +112,15 @@ def median(values: Array) -> Array:
     ordered = np.sort(values, axis=0)
     middle = len(ordered) // 2
     return np.asarray(ordered[middle] if len(ordered) % 2 else (ordered[middle - 1] + ordered[middle]) / 2)
+
+
+def _quantile(values: Array, share: float) -> float:
+    """Of (N,) values, as `numpy.quantile` has it, to the last bit."""
+    ordered = np.sort(values)
+    below = int(share * (len(ordered) - 1))
+    beyond = share * (len(ordered) - 1) - below
+    low, high = float(ordered[below]), float(ordered[min(below + 1, len(ordered) - 1)])
+    return low + (high - low) * beyond if beyond < 0.5 else high - (high - low) * (1 - beyond)
 
 
 def quantum(stack: Array, jumps: Array) -> float:

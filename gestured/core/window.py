@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.frames import Segment
+from gestured.core.settling import median
 
 SAME_RATE = 0.12  # a rate this near to the model's is taken as it is: interpolating jittered times blurs taps
 
@@ -55,7 +56,7 @@ class Window:
         """(T, R, C) segment -> (T', rows, columns) float32, 0..1 of the segment's own peak."""
         frames, times = self._span(segment)
         frames = self._regrid(frames, segment)
-        frames = self._retime(frames, times, float(np.median(np.diff(segment.times))) if len(times) > 1 else 0.0)
+        frames = self._retime(frames, times, float(median(np.diff(segment.times))) if len(times) > 1 else 0.0)
         if self.smooth_frames > 1:
             frames = _running_mean(frames, self.smooth_frames)
         frames = np.maximum(frames, 0.0)

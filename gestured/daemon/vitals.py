@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.front_end import FrontEnd
+from gestured.core.settling import median
 
 FAULTY = 0.25  # of the taxels bad: what is bridged between them is guesswork
 
@@ -32,7 +33,7 @@ class Vitals:
         if self._first is None or not front_end.ready or self._first.shape != front_end.conditioner.baseline.shape:
             return 0.0
         way = np.abs(front_end.conditioner.baseline - self._first)
-        return float(np.median(way)) / max(front_end.noise, 1e-30)
+        return float(median(way)) / max(front_end.noise, 1e-30)
 
     def silent(self) -> None:
         """The sensor has fallen silent: the next interval says nothing of its jitter."""

@@ -17,7 +17,7 @@ from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment, Touch
 from gestured.core.front_end import Contact, Cut, FrontEnd
-from gestured.core.settling import median
+from gestured.core.settling import _quantile, median
 from gestured.core.window import Window
 
 Array = NDArray[np.float64]
@@ -280,6 +280,8 @@ def test_the_median_is_numpys(rows: int, columns: int, seed: int) -> None:
     values = np.random.default_rng(seed).normal(0, 1, (rows, columns))
     assert median(values).tolist() == np.median(values, axis=0).tolist()
     assert float(median(values[0])) == np.median(values[0])
+    for share in (0.5, 0.75):
+        assert _quantile(values[0], share) == np.quantile(values[0], share)
 
 
 def test_the_noise_follows_a_sensor_that_becomes_noisier() -> None:
