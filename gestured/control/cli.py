@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 
 import gestured
+from gestured.client.lines import JOIN, Forbidden
 from gestured.control import (
     check,
     demo,
@@ -58,7 +59,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except GesturedError as error:
-        print(f"gesturectl: {error}", file=sys.stderr)
+        remedy = f" ({JOIN})" if isinstance(error, Forbidden) else ""
+        print(f"gesturectl: {error}{remedy}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return 0

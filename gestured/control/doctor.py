@@ -14,7 +14,7 @@ from typing import Any
 
 import gestured
 from gestured.client.control import Control
-from gestured.client.lines import Refused, Unreachable
+from gestured.client.lines import JOIN, Forbidden, Refused, Unreachable
 from gestured.control.address import add_control, default_control
 from gestured.core.errors import ModelError
 from gestured.models import check
@@ -34,16 +34,16 @@ class Finding:
     remedy: str = ""
 
 
-DROPS = {
-    "address": "its address is not set: gesturectl sniff proposes [addresses]",
-    "size": 'its grid is not set: [sensors.NAME] grid = "ROWSxCOLUMNS"; gesturectl sniff shows the sizes',
-    "types": "its arguments are neither numbers nor one blob; see docs on wire formats, and gesturectl sniff",
-    "not_allowed": "its source is not in --allow",
-    "second_source": "two senders use one sensor's name: give each sensor a name of its own",
-    "too_many_sensors": "more sensors than max_sensors; look for a sender that changes its name",
-    "flood": "a source sends more than the daemon can take, and is held to half a megabyte a second",
-    "not_osc": "something else than OSC is sent to this port",
-    "not_finite": "frames hold NaN or infinity: look at the sensor's firmware",
+DROPS = {  # why, and what to do
+    "address": "came to an address that no sensor has: gesturectl sniff proposes [addresses]",
+    "size": 'had another number of taxels than the grid: [sensors.NAME] grid = "ROWSxCOLUMNS" (gesturectl sniff)',
+    "types": "held neither numbers nor one blob: wire.md says what a frame is, gesturectl sniff what arrives",
+    "not_allowed": "came from a source that is not under allow",
+    "second_source": "came from a second sender for one sensor's name (gesturectl sniff): give each its own name",
+    "too_many_sensors": "were of more sensors than max_sensors: look for a sender that changes its name",
+    "flood": "were more than the daemon can take: their source is held to half a megabyte a second",
+    "not_osc": "were not OSC: something else is sent to this port",
+    "not_finite": "held NaN or infinity: look at the sensor's firmware",
 }
 
 
@@ -80,15 +80,19 @@ def examine(path: Path) -> Iterator[Finding]:
     yield _versions()
     yield _clock(time.time())
     yield _buffer(Path("/proc/sys/net/core/rmem_max"))
-    yield _permissions(path)
     try:
         with Control(path) as control:
             status = control.ask("status")
+    except Forbidden as error:
+        yield Finding("bad", str(error), JOIN)
+        return
     except (Unreachable, Refused) as error:
-        yield Finding("bad", f"the daemon cannot be asked: {error}", "does it run? systemctl status gestured")
+        remedy = "does it run? systemctl status gestured; its last words: journalctl --unit gestured --lines 20"
+        yield Finding("bad", str(error), remedy)
         yield _port(("127.0.0.1", 9000))
         yield _model("cnn_lstm", None)
         return
+    yield _permissions(path)
     for look in (_daemon, _ports, _active_model, _input, _sensors, _shift, _output):
         yield from look(status)
 
@@ -132,23 +136,19 @@ def _port(address: tuple[str, int]) -> Finding:
         try:
             probe.bind(address)
         except OSError as error:
-            remedy = f"ss -ulpn 'sport = {address[1]}' shows whose it is; end that, or choose another --listen"
+            remedy = (
+                f"sudo ss -ulpn 'sport = :{address[1]}' shows whose it is. systemd holds it for the service: good; "
+                "else end that program, or choose another --listen"
+            )
             return Finding("warn", f"{where}: {error.strerror}", remedy)
     return Finding("ok", f"{where} is free")
 
 
 def _permissions(path: Path) -> Finding:
-    try:
-        found = path.stat()
-    except OSError as error:
-        return Finding("bad", f"control socket {path}: {error.strerror}", "start gestured, or name its --control")
-    if not stat.S_ISSOCK(found.st_mode):
-        return Finding("bad", f"control socket {path}: is no socket", "name the daemon's --control")
-    if not os.access(path, os.R_OK | os.W_OK):
-        return Finding("bad", f"control socket {path}: not for you", f"join the group {found.st_gid}, or ask its owner")
-    if found.st_mode & 0o007:
+    mode = path.stat().st_mode
+    if mode & 0o007:
         return Finding("warn", f"control socket {path}: open to everybody", f"chmod o= {path}")
-    return Finding("ok", f"control socket {path}: mode {stat.S_IMODE(found.st_mode):04o}")
+    return Finding("ok", f"control socket {path}: mode {stat.S_IMODE(mode):04o}")
 
 
 def _model(name: str, sha256: str | None) -> Finding:
@@ -196,8 +196,8 @@ def _active_model(status: dict[str, Any]) -> Iterator[Finding]:
 
 def _input(status: dict[str, Any]) -> Iterator[Finding]:
     for reason, count in status["input"]["dropped"].items():
-        remedy = DROPS.get(reason, "gesturectl sniff shows what arrives")
-        yield Finding("warn", f"{count} packets or messages dropped: {reason}", remedy)
+        why = DROPS.get(reason, "were not what is expected: gesturectl sniff shows what arrives")
+        yield Finding("warn", f"{count} packets or messages dropped since the start: {reason}", f"they {why}")
     if status["input"]["kernel_drops"]:
         what = f"the kernel dropped {status['input']['kernel_drops']} packets that found no room"
         yield Finding("warn", what, f"sysctl -w net.core.rmem_max={BUFFER_BYTES}, and look for a busy machine")

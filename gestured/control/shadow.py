@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from gestured.client.lines import Refused
 from gestured.control.address import add_control, connect
 
 
@@ -35,7 +36,11 @@ def run(args: argparse.Namespace) -> int:
             # The daemon stands in another folder.
             path = Path(args.model)
             model = str(path.absolute()) if path.exists() or os.sep in args.model else args.model
-            report = control.ask("shadow", model=model)["shadow"]
+            try:
+                report = control.ask("shadow", model=model)["shadow"]
+            except Refused as error:
+                hint = "; you see this file, the service sees neither /home nor /tmp: put it into /etc/gestured"
+                raise Refused(f"{error}{hint if path.is_file() and 'cannot be opened' in str(error) else ''}") from None
         else:
             report = control.ask("status")["shadow"]
     if args.json:

@@ -69,28 +69,36 @@ def run(args: argparse.Namespace) -> int:
             sight.packet(t, source, packet)
     except KeyboardInterrupt:
         pass
-    rows = sorted(sight.seen.values(), key=lambda seen: -seen.count)
-    proposed = propose(rows)
+    rows = sight.rows()
     if args.json:
         found = [
             {"address": s.address, "types": s.types, "count": s.count, "rate_hz": round(s.rate_hz, 2),
              "sources": sorted(s.sources)} for s in rows
         ]  # fmt: skip
-        print(json.dumps({"packets": sight.packets, "messages": found, "errors": sight.errors, "proposed": proposed}))
+        summary = {"packets": sight.packets, "messages": found, "errors": sight.errors, "proposed": propose(rows)}
+        print(json.dumps(summary))
     else:
-        _print(sight, rows, proposed)
+        print("\n".join(lines(sight)))
     return 0 if rows else 1
 
 
-def _print(sight: "Sight", rows: list[Seen], proposed: list[str]) -> None:
-    print(f"{sight.packets} packets")
+def lines(sight: "Sight") -> Iterator[str]:
+    """What was seen, for a person, and what to set."""
+    yield f"{sight.packets} packets"
+    if not sight.packets:
+        yield "nothing arrives: is the sensor powered, does it send to this address, does a firewall keep it out?"
+        return
+    rows = sight.rows()
     for s in rows:
-        print(
-            f"  {s.address:<32} ,{s.types:<16} {s.count:6d}  {s.rate_hz:7.1f} Hz  from {', '.join(sorted(s.sources))}"
-        )
+        senders = ", ".join(sorted(s.sources))
+        yield f"  {s.address:<32} ,{s.types:<16} {s.count:6d}  {s.rate_hz:7.1f} Hz  from {senders}"
     for reason, count in sight.errors.items():
-        print(f"  {count} packets are no OSC: {reason}")
-    print("\n" + ("\n".join(proposed) if proposed else "nothing that looks like a pressure frame"))
+        yield f"  {count} packets are no OSC: {reason}"
+    for s in rows:
+        if _taxels(s.types) and len(s.sources) > 1:
+            yield f"  {s.address} has several senders: the daemon takes the first; give each sensor a name of its own"
+    yield ""
+    yield from propose(rows) or ["nothing that looks like a pressure frame"]
 
 
 class Sight:
@@ -100,6 +108,10 @@ class Sight:
         self.packets = 0
         self.seen: dict[tuple[str, str], Seen] = {}
         self.errors: Counter[str] = Counter()
+
+    def rows(self) -> list[Seen]:
+        """Each address with each kind of arguments, the most frequent first."""
+        return sorted(self.seen.values(), key=lambda seen: -seen.count)
 
     def packet(self, t: float, source: str, packet: bytes) -> None:
         """Take one packet, read at `t` s."""
@@ -137,22 +149,25 @@ def short_types(message: osc.Message) -> str:
 def propose(rows: list[Seen]) -> list[str]:
     """Lines for the configuration file, from what looks like frames: many numbers, or one blob, again and again."""
     patterns: Counter[str] = Counter()
-    sizes: dict[str, tuple[int, ...]] = {}
+    sizes: dict[tuple[str, str], tuple[int, ...]] = {}
     for seen in rows:
         taxels, split = _taxels(seen.types), _sensor(seen.address)
         if taxels and split is not None:
             patterns[split[0]] += seen.count
-            sizes.setdefault(split[1], taxels)
+            sizes.setdefault(split, taxels)
     if not patterns:
         return []
-    pressure = patterns.most_common(1)[0][0]
+    pressure, *others = [pattern for pattern, _ in patterns.most_common()]
     lines = [] if pressure == USUAL else ["[addresses]", f'pressure = "{pressure}"']
-    for name, taxels in sizes.items():
+    for (pattern, name), taxels in sizes.items():
+        if pattern != pressure:
+            continue
         sides = [round(size**0.5) for size in taxels if round(size**0.5) ** 2 == size]
         if 9 not in sides:
             grid = f"{sides[0]}x{sides[0]}" if sides else f"ROWSxCOLUMNS, of {' or '.join(map(str, taxels))} in all"
             lines += [f"[sensors.{name}]", f'grid = "{grid}"']
-    return lines or ["the defaults fit what arrives"]
+    lines = lines or ["the defaults fit what arrives"]
+    return lines + [f"# {other} looks like frames, too; a daemon takes one pattern" for other in others]
 
 
 def _taxels(types: str) -> tuple[int, ...]:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from gestured.control.cli import main
 from gestured.control.doctor import BUFFER_BYTES, _buffer, _clock, _permissions, _port
-from gestured.control.sniff import Sight, propose
+from gestured.control.sniff import Sight, lines, propose
 from gestured.control.status import screen
 from gestured.core import osc
 from tests.daemon import tiny_model
@@ -154,6 +155,25 @@ def test_sniff_proposes_a_grid_and_is_bounded() -> None:
     one = Sight()
     one.packet(0, "a:1", osc.encode_message("/arm/pressure", "f" * 25, [0.0] * 25))
     assert propose(list(one.seen.values())) == ["[sensors.arm]", 'grid = "5x5"']
+    one.packet(0, "a:1", osc.encode_message("/foo/7/matrix", "f" * 49, [0.0] * 49))
+    one.packet(0, "a:1", osc.encode_message("/arm/pressure", "f" * 25, [0.0] * 25))
+    assert propose(list(one.seen.values())) == [
+        "[sensors.arm]",
+        'grid = "5x5"',
+        "# /foo/{sensor}/matrix looks like frames, too; a daemon takes one pattern",
+    ]
+
+
+def test_sniff_says_what_may_be_wrong(run) -> None:
+    with socket.socket(type=socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        nobodys = f"127.0.0.1:{free.getsockname()[1]}"
+    status, out, _ = run("sniff", "--listen", nobodys, "--seconds", "0.1")
+    assert status == 1 and "nothing arrives" in out
+    two = Sight()
+    for n, source in enumerate(("a:1", "a:2", "a:2")):
+        two.packet(n, source, floats("/arm/pressure", Hand().frame(), n))
+    assert "has several senders" in "\n".join(lines(two))
 
 
 def test_sniff_on_a_port_of_its_own(start, udp: socket.socket) -> None:
@@ -193,7 +213,18 @@ def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon) -> 
 
 def test_doctor_without_a_daemon(run, tmp_path: Path) -> None:
     status, out, _ = run("doctor", "--control", tmp_path / "none.ctl")
-    assert status == 1 and "No such file" in out and "-> start gestured" in out
+    assert status == 1 and "No such file" in out and "-> does it run? systemctl status gestured" in out
+
+
+def test_a_socket_that_is_not_for_us_names_the_remedy(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    def connect(self: socket.socket, path: str) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(socket.socket, "connect", connect)
+    for command in (["status"], ["listen"], ["doctor"]):
+        assert main(command) == 1
+        out, err = capsys.readouterr()
+        assert "Permission denied" in out + err and 'adduser "$USER" gestured' in out + err
 
 
 def test_doctor_looks_at_the_machine(tmp_path: Path) -> None:
@@ -203,7 +234,9 @@ def test_doctor_looks_at_the_machine(tmp_path: Path) -> None:
     limit.write_text(f"{BUFFER_BYTES}\n")
     assert (small.level, _buffer(limit).level) == ("warn", "ok") and "sysctl" in small.remedy
     assert (_clock(0.0).level, _clock(1.8e9).level) == ("bad", "ok")
-    assert "no socket" in _permissions(limit).what
+    for mode, level in ((0o660, "ok"), (0o666, "warn")):
+        limit.chmod(mode)
+        assert _permissions(limit).level == level
     with socket.socket(type=socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         found = _port(taken.getsockname())

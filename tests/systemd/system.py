@@ -209,10 +209,17 @@ def test_members_of_the_group_may_and_others_may_not(box: Container):
     group = box.run("id", "--group", "gestured").stdout.strip()
     for command in ("status", "reload", "doctor"):
         stranger = as_user(box, "gesturectl", command, groups="")
-        assert stranger.returncode == 1 and "Permission denied" in stranger.stdout + stranger.stderr
+        said = stranger.stdout + stranger.stderr
+        assert stranger.returncode == 1 and "Permission denied" in said and "adduser" in said
     for command in ("status", "reload"):
         member = as_user(box, "gesturectl", command, groups=group)
         assert member.returncode == 0, member.stdout + member.stderr
+
+
+def test_a_model_where_the_service_sees_nothing_is_told_so(box: Container):
+    box.run("cp", "/usr/lib/gestured/gestured_models/lstm.onnx", "/tmp/candidate.onnx")
+    done = box.run("gesturectl", "shadow", "/tmp/candidate.onnx", check=False)
+    assert done.returncode == 1 and "put it into /etc/gestured" in done.stderr
 
 
 def bound(port: int) -> socket.socket:

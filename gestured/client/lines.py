@@ -1,0 +1,79 @@
+"""A Unix stream socket on which the daemon speaks JSON Lines."""
+
+import json
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Self
+
+from gestured.core.errors import GesturedError
+
+JOIN = 'sudo adduser "$USER" gestured, and log in again'
+
+
+class Unreachable(GesturedError):
+    """No daemon answers on the socket."""
+
+
+class Forbidden(Unreachable):
+    """There is a socket, but not for us."""
+
+
+class Refused(GesturedError):
+    """The daemon answered something that this client cannot go on with."""
+
+
+class Lines:
+    """One connection; a context manager."""
+
+    def __init__(self, path: Path, flag: str) -> None:
+        """Connect. `flag` is the one that names another socket. Raises Unreachable."""
+        self.path = path
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            self.socket.connect(str(path))
+        except OSError as error:
+            self.socket.close()
+            if isinstance(error, PermissionError):
+                raise Forbidden(f"{path}: {error.strerror}: it is for members of its group") from None
+            reason = error.strerror or error
+            raise Unreachable(f"no daemon on {path}: {reason}; start gestured, or name its {flag}") from None
+        self._file = self.socket.makefile("rb")
+
+    def raw(self) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Each line as it came, and parsed; ends when the daemon closes the connection. Raises Refused."""
+        try:
+            for line in self._file:
+                message = _parsed(line, self.path)
+                yield line.decode().rstrip("\n"), message
+        except ConnectionError:
+            return
+
+    def lines(self) -> Iterator[dict[str, Any]]:
+        """Each line, parsed."""
+        return (message for _, message in self.raw())
+
+    def close(self) -> None:
+        """Hang up; a reader in another thread comes to its end."""
+        try:
+            self.socket.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass
+        self.socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _parsed(line: bytes, path: Path) -> dict[str, Any]:
+    """One line as an object; raises Refused for anything else."""
+    try:
+        message = json.loads(line)
+    except ValueError:
+        message = None
+    if not isinstance(message, dict):
+        raise Refused(f"{path} sent a line that is no JSON object: {line[:80]!r}")
+    return message
