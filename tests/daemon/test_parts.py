@@ -149,6 +149,36 @@ def test_a_bug_in_the_decoder_costs_one_packet(pipeline, monkeypatch) -> None:
     assert metrics.frames.values == {("a", "ok"): 2}
 
 
+@pytest.mark.parametrize(("apart", "taken"), [(0.067, 5), (0.0, 1)])
+def test_packets_that_come_thick_are_taken_together_and_no_others_wait(pipeline, apart: float, taken: int) -> None:
+    line, _, metrics = pipeline
+    hand, rests, now = Hand(), [], 0.0
+
+    async def main() -> None:
+        nonlocal now
+        loop = asyncio.get_running_loop()
+        loop.call_later = lambda _, listen: rests.append(listen) or asyncio.Handle(listen, (), loop)
+        with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
+            receiver = Receiver(sock, line, Decoder(Addresses(), line.grid), (), lambda: now)
+            sender.connect(sock.getsockname())
+            for k in range(5):
+                now += apart
+                sender.send(harness.floats("/a/pressure", hand.frame(), k))
+                await turn()
+            assert metrics.frames.values == {("a", "ok"): taken} and len(rests) == (taken < 5)
+            for listen in rests:
+                listen()
+            await turn()
+            assert metrics.frames.values == {("a", "ok"): 5}
+            receiver.close()
+
+    async def turn() -> None:
+        for _ in range(3):
+            await asyncio.sleep(0)
+
+    asyncio.run(main())
+
+
 def test_one_packet_from_a_port_is_no_claim_but_two_are(pipeline) -> None:
     line, _, metrics = pipeline
     frames = Hand().idle(0.1)
