@@ -6,12 +6,15 @@ import time
 import numpy as np
 
 from benchmarks.latency import play
-from benchmarks.timing import Row, cpu_s_of, percentile, resident_kib
+from benchmarks.timing import Ratio, Row, cpu_s_of, cpu_us, interleaved, percentile, ratio, resident_kib
 from benchmarks.traffic import touched
 from gestured.client.engine import Engine
 from gestured.client.sensor import Form
 from gestured.client.stream import Stream
-from gestured.core.frames import Frame
+from gestured.core.frames import Frame, Touch
+from gestured.core.osc import encode_bundle, encode_message
+from gestured.core.wire import Addresses, Decoder
+from gestured.daemon.values import Grid
 from gestured.simulator import Participant, Sensor, generator, gesture_take
 
 SCENES: dict[str, tuple[str, ...]] = {
@@ -19,16 +22,20 @@ SCENES: dict[str, tuple[str, ...]] = {
     "metrics": ("--metrics", "127.0.0.1:0"),
     "OSC out": ("--publish", "osc://127.0.0.1:9"),
     "forest alone": (),
+    "trajectories": (),  # the sensor sends finger positions beside its frames; nothing in the daemon asks for them
     "swipes alone": ("--gestures", "swipe_left,swipe_right"),
     "everything": ("--metrics", "127.0.0.1:0", "--publish", "osc://127.0.0.1:9", "--log-level", "debug"),
 }
 REPEATS = 5
+TOUCHES = tuple(Touch(finger, 4.0, 1.0 + 3.0 * finger) for finger in range(3))
 
 
 def table(model: str) -> None:
-    """Print the table of scenes."""
-    form = Form("bench", plain=True)
-    stream = [form.packet(Frame(0.0, f), 0, 0.0) for f in touched(40, 15.0).frames]
+    """Print the table of scenes, and what finger positions add to the decoding of a frame."""
+    frames = touched(40, 15.0).frames
+    plain, bundle = Form("bench", plain=True), Form("bench")
+    streams = {"trajectories": [bundle.packet(Frame(0.0, f, TOUCHES), k, k / 15) for k, f in enumerate(frames)]}
+    matrices = [plain.packet(Frame(0.0, f), 0, 0.0) for f in frames]
     print("| scene | start to ready | resident | CPU a frame | threads | descriptors |\n|---|---|---|---|---|---|")
     for name, flags in SCENES.items():
         used = "touch_pattern_rf" if name == "forest alone" else model
@@ -40,8 +47,8 @@ def table(model: str) -> None:
                 kib.append(resident_kib(engine.pid))
         with Engine(used, 9, 9, *flags) as engine:
             before = cpu_s_of(engine.pid)
-            play(engine.listen[1], stream)
-            cpu = 1e6 * (cpu_s_of(engine.pid) - before) / len(stream)
+            play(engine.listen[1], streams.get(name, matrices))
+            cpu = 1e6 * (cpu_s_of(engine.pid) - before) / len(frames)
             threads = len(os.listdir(f"/proc/{engine.pid}/task"))
             descriptors = len(os.listdir(f"/proc/{engine.pid}/fd"))
         print(
@@ -49,6 +56,24 @@ def table(model: str) -> None:
             f"| {np.median(kib) / 1024:.1f} MiB | {cpu:.0f} us | {threads} | {descriptors} |",
             flush=True,
         )
+    passed, parsed = (_decoding(keep_touches) for keep_touches in (False, True))
+    print(f"\ndecode of a bundle, with three finger positions against without: {passed}; if they were kept: {parsed}")
+
+
+def _decoding(keep_touches: bool) -> Ratio:
+    """CPU of a bundle of a matrix and three touches, over that of one of a matrix alone."""
+    decoder = Decoder(Addresses(), lambda _: Grid(9, 9), keep_touches=keep_touches)
+    values = touched(40, 5.0).frames[0]
+    matrix = encode_message("/bench/pressure", "f" * 81, [values.ravel().astype(np.float32)])
+    both, alone = Form("bench").packet(Frame(0.0, values, TOUCHES), 0, 0.0), encode_bundle([matrix], 0.0)
+    source = ("127.0.0.1", 40000)
+    return ratio(
+        *interleaved(
+            lambda: cpu_us(lambda: decoder.decode(both, source), 5_000),
+            lambda: cpu_us(lambda: decoder.decode(alone, source), 5_000),
+            9,
+        )
+    )
 
 
 def subset(model: str) -> Row:

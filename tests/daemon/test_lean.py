@@ -2,15 +2,21 @@
 
 import os
 import re
+import socket
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
+from gestured.core import osc, wire
+from gestured.daemon.service import make_decoder
+from gestured.daemon.settings import Settings
 from gestured.models import shipped
-from tests.daemon.harness import Daemon, Sensor
+from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor, floats
 
 NEVER = {"torch", "sklearn", "pywt", "matplotlib", "scipy", "onnx", "mcap"}
 EVERYTHING = ("--metrics", "127.0.0.1:0", "--publish", "osc://127.0.0.1:9", "--flight-recorder", "1")
@@ -33,31 +39,52 @@ def count(daemon: Daemon, what: str) -> int:
     return len(os.listdir(f"/proc/{daemon.process.pid}/{what}"))
 
 
-def used(start: Start, *flags: str, model: object = "cnn_lstm") -> Daemon:
-    """A daemon that has answered one swipe, with `python -X importtime`."""
+def used(
+    start: Start, *flags: str, model: object = "cnn_lstm", make: Callable[[Daemon, str], Sensor] = Sensor
+) -> Daemon:
+    """A daemon that has answered one swipe of a sensor, with `python -X importtime`."""
     if model in shipped() and not shipped()[str(model)].exists():
         pytest.skip(f"{shipped()[str(model)]} is not there")
     daemon = start("--clock", "sensor", *flags, model=model, python=("-X", "importtime"))
     with_client = daemon.client().subscribe("gesture", "unknown")
-    sensor = Sensor(daemon, "armrest")
+    sensor = make(daemon, "armrest")
     sensor.send(sensor.hand.idle(1.5) + sensor.hand.swipe("right") + sensor.hand.idle(1.0))
     with_client.until(lambda line: line["type"] in ("gesture", "unknown"))
     with_client.close()
     return daemon
 
 
-SCENES = {
-    "minimal": (),
-    "metrics": ("--metrics", "127.0.0.1:0"),
-    "OSC out": ("--publish", "osc://127.0.0.1:9"),
-    "subset": ("--gestures", "swipe_left,swipe_right"),
-    "everything": EVERYTHING,
+class Fingers(Sensor):
+    """A sensor that sends finger positions in a bundle with each frame."""
+
+    def packet(self, frame: Frame) -> bytes:
+        """The next frame as a packet."""
+        self.t += 1 / RATE_HZ
+        self.count += 1
+        pressure = floats(f"/{self.name}/pressure", frame, self.count)
+        return osc.encode_bundle([pressure, trajectory(self.name)], self.t)
+
+
+def trajectory(sensor: str, types: str = "iffiff") -> bytes:
+    """Positions of fingers."""
+    return osc.encode_message(f"/{sensor}/trajectory", types, ([1, 4.0, 4.0] * 5)[: len(types)])
+
+
+SCENES: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
+    "minimal": ((), {}),
+    "metrics": (("--metrics", "127.0.0.1:0"), {}),
+    "OSC out": (("--publish", "osc://127.0.0.1:9"), {}),
+    "forest only": ((), {"model": "touch_pattern_rf"}),
+    "trajectories": ((), {"make": Fingers}),
+    "everything": (EVERYTHING, {"make": Fingers}),
+    "swipes only": (("--gestures", "swipe_left,swipe_right"), {}),
 }
 
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_no_scene_loads_what_belongs_to_training(start: Start, scene: str) -> None:
-    daemon = used(start, *SCENES[scene])
+    flags, more = SCENES[scene]
+    daemon = used(start, *flags, **more)
     assert not imported(daemon) & NEVER
     assert "libtorch" not in libraries(daemon)
     assert "numpy" in imported(daemon)  # so that an empty report does not pass
@@ -102,6 +129,40 @@ def test_the_forest_alone_opens_no_network(start: Start) -> None:
     daemon = used(start, model="touch_pattern_rf")
     assert "cnn_lstm" not in daemon.stderr() + libraries(daemon)
     assert daemon.client().hello["model"] == "touch_pattern_rf"
+
+
+def test_finger_positions_cost_nothing_that_is_kept(start: Start) -> None:
+    """Nothing in the daemon asks for them: right or wrong ones, with a frame or without, leave no trace."""
+    daemon = used(start, "--metrics", "127.0.0.1:0", make=Fingers)
+    before = daemon.get("/metrics")[1].count("\n")
+    with socket.socket(type=socket.SOCK_DGRAM) as sender:
+        sender.connect(daemon.address)
+        for n in range(300):  # of sensors that send nothing else
+            sender.send(trajectory(f"ghost{n}"))
+            sender.send(trajectory(f"ghost{n}", "iff" * 5))
+            sender.send(trajectory("armrest", "fff"))
+    frames = daemon.frames()
+    Sensor(daemon, "door").send(Hand().idle(1.0))
+    while daemon.frames() < frames + RATE_HZ:
+        pass
+    status = daemon.get("/readyz")[1]
+    assert "armrest" in status and "door" in status and "ghost" not in status
+    assert daemon.metric("gestured_sensors") == 2
+    text = daemon.get("/metrics")[1]
+    assert not re.search(r"^gestured_dropped_total\{.*\} [1-9]", text, re.MULTILINE)
+    assert text.count("\n") - before < 50  # the door's own series
+
+
+def test_finger_positions_are_passed_over_at_their_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    pipeline = SimpleNamespace(grid=lambda sensor: (9, 9))
+    decoder = make_decoder(Settings(), pipeline)  # type: ignore[arg-type]
+    monkeypatch.setattr(wire, "_touches", None)  # nobody calls it
+    frame = floats("/armrest/pressure", Hand().frame(), 0)
+    for n in range(1000):
+        packet = osc.encode_bundle([trajectory(f"s{n}"), frame, trajectory("armrest")], 1.7e9 + n)
+        (arrival,), errors = decoder.decode(packet, ("127.0.0.1", n))
+        assert arrival.touches == () and errors == []
+    assert decoder._pending == {}
 
 
 def test_the_explanation_names_what_is_left_out() -> None:
