@@ -24,6 +24,7 @@ Times = NDArray[np.float64]
 
 BUNDLE = b"#bundle\0"
 PATIENCE_S = 10.0  # a daemon says something once a second
+BACKLOG_S = 0.5  # what a daemon needs for a receive buffer that is full
 SILENT = ("stale", "no_data")  # states of a sensor that nobody feeds
 CONTACTS = 1000  # enough to tell
 TYPES = ("onset", "gesture", "unknown", "cancelled", "release", "status")
@@ -125,7 +126,7 @@ class Hearing:
             if line["type"] == "lost":
                 raise GesturedError("events were lost: this machine is too slow for that --speed")
             if line["type"] == "status":
-                if line["time"] >= since and not open_contacts:
+                if line["time"] >= since + BACKLOG_S and not open_contacts:
                     self._expect(line["sensors"])
                     return found
             elif line.get("sensor") in self._sensors and not line.get("test"):
