@@ -39,14 +39,15 @@ def idle(number: int, frames: int) -> NDArray[np.float64]:
     return rng.uniform(80, 160, (9, 9)) + rng.normal(0, 2, (frames, 9, 9))
 
 
-def packets(epoch: float) -> list[bytes]:
-    """A minute of ten sensors in turn, with time tags from `epoch` on."""
+def packets(minute: int, epoch: float) -> list[bytes]:
+    """A minute of ten sensors in turn; `minute` of them went before, and the first has time tags from `epoch` on."""
     session = touched(0, SECONDS).frames
     values = [session, *(idle(n, len(session)) for n in range(1, SENSORS))]
     forms = [Form(f"bench{n}") for n in range(SENSORS)]
+    first = minute * len(session)
     return [
-        form.packet(Frame(0.0, frames[k]), k, epoch + k / RATE_HZ)
-        for k in range(len(session))
+        form.packet(Frame(0.0, frames[k - first]), k, epoch + k / RATE_HZ)
+        for k in range(first, first + len(session))
         for form, frames in zip(forms, values, strict=True)
     ]
 
@@ -60,32 +61,35 @@ def waiting(port: int) -> tuple[int, int]:
     raise RuntimeError(f"no UDP socket on port {port}")
 
 
-def pour(port: int, stream: list[bytes]) -> int:
-    """Send as fast as the receiver takes it; returns how many packets were lost."""
+def pour(sock: socket.socket, port: int, stream: list[bytes]) -> int:
+    """Send as fast as the receiver takes it; returns how many were lost. One socket: a sensor has one source."""
     before = waiting(port)[1]
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-        sock.connect(("127.0.0.1", port))
-        for start in range(0, len(stream), 128):
-            for packet in stream[start : start + 128]:
-                sock.send(packet)
-            while waiting(port)[0] > ROOM:
-                time.sleep(0.0002)
-        while waiting(port)[0]:
-            time.sleep(0.0005)
+    for start in range(0, len(stream), 128):
+        for packet in stream[start : start + 128]:
+            sock.sendto(packet, ("127.0.0.1", port))
+        while waiting(port)[0] > ROOM:
+            time.sleep(0.0002)
+    while waiting(port)[0]:
+        time.sleep(0.0005)
     return waiting(port)[1] - before
 
 
 def datagrams(model: str, repeats: int = 5) -> Row:
     """Datagrams a CPU second, front end and recognition on, against a protocol that does nothing."""
     lost = 0
-    with Engine(model, 9, 9, "--clock", "sensor") as engine, Program("empty") as empty:
-        minute = iter(range(10_000))
+    with (
+        Engine(model, 9, 9, "--clock", "sensor") as engine,
+        Program("empty") as empty,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock,
+    ):
+        epoch, minutes = time.time(), {engine.pid: 0, empty.process.pid: 0}
 
         def one(pid: int, port: int) -> float:
             nonlocal lost
-            stream = packets(time.time() + next(minute) * SECONDS)
+            stream = packets(minutes[pid], epoch)
+            minutes[pid] += 1
             start = cpu_s_of(pid)
-            lost += pour(port, stream)
+            lost += pour(sock, port, stream)
             return (cpu_s_of(pid) - start) / len(stream)
 
         ours, theirs = interleaved(
