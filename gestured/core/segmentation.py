@@ -17,7 +17,7 @@ Not handled: two people on one sensor, and a tap that begins while another finge
 
 import math
 from dataclasses import dataclass
-from enum import Enum, auto
+from enum import IntEnum, auto  # its hash is an integer's; Enum's is a function in Python
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ SPIKE = 4.0  # a peak that one frame alone reached counts for so many times the 
 FIRM = 8.0  # which is taken to be so many times `on`: a tap may be a single frame
 
 
-class Phase(Enum):
+class Phase(IntEnum):
     """What is true of the sensor."""
 
     IDLE = auto()
@@ -52,7 +52,7 @@ class Phase(Enum):
     SPENT = auto()
 
 
-class Signal(Enum):
+class Signal(IntEnum):
     """What a frame, or the time that passed, says."""
 
     QUIET = auto()
@@ -65,7 +65,7 @@ class Signal(Enum):
     LIMIT = auto()
 
 
-class Action(Enum):
+class Action(IntEnum):
     """What the owner of the frames has to do."""
 
     OPEN = auto()

@@ -113,7 +113,7 @@ class Stamper:
             if last is not None and at < last + self.MIN_STEP_S:
                 at = last + self.MIN_STEP_S
             last = at
-            stamps[i] = stamps[i]._replace(t=at, implausible=implausible)
+            stamps[i] = Stamp(at, stamps[i].lost, "", stamps[i].restarted, implausible)
         self._last, self._arrived, self._tag = last, t, tag
 
     def _typical(self) -> float:
