@@ -35,8 +35,9 @@ _SCALARS = {"i": "i", "f": "f", "d": "d", "h": "q", "t": "Q"}
 _ARRAYS = {"i": np.dtype(">i4"), "f": np.dtype(">f4")}
 _RUNS = tuple(tag * RUN for tag in _ARRAYS)
 _PLACED = ("", "s", "r", "sr", "b", "sb")  # what has a place in a layout: scalars, a run, a blob that is not empty
-_LAYOUTS_BYTES = 8 << 20  # for the layouts that are remembered: 10,000 sensors of 9 x 9 floats
-_PLACE_BYTES = 500  # what Python takes for a place, beside its head, address and type tags
+_LAYOUTS_BYTES = 8 << 20  # for the layouts that are remembered: 8,000 sensors of 9 x 9 floats
+_PLACE_BYTES = 600  # what Python takes for a place, beside its head, address and type tags,
+_SCALAR_BYTES = 48  # and for each scalar in it
 
 
 class Message(NamedTuple):
@@ -108,7 +109,10 @@ def decode(data: bytes, errors: list[ProtocolError] | None = None) -> list[Messa
 
 def _remember(key: bytes, size: int, places: list[_Place]) -> None:
     global _room
-    cost = sum(_PLACE_BYTES + 3 * len(head) for _, head, *_ in places)
+    cost = 0
+    for _, head, _, types, _, _, dtype, count, _ in places:
+        scalars = len(types) - (count if dtype is not None else count > 0)  # all but the run, or the blob
+        cost += _PLACE_BYTES + 3 * len(head) + _SCALAR_BYTES * scalars
     if cost > _room:
         _layouts.clear()
         _room = _LAYOUTS_BYTES

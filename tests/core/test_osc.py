@@ -190,27 +190,38 @@ def test_known_layouts_do_not_mix_up_sensors_and_a_thousand_of_them_are_known() 
     assert len(osc._layouts) >= 1000
 
 
-def _invented(n: int) -> bytes:
-    """A packet that nobody has sent before: long in its address, its type tags or its number of messages."""
-    if n % 3 == 0:
-        return osc.encode_message(f"/{n}" + "x" * 240, "b", (b"x",))
-    if n % 3 == 1:
-        return osc.encode_message(f"/{n}", "i" * 4000, (np.arange(4000),))
-    return osc.encode_bundle([osc.encode_message(f"/{n}", "f", (1.0,))] * 200)
+INVENTED = {  # packets that nobody has sent before
+    "an address": lambda n: osc.encode_message(f"/{n}" + "x" * 240, "b", (b"x",)),
+    "an array": lambda n: osc.encode_message(f"/{n}", "i" * 4000, (np.arange(4000),)),
+    "scalars": lambda n: osc.encode_message(f"/{n}", "if" * 200, [1, 1.0] * 200),
+    "fingers": lambda n: osc.encode_message(f"/{n}", "iff" * 3, [1, 1.0, 1.0] * 3),
+    "messages": lambda n: osc.encode_bundle([osc.encode_message(f"/{n}", "f", (1.0,))] * 200),
+}
 
 
-def test_invented_layouts_take_no_more_memory_than_was_given_to_them() -> None:
+@pytest.mark.parametrize("kind", INVENTED)
+def test_invented_layouts_take_no_more_memory_than_was_given_to_them(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = 1 << 20
+    monkeypatch.setattr(osc, "_LAYOUTS_BYTES", given)
+    monkeypatch.setattr(osc, "_room", given)
     osc._layouts.clear()
+    held = 0
     tracemalloc.start()
     try:
         before = tracemalloc.get_traced_memory()[0]
-        for n in range(2000):
-            osc.decode(_invented(n))
-        held = tracemalloc.get_traced_memory()[0] - before
+        for n in range(1500):
+            osc.decode(INVENTED[kind](n))
+            held = max(held, tracemalloc.get_traced_memory()[0] - before)
+            if n and len(osc._layouts) == 1:  # they were forgotten
+                break
+        else:
+            pytest.fail("not enough of them")
     finally:
         tracemalloc.stop()
         osc._layouts.clear()
-    assert held <= osc._LAYOUTS_BYTES
+    assert held <= given
 
 
 def test_a_bad_message_does_not_lose_its_siblings() -> None:
