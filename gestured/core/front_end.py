@@ -37,8 +37,8 @@ class _Made:
 
 
 Contact = Onset | Cut | Cancelled | Release
-# t, (N,) counts above the baseline, touches, lost, whether it is no repetition of the last one
-Kept = tuple[float, NDArray[np.float64], tuple[Touch, ...], int, bool]
+# t, (N,) counts above the baseline, touches, lost, since when the sensor shows the same
+Kept = tuple[float, NDArray[np.float64], tuple[Touch, ...], int, float]
 
 
 class FrontEnd:
@@ -68,7 +68,8 @@ class FrontEnd:
         self.draft: Segment | None = None  # made by the last push: what will be cut if the finger stays off
         self.segments = 0  # so far; their ids
         self._last: float | None = None
-        self._shown = b""  # by the last frame
+        self._shown = b""  # by the last frame,
+        self._since = 0.0  # s, and since when; of a sensor that stands still when idle that says nothing
         self._interval = 0.0
         self._shifted: float | None = None  # s, since when the frames lie far below the baseline
 
@@ -145,8 +146,9 @@ class FrontEnd:
                 out += self._act(action, t)
         kept = self._kept
         shown, self._shown = self._shown, raw.tobytes()
-        fresh = shown != self._shown or not conditioner.lively
-        kept.append((t, d, frame.touches, frame.lost, fresh))
+        if shown != self._shown or not conditioner.lively:
+            self._since = t
+        kept.append((t, d, frame.touches, frame.lost, self._since))
         place = conditioner.place(d) if activity >= segmenter.off else None
         for action in segmenter.push(t, activity, place):
             out += self._act(action, t)
@@ -211,9 +213,10 @@ class FrontEnd:
             return [Cancelled(self.sensor, self.segments, "glitch"), release]
         self.conditioner.judge(self._make(onset, offset).inspection)
         segment = self._make(onset, offset).segment
+        self._made = None
         if float(segment.frames.max()) < self.segmenter.off * segment.noise:  # nothing is left without its bad taxels
             return [Cancelled(self.sensor, self.segments, "stuck"), release]
-        return [Cut(self.segments, segment, t, self._hole(onset, t)), release]
+        return [Cut(self.segments, segment, t, self._hole(onset)), release]
 
     def _cancel(self, reason: str) -> list[Contact]:
         release = Release(self.sensor, self.segments, self.segmenter.last_touched)
@@ -251,14 +254,12 @@ class FrontEnd:
         self._made = made = _Made(segment, self.conditioner.bad, inspection)
         return made
 
-    def _hole(self, onset: float, t: float) -> float:
-        """The longest time in s in which a finger may have moved unseen, from before the onset to `t`.
+    def _hole(self, onset: float) -> float:
+        """The longest time in s in which a finger may have moved unseen, from before the onset to the last frame.
 
         Infinite where nobody saw it come. Of a sensor that says no more nobody knows, and that counts for nothing.
         """
-        seen = [k[0] for k in self._kept if k[4]]
-        if t == self._last:
-            seen.append(t)
+        seen = [k[4] for k in self._kept] + [self._last or 0.0]
         before = int(np.searchsorted(seen, onset)) - 1
         return float(np.diff(seen[before:]).max()) if before >= 0 else math.inf
 

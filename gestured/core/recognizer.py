@@ -76,7 +76,7 @@ class Recognizer:
         self._refractory = dict(refractory or {})
         self._last_offset: dict[str, float] = {}
         self._witness = witness
-        self._asked: tuple[Segment, Scores | None] | None = None  # None where the classifier failed
+        self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # no scores where it failed
 
     def push(self, frame: Frame) -> list[Event]:
         """Take one frame, give what it decides; see `FrontEnd.push`."""
@@ -98,16 +98,19 @@ class Recognizer:
 
     def _ask(self, segment: Segment) -> Scores | None:
         """The classifier is asked once for each segment."""
-        if self._asked is None or self._asked[0] is not segment:
+        classifier, asked = self.classifier, self._asked
+        if asked is None or asked[0] is not classifier or asked[1] is not segment:
             try:
-                self._asked = segment, self.classifier.classify(segment)
+                asked = classifier, segment, classifier.classify(segment)
             except ModelError:
-                self._asked = segment, None
-        return self._asked[1]
+                asked = classifier, segment, None
+            self._asked = asked
+        return asked[2]
 
     def _decide(self, cut: Cut) -> Gesture | Unknown | Cancelled:
         sensor, segment = self.front_end.sensor, cut.segment
         answer = self._ask(segment)
+        self._asked = None
         if answer is None:
             return Cancelled(sensor, cut.id, "model")
         if self._witness is not None:

@@ -4,6 +4,7 @@ Streams are written as in tests/scenarios; times are written down.
 """
 
 import math
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -131,6 +132,14 @@ def test_a_witness_is_told_of_what_was_decided_alone() -> None:
     assert [segment.offset] == [event.offset for event in answers(events)]
 
 
+def test_what_was_answered_is_not_kept() -> None:
+    classifier = Fake()
+    subject = recognizer(classifier)
+    assert answers(run(subject, frames("quiet for 1500ms", SWIPE, "quiet for 900ms")))
+    held = weakref.ref(classifier.seen.pop().frames)
+    assert held() is None
+
+
 # --- what nobody saw
 
 
@@ -176,6 +185,14 @@ def test_a_sensor_that_repeats_itself_has_seen_nothing(where: int) -> None:
 
 def test_a_slow_sensor_has_no_holes() -> None:
     stream = frames("quiet for 1500ms", "move 4,1 to 4,7 0.8 in 1500ms", "quiet for 1500ms")[::3]
+    (answer,) = answers(run(recognizer(Fake()), stream))
+    assert isinstance(answer, Gesture)
+
+
+def test_a_slow_sensor_may_show_the_same_twice_before_it_is_touched() -> None:
+    stream = frames("quiet for 1500ms", "move 4,1 to 4,7 0.8 in 1500ms", "quiet for 1500ms")[::3]
+    at = touched(stream)[0] - 1
+    stream[at] = replace(stream[at], values=stream[at - 1].values)
     (answer,) = answers(run(recognizer(Fake()), stream))
     assert isinstance(answer, Gesture)
 
@@ -303,6 +320,17 @@ def test_the_classifier_may_be_replaced_between_frames() -> None:
     subject.classifier = Fake([says(0, 0, 1)])
     (answer,) = answers(run(subject, stream[middle:]))
     assert isinstance(answer, Gesture) and answer.gesture == "right" and answer.sequence == 1
+
+
+def test_a_classifier_that_is_replaced_while_a_second_tap_is_waited_for_is_asked_anew() -> None:
+    first = Fake()
+    subject = recognizer(first)
+    events = []
+    for frame in frames("quiet for 1500ms", TAP, "quiet for 900ms"):
+        events += answers(subject.push(frame))
+        if first.seen:
+            subject.classifier = Fake([says(0.2, 0.8)], gestures=("pinch", "zigzag"))
+    assert [(type(event), event.gesture) for event in events] == [(Gesture, "zigzag")]  # type: ignore[union-attr]
 
 
 def test_another_classifier_may_know_other_gestures() -> None:
