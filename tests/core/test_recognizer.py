@@ -183,6 +183,15 @@ def test_a_sensor_that_repeats_itself_has_seen_nothing(where: int) -> None:
     assert not [event for event in run(recognizer(Fake()), stream) if isinstance(event, Gesture)]
 
 
+@pytest.mark.parametrize(("before", "kind"), [((), Unknown), (("quiet for 1 frame",), Gesture)])
+def test_a_finger_that_is_there_when_a_sensor_begins_again_was_not_seen_coming(
+    before: tuple[str, ...], kind: type
+) -> None:
+    stream = frames("quiet for 1500ms", "silence for 3s", *before, *SLOW_SWIPE[1:])
+    (answer,) = answers(run(recognizer(Fake()), stream))
+    assert isinstance(answer, kind)
+
+
 def test_a_slow_sensor_has_no_holes() -> None:
     stream = frames("quiet for 1500ms", "move 4,1 to 4,7 0.8 in 1500ms", "quiet for 1500ms")[::3]
     (answer,) = answers(run(recognizer(Fake()), stream))
