@@ -159,6 +159,8 @@ class Hearing:
         try:
             for line in self._stream:
                 self._heard.put(line)
+        except GesturedError:
+            pass  # whoever waits for the next line is told that there is none
         finally:
             self._heard.put(None)
 

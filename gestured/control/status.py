@@ -106,7 +106,7 @@ def _shift(shift: dict[str, Any]) -> str:
         return f"nothing to say yet ({shift['gestures']} gestures)"
     shares = ", ".join(f"{NAMES.get(name, name)} {100 * share:.0f} %" for name, share in shift["outside"].items())
     verdict = "unlike the training data" if shift["unlike"] else "as in training"
-    return f"{verdict}; outside its range (2 % expected) in the last {shift['gestures']} gestures: {shares}"
+    return f"{verdict}; outside its range (2 % or less expected) in the last {shift['gestures']} gestures: {shares}"
 
 
 def _span(seconds: float) -> str:

@@ -26,6 +26,7 @@ FROZEN_S = 0.4  # a pressed taxel that does not change by its noise for so long 
 COMMON = 4.0  # noise units of what all taxels share that are taken off; a palm must not cancel itself
 BLOB = (0.5, 1.0, 0.5)  # a fingertip over three taxels, in rows and in columns
 BLOB_GAIN = sum(BLOB) ** 2 / sum(b * b for b in BLOB)  # of a level that all taxels share
+LIVELY = 10  # frames from which one can tell that a sensor with noise never sends the same one again
 STRIKES = 2  # gestures in which a taxel stood still while its neighbours were pressed
 
 
@@ -90,7 +91,7 @@ class Conditioner:
         self._step = 0.0  # counts, one quantisation step: below it noise cannot be known
         self._unit = 0.0  # counts, the smallest change that a sensor has shown which stood still when it was learned
         self._shown: Array = np.zeros(rows * columns)  # raw counts of its last frame
-        self.lively = False  # whether no two frames of the idle sensor were the same
+        self.lively = False  # whether no frame of the idle sensor was the one before again
         self._fine = False  # whether a finger's tremble shows in the last digit
         self._strikes = np.zeros(rows * columns, dtype=np.int64)
         self.bad = np.zeros(rows * columns, dtype=bool)
@@ -158,7 +159,7 @@ class Conditioner:
             return False
         self.baseline, self._sigma, self._stuck = learned.baseline, learned.noise, learned.constant
         self._fine, self._step = learned.fine, learned.step
-        self.lively = bool(np.diff(learned.frames, axis=0).any(axis=1).all())
+        self.lively = len(learned.frames) >= LIVELY and bool(np.diff(learned.frames, axis=0).any(axis=1).all())
         self._unit, self._shown = math.inf if learned.still else 0.0, raw
         self._frozen[:] = False
         self._provisional = not learned.stable

@@ -49,7 +49,7 @@ class Recognizer:
     `gestures` restricts the answer to a subset; what falls to the others is not given to those that are left.
     `thresholds` are the confidences below which a gesture is unknown, where not the model's own is to hold.
     `refractory` are the seconds in which the same gesture is not published again.
-    `witness` is told of each segment that was decided, and of its scores.
+    `witness` is told of each segment that was decided, of its scores, and whether they were enough for a gesture.
 
     What is not sure enough, or has a hole in which the finger may have moved unseen, is unknown.
 
@@ -66,7 +66,7 @@ class Recognizer:
         thresholds: Mapping[str, float] | None = None,
         refractory: Mapping[str, float] | None = None,
         sequence: int = 0,
-        witness: Callable[[Segment, Scores], None] | None = None,
+        witness: Callable[[Segment, Scores, bool], None] | None = None,
     ) -> None:
         self.front_end = front_end
         self.classifier = classifier
@@ -113,8 +113,6 @@ class Recognizer:
         self._asked = None
         if answer is None:
             return Cancelled(sensor, cut.id, "model")
-        if self._witness is not None:
-            self._witness(segment, answer)
         scores = {
             gesture: float(value)
             for gesture, value in zip(self.classifier.gestures, answer.values, strict=True)
@@ -124,7 +122,10 @@ class Recognizer:
         confidence = scores[best] * (1.0 - answer.unknown)
         frames = segment.last - segment.first + 1
         whole = cut.hole_s <= max(HOLE_S, HOLE_FRAMES * self.front_end.interval_s)
-        if not whole or not confidence >= self._thresholds.get(best, answer.threshold):
+        known = whole and confidence >= self._thresholds.get(best, answer.threshold)
+        if self._witness is not None:
+            self._witness(segment, answer, known)
+        if not known:
             return Unknown(
                 sensor, cut.id, confidence, segment.onset, segment.offset, cut.decided,
                 frames, segment.lost, answer.model, answer.degraded, scores,

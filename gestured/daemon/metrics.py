@@ -77,7 +77,11 @@ class Metrics:
         self.evicted = Counter("gestured_clients_evicted", "Clients that were cut off or turned away", "reason")
         self.tests = Counter("gestured_test_events", "Gestures that gesturectl emit made up")
         self.inference = Histogram(
-            "gestured_inference_seconds", "Time to classify a segment", INFERENCE_S, "model", most=NAMED_MODELS
+            "gestured_inference_seconds",
+            "Time to classify a segment that was decided",
+            INFERENCE_S,
+            "model",
+            most=NAMED_MODELS,
         )
         self.latency = Histogram("gestured_latency_seconds", "From the last touched frame to the event", LATENCY_S)
         self.confidence = Histogram("gestured_confidence", "Confidence of the published gestures", CONFIDENCE)

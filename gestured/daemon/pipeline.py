@@ -241,9 +241,9 @@ class Pipeline:
             witness=self._decided,
         )
 
-    def _decided(self, segment: Segment, scores: Scores) -> None:
+    def _decided(self, segment: Segment, scores: Scores, known: bool) -> None:
         self._metrics.inference.observe(scores.took_s, scores.model)
-        self.watched.note(segment, scores)
+        self.watched.note(segment, scores, known)
 
     def _publish(self, sensor: Sensor, events: Sequence[Event]) -> None:
         for event in events:

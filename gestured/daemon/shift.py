@@ -2,10 +2,10 @@
 
 The model's metadata say between which values the middle 98 % of its training gestures lay (`measures`, and the
 strength), and with which confidence it answered people whom it had not seen. Of the last LAST gestures we count how
-many lie outside, or below the confidence. In training it is 2 %, or 1; one person's are no sample of all people, so
-nothing is said below UNLIKELY. Of all segments we count how many were unknown; touches that are no gestures are among
-them, so nothing is said below MANY. (A test of the whole distribution, such as the population stability index, would
-call every single driver a shift: one hand varies less than a population's. The range does not.)
+many lie outside, or below the confidence. 2 % of the training's do (1 % of the confidence's); one person's are no
+sample of all people, so nothing is said below UNLIKELY. Of all segments we count how many were unknown; touches that
+are no gestures are among them, so nothing is said below MANY. (A test of the whole distribution, such as the population
+stability index, would call every single driver a shift: one hand varies less than a population's. The range does not.)
 Memory is LAST numbers a quantity.
 """
 
@@ -38,11 +38,10 @@ class Shift:
         names = [*self.ranges, *([UNKNOWN] if _mostly_known(quantiles) else [])]
         self._outside: dict[str, deque[bool]] = {name: deque(maxlen=LAST) for name in names}
 
-    def see(self, segment: Segment, scores: Scores) -> None:
-        """A segment was decided. What a fallback says of it is not what the quantiles are about."""
+    def see(self, segment: Segment, scores: Scores, known: bool) -> None:
+        """A segment was decided, as a gesture or as unknown. The quantiles say nothing of what a fallback makes of it."""
         if self._window is None or not self._outside or scores.degraded:
             return
-        known = scores.confidence >= scores.threshold
         if UNKNOWN in self._outside:
             self._outside[UNKNOWN].append(not known)
         if known:

@@ -23,23 +23,23 @@ class Watched:
         model = ladder.model
         self.shift = Shift(model.metadata.quantiles, model.metadata.window) if isinstance(model, Model) else Shift({})
         self.shadow: Shadow | None = None
-        self._decided: list[tuple[Segment, Scores]] = []
+        self._decided: list[tuple[Segment, Scores, bool]] = []
         self._throttle = Throttle()
 
     def classify(self, segment: Segment) -> Scores:
         """The ladder's answer; raises ModelError where it has none."""
         return self.ladder.classify(segment)
 
-    def note(self, segment: Segment, scores: Scores) -> None:
-        """A segment was decided by these scores: `look_on` will look at it."""
-        self._decided.append((segment, scores))
+    def note(self, segment: Segment, scores: Scores, known: bool) -> None:
+        """A segment was decided by these scores, as a gesture or not: `look_on` will look at it."""
+        self._decided.append((segment, scores, known))
 
     def look_on(self) -> None:
         """Look at what was decided; to be called when its events are out."""
-        while self._decided:
-            segment, scores = self._decided.pop()
+        decided, self._decided = self._decided, []
+        for segment, scores, known in decided:
             try:
-                self.shift.see(segment, scores)
+                self.shift.see(segment, scores, known)
                 if self.shadow is not None:
                     self.shadow.see(segment, scores)
             except Exception:

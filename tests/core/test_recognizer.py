@@ -124,11 +124,11 @@ def cut_late(stream: Sequence[Frame]) -> list[Segment]:
 
 
 def test_a_witness_is_told_of_what_was_decided_alone() -> None:
-    told: list[tuple[Segment, Scores]] = []
+    told: list[tuple[Segment, Scores, bool]] = []
     classifier = Fake([SURE, says(0, 0, 1)])
     events = run(recognizer(classifier, witness=lambda *what: told.append(what)), frames(*DOUBLE))
-    ((segment, scores),) = told
-    assert segment is classifier.seen[1] and scores.values[2] == 1
+    ((segment, scores, known),) = told
+    assert segment is classifier.seen[1] and scores.values[2] == 1 and known
     assert [segment.offset] == [event.offset for event in answers(events)]
 
 

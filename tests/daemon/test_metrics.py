@@ -179,11 +179,11 @@ def test_gestures_as_in_training_are_no_shift_and_others_are() -> None:
     assert shift.unlike() == ["confidence"]
 
 
-def decided(confidence: float, *, degraded: bool = False) -> tuple[Segment, Scores]:
+def decided(confidence: float, *, degraded: bool = False) -> tuple[Segment, Scores, bool]:
     frames = np.zeros((8, 9, 9), np.float32)
     frames[1:7, 4, 4] = 50
     scores = Scores(np.array([confidence, 0], np.float32), 0.0, "m", degraded, threshold=0.5)
-    return Segment(frames, np.arange(8) / 15, 1, 6, 1.0), scores
+    return Segment(frames, np.arange(8) / 15, 1, 6, 1.0), scores, confidence >= 0.5
 
 
 def test_more_unknown_than_known_is_a_shift_and_a_fallback_says_nothing() -> None:
@@ -275,5 +275,5 @@ def test_what_looks_on_cannot_prevent_an_answer(model: Path, monkeypatch: pytest
     for _ in range(2):
         answer = watched.classify(segment)
         assert np.array_equal(answer.values, expected.values) and answer.unknown == expected.unknown
-        watched.note(segment, answer)
+        watched.note(segment, answer, True)
         watched.look_on()
