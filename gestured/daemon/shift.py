@@ -39,7 +39,7 @@ class Shift:
         self._outside: dict[str, deque[bool]] = {name: deque(maxlen=LAST) for name in names}
 
     def see(self, segment: Segment, scores: Scores, known: bool) -> None:
-        """A segment was decided, as a gesture or as unknown. The quantiles say nothing of what a fallback makes of it."""
+        """A segment was decided, as a gesture or as unknown. The quantiles say nothing of a fallback's answers."""
         if self._window is None or not self._outside or scores.degraded:
             return
         if UNKNOWN in self._outside:
