@@ -68,6 +68,7 @@ class FrontEnd:
         self.draft: Segment | None = None  # made by the last push: what will be cut if the finger stays off
         self.segments = 0  # so far; their ids
         self._last: float | None = None
+        self._now = 0.0  # s, when the last frame came, or the one that is about to
         self._shown = b""  # by the last frame,
         self._since = 0.0  # s, and since when; of a sensor that stands still when idle that says nothing
         self._interval = 0.0
@@ -103,6 +104,16 @@ class FrontEnd:
         """Frames a second as they come, 0 before it is known."""
         return 1.0 / self._interval if self._interval > 0 else 0.0
 
+    def due(self, t: float) -> list[Contact]:
+        """What the time alone decides until a frame at `t` s. `push` decides it as well, after a look at the frame."""
+        if not self.touched or self._last is None or not 0 < t - self._last <= self.timing.stale_s:
+            return []
+        self._now = t
+        out: list[Contact] = []
+        for action in self.segmenter.flush(t):
+            out += self._act(action, t)
+        return out
+
     def push(self, frame: Frame) -> list[Contact]:
         """Take one frame; its time must lie after the last one's (ValueError), its grid must be the sensor's.
 
@@ -123,8 +134,9 @@ class FrontEnd:
             if step > self.timing.stale_s:
                 out = self.flush(t)
             else:
+                out = self.due(t)
                 self._interval += (step - self._interval) * (0.05 if self._interval else 1.0)
-        self._last = t
+        self._last = self._now = t
         conditioner, segmenter = self.conditioner, self.segmenter
         if not conditioner.ready:
             conditioner.settle(t, raw)
@@ -141,9 +153,6 @@ class FrontEnd:
             conditioner.settle(t, raw)
             return out
         self._shifted = None
-        if segmenter.phase is not Phase.IDLE:
-            for action in segmenter.flush(t):
-                out += self._act(action, t)
         kept = self._kept
         shown, self._shown = self._shown, raw.tobytes()
         if shown != self._shown or not conditioner.lively:
@@ -259,7 +268,7 @@ class FrontEnd:
 
         Infinite where nobody saw it come. Of a sensor that says no more nobody knows, and that counts for nothing.
         """
-        seen = [k[4] for k in self._kept] + [self._last or 0.0]
+        seen = [*(k[4] for k in self._kept), self._now]
         before = int(np.searchsorted(seen, onset)) - 1
         return float(np.diff(seen[before:]).max()) if before >= 0 else math.inf
 

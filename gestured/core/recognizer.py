@@ -78,6 +78,10 @@ class Recognizer:
         self._witness = witness
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # no scores where it failed
 
+    def due(self, t: float) -> list[Event]:
+        """What is decided as soon as there is a frame at `t` s; see `FrontEnd.due`."""
+        return self._name(self.front_end.due(t))
+
     def push(self, frame: Frame) -> list[Event]:
         """Take one frame, give what it decides; see `FrontEnd.push`."""
         found = self.front_end.push(frame)

@@ -111,6 +111,8 @@ class Pipeline:
                 if stamp.restarted:
                     self._throttle.warn("sensor restarted", "restarted", sensor=sensor.name)
                     self.restart(sensor)
+                if sensor.recognizer.front_end.touched:
+                    self._publish(sensor, sensor.recognizer.due(stamp.t))
                 events = sensor.recognizer.push(Frame(stamp.t, arrival.values, arrival.touches, stamp.lost))
             except Exception:
                 events = self._recover(sensor, stamp.t)

@@ -232,13 +232,8 @@ class Service:
         log.info("reloaded", model=ladder.active)
 
     def emit(self, event: Event, *, test: bool = False) -> None:
-        """Count an event and give it to every sink; a test's is no answer of a model."""
+        """Give an event to every sink, then count it; a test's is no answer of a model."""
         epoch = time.time() - time.monotonic()
-        if not test:
-            self.metrics.event(event)
-            self.health.note(event)
-        elif isinstance(event, Gesture):
-            self.metrics.tests.add()
         sinks: tuple[Sink, ...] = (self.clients, self.taps, *self._osc)
         for sink in sinks:
             try:
@@ -246,6 +241,11 @@ class Service:
             except Exception:  # a bug in one sink is not the others' business
                 self.metrics.internal_errors.add()
                 self._throttle.error("a bug in a sink", type(sink).__name__)
+        if not test:
+            self.metrics.event(event)
+            self.health.note(event)
+        elif isinstance(event, Gesture):
+            self.metrics.tests.add()
         self.recent.note(event, epoch, test)
         if not isinstance(event, Status):
             name = getattr(event, "gesture", None)

@@ -123,6 +123,19 @@ def cut_late(stream: Sequence[Frame]) -> list[Segment]:
     return found
 
 
+@pytest.mark.parametrize("lines", [(SWIPE,), (TAP,), (TAP, "quiet for 150ms", TAP), (TAP, "quiet for 150ms", SWIPE)])
+def test_what_is_due_is_what_the_frame_would_decide(lines: tuple[str, ...]) -> None:
+    stream = frames("quiet for 1500ms", *lines, "quiet for 900ms", *lines, "quiet for 900ms")
+    one, other = recognizer(Fake()), recognizer(Fake())
+    early = 0
+    for frame in stream:
+        expected = one.push(frame)
+        due = other.due(frame.t)
+        early += len(answers(due))
+        assert due + other.push(frame) == expected
+    assert early == 2 * len([line for line in lines if line == SWIPE] or [TAP])
+
+
 def test_a_witness_is_told_of_what_was_decided_alone() -> None:
     told: list[tuple[Segment, Scores, bool]] = []
     classifier = Fake([SURE, says(0, 0, 1)])
