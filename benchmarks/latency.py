@@ -12,7 +12,7 @@ from gestured.client.engine import Engine
 from gestured.client.sensor import Form
 from gestured.core.frames import Frame
 
-ROUNDS = 3
+ROUNDS = 5
 SECONDS = 30.0
 
 

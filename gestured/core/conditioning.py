@@ -68,7 +68,8 @@ class Inspection(NamedTuple):
     """Of one contact."""
 
     still: NDArray[np.bool_]  # (N,) taxels that did not change
-    pressed: NDArray[np.bool_]  # (N,) taxels whose neighbours were pressed
+    suspect: NDArray[np.bool_]  # (N,) those of them whose neighbours were pressed
+    any_suspect: bool
 
 
 class Conditioner:
@@ -94,6 +95,7 @@ class Conditioner:
         self.lively = False  # whether no frame of the idle sensor was the one before again
         self._fine = False  # whether a finger's tremble shows in the last digit
         self._strikes = np.zeros(rows * columns, dtype=np.int64)
+        self._blameless = False  # whether no taxel has strikes or is stuck
         self.bad = np.zeros(rows * columns, dtype=bool)
         self.noise = 1.0  # counts, the median taxel's standard deviation
         self._tracked: float | None = None
@@ -158,6 +160,7 @@ class Conditioner:
         if learned is None:
             return False
         self.baseline, self._sigma, self._stuck = learned.baseline, learned.noise, learned.constant
+        self._blameless = False
         self._fine, self._step = learned.fine, learned.step
         self.lively = len(learned.frames) >= LIVELY and bool(np.diff(learned.frames, axis=0).any(axis=1).all())
         self._unit, self._shown = math.inf if learned.still else 0.0, raw
@@ -234,18 +237,21 @@ class Conditioner:
     def inspect(self, frames: Array) -> Inspection:
         """Look at a contact (T, N), not yet bridged."""
         if len(frames) < 2:
-            return Inspection(np.ones(frames.shape[1], dtype=bool), np.zeros(frames.shape[1], dtype=bool))
+            return Inspection(np.ones(frames.shape[1], dtype=bool), np.zeros(frames.shape[1], dtype=bool), False)
         peaks = frames.max(axis=0)
         around = _neighbour_mean(peaks.reshape(self.rows, self.columns), np.ones((self.rows, self.columns), dtype=bool))
         still = np.ptp(frames, axis=0) == 0
-        return Inspection(still, around.ravel() > max(0.4 * float(peaks.max()), 8 * self.noise))
+        suspect = still & (around.ravel() > max(0.4 * float(peaks.max()), 8 * self.noise))
+        return Inspection(still, suspect, bool(suspect.any()))
 
     def judge(self, seen: Inspection) -> None:
         """The contact that was inspected is over: a taxel that stood still under pressure, twice, is stuck."""
-        still, pressed = seen
-        self._strikes[pressed & still] += 1
-        self._strikes[~still] = 0
-        stuck = (self._stuck & still) | (self._strikes >= STRIKES)
+        if self._blameless and not seen.any_suspect:
+            return
+        self._strikes[seen.suspect] += 1
+        self._strikes[~seen.still] = 0
+        stuck = (self._stuck & seen.still) | (self._strikes >= STRIKES)
+        self._blameless = not (stuck.any() or self._strikes.any())
         if (stuck != self._stuck).any():
             self._stuck = stuck
             self._review()

@@ -32,6 +32,7 @@ class _Made:
     """A segment as it was made, perhaps before it was cut."""
 
     segment: Segment
+    peak: float  # counts
     bad: NDArray[np.bool_]  # (N,) taxels that are bridged in it
     inspection: Inspection
 
@@ -221,11 +222,10 @@ class FrontEnd:
         if self._glitch(onset, offset):
             return [Cancelled(self.sensor, self.segments, "glitch"), release]
         self.conditioner.judge(self._make(onset, offset).inspection)
-        segment = self._make(onset, offset).segment
-        self._made = None
-        if float(segment.frames.max()) < self.segmenter.off * segment.noise:  # nothing is left without its bad taxels
+        made, self._made = self._make(onset, offset), None
+        if made.peak < self.segmenter.off * made.segment.noise:  # nothing is left without its bad taxels
             return [Cancelled(self.sensor, self.segments, "stuck"), release]
-        return [Cut(self.segments, segment, t, self._hole(onset)), release]
+        return [Cut(self.segments, made.segment, t, self._hole(onset)), release]
 
     def _cancel(self, reason: str) -> list[Contact]:
         release = Release(self.sensor, self.segments, self.segmenter.last_touched)
@@ -260,7 +260,7 @@ class FrontEnd:
         lost = sum(k[3] for k in list(self._kept)[first + 1 : last + 1])
         segment = Segment(frames, times, first, last, self.conditioner.noise, lost, touches)
         inspection = self.conditioner.inspect(stack[first : last + 1])
-        self._made = made = _Made(segment, self.conditioner.bad, inspection)
+        self._made = made = _Made(segment, float(frames.max()), self.conditioner.bad, inspection)
         return made
 
     def _hole(self, onset: float) -> float:
@@ -268,9 +268,12 @@ class FrontEnd:
 
         Infinite where nobody saw it come. Of a sensor that says no more nobody knows, and that counts for nothing.
         """
-        seen = [*(k[4] for k in self._kept), self._now]
-        before = int(np.searchsorted(seen, onset)) - 1
-        return float(np.diff(seen[before:]).max()) if before >= 0 else math.inf
+        last, longest = -math.inf, 0.0
+        for since in (*(k[4] for k in self._kept), self._now):
+            if since >= onset:
+                longest = max(longest, since - last)
+            last = since
+        return longest
 
     def _mount(self, touch: Touch) -> Touch:
         return Touch(touch.id, *self.mounting.point(touch.x, touch.y, *self.sent))

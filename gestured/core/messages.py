@@ -70,9 +70,12 @@ def error_json(reason: str) -> bytes:
 
 
 def _line(value: dict[str, Any]) -> bytes:
-    return json.dumps(value, separators=(",", ":"), allow_nan=False, default=_plain_value).encode() + b"\n"
+    return _ENCODER.encode(value).encode() + b"\n"
 
 
 def _plain_value(value: Any) -> Any:
     """Mappings of any kind, and numpy's numbers."""
     return dict(value) if isinstance(value, Mapping) else value.item()
+
+
+_ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False, default=_plain_value)
