@@ -130,4 +130,5 @@ def test_the_good_ones_are_untouched_by_the_bad(
         np.testing.assert_array_equal(found.times_of(k), recordings.times_of(i))
         for name in FIELDS[3:8]:
             value = getattr(recordings, name)
-            assert value is None or getattr(found, name)[k] == value[i]
+            if value is not None:
+                np.testing.assert_array_equal(getattr(found, name)[k], value[i])  # a speed may be NaN: nobody knows it
