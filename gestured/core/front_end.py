@@ -69,6 +69,7 @@ class FrontEnd:
         self.draft: Segment | None = None  # made by the last push: what will be cut if the finger stays off
         self.segments = 0  # so far; their ids
         self._last: float | None = None
+        self._settled = -math.inf  # s, the last frame of the quiet second after which the sensor was ready
         self._now = 0.0  # s, when the last frame came, or the one that is about to
         self._shown = b""  # by the last frame,
         self._since = 0.0  # s, and since when; of a sensor that stands still when idle that says nothing
@@ -140,7 +141,8 @@ class FrontEnd:
         self._last = self._now = t
         conditioner, segmenter = self.conditioner, self.segmenter
         if not conditioner.ready:
-            conditioner.settle(t, raw)
+            if conditioner.settle(t, raw):
+                self._settled = t
             return out
         d, activity, lowest = conditioner.deviation(raw)
         sunken = lowest < -segmenter.on
@@ -187,6 +189,7 @@ class FrontEnd:
             out += self._act(Action.CLOSE, t) if self.segmenter.let_go() else self._cancel("silence")
         self.segmenter.reset()
         self._kept.clear()
+        self._settled = -math.inf
         self.conditioner.doubt()
         return out
 
@@ -268,7 +271,7 @@ class FrontEnd:
 
         Infinite where nobody saw it come. Of a sensor that says no more nobody knows, and that counts for nothing.
         """
-        last, longest = -math.inf, 0.0
+        last, longest = self._settled, 0.0
         for since in (*(k[4] for k in self._kept), self._now):
             if since >= onset:
                 longest = max(longest, since - last)

@@ -205,6 +205,15 @@ def test_a_finger_that_is_there_when_a_sensor_begins_again_was_not_seen_coming(
     assert isinstance(answer, kind)
 
 
+def test_a_touch_as_soon_as_the_sensor_is_ready_has_no_hole() -> None:
+    """The quiet second from which it was learned has shown that nobody touched it."""
+    kinds = []
+    for ms in range(880, 1200, 10):
+        for line in (SWIPE, TAP):
+            kinds += map(type, answers(run(recognizer(Fake()), frames(f"quiet for {ms}ms", line, "quiet for 900ms"))))
+    assert len(kinds) > 30 and set(kinds) == {Gesture}
+
+
 def test_a_slow_sensor_has_no_holes() -> None:
     stream = frames("quiet for 1500ms", "move 4,1 to 4,7 0.8 in 1500ms", "quiet for 1500ms")[::3]
     (answer,) = answers(run(recognizer(Fake()), stream))
