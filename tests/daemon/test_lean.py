@@ -90,10 +90,10 @@ def test_no_scene_loads_what_belongs_to_training(start: Start, scene: str) -> No
     assert "numpy" in imported(daemon)  # so that an empty report does not pass
 
 
-def test_numpy_brings_no_threads_and_no_random_numbers(start: Start) -> None:
+def test_numpy_brings_no_threads_no_random_numbers_and_no_masked_arrays(start: Start) -> None:
     daemon = used(start)
     assert count(daemon, "task") == 2  # the loop, and what ends a run of a model that takes too long
-    assert "numpy.random" not in daemon.stderr()
+    assert "numpy.random" not in daemon.stderr() and "numpy.ma.core" not in daemon.stderr()
 
 
 def test_the_metrics_library_comes_with_metrics_alone(start: Start) -> None:
