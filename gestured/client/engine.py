@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import gestured
 from gestured.core.errors import GesturedError
 
 STOP_S = 5.0
@@ -21,7 +22,9 @@ class Engine:
         self._folder = tempfile.TemporaryDirectory(prefix="gestured-demo-")
         folder = Path(self._folder.name)
         self._log = folder / "log"
-        command = [sys.executable, "-m", "gestured.daemon", "--model", model, "--listen", "127.0.0.1:0"]
+        root = Path(gestured.__file__).parent.parent
+        safe = [] if root == Path.cwd() else ["-P"]  # a folder named gestured in the current one is not the package
+        command = [sys.executable, *safe, "-m", "gestured.daemon", "--model", model, "--listen", "127.0.0.1:0"]
         command += ["--socket", str(folder / "events.sock"), "--grid", f"{rows}x{columns}", *more]
         environment = {name: value for name, value in os.environ.items() if not name.startswith("GESTURED_")}
         with self._log.open("wb") as log:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import gestured
+from gestured.client.engine import Engine
 from gestured.models import shipped
 
 pytestmark = [
@@ -25,6 +27,16 @@ def daemons(mark: Path) -> list[int]:
         except OSError:
             continue
     return found
+
+
+def test_a_folder_of_the_same_name_is_not_taken_for_the_program(tmp_path, monkeypatch):
+    """As in the folder into which somebody has cloned it."""
+    (tmp_path / "gestured").mkdir()
+    (tmp_path / "gestured" / "__init__.py").write_text("raise SystemExit('not this one')")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(Path(gestured.__file__).parent.parent))
+    with Engine("cnn_lstm", 9, 9) as engine:
+        assert engine.ready["type"] == "ready"
 
 
 def test_outcomes_add_up_to_the_summary(run, tmp_path):
