@@ -172,7 +172,7 @@ def _open_session(data: bytes) -> Any:
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idling burns cores otherwise
-    options.enable_mem_reuse = False  # to plan it is more than half of opening; a run gains no time, and no memory
+    options.enable_mem_reuse = False  # planning it is slow, and makes no run faster or smaller
     options.log_severity_level = 4
     try:
         return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"], enable_fallback=0)

@@ -108,14 +108,14 @@ def _without_spikes(stack: Array) -> Array:
 
 
 def median(values: Array) -> Array:
-    """(n, ...) -> (...), along the first axis. `numpy.median` says the same, at four to eight times the price here."""
+    """(n, ...) -> (...), along the first axis. `numpy.median` says the same, and imports masked arrays."""
     ordered = np.sort(values, axis=0)
     middle = len(ordered) // 2
     return np.asarray(ordered[middle] if len(ordered) % 2 else (ordered[middle - 1] + ordered[middle]) / 2)
 
 
 def _quantile(values: Array, share: float) -> float:
-    """Of (N,) values, as `numpy.quantile` has it, to the last bit."""
+    """Of (N,) values, as `numpy.quantile` has it, to the last bit, without its masked arrays."""
     ordered = np.sort(values)
     below = int(share * (len(ordered) - 1))
     beyond = share * (len(ordered) - 1) - below

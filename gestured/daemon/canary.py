@@ -1,6 +1,6 @@
 """The canary of the watchdog: whether the way of a frame works, tried on a sensor that does not exist."""
 
-from random import Random  # numpy's own is 2 MiB that nothing else here needs
+from random import Random  # nothing else in the daemon needs numpy's own, which is large
 
 import numpy as np
 

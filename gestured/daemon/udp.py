@@ -22,7 +22,7 @@ BATCH_BYTES = 256 << 10  # so many bytes: a flood must leave room for everything
 CATCH_UP = 16  # batches, and
 CATCH_UP_S = 0.25
 PAUSE_S = 0.001  # after packets that come closer together than this we wait as long for more of them,
-FEW = 8  # where no more than these were waiting: to be woken for each one costs half as much as its frame
+FEW = 8  # where no more than these were waiting: to be woken for each one is a large part of its price
 SOURCES = 1024  # remembered decisions of the allow-list
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
