@@ -111,10 +111,7 @@ class FrontEnd:
         if not self.touched or self._last is None or not 0 < t - self._last <= self.timing.stale_s:
             return []
         self._now = t
-        out: list[Contact] = []
-        for action in self.segmenter.flush(t):
-            out += self._act(action, t)
-        return out
+        return self._acts(self.segmenter.flush(t), t)
 
     def push(self, frame: Frame) -> list[Contact]:
         """Take one frame; its time must lie after the last one's (ValueError), its grid must be the sensor's.
@@ -162,8 +159,7 @@ class FrontEnd:
             self._since = t
         kept.append((t, d, frame.touches, frame.lost, self._since))
         place = conditioner.place(d) if activity >= segmenter.off else None
-        for action in segmenter.push(t, activity, place):
-            out += self._act(action, t)
+        out += self._acts(segmenter.push(t, activity, place), t)
         if segmenter.phase in TOUCHED:
             conditioner.busy(t, raw, d)
             if segmenter.let_go() and t - segmenter.last_touched >= DRAFT_S:
@@ -183,8 +179,7 @@ class FrontEnd:
         if self._last is not None:
             t = min(t, self._last + self.timing.stale_s)  # it was over then, whenever one asks
         if self.touched:
-            for action in self.segmenter.flush(t):
-                out += self._act(action, t)
+            out += self._acts(self.segmenter.flush(t), t)
         if self.touched:
             out += self._act(Action.CLOSE, t) if self.segmenter.let_go() else self._cancel("silence")
         self.segmenter.reset()
@@ -204,6 +199,9 @@ class FrontEnd:
         self._kept.clear()
         self._shifted = None
         return out
+
+    def _acts(self, actions: list[Action], t: float) -> list[Contact]:
+        return [contact for action in actions for contact in self._act(action, t)]
 
     def _act(self, action: Action, t: float) -> list[Contact]:
         offset = self.segmenter.last_touched
