@@ -35,7 +35,9 @@ class Control(Lines):
         self.socket.settimeout(None)
         if answer is None:
             raise Unreachable(f"the daemon on {self.path} closed the connection")
-        if answer.get("ok") is not True:
+        if "ok" not in answer:
+            raise Refused(f"{self.path} is not the control socket; name the daemon's --control")
+        if answer["ok"] is not True:
             raise Refused(f"{verb}: {answer.get('reason')}")
         return answer
 

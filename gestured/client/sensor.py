@@ -53,6 +53,19 @@ class Form:
         return encode_message(f"/{self.sensor}/trajectory", "iff" * (len(args) // 3), args)
 
 
+def sent_after_refusal(sock: socket.socket, packet: bytes) -> bool:
+    """Send on a connected UDP socket; whether a closed port has refused an earlier packet.
+
+    The system says so instead of sending, once for each refusal.
+    """
+    try:
+        sock.send(packet)
+    except ConnectionRefusedError:
+        sock.send(packet)
+        return True
+    return False
+
+
 class Sensor:
     """Sends frames at the pace of their times. A frame's time in seconds counts from the first frame."""
 
@@ -73,10 +86,7 @@ class Sensor:
             wait = self.start + frame.t - time.monotonic()
             if self.stop.wait(max(wait, 0.0)):
                 return
-            try:
-                self.socket.send(self.form.packet(frame, counter, self.moment(frame.t)))
-            except ConnectionRefusedError:  # said about an earlier packet: nobody listens on that port
-                self.unheard += 1
+            self.unheard += sent_after_refusal(self.socket, self.form.packet(frame, counter, self.moment(frame.t)))
             self.sent += 1
 
     def moment(self, t: float) -> float:

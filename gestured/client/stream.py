@@ -8,6 +8,7 @@ from typing import Any
 from gestured.client.lines import Lines, Refused, Unreachable
 
 PROTOCOL = 1
+PATIENCE_S = 10.0  # a daemon greets at once
 
 
 class Stream(Lines):
@@ -17,7 +18,13 @@ class Stream(Lines):
         """Connect and subscribe (None: gestures only). Raises Unreachable or Refused."""
         super().__init__(path, "--socket")
         try:
-            first = next(self.raw(), None)
+            self.socket.settimeout(PATIENCE_S)
+            try:
+                first = next(self.raw(), None)
+            except TimeoutError:
+                said = f"says nothing within {PATIENCE_S:g} s: it hangs, or this is not its event socket (--socket)"
+                raise Unreachable(f"the daemon on {path} {said}") from None
+            self.socket.settimeout(None)
             if first is None:
                 raise Unreachable(f"the daemon on {path} closed the connection")
             self.hello_line, self.hello = first

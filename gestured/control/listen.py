@@ -52,6 +52,9 @@ def run(args: argparse.Namespace) -> int:
             time.sleep(RETRY_S)
             continue
         _greet(stream, args.json)
+        for name in args.gesture or ():
+            if name not in stream.hello["gestures"]:
+                print(f"no gesture of this daemon: {name} ({', '.join(stream.hello['gestures'])})", file=sys.stderr)
         for line, event in stream.raw():
             if event.get("type") == "error":
                 raise Refused(f"the daemon refused the request: {event.get('reason')}")

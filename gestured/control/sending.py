@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.client.lines import Unreachable
+from gestured.client.sensor import sent_after_refusal
 from gestured.client.stream import Stream
 from gestured.control.diff import ONSET_S, Line
 from gestured.core import osc
@@ -48,10 +49,7 @@ def send(found: Tape, to: tuple[str, int], speed: float) -> tuple[list[float], i
             if packet.source not in senders:
                 senders[packet.source] = socket.socket(family, kind)
                 senders[packet.source].connect(where)
-            try:
-                senders[packet.source].send(data)
-            except ConnectionRefusedError:
-                unheard += 1
+            unheard += sent_after_refusal(senders[packet.source], data)
             sent.append(time.time())
     finally:
         for sender in senders.values():

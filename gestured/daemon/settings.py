@@ -85,7 +85,7 @@ class Settings(Part):
     )
     control: SocketField | None = Field(
         default=None,
-        description="Unix socket of gesturectl's requests; by default the event socket's path with the suffix .ctl",
+        description="Unix socket of gesturectl's requests; by default beside the event socket, .ctl in place of .sock",
     )
     metrics: AddressField | None = Field(
         default=None, description="HTTP address of /metrics, /healthz and /readyz; off unless set"

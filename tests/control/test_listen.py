@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from gestured.client.lines import Unreachable
+from gestured.client.stream import Stream
+
 GESTURE = {
     "type": "gesture",
     "sensor": "armrest",
@@ -170,3 +173,17 @@ def test_the_default_socket_is_where_the_daemon_keeps_it():
         {"RUNTIME_DIRECTORY": "/run/a:/run/b", "XDG_RUNTIME_DIR": "/c"},
     ):
         assert default_socket(given) == daemons(given)
+
+
+def test_a_gesture_that_the_daemon_does_not_know_is_said(start, fake):
+    process = start("listen", "--socket", fake.path, "--gesture", "swipeleft", "--count", 1)
+    fake.accept()
+    assert b"no gesture of this daemon: swipeleft (one_tap)" in process.stderr.readline() + process.stderr.readline()
+
+
+def test_the_wrong_one_of_two_sockets_is_said(daemon, run, monkeypatch):
+    status, _, err = run("emit", "swipe_left", "--control", daemon.socket)
+    assert status == 1 and f"{daemon.socket} is not the control socket" in err
+    monkeypatch.setattr("gestured.client.stream.PATIENCE_S", 0.2)
+    with pytest.raises(Unreachable, match="not its event socket"):
+        Stream(Path(daemon.ready["control"]))

@@ -1,6 +1,7 @@
 """gesturectl simulate, received on a real UDP socket and read with python-osc."""
 
 import json
+import re
 import signal
 import socket
 import time
@@ -106,7 +107,8 @@ def test_nobody_listening_is_said(run):
         free = f"127.0.0.1:{taken.getsockname()[1]}"
     status, _, err = run("simulate", "--to", free, "--seconds", 1)
     assert status == 0
-    assert f"nobody listened on {free}" in err
+    heard, sent = map(int, re.search(rf"nobody listened on {free} for (\d+) of (\d+) packets", err).groups())
+    assert sent - 1 <= heard <= sent  # of the last one nobody can know
 
 
 @pytest.mark.parametrize(
