@@ -14,6 +14,7 @@ from gestured.core.segmentation import TOUCHED, Action, Phase, Segmenter, Timing
 
 LARGEST = float(np.finfo(np.float32).max)  # counts; also what a frame on the wire can hold
 LEAD_S = 0.15  # quiet frames kept before an onset: at 15 Hz two of them
+LEAD_FRAMES = 200  # the same at 1000 Hz, and some: a sensor's own clock may all but stand still
 DRAFT_S = 0.085  # quiet for so long, all that a window takes in is there; the wait goes on to see the finger stay off
 
 
@@ -160,18 +161,24 @@ class FrontEnd:
         kept.append((t, d, frame.touches, frame.lost, self._since))
         place = conditioner.place(d) if activity >= segmenter.off else None
         out += self._acts(segmenter.push(t, activity, place), t)
+        if len(kept) > self.timing.limit_frames:
+            out += self.give_up(t)
         if segmenter.phase in TOUCHED:
             conditioner.busy(t, raw, d)
             if segmenter.let_go() and t - segmenter.last_touched >= DRAFT_S:
                 self._make_draft(segmenter.onset, segmenter.last_touched)
             return out
-        while kept[0][0] < t - LEAD_S:
+        while kept[0][0] < t - LEAD_S or len(kept) > LEAD_FRAMES:
             kept.popleft()
         if segmenter.phase is Phase.IDLE:
             conditioner.idle(t, raw, d, activity, sunken=sunken, burst=burst, recovering=segmenter.recovering(t))
         else:
             conditioner.settle(t, raw)  # what stays on the sensor becomes part of its baseline
         return out
+
+    def give_up(self, t: float) -> list[Contact]:
+        """A contact that goes on has taken too long by another clock than its frames': it is cancelled as held."""
+        return self._acts(self.segmenter.give_up(t), t)
 
     def flush(self, t: float) -> list[Contact]:
         """The stream paused or ended at `t` s: close what is open."""

@@ -89,6 +89,10 @@ class Recognizer:
             self._ask(self.front_end.draft)
         return self._name(found) if found else []
 
+    def give_up(self, t: float) -> list[Event]:
+        """Cancel a contact that goes on; see `FrontEnd.give_up`."""
+        return self._name(self.front_end.give_up(t))
+
     def flush(self, t: float) -> list[Event]:
         """The stream paused or ended at `t` s: decide what can be decided, cancel the rest."""
         return self._name(self.front_end.flush(t))

@@ -29,6 +29,7 @@ class Timing:
     tap_s: float = 0.57  # a tap is at most this long
     tap_travel: float = 0.15  # and stays within this share of the grid's shorter side
     limit_s: float = 5.03  # a contact that is no gesture any more
+    limit_frames: int = 6000  # the same at 1000 Hz, where the sensor's own clock may all but stand still
     stale_s: float = 1.0  # silence that ends everything
     shift_s: float = 0.25  # frames far below the baseline for so long: the sensor restarted
     glitch_s: float = 0.02  # a contact surely shorter than this is no finger
@@ -95,6 +96,7 @@ TRANSITIONS: dict[tuple[Phase, Signal], tuple[Phase, Action | None]] = {
     (P.GAP, S.WEAK): (P.GAP, None),
     (P.GAP, S.STRONG): (P.CONTACT, None),
     (P.GAP, S.GAP_OVER): (P.IDLE, A.CLOSE),
+    (P.GAP, S.LIMIT): (P.SPENT, A.HELD),
     (P.SPENT, S.QUIET): (P.SPENT, None),
     (P.SPENT, S.WEAK): (P.SPENT, None),
     (P.SPENT, S.STRONG): (P.SPENT, None),
@@ -178,6 +180,13 @@ class Segmenter:
             if self.phase is Phase.GAP and quiet >= timing.tap_gap_s:
                 self._step(t, Signal.GAP_OVER, actions)
         if self.phase in TOUCHED and t - self.onset >= timing.limit_s:
+            self._step(t, Signal.LIMIT, actions)
+        return actions
+
+    def give_up(self, t: float) -> list[Action]:
+        """The contact has taken too much of something else than its own time: as if `limit_s` were over."""
+        actions: list[Action] = []
+        if self.phase in TOUCHED:
             self._step(t, Signal.LIMIT, actions)
         return actions
 

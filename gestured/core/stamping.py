@@ -28,6 +28,7 @@ class Stamper:
     """
 
     MAX_STEP_S = 10.0
+    AHEAD_S = 86_400.0  # a recording may be sent faster than it was felt, but a day ahead of its arrival is no time
     MIN_STEP_S = 1e-6  # where the clock did not move; a double still tells this after 30 years
     REORDER = 16  # a frame that is so many back may have been overtaken ...
     REORDER_S = 0.5  # ... but not after such a pause
@@ -48,8 +49,13 @@ class Stamper:
         """The stream's time at the arrival time `t` s, for `flush`: the last stamp plus what passed since."""
         return t if self._last is None else self._last + max(0.0, t - self._arrived)
 
-    def stamp(self, arrivals: Sequence[Arrival], t: float) -> list[Stamp]:
-        """One stamp for each of this sensor's frames that were waiting at the arrival time `t` s."""
+    def stamp(self, arrivals: Sequence[Arrival], t: float, *, missed: bool = False) -> list[Stamp]:
+        """One stamp for each of this sensor's frames that were waiting at the arrival time `t` s.
+
+        `missed`: packets may have been lost on this machine just before. A counter tells how many were this
+        sensor's; without one, what fits into the pause counts as lost.
+        """
+        before, usual = self._last, self._typical()
         stamps: list[Stamp] = []
         run: list[tuple[int, int]] = []  # frames with one time: index, periods since the frame before
         for i, arrival in enumerate(arrivals):
@@ -64,6 +70,8 @@ class Stamper:
             run.append((i, steps))
         if run:
             self._place(arrivals, stamps, run, t)
+        if missed and before is not None and arrivals[0].counter is None:
+            stamps[0] = stamps[0]._replace(lost=max(0, round((stamps[0].t - before) / usual) - 1))
         return stamps
 
     def _count(self, counter: int | None, pause: float) -> tuple[int, Literal["", "duplicate", "late"], bool]:
@@ -97,7 +105,7 @@ class Stamper:
             step = t - self._arrived
             if self._by_tag:
                 by_tag = tag - self._tag if tag is not None and self._tag is not None else 0.0
-                if 0 < by_tag <= self.MAX_STEP_S:
+                if 0 < by_tag <= self.MAX_STEP_S and self._last + by_tag <= t + self.AHEAD_S:
                     step = by_tag
                 else:
                     implausible = tag is None or self._tag is not None

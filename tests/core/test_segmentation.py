@@ -81,5 +81,10 @@ def test_no_row_is_there_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         tap + quiet + frames(1, 0.0, 6.0),  # no frame for so long
     ):
         play(stream)
+    waiting = Segmenter(81, 0.15 * 9)
+    for n, activity in enumerate([50.0] * 3 + [0.0] * 3):
+        waiting.flush(n / 15)
+        waiting.push(n / 15, activity, (4.0, 4.0))
+    assert waiting.give_up(0.4) == [Action.HELD]  # a tap whose second one never comes, by a clock that stands still
     # What lies there after a contact was given up counts as touched down to `off`: it is never weak.
     assert seen == set(TRANSITIONS) - {(Phase.SPENT, Signal.WEAK)}

@@ -185,3 +185,24 @@ def test_packets_that_waited_together_keep_their_own_time_tags() -> None:
     stamper = Stamper("sensor")
     got = stamps(stamper, (50.0, [felt(timetag=1000.0)]), (51.0, [felt(timetag=1000 + x) for x in (0.1, 0.5, 0.6)]))
     assert times(got) == pytest.approx([50.0, 50.1, 50.5, 50.6])
+
+
+def test_what_this_machine_had_no_room_for_counts_as_lost_where_it_leaves_a_pause() -> None:
+    stamper = Stamper()
+    stamps(stamper, *[(n * P, [felt()]) for n in range(30)])
+    assert stamper.stamp([felt()], 33 * P, missed=True)[0].lost == 3
+    assert stamper.stamp([felt()], 34 * P, missed=True)[0].lost == 0  # it was somebody else's
+    assert stamper.stamp([felt()], 38 * P)[0].lost == 0  # a pause alone says nothing
+
+
+def test_a_counter_knows_better_what_was_lost() -> None:
+    stamper = Stamper()
+    stamps(stamper, *[(n * P, [felt(n)]) for n in range(30)])
+    assert stamper.stamp([felt(31)], 35 * P, missed=True)[0].lost == 1
+
+
+def test_a_sensors_clock_runs_ahead_by_a_day_at_most() -> None:
+    stamper = Stamper("sensor")
+    got = stamps(stamper, *[(n * P, [felt(timetag=n * Stamper.MAX_STEP_S)]) for n in range(20_000)])
+    assert all(stamp.t <= n * P + Stamper.AHEAD_S for n, stamp in enumerate(got))
+    assert not got[100].implausible and got[-1].implausible
