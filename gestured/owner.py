@@ -1,32 +1,38 @@
 """Who may feed a sensor: the source that sent it first, until it has been silent."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 Source = tuple[str, int]  # host and port of a sender
+PORTS = 1024  # remembered of a sender that opens a new port for each packet: a second of the fastest sensor
 
 
 @dataclass(slots=True)
 class Owner:
-    """Of one sensor."""
+    """The source that may feed one sensor."""
 
     source: Source
-    before: Source | None = None  # the owner before this one
-    packets: int = 0  # of this owner
-    heard: float = 0.0  # s, monotonic
+    steady: bool = False  # it has sent more than one packet
+    heard: float = 0.0  # s, monotonic: the last packet that was admitted
+    _own: float | None = None  # s, the last packet of `source` itself
+    _ports: set[int] = field(default_factory=set)  # others of its host, each good for one packet
 
     def admits(self, source: Source, now: float, stale_s: float) -> bool:
-        """Whether a packet of `source` at `now` s may feed the sensor; if so, it is its owner's last word."""
-        if source != self.source:
-            if now - self.heard <= stale_s and not self._one_shot(source):
-                return False
-            self.before, self.source, self.packets = self.source, source, 0
-        self.packets += 1
+        """Whether a packet of `source` at `now` s may feed the sensor.
+
+        A program may open a new port for each packet, as `oscsend` does. So as long as the owner has sent a single
+        packet, each further port of its host may send one, too. A port that sends a second one is no such
+        program's, and has to wait until the owner has been silent for `stale_s`, like anybody else.
+        """
+        if source == self.source:
+            self.steady = self._own is not None
+            self._own = self.heard = now
+            return True
+        if self._own is None or now - self._own > stale_s:
+            self.source, self.steady, self._own, self.heard = source, False, now, now
+            self._ports.clear()
+            return True
+        if self.steady or source[0] != self.source[0] or source[1] in self._ports or len(self._ports) >= PORTS:
+            return False
+        self._ports.add(source[1])
         self.heard = now
         return True
-
-    def _one_shot(self, source: Source) -> bool:
-        """Whether the owner may be a program that opens a new port for each packet, as `oscsend` does.
-
-        One packet from a port is no claim against another port of the same host; two are.
-        """
-        return self.packets == 1 and source[0] == self.source[0] and source != self.before
