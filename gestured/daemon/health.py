@@ -52,7 +52,8 @@ class Health:
     def hello(self) -> bytes:
         """The first line to a client."""
         heard = {name: sensor.recognizer.sequence for name, sensor in self.pipeline.sensors.items()}
-        sequences = self.pipeline.given | heard
+        given = {name: sequence for name, (sequence, _) in self.pipeline.given.items()}
+        sequences = given | heard
         model, gestures = self.pipeline.watched.ladder.active, self.pipeline.gestures
         return messages.hello_json(__version__, self.instance, model, gestures, sequences)
 

@@ -7,6 +7,7 @@ place where a bug does not end the program: a daemon in a vehicle that dies of o
 nobody.
 """
 
+import ipaddress
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -18,7 +19,7 @@ from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Recognizer, Scores
 from gestured.core.segmentation import Timing
 from gestured.core.stamping import Stamper
-from gestured.core.wire import Arrival
+from gestured.core.wire import Addresses, Arrival, Decoder
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.reading import Reading
@@ -29,10 +30,21 @@ from gestured.daemon.watch import Watched
 from gestured.ladder import Ladder
 from gestured.owner import Owner, Source
 
-FORGET_S = 60.0  # a sensor that never made a gesture and is silent for this long gives its place to a new one
+FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one that sends
+GIVEN = 4096  # names of sensors that are not there, whose numbers are remembered
+HELD_S = 60.0  # of arrivals: a contact that lasts longer by the sensor's own clock is given up
+HOSTS = 1024  # remembered decisions of the allow-list
 DOUBLE_TAP = "double_tap"
 SILENT = ("no_data", "stale")  # states of sensors that are not there now
 Emit = Callable[[Event], None]
+Network = ipaddress.IPv4Network | ipaddress.IPv6Network
+
+
+def allowed(host: str, networks: Sequence[Network]) -> bool:
+    """Whether a host's address lies in one of the networks; any does where there are none."""
+    address = ipaddress.ip_address(host)
+    mapped = getattr(address, "ipv4_mapped", None)
+    return not networks or any((mapped or address) in network for network in networks)
 
 
 @dataclass(slots=True)
@@ -46,8 +58,10 @@ class Sensor:
     owner: Owner
     silent: bool = False  # and has been flushed
     open: int | None = None  # id of the contact that was not released yet
+    since: float = 0.0  # s, when the frame arrived that opened it
     answered: bool = True  # whether that contact has its answer
-    lost: int = 0  # frames, by its own counter
+    lost: int = 0  # frames, by its own counter, or by what this machine had no room for
+    missed: int = 0  # how often this machine had no room for a packet, when the last frame came
     vitals: Vitals = field(default_factory=Vitals)
 
 
@@ -57,9 +71,19 @@ class Pipeline:
     def __init__(self, settings: Settings, ladder: Ladder, metrics: Metrics, emit: Emit) -> None:
         self.sensors: dict[str, Sensor] = {}
         self.watched = Watched(ladder)
-        self.given: dict[str, int] = {}  # sequence numbers that sensors which are not there have used
+        self.given: dict[str, tuple[int, int]] = {}  # sequence and id that sensors which are not there have used
+        self.behind_s = 0.0  # for so long the oldest packet waits that has arrived and was not taken yet
         self._settings, self._metrics, self._emit = settings, metrics, emit
         self._throttle = Throttle()
+        self._missed = 0  # times that the kernel had no room for a packet
+        self.owners: frozenset[Source] = frozenset()  # sources that own a sensor which is there, as of the last tick
+        self._configure()
+
+    def _configure(self) -> None:
+        # Trajectories have no consumer yet: they are passed over at their address.
+        addresses = Addresses(self._settings.addresses.pressure, self._settings.addresses.trajectory)
+        self._decoder = Decoder(addresses, self.grid, keep_touches=False)
+        self._allowed: dict[str, bool] = {}  # host -> whether it may send
 
     @property
     def gestures(self) -> tuple[str, ...]:
@@ -72,6 +96,46 @@ class Pipeline:
         own = self._settings.sensors.get(sensor)
         model = Grid(self.watched.ladder.rows, self.watched.ladder.columns)
         return (own and own.grid) or self._settings.grid or model
+
+    def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> None:
+        """Take packets that had arrived by `now` (monotonic seconds), each with its source."""
+        batch: dict[str, tuple[Sensor, list[Arrival]]] = {}
+        for packet, source in packets:
+            try:
+                self._packet(packet, source, now, batch)
+            except Exception:  # what came before and after it is good
+                self.bug("in the decoding of a packet", source=source[0])
+        for sensor, arrivals in batch.values():
+            self.take(sensor, arrivals, now)
+
+    def missed(self) -> None:
+        """The kernel had no room for a packet: whose it was shows where the next frame comes after a pause."""
+        self._missed += 1
+
+    def _packet(
+        self, packet: bytes, source: Source, now: float, batch: dict[str, tuple[Sensor, list[Arrival]]]
+    ) -> None:
+        if self._settings.allow and not self._may_send(source[0]):
+            self.drop("not_allowed", source=source[0])
+            return
+        arrivals, errors = self._decoder.decode(packet, source)
+        for error in errors:
+            self.drop(error.reason, source=source[0], error=str(error))
+        for arrival in arrivals:
+            name = arrival.sensor
+            sensor = self.admit(name, source, now)
+            if sensor is not None:
+                if name not in batch:
+                    batch[name] = (sensor, [])
+                batch[name][1].append(arrival)
+
+    def _may_send(self, host: str) -> bool:
+        known = self._allowed.get(host)
+        if known is None:
+            if len(self._allowed) >= HOSTS:
+                self._allowed.clear()
+            known = self._allowed[host] = allowed(host, self._settings.allow)
+        return known
 
     def admit(self, name: str, source: Source, now: float) -> Sensor | None:
         """The sensor that a packet of `source` may feed, or None, counted, where it may not."""
@@ -93,10 +157,11 @@ class Pipeline:
         frames = self._metrics.frames
         taken = 0
         try:
-            stamps = sensor.stamper.stamp(arrivals, now)
+            stamps = sensor.stamper.stamp(arrivals, now, missed=sensor.missed != self._missed)
         except Exception:
             self._publish(sensor, self._recover(sensor, now))
             return
+        sensor.missed = self._missed
         sensor.vitals.arrived(now, len(arrivals), sensor.recognizer.front_end.rate_hz)
         for arrival, stamp in zip(arrivals, stamps, strict=True):
             if stamp.dropped:
@@ -119,14 +184,17 @@ class Pipeline:
             else:
                 taken += 1
             if events:
-                self._publish(sensor, events)
+                self._publish(sensor, events, now)
+        if sensor.open is not None and now - sensor.since > HELD_S:
+            self._publish(sensor, sensor.recognizer.give_up(sensor.stamper.at(now)))
         if taken:
             frames.add(sensor.label, "ok", count=taken)
 
     def tick(self, now: float) -> None:
         """Close what is open where a sensor has been silent for longer than `stale_s`."""
+        self.owners = frozenset(sensor.owner.source for sensor in self.sensors.values() if not sensor.silent)
         for sensor in self.sensors.values():
-            if not sensor.silent and now - sensor.owner.heard > self._settings.stale_s:
+            if not sensor.silent and self._stale(sensor, now):
                 self._throttle.warn("sensor is silent", "silent", sensor=sensor.name)
                 self.flush(sensor, now)
 
@@ -159,6 +227,7 @@ class Pipeline:
         if shadow is not None and shadow.candidate.gestures == watched.gestures:
             watched.shadow = shadow
         self.watched = watched
+        self._configure()
         for name, sensor in self.sensors.items():
             front_end, fresh = sensor.recognizer.front_end, self._front_end(name)
             another_clock = _clock(old, name) != _clock(settings, name)
@@ -189,13 +258,22 @@ class Pipeline:
         self._metrics.dropped.add(reason, count=count)
         self._throttle.warn("dropped", reason, **fields)
 
+    def muted(self, senders: Sequence[Source | str]) -> None:
+        """Say at a bounded rate that these senders of a flood are not heard for a while."""
+        names = [sender if isinstance(sender, str) else f"{sender[0]}:{sender[1]}" for sender in senders]
+        self._throttle.warn("senders of a flood are not heard for some seconds", "muted", senders=names)
+
     def bug(self, what: str, **fields: object) -> None:
         """Count a bug that was caught; log its traceback at a bounded rate."""
         self._metrics.internal_errors.add()
         self._throttle.error("a bug, caught", what, **fields)
 
+    def _stale(self, sensor: Sensor, now: float) -> bool:
+        """Whether a sensor is silent; one whose frames wait for us is not."""
+        return now - self.behind_s - sensor.owner.heard > self._settings.stale_s
+
     def _state(self, sensor: Sensor, now: float) -> str:
-        if now - sensor.owner.heard > self._settings.stale_s:
+        if self._stale(sensor, now):
             return "stale"
         front_end = sensor.recognizer.front_end
         if not front_end.ready:
@@ -211,15 +289,37 @@ class Pipeline:
         if len(strangers) < self._settings.max_sensors - len(named):
             return False
         for sensor in strangers:
-            if now - sensor.owner.heard > FORGET_S and sensor.recognizer.sequence == 0:
-                del self.sensors[sensor.name]
+            if now - sensor.owner.heard > FORGET_S:
+                self._forget(sensor)
                 return False
         return True
 
+    def _forget(self, sensor: Sensor) -> None:
+        """Take a sensor off the list; what it has numbered is numbered on should it return."""
+        del self.sensors[sensor.name]
+        if len(self.given) >= GIVEN:
+            self.given.pop(next(iter(self.given)))
+        self.given[sensor.name] = sensor.recognizer.sequence, sensor.recognizer.front_end.segments
+
+    def number(self, name: str) -> tuple[int, int]:
+        """The next sequence and id of a sensor, for an event that is made up; they count as used."""
+        sensor = self.sensors.get(name)
+        if sensor is None:
+            sequence, number = self.given.get(name, (0, 0))
+            self.given[name] = sequence + 1, number + 1
+            return self.given[name]
+        sensor.recognizer.sequence += 1
+        sensor.recognizer.front_end.segments += 1
+        return sensor.recognizer.sequence, sensor.recognizer.front_end.segments
+
     def _make(self, name: str, source: Source) -> Sensor:
-        recognizer = self._recognizer(self._front_end(name), self.given.pop(name, 0))
+        sequence, number = self.given.pop(name, (0, 0))
+        front_end = self._front_end(name)
+        front_end.segments = number
+        recognizer = self._recognizer(front_end, sequence)
         stamper = Stamper(_clock(self._settings, name))
-        return Sensor(name, self._metrics.sensor_label(name), recognizer, stamper, Owner(source))
+        label = self._metrics.sensor_label(name)
+        return Sensor(name, label, recognizer, stamper, Owner(source), missed=self._missed)
 
     def _front_end(self, name: str) -> FrontEnd:
         own = self._settings.sensors.get(name, SensorSettings())
@@ -247,10 +347,10 @@ class Pipeline:
         self._metrics.inference.observe(scores.took_s, scores.model)
         self.watched.note(segment, scores, known)
 
-    def _publish(self, sensor: Sensor, events: Sequence[Event]) -> None:
+    def _publish(self, sensor: Sensor, events: Sequence[Event], now: float = 0.0) -> None:
         for event in events:
             if isinstance(event, Onset):
-                sensor.open, sensor.answered = event.id, False
+                sensor.open, sensor.answered, sensor.since = event.id, False, now
             elif isinstance(event, Gesture | Unknown | Cancelled):
                 sensor.answered = True
             elif isinstance(event, Release):

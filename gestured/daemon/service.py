@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from gestured.core import messages, wire
+from gestured.core import messages
 from gestured.core.errors import GesturedError
 from gestured.core.events import Event, Gesture, Status
 from gestured.daemon import log as logging
@@ -37,12 +37,6 @@ SHOWN = 4  # sensors in systemd's status line
 Loader = Callable[[], Settings]
 
 
-def make_decoder(settings: Settings, pipeline: Pipeline) -> wire.Decoder:
-    """Trajectories have no consumer yet: they are passed over at their address."""
-    addresses = wire.Addresses(settings.addresses.pressure, settings.addresses.trajectory)
-    return wire.Decoder(addresses, pipeline.grid, keep_touches=False)
-
-
 class Service:
     """Everything that lives while the daemon runs."""
 
@@ -63,7 +57,7 @@ class Service:
         self.taps = Taps(settings.flight_recorder << 20)
         self.clients = EventServer(bound.events.sock, self.health.hello, self.metrics)
         self._osc = [OscSink(address, self.metrics) for address in settings.publish]
-        self._receiver = Receiver(bound.udp, self.pipeline, make_decoder(settings, self.pipeline), settings.allow)
+        self._receiver = Receiver(bound.udp, self.pipeline)
         self._control = ControlServer(bound.control.sock, verbs(self))
         self._http: Any = None
         if bound.http is not None:
@@ -134,7 +128,7 @@ class Service:
         due = status_at
         while not stop.is_set():
             self.health.woke(time.monotonic() - due)
-            self._receiver.read_all()  # a sensor whose frames wait for us is not silent
+            self._receiver.read()
             now = time.monotonic()
             self.pipeline.tick(now)
             if now >= status_at:
@@ -181,7 +175,7 @@ class Service:
         """Answer what is in flight, give clients a moment to read it, and say goodbye."""
         self.health.stopping = True
         systemd.notify("STOPPING=1")
-        self._receiver.read_all()
+        self._receiver.drain()
         self._receiver.close()
         self._control.close()
         now = time.monotonic()
@@ -224,7 +218,6 @@ class Service:
         logging.configure(settings.log_level)
         self.settings = settings
         self.pipeline.reload(settings, ladder)
-        self._receiver.configure(make_decoder(settings, self.pipeline), settings.allow)
         for sink in self._osc:
             sink.close()
         self._osc = osc

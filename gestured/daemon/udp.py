@@ -1,71 +1,66 @@
-"""OSC over UDP in: reads what waits, decodes it, and hands each sensor its frames.
+"""OSC over UDP in: reads what waits in the socket, and hands it on with the time at which it arrived.
 
-A reader of its own instead of a DatagramProtocol: it takes everything that waits before it looks at the
-clock, so that after a stall of the loop the frames are spread over the time they took, and it costs less per
-packet. Where packets come thick, as of hundreds of sensors, it takes them together, about every millisecond.
+A reader of its own instead of a DatagramProtocol, for two reasons. It asks the kernel when each packet came, so that
+a stall of the loop, however long, moves no frame: what waited is served as if it had been read at once. And it takes
+together what comes thick, as of hundreds of sensors, about every millisecond, which costs less per packet.
+
+Work is done in slices: between two of them the loop serves everybody else.
 """
 
 import asyncio
-import ipaddress
 import socket
+import struct
 import time
 from collections.abc import Callable, Sequence
 
-from gestured.core.wire import Arrival, Decoder
-from gestured.daemon.pipeline import Pipeline, Sensor
-from gestured.daemon.rations import Rations
+from gestured.daemon.backlog import FLOOD_S, GROUP_BYTES, TOGETHER_S, Backlog, Datagram
+from gestured.daemon.mute import LONGEST_S, Muted, Sender, mute
+from gestured.daemon.pipeline import Pipeline
+from gestured.daemon.sockets import kernel_drops
 from gestured.owner import Source
 
 PACKET_BYTES = 65_536
-BATCH = 256  # packets in one go, and
-BATCH_BYTES = 256 << 10  # so many bytes: a flood must leave room for everything else
-CATCH_UP = 16  # batches, and
-CATCH_UP_S = 0.25
+BATCH = 256  # packets in one read: half a millisecond, so that the kernel's buffer is empty again soon
+SLICE_S = 0.005  # of work on what waits, before others have their turn
+FLOOD_SLICE_S = 0.001  # the same in a flood of the largest packets, which fills the kernel's buffer in two milliseconds
+TURN_S = 0.05  # of work in a flood, where packets cost far more than those before them
+DRAIN_S = 0.25  # for what is left when the daemon ends
 PAUSE_S = 0.001  # after packets that come closer together than this we wait as long for more of them,
 FEW = 8  # where no more than these were waiting: to be woken for each one is a large part of its price
-SOURCES = 1024  # remembered decisions of the allow-list
+FULL_S = 0.25  # after which a stall no longer explains that the kernel has no room
+STEP_S = 0.05  # the wall clock was set by more than this while packets waited: their times say nothing
 
-Network = ipaddress.IPv4Network | ipaddress.IPv6Network
-
-
-def allowed(host: str, networks: Sequence[Network]) -> bool:
-    """Whether a host's address lies in one of the networks; any does where there are none."""
-    address = ipaddress.ip_address(host)
-    mapped = getattr(address, "ipv4_mapped", None)
-    return not networks or any((mapped or address) in network for network in networks)
+SO_TIMESTAMPNS = 35  # Linux; not in Python's socket module
+TIMESTAMP = struct.Struct("@qq")  # s and ns since the epoch, by the wall clock
+ANCILLARY_BYTES = socket.CMSG_SPACE(TIMESTAMP.size)
 
 
 class Receiver:
-    """Reads a UDP socket until it is closed. `decoder` and `allow` may be replaced at any time."""
+    """Reads a UDP socket until it is closed."""
 
-    def __init__(
-        self,
-        sock: socket.socket,
-        pipeline: Pipeline,
-        decoder: Decoder,
-        allow: Sequence[Network],
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
+    def __init__(self, sock: socket.socket, pipeline: Pipeline, clock: Callable[[], float] = time.monotonic) -> None:
         self._loop = asyncio.get_running_loop()
         self._sock, self._pipeline, self._clock = sock, pipeline, clock
-        self.tap: Callable[[Sequence[tuple[bytes, Source]], float], None] | None = None  # is shown what is read
-        self._rations = Rations()
-        self.configure(decoder, allow)
+        self.tap: Callable[[Sequence[tuple[bytes, Source]], float], None] | None = None  # is shown what is served
+        self._backlog = Backlog(lambda source: source in pipeline.owners)
+        self._muted = Muted()
+        self._wall = time.time() - clock()  # s, from the monotonic clock to the one that the kernel stamps with
+        self._empty = clock()  # s, when the socket was last seen empty
+        self._drops = 0  # packets that the kernel had dropped then
+        self._dropping = -FLOOD_S  # s, when it began to
         self._looked = 0.0  # s, when we last looked whether something waits
         self._found = 0  # packets, then
         self._pause: asyncio.TimerHandle | None = None
+        self._again: asyncio.Handle | None = None
+        sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         self._loop.add_reader(sock, self._wake)
-
-    def configure(self, decoder: Decoder, allow: Sequence[Network]) -> None:
-        """Decode and admit by these from now on."""
-        self._decoder, self._allow = decoder, tuple(allow)
-        self._known: dict[str, bool] = {}
 
     def close(self) -> None:
         """Stop reading; the socket stays its owner's."""
         self._loop.remove_reader(self._sock)
-        if self._pause is not None:
-            self._pause.cancel()
+        for handle in (self._pause, self._again):
+            if handle is not None:
+                handle.cancel()
 
     def _wake(self) -> None:
         now = self._clock()
@@ -80,68 +75,125 @@ class Receiver:
         self._looked = self._clock()
         self._loop.add_reader(self._sock, self._wake)
 
-    def read_all(self) -> None:
-        """Take everything that waits, within reason: after a stall timers run before readers do."""
-        end = self._clock() + CATCH_UP_S
-        for _ in range(CATCH_UP):
-            if not self.read() or self._clock() >= end:
-                break
+    def drain(self) -> None:
+        """Serve everything that waits, within reason: the end is near."""
+        end = self._clock() + DRAIN_S
+        self.read()
+        while self._backlog and self._clock() < end:
+            self.read()
 
-    def read(self) -> bool:
-        """Take what waits, at most a batch; says whether it has left something behind."""
-        receive = self._sock.recvfrom
-        waiting: list[tuple[bytes, Source]] = []
-        room = BATCH_BYTES * (BATCH if self._rations.on(self._clock()) else 1)  # what is not served costs little
-        full = False
+    def read(self) -> None:
+        """Take what waits, and serve what a slice of time is enough for; the rest has its turn after everybody else."""
+        if self._again is not None:
+            self._again.cancel()
+            self._again = None
+        found, full = self._receive()
+        now = self._clock()
+        wall = time.time() - now
+        if abs(wall - self._wall) > STEP_S:
+            found = [(packet, b"", source) for packet, _, source in found]
+        self._found = len(found)
+        much = len(found) > FEW and sum(len(packet) for packet, _, _ in found) > GROUP_BYTES
+        if found and (full or much or self._backlog or now - self._arrival(found[0][1], now) >= TOGETHER_S):
+            self._backlog.add(self._datagrams(found, now), now)
+            self._count_drops(now)
+        elif found:
+            self._serve([(packet, source) for packet, _, source in found], now)
+        if not full:
+            self._empty = now
+        self._wall = wall
+        if self._backlog:
+            self._work(now)
+        self._mute(now, self._muted.over(now))
+        self._pipeline.behind_s = self._backlog.age(now)
+        if self._backlog or full:
+            self._again = self._loop.call_soon(self.read)
+
+    def _receive(self) -> tuple[list[tuple[bytes, bytes, Source]], bool]:
+        """Packets with the kernel's time and their source; whether some may be left."""
+        receive = self._sock.recvmsg
+        found: list[tuple[bytes, bytes, Source]] = []
         try:
-            while len(waiting) < BATCH and room > 0:
-                datagram = receive(PACKET_BYTES)
-                waiting.append(datagram)
-                room -= len(datagram[0])
-            full = True
+            for _ in range(BATCH):
+                packet, ancillary, _, source = receive(PACKET_BYTES, ANCILLARY_BYTES)
+                found.append((packet, ancillary[0][2] if ancillary else b"", source))
+            return found, True
         except (BlockingIOError, InterruptedError):
             pass
         except (OSError, MemoryError) as error:  # the network's complaint about something else; the socket goes on
             self._pipeline.drop("socket_error", error=str(error))
-        self._found = len(waiting)
-        now = self._clock()
-        served = self._rations.share(waiting, full, now)
-        if len(served) < len(waiting):
-            self._pipeline.drop("flood", count=len(waiting) - len(served))
-            waiting = served
-        if self.tap is not None and waiting:
-            self.tap(waiting, now)
-        batch: dict[str, tuple[Sensor, list[Arrival]]] = {}
-        for packet, source in waiting:
-            try:
-                self._packet(packet, source, now, batch)
-            except Exception:  # what came before and after it in this batch is good
-                self._pipeline.bug("in the decoding of a packet", source=source[0])
-        for sensor, arrivals in batch.values():
-            self._pipeline.take(sensor, arrivals, now)
-        return full
+        return found, False
 
-    def _packet(
-        self, packet: bytes, source: Source, now: float, batch: dict[str, tuple[Sensor, list[Arrival]]]
-    ) -> None:
-        if self._allow and not self._may_send(source[0]):
-            self._pipeline.drop("not_allowed", source=source[0])
+    def _arrival(self, stamp: bytes, now: float) -> float:
+        """When a packet came, in s of the monotonic clock: after the socket was empty, and not after `now`."""
+        if len(stamp) != TIMESTAMP.size:
+            return now
+        seconds, nanoseconds = TIMESTAMP.unpack(stamp)
+        came: float = seconds + nanoseconds / 1e9 - self._wall
+        return min(now, max(self._empty, came))
+
+    def _datagrams(self, found: list[tuple[bytes, bytes, Source]], now: float) -> list[Datagram]:
+        """What was found with its arrivals, which never go back."""
+        arrival = self._empty
+        datagrams: list[Datagram] = []
+        for packet, stamp, source in found:
+            arrival = max(arrival, self._arrival(stamp, now))
+            datagrams.append(Datagram(arrival, packet, source))
+        return datagrams
+
+    def _work(self, now: float) -> None:
+        """Serve what waits for as long as a slice lasts."""
+        if self._backlog.flooded(now):
+            self._work_fairly(now)
             return
-        arrivals, errors = self._decoder.decode(packet, source)
-        for error in errors:
-            self._pipeline.drop(error.reason, source=source[0], error=str(error))
-        for arrival in arrivals:
-            name = arrival.sensor
-            sensor = self._pipeline.admit(name, source, now)
-            if sensor is not None:
-                if name not in batch:
-                    batch[name] = (sensor, [])
-                batch[name][1].append(arrival)
+        end, before = now + SLICE_S, time.thread_time()
+        while self._backlog and self._clock() < end:
+            group = self._backlog.group()
+            self._serve([(datagram.packet, datagram.source) for datagram in group], group[-1].arrival)
+        self._backlog.worked(time.thread_time() - before, self._clock())
 
-    def _may_send(self, host: str) -> bool:
-        known = self._known.get(host)
-        if known is None:
-            if len(self._known) >= SOURCES:
-                self._known.clear()
-            known = self._known[host] = allowed(host, self._allow)
-        return known
+    def _work_fairly(self, now: float) -> None:
+        served, dropped = self._backlog.share(FLOOD_SLICE_S, now)
+        start = before = time.thread_time()  # of the processor: when we are made to wait, no sender is to blame
+        for n, datagram in enumerate(served):
+            if before > start + TURN_S:
+                for left in served[n:]:
+                    sender = self._backlog.sender(left.source)
+                    dropped[sender] = dropped.get(sender, 0) + 1
+                break
+            self._serve([(datagram.packet, datagram.source)], datagram.arrival)
+            after = time.thread_time()
+            self._backlog.took(datagram, after - before)
+            before = after
+        if dropped:
+            self._pipeline.drop("flood", count=sum(dropped.values()))
+            self._pipeline.missed()
+            if blamed := self._muted.blame(dropped, now):
+                self._pipeline.muted(blamed)
+                self._mute(now, blamed)
+                self._backlog.flood(now + LONGEST_S + FLOOD_S)  # those who are heard again are held back at once
+
+    def _mute(self, now: float, changed: Sequence[Sender]) -> None:
+        """Have the kernel throw away what comes from senders of a flood: unread, it fills the socket's buffer."""
+        if changed:
+            try:
+                mute(self._sock, self._muted.rules(now, self._pipeline.owners))
+            except OSError as error:
+                self._pipeline.drop("socket_error", count=0, error=f"a sender cannot be muted: {error}")
+
+    def _serve(self, packets: Sequence[tuple[bytes, Source]], now: float) -> None:
+        if self.tap is not None:
+            self.tap(packets, now)
+        self._pipeline.receive(packets, now)
+
+    def _count_drops(self, now: float) -> None:
+        """Tell the pipeline where the kernel had no room for something."""
+        drops = kernel_drops(self._sock)
+        if drops == self._drops:
+            return
+        self._drops = drops
+        self._pipeline.missed()
+        if self._dropping <= now - FULL_S <= self._dropping + FLOOD_S:  # again: more comes than we can read
+            self._backlog.flood(now + FLOOD_S)
+        elif now > self._dropping + FLOOD_S:
+            self._dropping = now

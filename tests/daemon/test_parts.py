@@ -12,16 +12,16 @@ import pytest
 
 from gestured.core.errors import SettingsError
 from gestured.core.events import Event
-from gestured.core.wire import Addresses, Arrival, Decoder
+from gestured.core.wire import Arrival, Decoder
 from gestured.daemon import log
 from gestured.daemon.health import Health
 from gestured.daemon.http import HttpThread, as_json
 from gestured.daemon.merge import load
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.pipeline import Pipeline
+from gestured.daemon.pipeline import Pipeline, allowed
 from gestured.daemon.settings import FLAGS, Settings
 from gestured.daemon.sockets import bind_udp
-from gestured.daemon.udp import Receiver, allowed
+from gestured.daemon.udp import Receiver
 from gestured.daemon.values import Address
 from gestured.ladder import ladder_for
 from tests.daemon import harness
@@ -130,21 +130,10 @@ def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(pipel
 
 def test_a_bug_in_the_decoder_costs_one_packet(pipeline, monkeypatch) -> None:
     line, _, metrics = pipeline
-    decoder = Decoder(Addresses(), line.grid)
-    decode = decoder.decode
-    monkeypatch.setattr(decoder, "decode", lambda data, source: decode(data, source) if data else 1 / 0)
-
-    async def main() -> None:
-        with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
-            receiver = Receiver(sock, line, decoder, ())
-            sender.connect(sock.getsockname())
-            for packet in (harness.floats("/a/pressure", Hand().frame(), 0), b"", b"rubbish!", b""):
-                sender.send(packet)
-            sender.send(harness.floats("/a/pressure", Hand().frame(), 0))
-            receiver.read_all()
-            receiver.close()
-
-    asyncio.run(main())
+    decode = Decoder.decode
+    monkeypatch.setattr(Decoder, "decode", lambda self, data, source: decode(self, data, source) if data else 1 / 0)
+    good = harness.floats("/a/pressure", Hand().frame(), 0)
+    line.receive([(packet, ("10.0.0.1", 1)) for packet in (good, b"", b"rubbish!", b"", good)], 1.0)
     assert metrics.internal_errors.total() == 2 and metrics.dropped.values == {("not_osc",): 1}
     assert metrics.frames.values == {("a", "ok"): 2}
 
@@ -159,7 +148,7 @@ def test_packets_that_come_thick_are_taken_together_and_no_others_wait(pipeline,
         loop = asyncio.get_running_loop()
         loop.call_later = lambda _, listen: rests.append(listen) or asyncio.Handle(listen, (), loop)
         with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
-            receiver = Receiver(sock, line, Decoder(Addresses(), line.grid), (), lambda: now)
+            receiver = Receiver(sock, line, lambda: now)
             sender.connect(sock.getsockname())
             for k in range(5):
                 now += apart
@@ -177,19 +166,6 @@ def test_packets_that_come_thick_are_taken_together_and_no_others_wait(pipeline,
             await asyncio.sleep(0)
 
     asyncio.run(main())
-
-
-def test_one_packet_from_a_port_is_no_claim_but_two_are(pipeline) -> None:
-    line, _, metrics = pipeline
-    frames = Hand().idle(0.1)
-    for port in range(5):  # a sender that opens a new port each time
-        feed(line, "a", frames[:1], 0.01 * port, ("10.0.0.1", port))
-    assert metrics.dropped.total() == 0
-    feed(line, "a", frames[:1], 0.1, ("10.0.0.1", 4))  # now it has said something twice
-    feed(line, "a", frames[:1], 0.1, ("10.0.0.1", 9))
-    feed(line, "b", frames[:1], 0.1, ("10.0.0.1", 1))
-    feed(line, "b", frames[:1], 0.1, ("10.0.0.2", 1))  # another host has no such privilege
-    assert metrics.dropped.values == {("second_source",): 2}
 
 
 def test_healthz_says_when_the_loop_hangs(pipeline, model: Path) -> None:

@@ -1,19 +1,17 @@
 """How often a damaged gesture is wrong, for each fault: `python -m tests.hostile.damage`.
 
 Simulated people (the project's own simulator, nominal sensor, people whom the models have not seen) perform
-gestures; a fault damages what the sensor sends; the daemon's own receiver and pipeline take it from a real UDP
-socket, with the clock written down, so that the same seed gives the same numbers at any speed. "Damaged" are the
+gestures; a fault damages what the sensor sends; the daemon's own pipeline takes it at times that are written down,
+so that the same seed gives the same numbers at any speed. "Damaged" are the
 gestures during which a packet or frame was not what it should have been. An untouched sensor has the same fault
 for as long: any gesture there is one too many.
 """
 
 import argparse
-import asyncio
 import heapq
 import itertools
 import json
 import math
-import socket
 import sys
 from collections import Counter
 from collections.abc import Callable
@@ -28,13 +26,10 @@ from gestured.core import messages
 from gestured.core.events import Event
 from gestured.core.frames import Frame
 from gestured.daemon import log
+from gestured.daemon.health import TICK_S
 from gestured.daemon.merge import load
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.pipeline import Pipeline
-from gestured.daemon.service import TICK_S, make_decoder
-from gestured.daemon.sockets import bind_udp
-from gestured.daemon.udp import Receiver
-from gestured.daemon.values import Address
 from gestured.ladder import ladder_for
 from gestured.simulator import Participant, Sensor, Take, generator, session
 from tests.hostile.faults import FAULTS, Fault
@@ -43,6 +38,7 @@ from tests.hostile.line import Line
 
 SESSION_S = 120.0
 FIRST = 2000  # the participant; nobody whom training, calibration or evaluation know
+SOURCE = ("127.0.0.1", 40000)
 BEFORE_S, AFTER_S = 0.1, 0.2  # frames around a contact that are part of its segment or of its end
 
 
@@ -84,7 +80,7 @@ def take(participant: int, seconds: float = SESSION_S, touched: bool = True) -> 
 
 
 class Bench:
-    """The daemon's receiver and pipeline behind a UDP socket, at times that are written down."""
+    """The daemon's pipeline, at times that are written down."""
 
     def __init__(self, model: str) -> None:
         # Nothing here may depend on how fast this machine is: no rung is ever too slow.
@@ -93,9 +89,6 @@ class Bench:
 
     def events(self, arrivals: list[tuple[float, bytes]]) -> list[dict[str, Any]]:
         """What the daemon says to (time in s, packet), in order of arrival, as a client's lines."""
-        return asyncio.run(self._events(arrivals))
-
-    async def _events(self, arrivals: list[tuple[float, bytes]]) -> list[dict[str, Any]]:
         lines: list[dict[str, Any]] = []
 
         def emit(event: Event) -> None:
@@ -103,22 +96,13 @@ class Bench:
 
         now = 0.0
         pipeline = Pipeline(self._settings, self._ladder, Metrics(), emit)
-        with (
-            bind_udp(Address("127.0.0.1", 0)) as sock,
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender,
-        ):
-            receiver = Receiver(sock, pipeline, make_decoder(self._settings, pipeline), (), lambda: now)
-            sender.connect(sock.getsockname())
-            tick = arrivals[0][0]
-            for t, together in itertools.groupby(arrivals, key=lambda arrival: arrival[0]):
-                while tick < t:
-                    pipeline.tick(tick)
-                    tick += TICK_S
-                for _, packet in together:
-                    sender.send(packet)
-                now = t
-                receiver.read_all()
-            receiver.close()
+        tick = arrivals[0][0]
+        for t, together in itertools.groupby(arrivals, key=lambda arrival: arrival[0]):
+            while tick < t:
+                pipeline.tick(tick)
+                tick += TICK_S
+            now = t
+            pipeline.receive([(packet, SOURCE) for _, packet in together], now)
         for one in pipeline.sensors.values():
             pipeline.flush(one, now)
         return lines

@@ -4,6 +4,7 @@ import argparse
 import socket
 import sys
 import time
+from contextlib import ExitStack
 
 import numpy as np
 
@@ -31,19 +32,22 @@ def main() -> int:
     parser.add_argument("to")
     parser.add_argument("kind", choices=("rubbish", "frames", "sensors", "full"))
     parser.add_argument("--rate", type=float, default=50_000.0, help="packets a second")
+    parser.add_argument("--ports", type=int, default=1, help="sent from so many ports in turn (default: 1)")
     parser.add_argument("--seconds", type=float, default=5.0)
     args = parser.parse_args()
     host, port = args.to.rsplit(":", 1)
     what, sent = packets(args.kind), 0
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-        sock.connect((host, int(port)))
+    with ExitStack() as stack:
+        socks = [stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(args.ports)]
+        for sock in socks:
+            sock.connect((host, int(port)))
         start = time.monotonic()
         while (passed := time.monotonic() - start) < args.seconds:
             if sent > passed * args.rate:
                 time.sleep(BURST / args.rate)
                 continue
             for _ in range(min(BURST, max(1, int(args.rate / 100)))):
-                sock.send(what[sent % len(what)])
+                socks[sent % len(socks)].send(what[sent % len(what)])
                 sent += 1
     print(f"{args.kind}: {sent / args.seconds:.0f} packets/s", flush=True)
     return 0

@@ -1,0 +1,159 @@
+"""Packets that wait for their turn, and who is served when more comes than can be done."""
+
+from collections import deque
+from collections.abc import Callable
+from typing import NamedTuple
+
+from gestured.daemon.mute import Sender
+from gestured.owner import Source
+
+TOGETHER_S = 0.004  # packets that arrived so close to each other are looked at together
+GROUP_BYTES = 64 << 10  # in one go at the most: 150 frames of 9 x 9 floats
+MOST_BYTES = 32 << 20  # four times what a kernel's buffer of 4 MiB hands over after a stall
+FLOOD_S = 1.0  # of work, after which it shows whether we catch up
+PACE = 0.5  # where it served less than this share of as much time of arrivals, we do not
+OWNERS_SHARE = 0.75  # of the time, in a flood, for those who own a sensor; strangers get the rest
+CREDIT_S = 0.02  # of work that a sender may save up, and begins with: what the largest packet of frames costs
+FIRST_GUESS = 3e-7  # s of work a byte, until a sender's packets have been served
+NEWEST = 0.2  # weight of the newest measurement of that
+SENDERS = 4096  # whose credit is remembered
+
+
+class Datagram(NamedTuple):
+    """A packet as it arrived."""
+
+    arrival: float  # s, monotonic
+    packet: bytes
+    source: Source
+
+
+class Backlog:
+    """What was read and not yet served, oldest first.
+
+    In a flood, work is shared out: in each turn every sender gets the same time, what one does not need goes to the
+    others, and what is too much is dropped, the oldest first. Who needs least is served first. A source that owns a
+    sensor counts for itself and comes before strangers; all strangers of one host are one sender, however many ports
+    they open.
+    """
+
+    def __init__(self, owns: Callable[[Source], bool]) -> None:
+        """`owns` says whether a source owns a sensor."""
+        self._owns = owns
+        self._waiting: deque[Datagram] = deque()
+        self._bytes = 0
+        self._work = 0.0  # s that groups were served since
+        self._oldest = 0.0  # s, when what waited longest then had arrived
+        self._until = 0.0  # s, when the flood is over unless something is dropped before
+        self._cost: dict[Sender, float] = {}  # s of work a byte
+        self._credit: dict[Sender, float] = {}  # s of work
+
+    def __bool__(self) -> bool:
+        return bool(self._waiting)
+
+    def age(self, now: float) -> float:
+        """How long the oldest has been waiting, in s; 0 where nothing waits."""
+        return max(0.0, now - self._waiting[0].arrival) if self._waiting else 0.0
+
+    def add(self, datagrams: list[Datagram], now: float) -> None:
+        """Let these wait, in the order of their arrival."""
+        if not self._waiting and datagrams:
+            self._work, self._oldest = 0.0, datagrams[0].arrival
+        self._waiting.extend(datagrams)
+        self._bytes += sum(len(datagram.packet) for datagram in datagrams)
+
+    def flooded(self, now: float) -> bool:
+        """Whether more comes than can be done."""
+        if self._bytes > MOST_BYTES or now < self._until:
+            return True
+        self._credit.clear()
+        self._cost.clear()
+        return False
+
+    def flood(self, until: float) -> None:
+        """Count it as a flood until then (s)."""
+        self._until = max(self._until, until)
+
+    def worked(self, seconds: float, now: float) -> None:
+        """So much work was done, in s: after a stall that catches up with what arrived, in a flood it does not."""
+        self._work += seconds
+        if self._waiting and self._work >= FLOOD_S:
+            oldest = self._waiting[0].arrival
+            if oldest - self._oldest < PACE * self._work and now - oldest >= FLOOD_S:
+                self.flood(now + FLOOD_S)
+            self._work, self._oldest = 0.0, oldest
+
+    def group(self) -> list[Datagram]:
+        """The oldest that arrived together."""
+        first = self._waiting[0].arrival
+        found: list[Datagram] = []
+        size = 0
+        while self._waiting and size < GROUP_BYTES and self._waiting[0].arrival - first < TOGETHER_S:
+            found.append(self._waiting.popleft())
+            size += len(found[-1].packet)
+        self._bytes -= size
+        return found
+
+    def share(self, seconds: float, now: float) -> tuple[list[Datagram], dict[Sender, int]]:
+        """In a flood: what is to be served in a turn of so many seconds, and how many packets of whom were dropped.
+
+        Nothing waits after it.
+        """
+        by_sender: dict[Sender, list[Datagram]] = {}
+        for datagram in self._waiting:
+            by_sender.setdefault(self.sender(datagram.source), []).append(datagram)
+        self._waiting.clear()
+        self._bytes = 0
+        needs: dict[Sender, float] = {key: sum(map(self._guess, waiting)) for key, waiting in by_sender.items()}
+        owners: dict[Sender, float] = {key: need for key, need in needs.items() if isinstance(key, tuple)}
+        shares = fair(owners, OWNERS_SHARE * seconds)
+        spent = sum(min(shares[key], need) for key, need in owners.items())
+        shares |= fair({key: need for key, need in needs.items() if key not in owners}, seconds - spent)
+        served: list[Datagram] = []
+        dropped: dict[Sender, int] = {}
+        for key in sorted(by_sender, key=needs.__getitem__):
+            kept = self._newest(key, by_sender[key], shares[key])
+            served += kept
+            if len(kept) < len(by_sender[key]):
+                dropped[key] = len(by_sender[key]) - len(kept)
+        if dropped:
+            self.flood(now + FLOOD_S)
+        return served, dropped
+
+    def took(self, datagram: Datagram, seconds: float) -> None:
+        """A packet of a flood was served, and cost so much."""
+        key = self.sender(datagram.source)
+        cost = seconds / len(datagram.packet) if datagram.packet else 0.0
+        if len(self._cost) < SENDERS or key in self._cost:
+            before = self._cost.get(key, cost)
+            self._cost[key] = before + NEWEST * (cost - before)
+
+    def sender(self, source: Source) -> Sender:
+        """As whom a source counts: for itself where it owns a sensor, else as its host."""
+        return source if self._owns(source) else source[0]
+
+    def _guess(self, datagram: Datagram) -> float:
+        guess = len(datagram.packet) * self._cost.get(self.sender(datagram.source), FIRST_GUESS)
+        return min(guess, CREDIT_S)  # so that anybody is served in the end
+
+    def _newest(self, key: Sender, datagrams: list[Datagram], share: float) -> list[Datagram]:
+        credit = min(self._credit.get(key, CREDIT_S) + share, max(share, CREDIT_S))
+        kept: list[Datagram] = []
+        for datagram in reversed(datagrams):
+            cost = self._guess(datagram)
+            if cost > credit:
+                break
+            credit -= cost
+            kept.append(datagram)
+        if len(self._credit) < SENDERS or key in self._credit:
+            self._credit[key] = credit
+        return kept[::-1]
+
+
+def fair(needs: dict[Sender, float], seconds: float) -> dict[Sender, float]:
+    """Shares of a time for those who need some of it: the same for all, but nobody's unused rest is lost."""
+    shares: dict[Sender, float] = {}
+    left = seconds
+    for n, (key, need) in enumerate(sorted(needs.items(), key=lambda item: item[1])):
+        shares[key] = left / (len(needs) - n)
+        left -= min(need, shares[key])
+    return shares

@@ -1,0 +1,112 @@
+"""Senders whose packets the kernel throws away before they take room in a socket's buffer: a classic BPF filter.
+
+The filter sees a packet from its UDP header on; `NETWORK` is where its IP header begins (linux/filter.h). It is a list
+of rules, the first that fits decides, and what no rule names is let in.
+"""
+
+import array
+import ipaddress
+import math
+import socket
+import struct
+from collections.abc import Collection, Iterable, Mapping
+from typing import NamedTuple
+
+from gestured.owner import Source
+
+TOO_MANY = 100  # packets of a sender that were dropped within a second
+FIRST_S = 1.0  # for which a sender is muted; each further time twice as long,
+LONGEST_S = 8.0  # but never longer
+SO_ATTACH_FILTER, SO_DETACH_FILTER = 26, 27  # Linux; not in Python's socket module
+NETWORK = 0xFFF00000
+LOAD_WORD, LOAD_HALF, LOAD_BYTE, AND, JUMP_EQUAL, RETURN = 0x20, 0x28, 0x30, 0x54, 0x15, 0x06  # of absolute offsets
+LET_IN, THROW_AWAY = 0xFFFFFFFF, 0
+MOST_RULES = 256  # of at most 13 instructions each; the kernel takes 4096
+
+
+Sender = Source | str  # a host and port, or all of a host
+
+
+class Muted:
+    """Who is muted, and until when."""
+
+    def __init__(self) -> None:
+        self._until: dict[Sender, tuple[float, float]] = {}  # s, and for how long
+        self._next = math.inf  # s, when the first of them is to be heard again
+        self._dropped: dict[Sender, int] = {}  # packets, since
+        self._since = 0.0  # s
+
+    def blame(self, dropped: Mapping[Sender, int], now: float) -> list[Sender]:
+        """So many packets of these senders had to be dropped: who is muted for it from now on."""
+        if now - self._since > 1.0:
+            self._dropped, self._since = {}, now
+        found: list[Sender] = []
+        for sender, count in dropped.items():
+            count += self._dropped.get(sender, 0)
+            self._dropped[sender] = count
+            until, before = self._until.get(sender, (0.0, 0.0))
+            if count >= TOO_MANY and now >= until:
+                again = now < until + 2 * LONGEST_S
+                length = min(LONGEST_S, 2 * before) if again and before else FIRST_S
+                self._until[sender] = now + length, length
+                self._next = min(self._next, now + length)
+                found.append(sender)
+        return found
+
+    def over(self, now: float) -> list[Sender]:
+        """Who was muted and is to be heard again."""
+        if now < self._next:
+            return []
+        found = [sender for sender, (until, _) in self._until.items() if self._next <= until <= now]
+        self._until = {sender: one for sender, one in self._until.items() if now < one[0] + 2 * LONGEST_S}
+        self._next = min((until for until, _ in self._until.values() if until > now), default=math.inf)
+        return found
+
+    def rules(self, now: float, owners: Collection[Source]) -> list["Rule"]:
+        """What the kernel is to do at `now`. The ports of a muted host that own a sensor are heard on."""
+        muted = [sender for sender, (until, _) in self._until.items() if until > now]
+        ports = [Rule(*sender, False) for sender in muted if not isinstance(sender, str)]
+        hosts = {sender for sender in muted if isinstance(sender, str)}
+        let_in = [Rule(*owner, True) for owner in owners if owner[0] in hosts and owner not in muted]
+        return [*ports, *let_in, *(Rule(host, None, False) for host in hosts)]
+
+
+class Rule(NamedTuple):
+    """What becomes of the packets of a sender."""
+
+    host: str
+    port: int | None  # None: any
+    let_in: bool
+
+
+def mute(sock: socket.socket, rules: Iterable[Rule]) -> None:
+    """Filter a UDP socket by these rules; without any, let in everything. Raises OSError."""
+    program = b"".join(_instructions(rule) for rule in list(rules)[:MOST_RULES])
+    if not program:
+        sock.setsockopt(socket.SOL_SOCKET, SO_DETACH_FILTER, 0)
+        return
+    program += _step(RETURN, LET_IN)
+    code = array.array("B", program)
+    address, size = code.buffer_info()
+    sock.setsockopt(socket.SOL_SOCKET, SO_ATTACH_FILTER, struct.pack("@HP", size // 8, address))
+
+
+def _step(what: int, value: int, otherwise: int = 0) -> bytes:
+    """One instruction; a comparison that fails skips `otherwise` of them."""
+    return struct.pack("@HBBI", what, 0, otherwise, value)
+
+
+def _instructions(rule: Rule) -> bytes:
+    address = ipaddress.ip_address(rule.host.partition("%")[0])
+    address = getattr(address, "ipv4_mapped", None) or address
+    version, start = (0x40, 12) if address.version == 4 else (0x60, 8)
+    words = struct.unpack(f">{len(address.packed) // 4}I", address.packed)
+    checks = [(LOAD_WORD, NETWORK + start + 4 * n, word) for n, word in enumerate(words)]
+    if rule.port is not None:
+        checks.append((LOAD_HALF, 0, rule.port))
+    left = 2 * len(checks) + 1  # instructions after the check of the version
+    steps = [_step(LOAD_BYTE, NETWORK), _step(AND, 0xF0), _step(JUMP_EQUAL, version, left)]
+    for load, where, wanted in checks:
+        left -= 2
+        steps += [_step(load, where), _step(JUMP_EQUAL, wanted, left)]
+    return b"".join([*steps, _step(RETURN, LET_IN if rule.let_in else THROW_AWAY)])

@@ -1,0 +1,137 @@
+"""What a stall of the daemon costs: `python -m tests.hostile.stall --sensors 100 --rate 15 --stall 3`.
+
+Made-up hands swipe and tap on many sensors, in real time, without frame counters. The daemon's process is stopped for
+a while, and goes on. Every gesture should be recognised as if nothing had happened, as far as the kernel's buffer
+holds the packets; and where it does not, none may be made up.
+"""
+
+import argparse
+import json
+import select
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from gestured.client.score import Performed, Tally
+from tests.daemon.harness import Client, Daemon, Frame, Hand, Sensor, floats
+from tests.hostile.grammar import TYPES, violations
+
+QUIET_S = 2.0  # before the first gesture
+PERIOD_S = 1.6  # from one gesture to the next
+SWIPE_S, TAP_S = 0.45, 0.14
+KINDS = ("swipe_left", "one_tap", "swipe_right")
+
+
+@dataclass
+class Result:
+    """What became of the gestures."""
+
+    verdicts: Counter[str] = field(default_factory=Counter)
+    unknown: int = 0
+    kernel_drops: int = 0
+    held_back: int = 0  # packets that were taken for a flood
+    late_s: float = 0.0  # how late the sensors were at most: no fault of the daemon's
+    violations: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        said = ", ".join(f"{count} {verdict}" for verdict, count in sorted(self.verdicts.items()))
+        drops = f"{self.kernel_drops} packets found no room, {self.held_back} held back"
+        return f"{said}, {self.unknown} unknown; {drops}; sensors late by {self.late_s:.2f} s"
+
+
+class Script:
+    """What one hand does on one sensor, by the time since the start in s."""
+
+    def __init__(self, number: int, seconds: float) -> None:
+        self._hand = Hand(number)
+        self._first = QUIET_S + PERIOD_S * (number * 0.381 % 1.0)  # so that not all are in the same phase
+        self.gestures = [
+            (start, start + (TAP_S if kind == "one_tap" else SWIPE_S), kind)
+            for n in range(int((seconds - self._first - PERIOD_S) / PERIOD_S))
+            if (start := self._first + n * PERIOD_S, kind := KINDS[(n + number) % len(KINDS)])
+        ]
+
+    def frame(self, t: float) -> Frame:
+        """What the sensor shows."""
+        n = int((t - self._first) / PERIOD_S)
+        if t >= self._first and n < len(self.gestures):
+            start, end, kind = self.gestures[n]
+            if start <= t <= end:
+                way = (t - start) / (end - start)
+                return self._hand.frame(4.0, {"swipe_left": 7 - 6 * way, "swipe_right": 1 + 6 * way}.get(kind, 4.0))
+        return self._hand.frame()
+
+
+def play(daemon: Daemon, sensors: int, rate_hz: float, stall_s: float, seconds: float) -> Result:
+    """Play `seconds` on so many sensors; the daemon stands still for `stall_s` in the middle of it."""
+    client = daemon.client().subscribe(*TYPES, "status")
+    scripts = [Script(n, seconds) for n in range(sensors)]
+    streams = [Sensor(daemon, f"s{n}") for n in range(sensors)]
+    tallies, result, lines = [Tally() for _ in scripts], Result(), []
+    stop, go = seconds / 2, seconds / 2 + stall_s
+    stopped = False
+    start, began = time.monotonic(), time.time()
+    for frame in range(round(seconds * rate_hz)):
+        for n, (script, stream) in enumerate(zip(scripts, streams, strict=True)):
+            due = start + (frame + n / sensors) / rate_hz
+            while (wait := due - time.monotonic()) > 0 or (not stopped and select.select([client.sock], [], [], 0)[0]):
+                if not stopped and select.select([client.sock], [], [], max(0.0, wait))[0]:
+                    lines.append(client.line())
+                elif stopped:
+                    time.sleep(wait)
+            now = time.monotonic() - start
+            result.late_s = max(result.late_s, start + now - due)
+            if stopped != (stop <= now < go):
+                stopped = not stopped
+                daemon.signal(signal.SIGSTOP if stopped else signal.SIGCONT)
+            stream.sock.send(floats(f"/{stream.name}/pressure", script.frame(now), frame))
+    lines += listen(client)
+    for n, (script, tally) in enumerate(zip(scripts, tallies, strict=True)):
+        for onset, offset, kind in script.gestures:
+            tally.begin(Performed(kind, kind, began + onset, began + offset))
+        for line in lines:
+            if line["type"] in ("gesture", "unknown") and line["sensor"] == f"s{n}":
+                tally.hear(line, line["decided"])
+                result.unknown += line["type"] == "unknown"
+        tally.settle(began + 2 * seconds)
+        result.verdicts.update(tally.counts)
+    result.kernel_drops = round(daemon.metric("gestured_kernel_drops_total"))
+    result.held_back = round(daemon.metric("gestured_dropped_total", reason="flood"))
+    result.violations = violations(lines)
+    return result
+
+
+def listen(client: Client) -> list[dict]:
+    """What is still to come, until the daemon has heard nothing of any sensor for a while."""
+    return client.until(lambda line: line["type"] == "status" and all(s == "stale" for s in line["sensors"].values()))
+
+
+def main() -> int:
+    """Print what became of the gestures; 1 where one was wrong, made up, or missed without need."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--model", default="cnn_lstm")
+    parser.add_argument("--sensors", type=int, default=40)
+    parser.add_argument("--rate", type=float, default=15.0, help="frames a second of each sensor (default: 15)")
+    parser.add_argument("--stall", type=float, default=1.0, help="seconds for which the daemon stands still")
+    parser.add_argument("--seconds", type=float, default=14.0, help="in all (default: 14)")
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        many = max(64, args.sensors)
+        daemon = Daemon.start(Path(folder), args.model, "--metrics", "127.0.0.1:0", "--max-sensors", many)
+        try:
+            result = play(daemon, args.sensors, args.rate, args.stall, args.seconds)
+        finally:
+            daemon.stop()
+    found = result.verdicts
+    print(json.dumps(found | {"unknown": result.unknown}) if args.json else result)
+    bad = found["wrong"] + found["false"] + (0 if result.kernel_drops else found["missed"])
+    return 1 if bad or result.violations else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
