@@ -7,14 +7,15 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from gestured.core import osc, wire
-from gestured.daemon.service import make_decoder
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.pipeline import Pipeline
 from gestured.daemon.settings import Settings
+from gestured.ladder import ladder_for
 from gestured.models import shipped
 from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor, floats
 
@@ -153,16 +154,16 @@ def test_finger_positions_cost_nothing_that_is_kept(start: Start) -> None:
     assert text.count("\n") - before < 50  # the door's own series
 
 
-def test_finger_positions_are_passed_over_at_their_address(monkeypatch: pytest.MonkeyPatch) -> None:
-    pipeline = SimpleNamespace(grid=lambda sensor: (9, 9))
-    decoder = make_decoder(Settings(), pipeline)  # type: ignore[arg-type]
+def test_finger_positions_are_passed_over_at_their_address(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    metrics = Metrics()
+    pipeline = Pipeline(Settings(max_sensors=1000), ladder_for(model), metrics, lambda event: None)
     monkeypatch.setattr(wire, "_touches", None)  # nobody calls it
     frame = floats("/armrest/pressure", Hand().frame(), 0)
-    for n in range(1000):
+    for n in range(100):
         packet = osc.encode_bundle([trajectory(f"s{n}"), frame, trajectory("armrest")], 1.7e9 + n)
-        (arrival,), errors = decoder.decode(packet, ("127.0.0.1", n))
-        assert arrival.touches == () and errors == []
-    assert decoder._pending == {}
+        pipeline.receive([(packet, ("127.0.0.1", 40000))], n / 15)
+    assert metrics.frames.values == {("armrest", "ok"): 100} and metrics.dropped.values == {}
+    assert pipeline._decoder._pending == {}
 
 
 def test_the_explanation_names_what_is_left_out() -> None:
