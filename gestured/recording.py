@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame, Touch
+from gestured.files import PRIVATE, atomic_write
 from gestured.recording_check import EVENTS, Wrong, check
 
 MAX_BYTES = 2 << 30  # unpacked
@@ -110,17 +111,10 @@ def read(path: str | Path) -> Recordings:
 def write(path: str | Path, recordings: Recordings) -> None:
     """Check and write: all or nothing, the same bytes for the same recordings. Raises RecordingError."""
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         check(recordings)
-        try:
-            with temporary.open("wb") as file:
-                _pack(file, recordings)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
+        with atomic_write(path) as file:
+            _pack(file, recordings)
     except Wrong as error:
         raise RecordingError(f"{path}: not written: {error}") from None
     except OSError as error:
@@ -203,6 +197,6 @@ def _pack(file: IO[bytes], recordings: Recordings) -> None:
         for field, value in _present(recordings):
             info = zipfile.ZipInfo(f"{field}.npy", (1980, 1, 1, 0, 0, 0))
             info.compress_type = zipfile.ZIP_DEFLATED
-            info.external_attr = 0o644 << 16
+            info.external_attr = PRIVATE << 16
             with archive.open(info, "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, np.ascontiguousarray(value), allow_pickle=False)

@@ -24,6 +24,7 @@ from typing import IO, Any
 from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
+from gestured.files import create
 
 PACKETS, EVENTS, SCENE = "/gestured/packets", "/gestured/events", "scene"
 RECORD_BYTES = 64 << 20  # of one record of a file that somebody gave us
@@ -101,7 +102,7 @@ class Writer:
         mcap = library()
         self.path, self.limit_bytes = path, limit_bytes
         try:
-            self._file: IO[bytes] = path.open("xb")
+            self._file = create(path)
         except OSError as error:
             raise RecordingError(f"{path}: cannot be made: {error.strerror}") from None
         self._mcap = mcap.writer.Writer(self._file, chunk_size=CHUNK_BYTES)

@@ -23,6 +23,7 @@ from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
 from gestured.core.window import Window
+from gestured.files import PUBLIC, atomic_write
 from gestured.lab.progress import progress
 from gestured.simulator import (
     NON_GESTURES,
@@ -209,9 +210,8 @@ def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) ->
         made = pool.imap(make, range(count), chunksize=50)
         samples = collect(s for found in progress(made, count, f"simulating {stream}") for s in found)
     cache.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part.npz")
-    np.savez(part, **{name: getattr(samples, name) for name in Samples.__slots__})
-    part.replace(path)
+    with atomic_write(path, PUBLIC, durable=False) as file:
+        np.savez(file, **{name: getattr(samples, name) for name in Samples.__slots__})
     return samples
 
 

@@ -7,7 +7,6 @@ against the trained model's own within `PARITY`, for batches and windows of many
 import hashlib
 import json
 import math
-import os
 import tempfile
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -23,6 +22,7 @@ from sklearn.ensemble import RandomForestClassifier
 
 from gestured.core.errors import ModelError
 from gestured.core.window import Window
+from gestured.files import PUBLIC, atomic_write
 from gestured.lab.forest_graph import OPSET, Outputs, around_thresholds, forest_graph, forest_outputs
 from gestured.lab.recordings import origin
 from gestured.model_file import SelfTest, inspect
@@ -249,12 +249,5 @@ def _windows(batch: int, length: int, rows: int, columns: int) -> NDArray[np.flo
 def _write(path: Path, data: bytes) -> None:
     """All of it or nothing, also when the machine stops half-way."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with temporary.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with atomic_write(path, PUBLIC) as file:
+        file.write(data)

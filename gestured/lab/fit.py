@@ -15,6 +15,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from gestured.files import PUBLIC, atomic_write
 from gestured.lab.augment import symmetry_table, turned, varied
 from gestured.lab.dataset import NONE, WINDOW, Samples
 from gestured.lab.nets import CnnLstm, Lstm
@@ -247,7 +248,5 @@ def _restore(
 
 def _write(path: Path, arrays: dict[str, NDArray[np.generic]]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
-    with part.open("wb") as file:
+    with atomic_write(path, PUBLIC, durable=False) as file:
         np.savez(file, **arrays)  # type: ignore[arg-type]
-    part.replace(path)

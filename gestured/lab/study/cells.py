@@ -6,7 +6,6 @@ that collects the results, so that workers on other machines need no common fold
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -19,6 +18,7 @@ from joblib import Parallel, delayed, parallel_config
 import gestured.core
 import gestured.lab
 from gestured.core.errors import GesturedError
+from gestured.files import PUBLIC, atomic_write
 from gestured.lab.progress import progress
 from gestured.lab.study.material import Data
 from gestured.lab.study.protocols import Result, Task, run
@@ -113,9 +113,8 @@ def _backend(cluster: str | None, sets: Mapping[str, Data]) -> Iterator[None]:
 def keep(path: Path, result: Any) -> None:
     """Write a checkpoint, all or nothing."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
-    part.write_text(json.dumps(result))
-    part.replace(path)
+    with atomic_write(path, PUBLIC, durable=False) as file:
+        file.write(json.dumps(result).encode())
 
 
 def _read(path: Path) -> Result | None:

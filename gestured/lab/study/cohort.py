@@ -19,6 +19,7 @@ import gestured.lab.dataset
 import gestured.simulator
 from gestured.core.frames import Segment
 from gestured.core.window import Window
+from gestured.files import PUBLIC, atomic_write
 from gestured.lab.dataset import TRIALS, WINDOW, Performed, Samples, collect, cuts, matched
 from gestured.lab.progress import progress
 from gestured.simulator import Trial, cohort_take
@@ -103,15 +104,14 @@ def load(cache: Path, trials: NDArray[np.int64], jobs: int) -> Cohort:
 def _write(path: Path, trials: NDArray[np.int64], segments: list[Segment | None]) -> None:
     cut = [(index, segment) for index, segment in zip(trials, segments, strict=True) if segment is not None]
     kept = [segment for _, segment in cut]
-    part = path.with_suffix(".part.npz")
-    np.savez(
-        part,
-        frames=np.concatenate([s.frames for s in kept]).astype(np.float32),
-        times=np.concatenate([s.times for s in kept]),
-        offsets=np.concatenate([[0], np.cumsum([len(s.frames) for s in kept])]).astype(np.int64),
-        first=np.array([s.first for s in kept], np.int64),
-        last=np.array([s.last for s in kept], np.int64),
-        noise=np.array([s.noise for s in kept]),
-        trial=np.array([index for index, _ in cut], np.int64),
-    )
-    part.replace(path)
+    with atomic_write(path, PUBLIC, durable=False) as file:
+        np.savez(
+            file,
+            frames=np.concatenate([s.frames for s in kept]).astype(np.float32),
+            times=np.concatenate([s.times for s in kept]),
+            offsets=np.concatenate([[0], np.cumsum([len(s.frames) for s in kept])]).astype(np.int64),
+            first=np.array([s.first for s in kept], np.int64),
+            last=np.array([s.last for s in kept], np.int64),
+            noise=np.array([s.noise for s in kept]),
+            trial=np.array([index for index, _ in cut], np.int64),
+        )

@@ -13,6 +13,7 @@ import torch
 
 import gestured
 from gestured.core.errors import GesturedError
+from gestured.files import PUBLIC, atomic_write
 from gestured.lab.cli import REAL
 from gestured.lab.dataset import NONE, Samples, simulated
 from gestured.lab.study import cohort, elapsed, failures, own, signals, tables
@@ -139,9 +140,8 @@ def _about(name: str, tuned: Mapping[str, Values]) -> dict[str, Any]:
 
 def write(study: Mapping[str, Any], out: Path) -> None:
     """study.json, the key tables as Markdown, and a CSV file for each section that is a table."""
-    part = out / "study.json.part"
-    part.write_text(json.dumps(study))
-    part.replace(out / "study.json")
+    with atomic_write(out / "study.json", PUBLIC) as file:
+        file.write(json.dumps(study).encode())
     (out / "tables.md").write_text(tables_of(study))
     for name in ("cells", "copies", "run_time", "learning", "online"):
         rows = [{k: v for k, v in row.items() if not isinstance(v, list | dict)} for row in study.get(name, [])]

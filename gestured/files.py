@@ -1,0 +1,67 @@
+"""Files: written at once or not at all, and opened without trusting what stands at a path."""
+
+import os
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+PRIVATE = 0o600  # whatever is about people: how somebody touches things is personal data
+PUBLIC = 0o644  # what anybody may read, as far as the umask lets them: models, figures, caches of simulated people
+
+
+def create(path: Path, mode: int = PRIVATE) -> BinaryIO:
+    """A new file to write to, which has `mode` (less the umask) from the start. OSError where anything is there.
+
+    No link is followed, so nobody can lead what is written elsewhere.
+    """
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+    return open(os.open(path, flags, mode), "wb")
+
+
+@contextmanager
+def atomic_write(path: Path, mode: int = PRIVATE, *, durable: bool = True) -> Iterator[BinaryIO]:
+    """A file to write to that takes the place of `path` in the end, all of it; whatever is raised changes nothing.
+
+    It is written beside `path` under a name that nobody can foresee. What is `durable` survives a power cut once
+    this returns; what can be made again, as a cache, need not. Raises OSError.
+    """
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
+    file = create(temporary, mode)
+    try:
+        with file:
+            yield file
+            file.flush()
+            if durable:
+                os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink()
+        raise
+    if durable:
+        _sync_folder(path.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Put a changed name onto the disk; some file systems cannot do that for a folder."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def open_regular(path: str | Path) -> BinaryIO:
+    """A regular file to read from; OSError for anything else. Nobody waits for a pipe's other end."""
+    try:
+        file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
+    except ValueError as error:  # a path with a NUL
+        raise OSError(None, str(error), str(path)) from None
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise OSError(None, "is not a regular file", str(path))
+    return file
