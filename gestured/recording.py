@@ -1,15 +1,12 @@
 """Read and write recordings: the contract's .npz, without pickles, readable with NumPy alone.
 
-A file may be damaged or hostile: its members are measured before they are unpacked, and every field is held
-against the contract (`recording_check`). What is wrong is one `RecordingError`: file, field, recording, and what was
-expected.
+A file may be damaged or hostile: its members are measured before they are unpacked (`npz`), and every field is held
+against the contract (`recording_check`), the frames last. What is wrong is one `RecordingError`: file, field,
+recording, and what was expected.
 """
 
-import math
-import os
-import stat
 import zipfile
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import IO, Any
@@ -19,8 +16,9 @@ from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame, Touch
-from gestured.files import PRIVATE, atomic_write
-from gestured.recording_check import EVENTS, Wrong, check
+from gestured.files import PRIVATE, atomic_write, open_regular
+from gestured.npz import Archive, brief
+from gestured.recording_check import EVENTS, Wrong, check, check_all_but_frames, check_frames, shapes, structure
 
 MAX_BYTES = 2 << 30  # unpacked
 
@@ -95,14 +93,15 @@ class Recordings:
 
 
 _FIELDS = tuple(field.name for field in fields(Recordings))
+_KNOWN = frozenset(_FIELDS)
 _REQUIRED = _FIELDS[:5]
 
 
 def read(path: str | Path) -> Recordings:
     """Read and check a file; RecordingError for what is no recording. It ignores unknown members."""
     try:
-        found = load(path)
-        check(found)
+        found = load(path, look=check_all_but_frames)
+        check_frames(found)
     except Wrong as error:
         raise RecordingError(f"{path}: {error}") from None
     return found
@@ -113,83 +112,41 @@ def write(path: str | Path, recordings: Recordings) -> None:
     path = Path(path)
     try:
         check(recordings)
+        total = sum(value.nbytes for _, value in _present(recordings))
+        if total > MAX_BYTES:
+            raise Wrong(f"unpacks to {total} bytes, expected at most {MAX_BYTES}")
         with atomic_write(path) as file:
             _pack(file, recordings)
     except Wrong as error:
         raise RecordingError(f"{path}: not written: {error}") from None
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be written: {_brief(error)}") from None
-
-
-def _brief(error: BaseException) -> str:
-    return getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or type(error).__name__
+        raise RecordingError(f"{path}: cannot be written: {brief(error)}") from None
 
 
 def _present(recordings: Recordings) -> Iterator[tuple[str, NDArray[Any]]]:
     return ((f, value) for f in _FIELDS if (value := getattr(recordings, f)) is not None)
 
 
-def load(path: str | Path, without: Collection[str] = ()) -> Recordings:
-    """A file's fields as they stand there, not held against the contract, `without` some; raises Wrong."""
+def load(path: str | Path, without: Collection[str] = (), look: Callable[[Recordings], None] = structure) -> Recordings:
+    """A file's fields as they stand there, `without` some; raises Wrong.
+
+    They are held against nothing but `look`, which gets zeros for the frames: those are unpacked last.
+    """
     try:
-        # Non-blocking: opening a FIFO must not wait for a writer.
-        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise Wrong("is not a regular file")
-            with zipfile.ZipFile(file) as archive:
-                return Recordings(**_unpack(archive, without))
+        with open_regular(path) as file:
+            archive = Archive(file, _KNOWN.difference(without), MAX_BYTES)
+            forms = {field: header.stand_in() for field, header in archive.headers.items()}
+            missing = [field for field in _REQUIRED if field not in forms]
+            if missing:
+                raise Wrong(f"{missing[0]}: is missing, expected the fields {', '.join(_REQUIRED)}", missing[0])
+            shapes(Recordings(**forms))
+            fields = {field: archive.array(field) for field in forms if field != "frames"}
+            look(Recordings(frames=forms["frames"], **fields))
+            return Recordings(frames=archive.array("frames"), **fields)
     except Wrong:
         raise
-    except Exception as error:  # of a damaged file zipfile and NumPy's header parser raise a dozen types
-        raise Wrong(f"cannot be read as a recording (.npz): {_brief(error)}") from None
-
-
-def _unpack(archive: zipfile.ZipFile, without: Collection[str]) -> dict[str, NDArray[Any]]:
-    """The fields' arrays. Nothing is unpacked before all of it is known to fit."""
-    members: dict[str, zipfile.ZipInfo] = {}
-    for info in archive.infolist():
-        field = info.filename.removesuffix(".npy")
-        if field in _FIELDS and field not in without and info.filename.endswith(".npy"):
-            if field in members:
-                raise Wrong(f"{field}: is there twice", field)
-            if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                raise Wrong(f"{field}: expected it stored or deflated", field)
-            members[field] = info
-    missing = [field for field in _REQUIRED if field not in members]
-    if missing:
-        raise Wrong(f"{missing[0]}: is missing, expected the fields {', '.join(_REQUIRED)}", missing[0])
-    total = sum(info.file_size for info in members.values())
-    if total > MAX_BYTES:
-        raise Wrong(f"unpacks to {total} bytes, expected at most {MAX_BYTES}")
-    arrays = {}
-    for field, info in members.items():
-        try:
-            with archive.open(info) as member:
-                arrays[field] = _array(member, info.file_size)
-        except Wrong as error:
-            raise Wrong(f"{field}: {error}", field) from None
-        except Exception as error:  # see `load`
-            raise Wrong(f"{field}: is damaged: {_brief(error)}", field) from None
-    return arrays
-
-
-def _array(member: IO[bytes], size: int) -> NDArray[Any]:
-    version = np.lib.format.read_magic(member)
-    if version not in ((1, 0), (2, 0)):
-        raise Wrong(f"expected version 1 or 2 of NumPy's format, found {version}")
-    read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, fortran, dtype = read_header(member)
-    if dtype.kind not in "iufU":
-        raise Wrong(f"expected numbers or text, found {dtype}")
-    count = math.prod(shape)
-    if count < 0 or dtype.itemsize == 0 or count * dtype.itemsize > size:
-        raise Wrong(f"the shape {shape} does not fit into its {size} bytes")
-    data = member.read(count * dtype.itemsize + 1)
-    if len(data) != count * dtype.itemsize:
-        raise Wrong(f"expected {count * dtype.itemsize} bytes for the shape {shape}, found {len(data)}")
-    array = np.frombuffer(data, dtype) if count else np.empty(0, dtype)
-    array = array.reshape(shape, order="F" if fortran else "C")
-    return np.asarray(array, dtype.newbyteorder("="))
+    except Exception as error:  # of a damaged file zipfile raises a dozen types
+        raise Wrong(f"cannot be read as a recording (.npz): {brief(error)}") from None
 
 
 def _pack(file: IO[bytes], recordings: Recordings) -> None:

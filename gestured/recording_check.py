@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from gestured.recording import Recordings
 
 FINGERS = 3
+# What holds no recording of a person; what is checked one by one takes a multiple of its size.
+FRAMES = 1 << 24  # twelve days at 15 Hz
+RECORDINGS = 1 << 20  # and events
+CHARACTERS = 1024  # of a text
 LABEL = re.compile(r"[a-z0-9_]{1,64}")
 DAY = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 # What a field may hold: i and u integers, f floats, U text.
@@ -32,8 +36,22 @@ class Wrong(Exception):
 
 def check(r: "Recordings") -> None:
     """Everything the contract says of the fields; raises Wrong."""
+    check_all_but_frames(r)
+    check_frames(r)
+
+
+def check_all_but_frames(r: "Recordings") -> None:
+    """Everything but what the frames hold; raises Wrong."""
     structure(r)
     _values(r)
+
+
+def check_frames(r: "Recordings") -> None:
+    """What the frames hold; raises Wrong."""
+    if r.frames.dtype.kind == "f" and r.frames.size:
+        low, high = r.frames.min(axis=(1, 2)), r.frames.max(axis=(1, 2))  # NaN is both
+        owner = np.repeat(np.arange(len(r)), np.diff(r.offsets))
+        _first("frames", np.isfinite(low) & np.isfinite(high), "finite values", owner)
 
 
 def structure(r: "Recordings") -> None:
@@ -41,17 +59,30 @@ def structure(r: "Recordings") -> None:
 
     Raises Wrong with the field.
     """
+    shapes(r)
+    n, ends = len(r.frames), r.offsets
+    if ends[0] != 0 or ends[-1] != n:
+        text = f"offsets: expected int64 from 0 to {n} (the number of frames), found {ends[0]} to {ends[-1]}"
+        raise Wrong(text, "offsets")
+    _first("offsets", ends[1:] >= ends[:-1], "at least one frame")
+    if r.event_recording is not None:
+        g = len(ends) - 1
+        _first("event_recording", (r.event_recording >= 0) & (r.event_recording < g), f"0 to {g - 1}", of="event")
+
+
+def shapes(r: "Recordings") -> None:
+    """Types, shapes and numbers: what can be told before anything is unpacked. Raises Wrong with the field."""
     _shape("frames", r.frames, "iuf", (None, None, None))
     n, rows, columns = r.frames.shape
     if not (rows and columns):
         raise Wrong(f"frames: expected (N, R, C), found {r.frames.shape}", "frames")
+    _at_most("frames", n, FRAMES)
     _shape("offsets", r.offsets, "i", (None,))
-    ends = r.offsets
-    if r.offsets.dtype != np.int64 or not len(ends) or ends[0] != 0 or ends[-1] != n:
+    g = len(r.offsets) - 1
+    if r.offsets.dtype != np.int64 or g < 0:
         text = f"offsets: expected int64 from 0 to {n} (the number of frames), found {r.offsets.dtype}"
         raise Wrong(text, "offsets")
-    _first("offsets", ends[1:] >= ends[:-1], "at least one frame")
-    g = len(ends) - 1
+    _at_most("offsets", g, RECORDINGS)
     _shape("times", r.times, "f", (n,))
     if r.times.dtype != np.float64:
         raise Wrong(f"times: expected float64, found {r.times.dtype}", "times")
@@ -72,11 +103,11 @@ def structure(r: "Recordings") -> None:
             raise Wrong(f"{present[0]}: expected together with all of {', '.join(EVENTS)}", present[0])
         assert r.event_recording is not None
         e = len(r.event_recording)
+        _at_most("event_recording", e, RECORDINGS)
         for field, kinds in EVENTS.items():
             _shape(field, getattr(r, field), kinds, (e,))
             if kinds == "f" and getattr(r, field).dtype != np.float64:
                 raise Wrong(f"{field}: expected float64, found {getattr(r, field).dtype}", field)
-        _first("event_recording", (r.event_recording >= 0) & (r.event_recording < g), f"0 to {g - 1}", of="event")
 
 
 def _values(r: "Recordings") -> None:
@@ -88,8 +119,6 @@ def _values(r: "Recordings") -> None:
     _first("times", np.isfinite(r.times), "finite seconds", owner)
     later = (np.diff(r.times) > 0) | (np.diff(owner) > 0)
     _first("times", later, "strictly increasing seconds", owner[1:])
-    if r.frames.dtype.kind == "f":
-        _first("frames", np.isfinite(r.frames).all(axis=(1, 2)), "finite values", owner)
     _labels("labels", r.labels)
     for field in ("subjects", "speeds", "inclinations", "kinds", "consents"):
         value = getattr(r, field)
@@ -142,11 +171,18 @@ def _shape(field: str, value: NDArray[Any], kinds: str, shape: tuple[int | None,
     names = {"i": "integers", "u": "unsigned integers", "f": "floats", "U": "text"}
     if value.dtype.kind not in kinds:
         raise Wrong(f"{field}: expected {' or '.join(names[k] for k in kinds)}, found {value.dtype}", field)
+    if value.dtype.kind == "U" and value.dtype.itemsize > 4 * CHARACTERS:
+        raise Wrong(f"{field}: expected text of at most {CHARACTERS} characters, found {value.dtype}", field)
     if len(value.shape) != len(shape) or any(
         want is not None and want != have for want, have in zip(shape, value.shape, strict=True)
     ):
         expected = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
         raise Wrong(f"{field}: expected the shape {expected}, found {value.shape}", field)
+
+
+def _at_most(field: str, count: int, limit: int) -> None:
+    if count > limit:
+        raise Wrong(f"{field}: expected at most {limit}, found {count}", field)
 
 
 def _first(

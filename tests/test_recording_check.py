@@ -29,7 +29,7 @@ def changed(name: str, index: object, value: object) -> np.ndarray:
     ("name", "value", "expected"),
     [
         ("frames", np.zeros((10, 6), np.uint8), "(any, any, any)"),
-        ("frames", np.zeros((9, 2, 3), np.uint8), "9 (the number of frames)"),
+        ("frames", np.zeros((9, 2, 3), np.uint8), "expected the shape (9), found (10,)"),
         ("frames", np.zeros((10, 0, 3), np.uint8), "(N, R, C)"),
         ("frames", np.zeros((10, 2, 3), complex), "complex128"),
         ("frames", np.zeros((10, 2, 3), bool), "bool"),
@@ -87,6 +87,7 @@ def test_wrong_field_is_named(tmp_path: Path, name: str, value: np.ndarray | Non
     assert expected in message
     assert message.split(": ")[1].split(" of ")[0] in (
         name,
+        "times",
         "touches",
         "offsets",
         "event_recording",

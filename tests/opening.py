@@ -1,0 +1,118 @@
+"""Each kind of file that somebody may hand us, opened as our programs open it; as a process of bounded memory, too.
+
+    python -m tests.opening KIND PATH MIB
+
+opens one file with so much address space beyond what the program itself takes, and prints what was refused and the
+memory that it took, as JSON.
+"""
+
+import json
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from gestured.core.errors import GesturedError
+
+ROOT = Path(__file__).parent.parent
+Open = Callable[[Path], object]
+
+
+def npz(path: Path) -> object:
+    """As `replay` plays it, and as `inspect` shows what is good of it."""
+    from gestured.control.labelled import Labelled
+    from gestured.lab.recordings.looking import one, summary
+    from gestured.lab.recordings.safe import read_what_is_good
+
+    try:
+        good, left = read_what_is_good(path)
+    except GesturedError:
+        pass
+    else:
+        assert all(str(path) in str(what) for what in left)
+        if len(good):
+            json.dumps([summary(good), one(good, 0)])
+    return Labelled(path, "arm").tape
+
+
+def npz_alone(path: Path) -> object:
+    """As whoever needs no more than the recordings reads it."""
+    from gestured.recording import read
+
+    return read(path)
+
+
+def mcap(path: Path) -> object:
+    """As `replay --diff` and `export` read it, with a model that has no answers."""
+    from gestured.control import export
+    from gestured.control.diff import Recorded
+    from gestured.offline import Mute, Replay
+
+    recorded = Recorded(path)
+    replay = Replay(recorded.tape, recorded.scene, Mute(recorded.scene.gestures))
+    list(replay.events())
+    verdict = recorded.compare([], lambda sensor, t: True)
+    export.sessions(recorded)
+    return [difference.words() for difference in verdict.differences]
+
+
+def csv(path: Path) -> object:
+    """As `import --format csv` reads one gesture."""
+    from gestured.lab.recordings.sources import Csv, read_csv
+
+    return read_csv(path, Csv(3, 3, "s", "swipe_left", "07", ""))
+
+
+def capfingerid(path: Path) -> object:
+    """As `import --format capfingerid` reads it."""
+    from gestured.lab.recordings.sources import read_capfingerid
+
+    return read_capfingerid(path)
+
+
+KINDS: dict[str, Open] = {"npz": npz, "npz_alone": npz_alone, "mcap": mcap, "csv": csv, "capfingerid": capfingerid}
+
+
+def refused(kind: str, path: Path) -> str:
+    """What is said against a file in one sentence that names it, "" where it is taken; nothing else may be raised."""
+    try:
+        KINDS[kind](path)
+    except GesturedError as error:
+        assert str(path) in str(error) and "\n" not in str(error), str(error)
+        return str(error)
+    return ""
+
+
+def in_bounds(kind: str, path: Path, mib: int) -> tuple[str, float]:
+    """What a process says that has so many MiB for the file, and the MiB that it used."""
+    command = [sys.executable, "-m", "tests.opening", kind, str(path), str(mib)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr[-2000:]
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found["refused"], found["mib"]
+
+
+def _kib(name: str) -> int:
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return int(next(line for line in lines if line.startswith(name)).split()[1])
+
+
+def main() -> None:
+    kind, path, mib = sys.argv[1:]
+    missing = Path("/nowhere/at/all")
+    refused(kind, missing)  # whatever is imported and started for it is there now
+    if kind == "mcap":
+        from gestured.tape import library
+
+        library()
+    before, mapped = _kib("VmRSS"), _kib("VmSize")
+    limit = 1024 * mapped + (int(mib) << 20)
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    said = refused(kind, Path(path))
+    print(json.dumps({"refused": said, "mib": round((_kib("VmHWM") - before) / 1024, 1)}))
+
+
+if __name__ == "__main__":
+    main()
