@@ -1,8 +1,9 @@
 """A tape through the same code as in the daemon, without one: decode, stamp, recognise, event for event."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 from gestured.core.conditioning import Mounting
@@ -15,7 +16,20 @@ from gestured.core.segmentation import Timing
 from gestured.core.stamping import Stamper
 from gestured.core.wire import Addresses, Arrival, Decoder
 from gestured.owner import Owner
-from gestured.tape import Packet, Tape
+from gestured.tape import Packet, Tape, read
+
+SENSORS = 4096  # that a daemon's settings allow, at most
+MAX_SENSORS = 64  # where a tape does not say
+STALE_S = 60  # that a daemon's settings allow, at most
+
+
+def opened(path: str | Path) -> tuple[Tape, "Scene"]:
+    """A tape and what of its scene decides. RecordingError names the file."""
+    found = read(path)
+    try:
+        return found, Scene(found.scene)
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from None
 
 
 class Scene:
@@ -24,26 +38,39 @@ class Scene:
     def __init__(self, scene: Mapping[str, Any]) -> None:
         settings = scene.get("settings")
         if not isinstance(settings, dict):
-            raise RecordingError("scene.settings: expected the daemon's settings")
+            raise RecordingError("scene: expected settings, as the daemon writes them")
         try:
-            self.gestures: list[str] = [str(name) for name in scene["gestures"]]
+            self.gestures = [_text(name) for name in scene["gestures"]]
+            if not self.gestures:
+                raise ValueError("none were in use")
             self.addresses = Addresses(settings["addresses"]["pressure"], settings["addresses"]["trajectory"])
             self.stale_s = float(settings["stale_s"])
             model = scene["model"]
             self.sha256 = str(model.get("sha256"))
-            self.ladder: tuple[str, list[str]] = settings["model"], list(settings["fallback"])
+            self.ladder = [_text(name) for name in (settings["model"], *settings["fallback"])]  # best first
             self._grid = tuple(settings["grid"] or (model["rows"], model["columns"]))
             self._clock = settings["clock"]
             self._sensors: Mapping[str, Any] = dict(settings["sensors"])
             parts: Mapping[str, Any] = dict(settings["per_gesture"])
             self.thresholds = {n: float(p["threshold"]) for n, p in parts.items() if p["threshold"] is not None}
             self.refractory = {n: float(p["refractory_s"]) for n, p in parts.items()}
+            self._sensors_at_most = int(settings.get("max_sensors", MAX_SENSORS))
+            numbers = [*self.thresholds.values(), *self.refractory.values()]
+            if not all(map(math.isfinite, numbers)) or not 0 < self.stale_s <= STALE_S:
+                raise ValueError(f"stale_s of 0 to {STALE_S} s, and finite thresholds")
+            if len(self._sensors) > SENSORS:
+                raise ValueError(f"{len(self._sensors)} sensors, expected at most {SENSORS}")
             for name in ("", *self._sensors):  # whatever is wrong is found now
                 self.grid(name), self.front_end(name), self.stamper(name)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise RecordingError(
-                f"scene: expected gestures and settings as the daemon writes them: {error!r}"
+                f"scene: expected gestures and settings as the daemon writes them: {repr(error)[:200]}"
             ) from None
+
+    def admits(self, name: str, sensors: Collection[str]) -> bool:
+        """Whether there is a place for one sensor more beside `sensors`; those of the settings have theirs."""
+        strangers = sum(sensor not in self._sensors for sensor in sensors)
+        return name in self._sensors or strangers < self._sensors_at_most - len(self._sensors)
 
     def grid(self, name: str) -> tuple[int, int]:
         """Rows and columns of a sensor's frames, as they are sent."""
@@ -69,6 +96,12 @@ class Scene:
         if clock not in ("arrival", "sensor"):
             raise ValueError(f"clock: {clock!r}")
         return Stamper(clock)
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"expected text, found {value!r}")
+    return value
 
 
 class Mute:
@@ -132,9 +165,9 @@ class Replay:
         """Raises RecordingError for a classifier that does not know the gestures that were in use."""
         self.scene = scene
         missing = [name for name in self.scene.gestures if name not in classifier.gestures]
-        if missing or not self.scene.gestures:
+        if missing:
             known = ", ".join(classifier.gestures)
-            raise RecordingError(f"gestures: {', '.join(missing) or 'none'} were in use, the model knows {known}")
+            raise RecordingError(f"gestures: {', '.join(missing)} were in use, the model knows {known}")
         self.streams: dict[str, Stream] = {}
         self._start = tape.packets[0].t_ns if tape.packets else 0
         self.epoch = self._start / 1e9
@@ -152,6 +185,8 @@ class Replay:
                 for arrival in self._decoder.decode(packet.data, packet.source)[0]:
                     name = arrival.sensor
                     if name not in self.streams:
+                        if not self.scene.admits(name, self.streams):
+                            continue
                         self.streams[name] = Stream(self.scene, name, packet, self._classifier)
                     if self.streams[name].owner.admits(packet.source, now, self.scene.stale_s):
                         waiting.setdefault(name, []).append(arrival)

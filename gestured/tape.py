@@ -19,18 +19,25 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
-from gestured.files import create
+from gestured.files import create, open_regular
+from gestured.mcap_records import CHANNEL, MESSAGE, METADATA, Budget, CutOff, Damaged, Fields, TooLarge, records
 
 PACKETS, EVENTS, SCENE = "/gestured/packets", "/gestured/events", "scene"
-RECORD_BYTES = 64 << 20  # of one record of a file that somebody gave us
+# Of a file that somebody gave us:
+TEXT_BYTES = 1 << 20  # of one channel or metadata record; settings have some kilobytes
+ITEM_COSTS = 250  # bytes of memory for a packet or an event, besides what it holds
+EVENT_COSTS = 24  # bytes of memory for a byte of JSON, where it is all empty lists
+NOBODY = "", 0
+HOST_CHARACTERS = 255  # of a name in the DNS
+LARGEST = 1e11  # of an event's numbers: seconds until the year 5138
 CHUNK_BYTES = 1 << 20
 SENDERS = 256  # channels; whoever comes after that shares one
-EVENT_SCHEMA = {
+EVENT_SCHEMA: dict[str, Any] = {
     "title": "gestured.Event",
     "type": "object",
     "properties": {
@@ -47,6 +54,14 @@ EVENT_SCHEMA = {
     },
     "required": ["type"],
 }
+FORMS: dict[str, str] = {key: form["type"] for key, form in EVENT_SCHEMA["properties"].items()}
+NEEDED = {
+    "onset": ("sensor", "id", "onset"),
+    "gesture": ("sensor", "id", "gesture", "confidence", "onset", "offset"),
+    "unknown": ("sensor", "id", "confidence", "onset", "offset"),
+    "cancelled": ("sensor", "id", "reason"),
+    "release": ("sensor", "id"),
+}  # what an event of a type says at least
 
 IMAGE_SCHEMA = {
     "title": "foxglove.RawImage",
@@ -85,9 +100,6 @@ class Tape:
 def library() -> Any:
     """The mcap package; RecordingError says how to get it."""
     try:
-        import mcap.exceptions
-        import mcap.records
-        import mcap.stream_reader
         import mcap.writer
     except ImportError:
         raise RecordingError("recordings need the mcap package: pip install 'gestured[record]'") from None
@@ -193,52 +205,116 @@ class Writer:
 
 
 def read(path: str | Path) -> Tape:
-    """Read a file, as far as it is good. Raises RecordingError for what is no tape."""
-    mcap = library()
-    scene: Mapping[str, Any] | None = None
-    channels: dict[int, tuple[str, tuple[str, int]]] = {}
-    packets: list[Packet] = []
-    events: list[Mapping[str, Any]] = []
+    """Read a file, as far as it is good. Raises RecordingError for what is no tape, and for what wants to be larger."""
+    library()
+    reading = _Reading()
     whole = True
     try:
-        with open(path, "rb") as file:
-            for record in _records(mcap, file):
-                if isinstance(record, mcap.records.Channel):
-                    channels[record.id] = record.topic, _source(record.metadata.get("source", ":0"))
-                elif isinstance(record, mcap.records.Metadata) and record.name == SCENE:
-                    scene = json.loads(record.metadata["json"])
-                elif isinstance(record, mcap.records.Message):
-                    topic, source = channels[record.channel_id]
-                    if topic == PACKETS:
-                        packets.append(Packet(record.log_time, source, bytes(record.data)))
-                    elif topic == EVENTS:
-                        events.append(json.loads(record.data))
-    except mcap.exceptions.EndOfFile:
+        with open_regular(path) as file:
+            budget = Budget(file)
+            for opcode, content in records(file, budget):
+                reading.take(opcode, content, budget)
+    except CutOff:
         whole = False
+    except Damaged as error:
+        if reading.scene is None:
+            raise RecordingError(f"{path}: is no recording of gesturectl (MCAP): {error}") from None
+        whole = False
+    except (_Wrong, TooLarge) as error:
+        raise RecordingError(f"{path}: {error}") from None
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
-    except Exception as error:  # of a damaged file the library raises a dozen types
-        if scene is None:
-            raise RecordingError(
-                f"{path}: is no recording of gesturectl (MCAP): {error or type(error).__name__}"
-            ) from None
-        whole = False
-    if not isinstance(scene, dict):
-        raise RecordingError(f"{path}: has no metadata {SCENE!r}, expected a recording of gesturectl")
-    return Tape(scene, tuple(packets), tuple(events), whole)
+    if reading.scene is None:
+        raise RecordingError(f"{path}: has no metadata {SCENE!r}, expected a recording of gesturectl (MCAP)")
+    return Tape(reading.scene, tuple(reading.packets), tuple(reading.events), whole)
 
 
-def _records(mcap: Any, file: IO[bytes]) -> Iterator[Any]:
-    reader = mcap.stream_reader.StreamReader(file, emit_chunks=True, record_size_limit=RECORD_BYTES)
-    for record in reader.records:
-        if not isinstance(record, mcap.records.Chunk):
-            yield record
-        elif record.uncompressed_size > RECORD_BYTES:
-            raise ValueError(f"a chunk unpacks to {record.uncompressed_size} bytes, expected at most {RECORD_BYTES}")
-        else:
-            yield from mcap.stream_reader.breakup_chunk(record, validate_crc=True)
+class _Wrong(Exception):
+    """What a tape says that no tape of ours does."""
+
+
+class _Reading:
+    """What was found so far."""
+
+    def __init__(self) -> None:
+        self.scene: Mapping[str, Any] | None = None
+        self.packets: list[Packet] = []
+        self.events: list[Mapping[str, Any]] = []
+        self._channels: dict[int, tuple[str, tuple[str, int]]] = {}  # topic, "" where we do not know it; source
+
+    def take(self, opcode: int, content: bytes, budget: Budget) -> None:
+        """One record; what we do not know is passed over."""
+        if opcode == MESSAGE:
+            self._message(content, budget)
+        elif opcode in (CHANNEL, METADATA):
+            if len(content) > TEXT_BYTES:
+                raise Damaged(f"a channel or metadata of {len(content)} bytes, expected at most {TEXT_BYTES}")
+            fields = Fields(content)
+            if opcode == CHANNEL:
+                self._channel(fields)
+            elif fields.text() == SCENE:
+                self.scene = _scene(fields.pairs())
+
+    def _channel(self, fields: Fields) -> None:
+        number, _ = fields.take("<HH")
+        topic, _ = fields.text(), fields.text()
+        topic = topic if topic in (PACKETS, EVENTS) else ""
+        self._channels[number] = topic, _source(fields.pairs().get("source", ":0")) if topic == PACKETS else NOBODY
+
+    def _message(self, content: bytes, budget: Budget) -> None:
+        fields = Fields(content)
+        number, _, t_ns, _ = fields.take("<HIQQ")
+        if number not in self._channels:
+            raise Damaged(f"a message of channel {number}, which there is not")
+        topic, source = self._channels[number]
+        data = fields.rest() if topic else b""
+        if topic == PACKETS:
+            budget.keep(ITEM_COSTS + len(data))
+            self.packets.append(Packet(t_ns, source, data))
+        elif topic == EVENTS:
+            budget.keep(ITEM_COSTS + EVENT_COSTS * len(data))
+            self.events.append(_event(data, len(self.events) + 1))
+
+
+def _scene(metadata: Mapping[str, str]) -> Mapping[str, Any]:
+    try:
+        found = json.loads(metadata["json"])
+    except (KeyError, ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        raise _Wrong(f"metadata {SCENE!r}: expected a JSON object, as gesturectl record writes it")
+    return found
+
+
+def _event(line: bytes, number: int) -> Mapping[str, Any]:
+    """A line of the event stream, held against what is asked of events later; what it says besides is left alone."""
+    try:
+        event = json.loads(line)
+    except (ValueError, RecursionError):
+        event = None
+    if not isinstance(event, dict):
+        raise _Wrong(f"event {number}: expected a JSON object")
+    needed = ("type", *NEEDED.get(str(event.get("type")), ()))
+    for key, form in FORMS.items():
+        if (key in event or key in needed) and not _right(form, event.get(key)):
+            raise _Wrong(f"event {number}: expected {key} to be of the type {form}, found {_brief(event.get(key))}")
+    return event
+
+
+def _right(form: str, value: object) -> bool:
+    if form == "string":
+        return isinstance(value, str)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= LARGEST and (form == "number" or isinstance(value, int))  # so NaN is none
+
+
+def _brief(value: object) -> str:
+    return repr(value)[:40]
 
 
 def _source(text: str) -> tuple[str, int]:
     host, _, port = text.rpartition(":")
+    if not port.isdecimal() or len(port) > 5 or len(host) > HOST_CHARACTERS:
+        raise Damaged(f"a source {text[:40]!r}, expected HOST:PORT")
     return host, int(port)

@@ -49,13 +49,16 @@ def mcap(path: Path) -> object:
     from gestured.control import export
     from gestured.control.diff import Recorded
     from gestured.offline import Mute, Replay
+    from gestured.recording_check import check
 
     recorded = Recorded(path)
     replay = Replay(recorded.tape, recorded.scene, Mute(recorded.scene.gestures))
     list(replay.events())
     verdict = recorded.compare([], lambda sensor, t: True)
-    export.sessions(recorded)
-    return [difference.words() for difference in verdict.differences]
+    words = [difference.words() for difference in verdict.differences]
+    if replay.streams:
+        check(export.sessions_of(path)[1])
+    return words
 
 
 def csv(path: Path) -> object:

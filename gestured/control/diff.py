@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gestured import tape
+from gestured.offline import opened
 
 ONSET_S = 0.25  # answers whose onsets lie closer are about the same contact
 CONFIDENCE = 0.05  # what a baseline learned at another moment may change
@@ -59,7 +59,8 @@ class Recorded:
     """What `gesturectl record` or `flag` wrote. Raises RecordingError."""
 
     def __init__(self, path: Path) -> None:
-        self.tape = tape.read(path)
+        self.path = path
+        self.tape, self.scene = opened(path)
 
     def compare(self, lines: Iterable[Line], knew: Knew) -> Verdict:
         """Hold the events of a replay against those that were recorded."""

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from gestured import recording, tape
+from gestured import recording
 from gestured.core.errors import RecordingError
 from gestured.core.wire import Arrival, Decoder
-from gestured.offline import Scene
+from gestured.offline import Scene, opened
+from gestured.tape import Tape
 
 FINGERS = 3
 
@@ -35,33 +36,37 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
 
 def run(args: argparse.Namespace) -> int:
     """Decode, stamp and write."""
-    found = tape.read(args.file)
+    names, made = sessions_of(args.file, args.sensor)
+    recording.write(args.out, made)
+    summary = {"file": str(args.out), "sessions": names, "frames": len(made.frames)}
+    words = f"{args.out}: {len(made.frames)} frames of {', '.join(names)}, {_count(made.event_labels)} gestures"
+    print(json.dumps(summary | {"events": _count(made.event_labels)}) if args.json else words)
+    return 0
+
+
+def sessions_of(path: Path, sensor: str | None = None) -> tuple[list[str], recording.Recordings]:
+    """The sensors of a tape, or the one, and a session of each. Raises RecordingError."""
+    found, scene = opened(path)
     sessions = {
         name: stamped
-        for name, arrivals in _arrivals(found).items()
-        if args.sensor in (None, name) and (stamped := list(_stamped(found, name, arrivals)))
+        for name, arrivals in _arrivals(found, scene).items()
+        if sensor in (None, name) and (stamped := list(_stamped(scene, name, arrivals)))
     }
     if not sessions:
-        raise RecordingError(f"{args.file}: holds no frame of {args.sensor or 'any sensor'}")
+        raise RecordingError(f"{path}: holds no frame of {sensor or 'any sensor'}")
     grids = {name: each[0][1].values.shape for name, each in sessions.items()}
     if len(set(grids.values())) > 1:
         said = ", ".join(f"{name} {rows}x{columns}" for name, (rows, columns) in grids.items())
-        raise RecordingError(f"{args.file}: sensors of several grids ({said}), choose one with --sensor")
-    made = _recordings(sessions, found)
-    recording.write(args.out, made)
-    summary = {"file": str(args.out), "sessions": list(sessions), "frames": len(made.frames)}
-    words = f"{args.out}: {len(made.frames)} frames of {', '.join(sessions)}, {_count(made.event_labels)} gestures"
-    print(json.dumps(summary | {"events": _count(made.event_labels)}) if args.json else words)
-    return 0
+        raise RecordingError(f"{path}: sensors of several grids ({said}), choose one with --sensor")
+    return list(sessions), _recordings(sessions, found)
 
 
 def _count(labels: Any) -> int:
     return 0 if labels is None else len(labels)
 
 
-def _arrivals(found: tape.Tape) -> dict[str, list[tuple[float, Arrival]]]:
+def _arrivals(found: Tape, scene: Scene) -> dict[str, list[tuple[float, Arrival]]]:
     """Sensor -> its frames with their arrival in seconds since the epoch."""
-    scene = Scene(found.scene)
     decoder = Decoder(scene.addresses, scene.grid)
     out: dict[str, list[tuple[float, Arrival]]] = {}
     for packet in found.packets:
@@ -70,9 +75,9 @@ def _arrivals(found: tape.Tape) -> dict[str, list[tuple[float, Arrival]]]:
     return out
 
 
-def _stamped(found: tape.Tape, name: str, arrivals: list[tuple[float, Arrival]]) -> Iterator[tuple[float, Arrival]]:
+def _stamped(scene: Scene, name: str, arrivals: list[tuple[float, Arrival]]) -> Iterator[tuple[float, Arrival]]:
     """The frames that the daemon used, at the times that it gave them."""
-    stamper = Scene(found.scene).stamper(name)
+    stamper = scene.stamper(name)
     last, start = -np.inf, 0
     while start < len(arrivals):
         now = arrivals[start][0]
@@ -87,7 +92,7 @@ def _stamped(found: tape.Tape, name: str, arrivals: list[tuple[float, Arrival]])
         start = end
 
 
-def _recordings(sessions: dict[str, list[tuple[float, Arrival]]], found: tape.Tape) -> recording.Recordings:
+def _recordings(sessions: dict[str, list[tuple[float, Arrival]]], found: Tape) -> recording.Recordings:
     frames = [arrival.values for each in sessions.values() for _, arrival in each]
     touches = np.full((len(frames), FINGERS, 2), np.nan, np.float32)
     ids = np.full((len(frames), FINGERS), -1, np.int32)

@@ -19,6 +19,7 @@ from gestured.core import messages
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.core.wire import is_sensor
 from gestured.ladder import Ladder, ladder_for
+from gestured.models import shipped
 from gestured.offline import Mute, Replay, Scene
 
 MODEL = "cnn_lstm"  # for a file that names none
@@ -51,7 +52,11 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         metavar="PATH",
         help="with --to and --diff: that daemon's event socket (default: its own)",
     )
-    parser.add_argument("--model", metavar="MODEL", help="without --to: another model than the recorded one")
+    parser.add_argument(
+        "--model",
+        metavar="MODEL",
+        help="without --to: the model (default: the recorded one, if it is a shipped one)",
+    )
     parser.add_argument("--sensor", default="recording", metavar="NAME", help="the sensor's name, for an .npz")
     parser.add_argument("--json", action="store_true", help="print events, or differences, as JSON lines")
     parser.set_defaults(run=run)
@@ -87,7 +92,10 @@ def _check(args: argparse.Namespace) -> None:
 def _here(args: argparse.Namespace, source: Source) -> int:
     """Without a daemon."""
     scene, ladder = _opened(source, args.model)
-    replay = Replay(source.tape, scene, ladder)
+    try:
+        replay = Replay(source.tape, scene, ladder)
+    except RecordingError as error:
+        raise RecordingError(f"{args.file}: {error}") from None
     lines = (json.loads(messages.to_json(event, replay.epoch)) for event in replay.events())
     if args.diff:
         return _compare(args, source, list(lines), _knew(replay))
@@ -100,18 +108,32 @@ def _opened(source: Source, model: str | None) -> tuple[Scene, Ladder]:
     if isinstance(source, Labelled):
         ladder = ladder_for(model or MODEL, None)
         return Scene(source.scene(ladder.gestures)), ladder
-    scene = Scene(source.tape.scene)
-    recorded_model, fallback = scene.ladder
-    ladder = ladder_for(model or recorded_model, fallback or None)
+    scene = source.scene
+    if model is None:
+        first, *others = _recorded_models(source.path, scene)
+        ladder = ladder_for(first, others or None)
+    else:
+        ladder = ladder_for(model)
     if model is None and getattr(ladder.model, "sha256", None) != scene.sha256:
         print(f"{ladder.name} is not the file that it was when this was recorded", file=sys.stderr)
     return scene, ladder
 
 
+def _recorded_models(path: Path, scene: Scene) -> list[Path]:
+    """The shipped models that a tape names, best first: a file is opened because the user names it, not a tape."""
+    names = [name.removesuffix(".onnx") for name in scene.ladder]
+    foreign = [given for given, name in zip(scene.ladder, names, strict=True) if name not in shipped()]
+    if foreign:
+        raise RecordingError(
+            f"{path}: was recorded with the model {foreign[0]!r}, which is not a shipped one; name it with --model"
+        )
+    return [shipped()[name] for name in names]
+
+
 def _there(args: argparse.Namespace, source: Source) -> int:
     """To a daemon, whose events are compared."""
     # Which gestures there are is the daemon's business.
-    scene = Scene(source.scene(("none",))) if isinstance(source, Labelled) else Scene(source.tape.scene)
+    scene = Scene(source.scene(("none",))) if isinstance(source, Labelled) else source.scene
     rehearsal = Replay(source.tape, scene, Mute(scene.gestures))  # when sensors are known, and contacts begin
     for _ in rehearsal.events():
         pass

@@ -1,0 +1,232 @@
+"""Tapes that are small and want to be large, that say what is no event, and that name files for us to open."""
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gestured import tape
+from gestured.control.cli import main
+from tests.opening import in_bounds, refused
+
+pytest.importorskip("mcap", reason="recordings need the extra [record]")
+
+MIB = 400  # for a file; the bombs below want a gigabyte or more
+MAGIC = b"\x89MCAP0\r\n"
+TABLE = {"pressure": "/{sensor}/pressure", "trajectory": "/{sensor}/trajectory"}
+SETTINGS: dict[str, Any] = {
+    "addresses": TABLE, "stale_s": 1.0, "grid": None, "clock": "arrival", "sensors": {}, "per_gesture": {},
+    "model": "cnn_lstm", "fallback": [],
+}  # fmt: skip
+SCENE: dict[str, Any] = {"settings": SETTINGS, "gestures": ["one_tap"], "model": {"rows": 9, "columns": 9}}
+ONSET = {"type": "onset", "sensor": "arm", "id": 1, "onset": 5.0}
+TAP = {"type": "gesture", "sensor": "arm", "id": 1, "gesture": "one_tap", "confidence": 0.9, "onset": 5.0,
+       "offset": 5.2, "decided": 5.3}  # fmt: skip
+
+
+def record(opcode: int, content: bytes) -> bytes:
+    return struct.pack("<BQ", opcode, len(content)) + content
+
+
+def text(value: str) -> bytes:
+    return struct.pack("<I", len(value.encode())) + value.encode()
+
+
+def pairs(**values: str) -> bytes:
+    inside = b"".join(text(key) + text(value) for key, value in values.items())
+    return struct.pack("<I", len(inside)) + inside
+
+
+def channel(number: int, topic: str, **metadata: str) -> bytes:
+    return record(4, struct.pack("<HH", number, 0) + text(topic) + text("osc") + pairs(**metadata))
+
+
+def message(number: int, t_ns: int, data: bytes) -> bytes:
+    return record(5, struct.pack("<HIQQ", number, 0, t_ns, t_ns) + data)
+
+
+def chunk(data: bytes, compression: str, size: int) -> bytes:
+    head = struct.pack("<QQQI", 0, 0, size, 0) + text(compression)
+    return record(6, head + struct.pack("<Q", len(data)) + data)
+
+
+def packed(data: bytes, compression: str) -> bytes:
+    import lz4.frame
+    import zstandard
+
+    return zstandard.compress(data) if compression == "zstd" else lz4.frame.compress(data)
+
+
+START = MAGIC + record(1, text("gestured") + text("")) + record(12, text("scene") + pairs(json=json.dumps(SCENE)))
+CHANNELS = channel(1, "/gestured/packets", source="127.0.0.1:5") + channel(2, "/gestured/events")
+END = record(15, bytes(4)) + record(2, bytes(20)) + MAGIC
+PACKET = message(1, 10**9, bytes(1 << 16))
+
+
+def write(path: Path, *inside: bytes, start: bytes = START, end: bytes = END) -> Path:
+    path.write_bytes(start + b"".join(inside) + end)
+    return path
+
+
+def events(path: Path, *lines: object) -> Path:
+    data = [line if isinstance(line, bytes) else json.dumps(line).encode() for line in lines]
+    return write(path, CHANNELS, *(message(2, 10**9, line) for line in data))
+
+
+@pytest.mark.parametrize("number", [1, 3], ids=["packets", "pictures"])
+def test_the_sum_of_all_chunks_is_bounded(tmp_path: Path, number: int) -> None:
+    inside = CHANNELS + channel(3, "/arm/pressure") + message(number, 10**9, bytes(1 << 16)) * 60  # 4 MiB
+    one = chunk(packed(inside, "zstd"), "zstd", len(inside))
+    path = write(tmp_path / "a.mcap", *[one] * 512)
+    assert path.stat().st_size < 400_000
+    reason, mib = in_bounds("mcap", path, MIB)
+    assert "than a recording of its size does" in reason and mib < 300
+
+
+@pytest.mark.parametrize("small", [CHANNELS + message(1, 10**9, b""), message(2, 10**9, b'{"type":"status"}')])
+def test_what_is_kept_of_a_tape_is_bounded_too(tmp_path: Path, small: bytes) -> None:
+    """Thirty bytes of a file are a few hundred of this program's."""
+    inside = CHANNELS + small * ((4 << 20) // len(small))
+    path = write(tmp_path / "a.mcap", *[chunk(packed(inside, "zstd"), "zstd", len(inside))] * 64)
+    reason, mib = in_bounds("mcap", path, MIB)
+    assert "than a recording of its size does" in reason and mib < 300
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", ""])
+@pytest.mark.parametrize("says", [100, 1 << 20, 1 << 40])
+def test_a_chunk_unpacks_to_what_it_says(tmp_path: Path, compression: str, says: int) -> None:
+    data = bytes(1 << 29) if compression else bytes(1 << 16)
+    path = write(tmp_path / "a.mcap", chunk(packed(data, compression) if compression else data, compression, says))
+    _, mib = in_bounds("mcap", path, MIB)
+    found = tape.read(path)
+    assert mib < 64 and not found.whole and not found.packets
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        record(6, struct.pack("<QQQI", 0, 0, 100, 0) + text("") + struct.pack("<Q", 1 << 40)),
+        struct.pack("<BQ", 5, 1 << 40),
+        record(5, b""),
+        record(5, bytes(21)),
+        record(4, bytes(3)),
+        record(4, struct.pack("<HHI", 1, 0, 0xFFFFFFFF)),
+        record(12, text("scene") + struct.pack("<I", 0xFFFFFFFF)),
+        record(6, b"\xff" * 40),
+        channel(1, "/gestured/packets", source="nowhere"),
+        channel(1, "/gestured/packets", source="a" * 5000 + ":5"),
+        message(9, 5, b"of no channel"),
+    ],
+    ids=range(11),
+)
+def test_records_that_lie_about_their_sizes_end_what_is_read(tmp_path: Path, inside: bytes) -> None:
+    with (path := tmp_path / "a.mcap").open("wb") as file:
+        file.write(START + CHANNELS + PACKET + inside)
+        file.truncate(8 << 30)  # whoever believes a size finds that much
+    _, mib = in_bounds("mcap", path, MIB)
+    found = tape.read(path)
+    assert mib < 64 and not found.whole and len(found.packets) == 1
+
+
+WRONG = {
+    "no object": [1],
+    "no JSON": b"{",
+    "nested": b'{"type":"status","x":' + b"[" * 100_000,
+    "no type": {"sensor": "arm"},
+    "type": {"type": 5},
+    "sensor": ONSET | {"sensor": ["arm"]},
+    "no sensor": {k: v for k, v in ONSET.items() if k != "sensor"},
+    "id": ONSET | {"id": "1"},
+    "onset": ONSET | {"onset": "now"},
+    "not finite": ONSET | {"onset": float("nan")},
+    "in no year": TAP | {"onset": 1e300},
+    "no onset": {k: v for k, v in TAP.items() if k != "onset"},
+    "no gesture": {k: v for k, v in TAP.items() if k != "gesture"},
+    "gesture": TAP | {"gesture": None},
+    "confidence": TAP | {"confidence": True},
+    "no reason": {"type": "cancelled", "sensor": "arm", "id": 1},
+    "large": ONSET | {"onset": 10**400},
+}
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_what_is_no_event_is_named(tmp_path: Path, kind: str) -> None:
+    assert refused("mcap", events(tmp_path / "good.mcap", ONSET, TAP | {"more": [1]}, {"type": "new"})) == ""
+    path = events(tmp_path / "a.mcap", ONSET, WRONG[kind])
+    assert f"{path}: event 2: expected" in refused("mcap", path)
+
+
+SCENES = {
+    "model": {"model": 5},
+    "fallback": {"fallback": 5},
+    "stale": {"stale_s": 10**400},
+    "never stale": {"stale_s": -1},
+    "not finite": {"stale_s": float("nan")},
+    "grid": {"grid": [1 << 70, 9]},
+    "grid of three": {"grid": [9, 9, 9]},
+    "sensors": {"sensors": [1]},
+    "many sensors": {"sensors": {f"s{k}": {} for k in range(20_000)}},
+    "a sensor": {"sensors": {"arm": 5}},
+    "rotate": {"sensors": {"arm": {"rotate": []}}},
+    "clock": {"clock": {}},
+    "addresses": {"addresses": {"pressure": [], "trajectory": []}},
+    "per gesture": {"per_gesture": {"one_tap": {"threshold": "x", "refractory_s": 0}}},
+    "refractory": {"per_gesture": {"one_tap": {"threshold": None, "refractory_s": float("inf")}}},
+}
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_a_scene_that_is_none_is_named_with_its_file(tmp_path: Path, kind: str) -> None:
+    scene = SCENE | {"settings": SETTINGS | SCENES[kind]}
+    start = MAGIC + record(12, text("scene") + pairs(json=json.dumps(scene)))
+    assert "scene: expected" in refused("mcap", write(tmp_path / "a.mcap", CHANNELS, PACKET, start=start))
+
+
+@pytest.mark.parametrize("said", ["", "[]", "{", "[" * 100_000, "5"])
+def test_a_scene_that_is_no_json(tmp_path: Path, said: str) -> None:
+    start = MAGIC + record(12, text("scene") + pairs(json=said))
+    reason = refused("mcap", write(tmp_path / "a.mcap", start=start))
+    assert "scene" in reason and "expected" in reason
+
+
+def test_sensors_are_as_many_as_the_daemon_would_have_taken(tmp_path: Path) -> None:
+    from gestured.core import osc
+    from gestured.offline import Mute, Replay, Scene
+
+    packets = [message(1, k * 10**7, osc.encode_message(f"/s{k}/pressure", "b", [bytes(81)])) for k in range(1000)]
+    found = tape.read(write(tmp_path / "a.mcap", CHANNELS, *packets))
+    replay = Replay(found, Scene(found.scene), Mute(["one_tap"]))
+    list(replay.events())
+    assert len(replay.streams) == 64
+
+
+@pytest.mark.parametrize("how", ["model", "fallback"])
+def test_a_model_that_only_the_tape_names_is_not_opened(
+    tmp_path: Path, how: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from gestured import models
+
+    opened = []
+    monkeypatch.setattr(models, "read_bytes", lambda path: opened.append(str(path)) or b"")
+    planted = tmp_path / "planted.onnx"
+    planted.write_bytes(b"")
+    named = {"model": str(planted)} if how == "model" else {"model": "cnn_lstm", "fallback": [str(planted)]}
+    scene = SCENE | {"settings": SETTINGS | named}
+    start = MAGIC + record(12, text("scene") + pairs(json=json.dumps(scene)))
+    path = write(tmp_path / "a.mcap", CHANNELS, PACKET, start=start)
+    assert main(["replay", str(path)]) == 1
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and opened == []
+    assert str(path) in err and str(planted) in err and "--model" in err
+
+
+def test_a_file_of_a_shipped_models_name_is_not_taken_for_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write(tmp_path / "a.mcap", CHANNELS, PACKET)
+    (tmp_path / "cnn_lstm").write_bytes(b"planted")
+    monkeypatch.chdir(tmp_path)
+    status = main(["replay", str(path)])
+    assert status == 0, capsys.readouterr().err
