@@ -1,5 +1,6 @@
 """Files: written at once or not at all, and opened without trusting what stands at a path."""
 
+import errno
 import os
 import secrets
 import stat
@@ -60,8 +61,8 @@ def open_regular(path: str | Path) -> BinaryIO:
     try:
         file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
     except ValueError as error:  # a path with a NUL
-        raise OSError(None, str(error), str(path)) from None
+        raise OSError(errno.EINVAL, str(error), str(path)) from None
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         file.close()
-        raise OSError(None, "is not a regular file", str(path))
+        raise OSError(errno.EINVAL, "is not a regular file", str(path))
     return file

@@ -6,6 +6,7 @@ Whatever is wrong is `Wrong`, with the field.
 import io
 import math
 import struct
+import warnings
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -77,7 +78,8 @@ class Archive:
         return array.reshape(header.shape, order="F" if header.fortran else "C")
 
     def _header(self, field: str) -> Header:
-        with self._opened(field) as member:
+        with self._opened(field) as member, warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # a header may be as Python 2 wrote it
             start = io.BytesIO(member.read(HEADER_BYTES))
             version = np.lib.format.read_magic(start)
             if version == (1, 0):

@@ -2,8 +2,8 @@
 
     python -m tests.opening KIND PATH MIB
 
-opens one file with so much address space beyond what the program itself takes, and prints what was refused and the
-memory that it took, as JSON.
+opens one file, or all of a folder, with so much address space beyond what the program itself takes, and prints what
+was refused of the last one, and the memory that it took, as JSON.
 """
 
 import json
@@ -68,6 +68,13 @@ def csv(path: Path) -> object:
     return read_csv(path, Csv(3, 3, "s", "swipe_left", "07", ""))
 
 
+def wide(path: Path) -> object:
+    """As `import --format csv` reads a session of a large sensor."""
+    from gestured.lab.recordings.sources import Csv, read_csv
+
+    return read_csv(path, Csv(64, 64, "s", "session", "07", ""))
+
+
 def capfingerid(path: Path) -> object:
     """As `import --format capfingerid` reads it."""
     from gestured.lab.recordings.sources import read_capfingerid
@@ -75,7 +82,9 @@ def capfingerid(path: Path) -> object:
     return read_capfingerid(path)
 
 
-KINDS: dict[str, Open] = {"npz": npz, "npz_alone": npz_alone, "mcap": mcap, "csv": csv, "capfingerid": capfingerid}
+KINDS: dict[str, Open] = {
+    "npz": npz, "npz_alone": npz_alone, "mcap": mcap, "csv": csv, "wide": wide, "capfingerid": capfingerid,
+}  # fmt: skip
 
 
 def refused(kind: str, path: Path) -> str:
@@ -113,7 +122,8 @@ def main() -> None:
     before, mapped = _kib("VmRSS"), _kib("VmSize")
     limit = 1024 * mapped + (int(mib) << 20)
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    said = refused(kind, Path(path))
+    files = sorted(Path(path).iterdir()) if Path(path).is_dir() else [Path(path)]
+    said = [refused(kind, file) for file in files][-1]
     print(json.dumps({"refused": said, "mib": round((_kib("VmHWM") - before) / 1024, 1)}))
 
 

@@ -5,14 +5,18 @@ half of a file, its form is another one, and the file is refused.
 """
 
 import math
+from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from io import TextIOWrapper
+from itertools import count
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
+from gestured.files import open_regular
 from gestured.lab.recordings.protocol import PSEUDONYM
 from gestured.lab.recordings.safe import LeftOut
 from gestured.lab.recordings.store import compact, touched
@@ -23,6 +27,11 @@ OTHER = "other"  # something was performed, and nobody knows exactly what
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 CAPFINGERID = (27, 15)  # electrodes of the Nexus 5's panel
 PAUSE = "PAUSE"
+LINE = 256 << 10  # characters; 64 x 64 numbers of 17 digits with their exponents have half as many
+NUMBERS = 1 << 27  # of all frames of a file: a gibibyte in memory
+BAD_LINES = 10_000
+LARGEST = 1e30  # of any number; sums and differences of such counts still fit into a float32
+WORD = 40  # characters of a hand, a finger or a task
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +67,7 @@ def read_csv(path: Path, form: Csv) -> tuple[Recordings, list[LeftOut]]:
             try:
                 time_s, *values = _numbers(cells, 1 + form.rows * form.columns)
             except _Refused as refused:
-                left.append(_left(path, number, refused))
+                _leave(left, path, number, refused)
                 continue
             yield number, time_s * UNITS[form.unit], values, ""
 
@@ -103,9 +112,11 @@ def read_capfingerid(path: Path) -> tuple[Recordings, list[LeftOut]]:
                 seconds, nanoseconds, *values = _numbers(head[5].removesuffix(",").split(","), size)
                 if not 0 <= nanoseconds < 1e9:
                     raise _Refused("time", f"expected 0 to 999999999 nanoseconds, found {nanoseconds:g}")
+                if max(map(len, head[1:4])) > WORD:
+                    raise _Refused("finger", f"expected hand, finger and task of at most {WORD} characters each")
                 who[:] = head[:3]
             except _Refused as refused:
-                left.append(_left(path, number, refused))
+                _leave(left, path, number, refused)
                 continue
             yield number, seconds + nanoseconds * 1e-9, values, head[3]
 
@@ -138,31 +149,38 @@ def _frames(
 ) -> tuple[NDArray[np.generic], NDArray[np.float64], list[str]]:
     """(T, R, C) frames, (T,) seconds from the first one on, and what else each row says."""
     times: list[float] = []
-    values: list[list[float]] = []
+    values = array("d")
+    last: list[float] = []
     more: list[str] = []
     for line, t, counts, text in rows:
-        if times and t == times[-1] and counts == values[-1]:
+        if times and t == times[-1] and counts == last:
             continue  # the same frame again
         if times and t <= times[-1]:
-            left.append(_left(path, line, _Refused("time", f"expected later than {times[-1]:.6f} s, found {t:.6f} s")))
+            _leave(left, path, line, _Refused("time", f"expected later than {times[-1]:.6f} s, found {t:.6f} s"))
             continue
+        if len(values) + len(counts) > NUMBERS:
+            raise RecordingError(f"{path}: line {line}: expected at most {NUMBERS} numbers in a file; split it")
         times.append(t)
-        values.append(counts)
+        values.extend(counts)
+        last = counts
         more.append(text)
     if len(times) < 2 or len(left) > len(times):
         first = f"; {left[0].reason} (line {left[0].line})" if left else ""
         raise RecordingError(f"{path}: expected frames, found {len(times)} and {len(left)} lines that are none{first}")
     stamps = np.array(times)
-    return compact(np.array(values).reshape(-1, *grid)), stamps - stamps[0], more
+    return compact(np.frombuffer(values).reshape(-1, *grid)), stamps - stamps[0], more
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
-    """The lines that are not empty, with their numbers from 1."""
-    if not path.is_file():
-        raise RecordingError(f"{path}: is no file")
+    """The lines that are not empty, with their numbers from 1. RecordingError for one that no frame needs."""
     try:
-        with path.open(encoding="utf-8-sig", errors="replace") as file:
-            for number, line in enumerate(file, 1):
+        with TextIOWrapper(open_regular(path), encoding="utf-8-sig", errors="replace") as file:
+            for number in count(1):
+                line = file.readline(LINE + 1)
+                if not line:
+                    return
+                if len(line) > LINE:
+                    raise RecordingError(f"{path}: line {number}: expected at most {LINE} characters")
                 if text := line.strip():
                     yield number, text
     except OSError as error:
@@ -181,11 +199,16 @@ def _numbers(cells: list[str], count: int) -> list[float]:
         raise _Refused("line", f"expected {count} numbers, found {len(cells)}")
     found = [_number(cell) for cell in cells]
     for k, value in enumerate(found, 1):
-        if value is None or not math.isfinite(value):
+        if value is None or not abs(value) <= LARGEST:
             raise _Refused(f"number {k}", f"expected a finite number, found {cells[k - 1][:20]!r}")
     return [value for value in found if value is not None]
 
 
-def _left(path: Path, line: int, refused: _Refused) -> LeftOut:
+def _leave(left: list[LeftOut], path: Path, line: int, refused: _Refused) -> None:
+    """Leave a line out. RecordingError where so many are bad that nobody needs a list of them."""
     field, text = refused.args
-    return LeftOut(path, None, field, f"{field}: {text}", line)
+    if len(left) >= BAD_LINES:
+        raise RecordingError(
+            f"{path}: expected frames, found more than {BAD_LINES} lines that are none; {field}: {text}"
+        )
+    left.append(LeftOut(path, None, field, f"{field}: {text}", line))

@@ -95,7 +95,7 @@ def test_where_nothing_is_good_nothing_is_written(tmp_path: Path, capsys: pytest
     out = tmp_path / "out.npz"
     flags = ("--format", "csv", "--participant", "07")
     status, text, err = run(capsys, *flags, tmp_path / "none.csv", "--out", out)
-    assert (status, text) == (1, f"{tmp_path / 'none.csv'}: is no file\n")
+    assert (status, text) == (1, f"{tmp_path / 'none.csv'}: cannot be read: No such file or directory\n")
     assert "nothing could be imported" in err
     assert not out.exists()
     out.write_text("somebody's")

@@ -1,0 +1,81 @@
+"""Text files to import that are small and want to be large, or are no text at all."""
+
+from pathlib import Path
+
+import pytest
+
+from gestured.lab.cli import main
+from tests.opening import in_bounds, refused
+
+MIB = 128
+
+
+@pytest.mark.parametrize("kind", ["csv", "capfingerid"])
+def test_one_line_of_gigabytes_is_not_read(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "a.csv"
+    with path.open("wb") as file:
+        file.write(b"1,2,3\n")
+        file.truncate(6 << 30)
+    reason, mib = in_bounds(kind, path, MIB)
+    assert "line 2: expected at most" in reason and mib < 32
+
+
+@pytest.mark.parametrize("kind", ["csv", "capfingerid"])
+def test_a_file_of_nothing_but_bad_lines_is_given_up(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("x\n" * (4 << 20))
+    reason, mib = in_bounds(kind, path, MIB)
+    assert "expected frames" in reason and mib < 64
+
+
+def test_frames_of_a_text_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from gestured.lab.recordings import sources
+
+    path = tmp_path / "a.csv"
+    path.write_text("".join(f"{k}," + ",".join("0" * 9) + "\n" for k in range(100)))
+    monkeypatch.setattr(sources, "NUMBERS", 500)
+    assert "expected at most 500 numbers" in refused("csv", path)
+
+
+def test_numbers_take_eight_bytes_each(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    with path.open("w") as file:
+        for k in range(2000):
+            file.write(f"{k}" + ",0" * 4095 + f",{k % 7}\n")
+    reason, mib = in_bounds("wide", path, 2 * MIB)
+    assert reason == "" and mib < 200
+
+
+LINE = "1,2,3,4,5,6,7,8,9"
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        [f"{k},{'1e308,' * 8}{'-' * (k % 2)}1e308" for k in range(40)],
+        [f"{k}e300,{LINE}" for k in range(40)],
+        [f"-1e308,{LINE}", f"1e308,{LINE}", f"1.1e308,{LINE}"],
+        [f"{k},{'9' * 400},{LINE[2:]}" for k in range(40)],
+    ],
+    ids=["huge counts", "huge times", "far apart", "long numbers"],
+)
+def test_numbers_beyond_what_a_frame_can_hold_are_no_frames(tmp_path: Path, lines: list[str]) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(lines) + "\n")
+    assert "expected" in refused("csv", path)
+
+
+def test_a_fifo_is_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import os
+
+    os.mkfifo(tmp_path / "a.csv")
+    assert "not a regular file" in refused("csv", tmp_path / "a.csv")
+    status = main(["import", "--format", "csv", "--participant", "07", str(tmp_path / "a.csv"), "--out", "b.npz"])
+    assert status == 1 and "a.csv" in capsys.readouterr().out
+
+
+def test_who_and_what_of_a_line_is_bounded(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    numbers = ",".join(["1"] * 407)
+    path.write_text("".join(f"7;left;{'ring' * 500};TAP;-1;{k},0,{numbers[4:]},\n" for k in range(5)))
+    assert "finger" in refused("capfingerid", path)
