@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from gestured.model_file import inspect
+from gestured.model_file import inspect, read_bytes
 from gestured.recording import read
 
 KEY = "learned_from"  # in an .onnx file's metadata: a JSON list of Origin
@@ -35,10 +35,10 @@ def origins(paths: Iterable[Path]) -> list[dict[str, Any]]:
 
 def said(model: Path) -> list[Origin] | None:
     """The recordings that a model says it learned from; None where it does not say. ValueError for no model."""
-    text = inspect(model.read_bytes()).get(KEY)
+    text = inspect(read_bytes(model)).get(KEY)
     if text is None:
         return None
     try:
         return [Origin(str(o["file"]), str(o["sha256"]), [str(s) for s in o["subjects"]]) for o in json.loads(text)]
-    except (TypeError, KeyError) as error:
+    except (TypeError, KeyError, RecursionError) as error:
         raise ValueError(f"{KEY}: expected a list of file, sha256 and subjects: {error}") from None
