@@ -14,11 +14,10 @@ from typing import BinaryIO
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER, CHANNEL, MESSAGE, CHUNK, METADATA = 2, 4, 5, 6, 12  # opcodes
 RECORD_BYTES = 16 << 20  # of one record, and of what a chunk unpacks to; ours have little more than a mebibyte
-# What may become of a file in memory. An idle sensor that sends zeros shrinks to less than a hundredth.
-GROWTH = 500  # times its size ...
-GROWTH_BYTES = 64 << 20  # ... and this, for small ones ...
-KEPT_BYTES = 4 << 30  # ... and no more than this; a gigabyte that `record` wrote needs about half of it
-PASSED_OVER = 4  # times that may be unpacked in all: the pictures, of which nothing is kept
+GROWTH = 500  # bytes of memory for a byte of the file: an idle sensor that sends zeros leaves next to nothing
+GROWTH_BYTES = 64 << 20  # bytes of memory for any file, however small
+KEPT_BYTES = 4 << 30  # bytes of memory at most, however large the file is
+PASSED_OVER = 4  # bytes that are unpacked for one that may be kept: nothing is kept of the pictures
 
 
 class CutOff(Exception):

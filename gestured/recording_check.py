@@ -10,10 +10,9 @@ if TYPE_CHECKING:
     from gestured.recording import Recordings
 
 FINGERS = 3
-# What holds no recording of a person; what is checked one by one takes a multiple of its size.
-FRAMES = 1 << 24  # twelve days at 15 Hz
-RECORDINGS = 1 << 20  # and events
-CHARACTERS = 1024  # of a text
+FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; checking their times takes a multiple of their size
+RECORDINGS = 1 << 20  # of a file, and as many events; each of their texts is checked alone
+CHARACTERS = 1024  # of one text
 LABEL = re.compile(r"[a-z0-9_]{1,64}")
 DAY = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 # What a field may hold: i and u integers, f floats, U text.

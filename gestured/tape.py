@@ -28,13 +28,12 @@ from gestured.files import create, open_regular
 from gestured.mcap_records import CHANNEL, MESSAGE, METADATA, Budget, CutOff, Damaged, Fields, TooLarge, records
 
 PACKETS, EVENTS, SCENE = "/gestured/packets", "/gestured/events", "scene"
-# Of a file that somebody gave us:
-TEXT_BYTES = 1 << 20  # of one channel or metadata record; settings have some kilobytes
+TEXT_BYTES = 1 << 20  # of one channel or metadata record that is read; settings have some kilobytes
 ITEM_COSTS = 250  # bytes of memory for a packet or an event, besides what it holds
 EVENT_COSTS = 24  # bytes of memory for a byte of JSON, where it is all empty lists
-NOBODY = "", 0
-HOST_CHARACTERS = 255  # of a name in the DNS
-LARGEST = 1e11  # of an event's numbers: seconds until the year 5138
+NOBODY = "", 0  # the source of a channel that holds no packets
+HOST_CHARACTERS = 255  # of a sender's name; the DNS allows no more
+LARGEST = 1e11  # of any number in an event that is read; as seconds since 1970 it is a date that Python can print
 CHUNK_BYTES = 1 << 20
 SENDERS = 256  # channels; whoever comes after that shares one
 EVENT_SCHEMA: dict[str, Any] = {
@@ -55,13 +54,14 @@ EVENT_SCHEMA: dict[str, Any] = {
     "required": ["type"],
 }
 FORMS: dict[str, str] = {key: form["type"] for key, form in EVENT_SCHEMA["properties"].items()}
+# What an event of a type says at least.
 NEEDED = {
     "onset": ("sensor", "id", "onset"),
     "gesture": ("sensor", "id", "gesture", "confidence", "onset", "offset"),
     "unknown": ("sensor", "id", "confidence", "onset", "offset"),
     "cancelled": ("sensor", "id", "reason"),
     "release": ("sensor", "id"),
-}  # what an event of a type says at least
+}
 
 IMAGE_SCHEMA = {
     "title": "foxglove.RawImage",
