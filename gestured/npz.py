@@ -118,7 +118,9 @@ def _check_directory(file: BinaryIO) -> None:
     file.seek(max(size - _END_BYTES - _LOCATOR_BYTES, 0))
     before, end = (tail := file.read())[:-_END_BYTES], tail[-_END_BYTES:]
     if not end.startswith(_END) or not end.endswith(b"\0\0") or before.startswith(_LOCATOR):
-        raise Wrong("expected a recording (.npz): a zip archive without a comment, of less than 4 GiB")
+        raise Wrong(
+            "cannot be read as a recording (.npz): expected a zip archive without a comment, of less than 4 GiB"
+        )
     (listed,) = struct.unpack_from("<I", end, 12)
     if listed > DIRECTORY_BYTES:
         raise Wrong(f"its list of members has {listed} bytes, expected at most {DIRECTORY_BYTES}")
