@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Self
 
+from gestured.client.peer import Stranger, check_peer
 from gestured.core.errors import GesturedError
 
 JOIN = 'sudo adduser "$USER" gestured, and log in again'
@@ -27,7 +28,7 @@ class Lines:
     """One connection; a context manager."""
 
     def __init__(self, path: Path, flag: str) -> None:
-        """Connect. `flag` is the one that names another socket. Raises Unreachable."""
+        """Connect. `flag` is the one that names another socket. Raises Unreachable, Stranger."""
         self.path = path
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
@@ -38,6 +39,11 @@ class Lines:
                 raise Forbidden(f"{path}: {error.strerror}: it is for members of its group") from None
             reason = error.strerror or error
             raise Unreachable(f"no daemon on {path}: {reason}; start gestured, or name its {flag}") from None
+        try:
+            check_peer(self.socket, path, flag)
+        except Stranger:
+            self.socket.close()
+            raise
         self._file = self.socket.makefile("rb")
 
     def raw(self) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -9,17 +9,24 @@ from pathlib import Path
 from gestured.client.control import Control
 
 SYSTEM = Path("/run/gestured/events.sock")  # of the installed service
+SHARED = Path("/tmp")  # where a daemon without a session keeps its folder; anybody can make it first
 
 
 def default_socket(environ: Mapping[str, str]) -> Path:
-    """Where a daemon with the same environment keeps its event socket; the installed service's where none is there."""
+    """The event socket that is meant where none is named, the first of these.
+
+    What the environment says, as the daemon reads it; that of a daemon in the session; the installed service's; the one
+    where a daemon without a session would keep it. Who serves it, `client.peer` looks at.
+    """
     if path := environ.get("GESTURED_SOCKET"):
         return Path(path)
     if directory := environ.get("RUNTIME_DIRECTORY"):
         return Path(directory.split(":")[0]) / "events.sock"
     session = environ.get("XDG_RUNTIME_DIR")
-    own = (Path(session, "gestured") if session else Path(f"/tmp/gestured-{os.getuid()}")) / "events.sock"
-    return SYSTEM if SYSTEM.parent.is_dir() and not own.exists() else own
+    own = (Path(session, "gestured") if session else SHARED / f"gestured-{os.getuid()}") / "events.sock"
+    if session and os.path.exists(own):  # unlike Path.exists, no error where we may not look
+        return own
+    return SYSTEM if SYSTEM.parent.is_dir() else own
 
 
 def default_control(environ: Mapping[str, str]) -> Path:

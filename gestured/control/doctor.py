@@ -15,6 +15,7 @@ from typing import Any
 import gestured
 from gestured.client.control import Control
 from gestured.client.lines import JOIN, Forbidden, Refused, Unreachable
+from gestured.client.peer import Stranger
 from gestured.control.address import add_control, default_control
 from gestured.core.errors import ModelError
 from gestured.models import check
@@ -86,8 +87,10 @@ def examine(path: Path) -> Iterator[Finding]:
     except Forbidden as error:
         yield Finding("bad", str(error), JOIN)
         return
-    except (Unreachable, Refused) as error:
+    except (Unreachable, Refused, Stranger) as error:
         remedy = "does it run? systemctl status gestured; its last words: journalctl --unit gestured --lines 20"
+        if isinstance(error, Stranger):
+            remedy = f"ls -ld {path.parent} shows whose folder it is"
         yield Finding("bad", str(error), remedy)
         yield _port(("127.0.0.1", 9000))
         yield _model("cnn_lstm", None)

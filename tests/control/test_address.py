@@ -1,5 +1,6 @@
 """Which daemon gesturectl talks to when nobody says so."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -31,3 +32,15 @@ def test_what_the_environment_says_comes_first(tmp_path: Path, system: Path):
     system.parent.mkdir()
     assert address.default_socket({"GESTURED_SOCKET": "/a/b.sock", "RUNTIME_DIRECTORY": "/c"}) == Path("/a/b.sock")
     assert address.default_socket({"RUNTIME_DIRECTORY": "/c:/d"}) == Path("/c/events.sock")
+
+
+def test_the_installed_service_comes_before_any_folder_in_tmp(
+    tmp_path: Path, system: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(address, "SHARED", tmp_path)
+    anybodys = tmp_path / f"gestured-{os.getuid()}" / "events.sock"
+    anybodys.parent.mkdir()
+    anybodys.touch()
+    assert address.default_socket({}) == anybodys
+    system.parent.mkdir()
+    assert address.default_socket({}) == system

@@ -1,0 +1,160 @@
+"""Whom gesturectl believes: root, oneself, and the account to which root gave the socket's folder."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.control.conftest import HELLO, environment
+
+OTHER, OPERATOR = 65_533, 65_532  # two accounts that nobody has
+
+# Binds a socket as another account, says one line to whoever connects, and reports what it was asked.
+SERVER = """
+import os, socket, sys
+path, uid, line = sys.argv[1], int(sys.argv[2]), sys.argv[3]
+os.setgroups([]); os.setgid(uid); os.setuid(uid)
+listener = socket.socket(socket.AF_UNIX)
+listener.bind(path)
+os.chmod(path, 0o666)
+listener.listen()
+print("ready", flush=True)
+client, _ = listener.accept()
+try:
+    client.sendall(line.encode() + b"\\n")
+    asked = client.recv(4096)
+except ConnectionError:  # it hung up at once
+    asked = b""
+print(asked.decode() or "nothing", flush=True)
+"""
+
+CLIENT = """
+import os, sys
+from gestured.control.cli import main
+os.setgroups([]); os.setgid(int(sys.argv[1])); os.setuid(int(sys.argv[1]))
+sys.exit(main(sys.argv[2:]))
+"""
+
+EVIL = json.dumps({"ok": True, "type": "hello", "protocol": 1, "model": "\x1b]0;evil\x07", "reason": "\x1b[2J"})
+GOOD = json.dumps({"ok": True, "model": "tiny"})
+
+Serve = Callable[[Path, str], "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def serve() -> Iterator[Serve]:
+    """Starts a server of the account OTHER at a path, with the line that it says."""
+    if os.geteuid() != 0:
+        pytest.skip("only root can act as another account")
+    running: list[subprocess.Popen[str]] = []
+
+    def begin(path: Path, line: str) -> "subprocess.Popen[str]":
+        command = [sys.executable, "-c", SERVER, str(path), str(OTHER), line]
+        running.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
+        assert running[-1].stdout is not None and running[-1].stdout.readline() == "ready\n"
+        return running[-1]
+
+    yield begin
+    for process in running:
+        process.kill()
+        process.communicate()
+
+
+def folder(below: str) -> Iterator[Path]:
+    """A folder of the account OTHER."""
+    made = Path(tempfile.mkdtemp(prefix="gestured-test-", dir=below))
+    if os.geteuid() == 0:
+        os.chown(made, OTHER, OTHER)
+    made.chmod(0o755)
+    yield made
+    shutil.rmtree(made)
+
+
+@pytest.fixture
+def seized() -> Iterator[Path]:
+    """A folder where anybody could have made it first."""
+    yield from folder("/tmp")
+
+
+@pytest.fixture
+def given() -> Iterator[Path]:
+    """A folder that only root can have made, as /run/gestured is."""
+    if os.geteuid() != 0:
+        pytest.skip("only root can give a folder to another account")
+    yield from folder("/run")
+
+
+def heard(server: "subprocess.Popen[str]") -> str:
+    assert server.stdout is not None
+    return server.stdout.readline().strip()
+
+
+@pytest.mark.parametrize("command", [["reload"], ["status"], ["status", "--json"], ["emit", "one_tap"], ["doctor"]])
+def test_root_asks_nothing_of_whoever_made_the_default_folder_first(
+    run, serve: Serve, seized: Path, command: list[str]
+) -> None:
+    (seized / "gestured").mkdir()
+    os.chown(seized / "gestured", OTHER, OTHER)
+    path = seized / "gestured" / "events.ctl"
+    server = serve(path, EVIL)
+    status, out, err = run(*command, env={"XDG_RUNTIME_DIR": str(seized), "RUNTIME_DIRECTORY": ""})
+    said = out + err
+    assert status == 1 and f"{path} is served by uid {OTHER}" in said and "neither root nor you" in said
+    assert "\x1b" not in said and "--control" in said
+    assert heard(server) == "nothing"
+
+
+def test_nor_does_it_listen_to_him(run, serve: Serve, seized: Path) -> None:
+    server = serve(seized / "events.sock", EVIL)
+    for more in ([], ["--reconnect"]):
+        status, out, err = run("listen", "--socket", seized / "events.sock", *more)
+        assert (status, out, err.count("\n")) == (1, "", 1)
+        assert f"served by uid {OTHER}" in err and "--socket" in err
+        assert heard(server) == "nothing"
+        (seized / "events.sock").unlink()
+        server = serve(seized / "events.sock", json.dumps(HELLO))
+
+
+def test_a_link_to_a_folder_that_root_gave_him_is_no_better(run, serve: Serve, seized: Path, given: Path) -> None:
+    server = serve(given / "events.ctl", EVIL)
+    (seized / "link").symlink_to(given)
+    status, out, err = run("reload", "--control", seized / "link" / "events.ctl")
+    assert status == 1 and f"served by uid {OTHER}" in err
+    assert heard(server) == "nothing"
+
+
+def test_the_account_to_which_root_gave_the_folder_is_believed(run, serve: Serve, given: Path) -> None:
+    server = serve(given / "events.ctl", GOOD)
+    assert run("reload", "--control", given / "events.ctl") == (0, "reloaded; tiny answers\n", "")
+    assert json.loads(heard(server)) == {"verb": "reload"}
+
+
+def test_an_operator_believes_that_account(serve: Serve, given: Path) -> None:
+    serve(given / "events.ctl", GOOD)
+    assert as_operator("reload", "--control", given / "events.ctl") == (0, "reloaded; tiny answers\n", "")
+
+
+def test_an_operator_believes_no_other_account(serve: Serve, seized: Path) -> None:
+    server = serve(seized / "events.ctl", EVIL)
+    status, out, err = as_operator("reload", "--control", seized / "events.ctl")
+    assert (status, out) == (1, "") and f"served by uid {OTHER}" in err
+    assert heard(server) == "nothing"
+
+
+def test_a_session_into_which_an_operator_may_not_look_is_no_bug(serve: Serve, seized: Path) -> None:
+    seized.chmod(0o700)
+    status, out, err = as_operator("reload", XDG_RUNTIME_DIR=str(seized), RUNTIME_DIRECTORY="")
+    assert (status, out, err.count("\n")) == (1, "", 1)
+
+
+def as_operator(*arguments: object, **more: str) -> tuple[int, str, str]:
+    """Runs gesturectl as the account OPERATOR, with more in its environment."""
+    command = [sys.executable, "-c", CLIENT, str(OPERATOR), *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment() | more, timeout=60)
+    return done.returncode, done.stdout, done.stderr
