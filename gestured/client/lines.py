@@ -77,8 +77,8 @@ class Lines:
 def _parsed(line: bytes, path: Path) -> dict[str, Any]:
     """One line as an object; raises Refused for anything else."""
     try:
-        message = json.loads(line)
-    except ValueError:
+        message = json.loads(line.decode())
+    except (ValueError, RecursionError):
         message = None
     if not isinstance(message, dict):
         raise Refused(f"{path} sent a line that is no JSON object: {line[:80]!r}")

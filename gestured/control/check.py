@@ -1,9 +1,9 @@
 """`gesturectl check`: whether a model file can be used."""
 
 import argparse
-import json
 import sys
 
+from gestured.client.say import say, say_json
 from gestured.core.errors import ModelError
 from gestured.models import check
 
@@ -30,14 +30,14 @@ def run(args: argparse.Namespace) -> int:
     try:
         report = check(args.model)
     except ModelError as error:
-        print(f"gesturectl: {error}", file=sys.stderr)
+        say(f"gesturectl: {error}", to=sys.stderr)
         return UNUSABLE
     if args.json:
-        print(json.dumps(report))
+        say_json(report)
         return 0
     for key, value in report.items():
-        print(f"{key:<14} {_words(value)}")
-    print("usable")
+        say(f"{key:<14} {_words(value)}")
+    say("usable")
     return 0
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import gestured
 from gestured.client.lines import JOIN, Forbidden
+from gestured.client.say import say
 from gestured.control import (
     check,
     demo,
@@ -60,7 +61,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return status
     except GesturedError as error:
         remedy = f" ({JOIN})" if isinstance(error, Forbidden) else ""
-        print(f"gesturectl: {error}{remedy}", file=sys.stderr)
+        say(f"gesturectl: {error}{remedy}", to=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return 0

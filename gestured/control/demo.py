@@ -1,7 +1,6 @@
 """`gesturectl demo`: the real daemon, a simulated sensor over real UDP, and how well they get on."""
 
 import argparse
-import json
 import math
 import os
 import queue
@@ -14,6 +13,7 @@ from typing import Any
 
 from gestured.client.engine import Engine
 from gestured.client.picture import trace
+from gestured.client.say import say, say_drawn, say_json
 from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form, Sensor
 from gestured.client.stream import Stream
@@ -64,9 +64,11 @@ def run(args: argparse.Namespace) -> int:
             ):
                 host, port = engine.listen
                 show.say(
-                    f"The daemon listens on {host}:{port} with the model {engine.ready['model']}.\n"
+                    f"The daemon listens on {host}:{port} with the model {engine.ready['model']}.",
                     f"A simulated sensor of {play.rows} x {play.columns} taxels sends OSC to it "
-                    f"at {play.rate_hz:g} Hz.\nFor two seconds nobody touches it. Ctrl-C ends.\n"
+                    f"at {play.rate_hz:g} Hz.",
+                    "For two seconds nobody touches it. Ctrl-C ends.",
+                    "",
                 )
                 show.follow(sensor, stream)
         except KeyboardInterrupt:
@@ -86,10 +88,10 @@ class Show:
         self.colour = sys.stdout.isatty() and not plain
         self.tally = Tally()
 
-    def say(self, text: str) -> None:
+    def say(self, *lines: str) -> None:
         """Words for a person."""
         if not self.as_json:
-            print(text, flush=True)
+            say(*lines)
 
     def follow(self, sensor: Sensor, stream: Stream) -> None:
         """Send the take and show what comes of it, until its end."""
@@ -128,16 +130,18 @@ class Show:
         """The summary of what was shown."""
 
         figures = self.tally.summary()
-        words = json.dumps({"type": "summary"} | figures) if self.as_json else summary(figures, self.colour)
-        print(words, flush=True)
+        if self.as_json:
+            say_json({"type": "summary"} | figures)
+        else:
+            say_drawn(summary(figures, self.colour))
 
     def _show(self, outcome: Outcome, sensor: Sensor) -> None:
 
         if self.as_json:
-            print(json.dumps(as_dict(outcome)), flush=True)
+            say_json(as_dict(outcome))
             return
         of = outcome.performed
         onset, offset = (of.onset, of.offset) if of else (outcome.event["onset"], outcome.event["offset"])  # type: ignore[index]
         times = self.take.times + sensor.epoch
         shown = (times >= onset - SLACK_S) & (times <= offset + TAIL_S)
-        print(block(outcome, trace(self.take.frames[shown]), self.colour), flush=True)
+        say_drawn(block(outcome, trace(self.take.frames[shown]), self.colour))

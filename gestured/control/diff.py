@@ -6,6 +6,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from gestured.client.say import shown
 from gestured.offline import opened
 
 ONSET_S = 0.25  # answers whose onsets lie closer are about the same contact
@@ -44,7 +45,7 @@ class Difference:
     def words(self) -> str:
         """For a person: `-` is what was recorded, `+` what the replay says."""
         sides = (("-", self.recorded), ("+", self.replayed))
-        return "\n".join(f"{sign} {answer.words()}" for sign, answer in sides if answer is not None)
+        return "\n".join(shown(f"{sign} {answer.words()}") for sign, answer in sides if answer is not None)
 
 
 class Verdict(NamedTuple):

@@ -1,7 +1,6 @@
 """`gesturectl doctor`: what is wrong, and what to do about it."""
 
 import argparse
-import json
 import os
 import platform
 import socket
@@ -16,6 +15,7 @@ import gestured
 from gestured.client.control import Control
 from gestured.client.lines import JOIN, Forbidden, Refused, Unreachable
 from gestured.client.peer import Stranger
+from gestured.client.say import say, say_json
 from gestured.control.address import add_control, default_control
 from gestured.core.errors import ModelError
 from gestured.models import check
@@ -69,10 +69,10 @@ def run(args: argparse.Namespace) -> int:
     for finding in examine(args.control or default_control(os.environ)):
         bad += finding.level == "bad"
         if args.json:
-            print(json.dumps(asdict(finding)), flush=True)
+            say_json(asdict(finding))
         else:
-            remedy = f"\n        -> {finding.remedy}" if finding.remedy else ""
-            print(f"{finding.level:<5}   {finding.what}{remedy}", flush=True)
+            remedy = [f"        -> {finding.remedy}"] if finding.remedy else []
+            say(f"{finding.level:<5}   {finding.what}", *remedy)
     return 1 if bad else 0
 
 

@@ -1,8 +1,8 @@
 """`gesturectl emit`: a made-up gesture through every output."""
 
 import argparse
-import json
 
+from gestured.client.say import tell
 from gestured.control.address import add_control, connect
 
 
@@ -29,5 +29,5 @@ def run(args: argparse.Namespace) -> int:
     with connect(args) as control:
         answer = control.ask("emit", gesture=args.gesture, sensor=args.sensor)
     words = f"published {answer['gesture']} of {answer['sensor']} as #{answer['sequence']}, marked as a test"
-    print(json.dumps(answer) if args.json else words)
+    tell(args.json, answer, words)
     return 0

@@ -1,7 +1,6 @@
 """`gesturectl export`: a recording as frames, in the form that NumPy reads."""
 
 import argparse
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gestured import recording
+from gestured.client.say import tell
 from gestured.core.errors import RecordingError
 from gestured.core.wire import Arrival, Decoder
 from gestured.offline import Scene, opened
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     recording.write(args.out, made)
     summary = {"file": str(args.out), "sessions": names, "frames": len(made.frames)}
     words = f"{args.out}: {len(made.frames)} frames of {', '.join(names)}, {_count(made.event_labels)} gestures"
-    print(json.dumps(summary | {"events": _count(made.event_labels)}) if args.json else words)
+    tell(args.json, summary | {"events": _count(made.event_labels)}, words)
     return 0
 
 

@@ -1,11 +1,11 @@
 """`gesturectl flag`: "that was wrong" - what the flight recorder holds, kept as a recording."""
 
 import argparse
-import json
 from datetime import datetime
 from pathlib import Path
 
 from gestured.client.lines import Unreachable
+from gestured.client.say import tell
 from gestured.control.address import add_control, connect
 from gestured.control.record import Keeper
 from gestured.tape import Writer, library
@@ -45,5 +45,6 @@ def run(args: argparse.Namespace) -> int:
             else:
                 raise Unreachable(f"the daemon closed the connection; {path} is not complete")
     kept = {"file": str(path), "packets": keeper.packets, "events": keeper.events, "model": scene["model"]}
-    print(json.dumps(kept) if args.json else f"{path}: {keeper.packets} packets, {keeper.events} events")
+    words = f"{path}: {keeper.packets} packets, {keeper.events} events"
+    tell(args.json, kept, words)
     return 0

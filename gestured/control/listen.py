@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gestured.client.lines import Refused, Unreachable
+from gestured.client.say import say, say_drawn, say_json
 from gestured.client.stream import Stream
 from gestured.control.address import default_socket
 
@@ -54,11 +55,14 @@ def run(args: argparse.Namespace) -> int:
         _greet(stream, args.json)
         for name in args.gesture or ():
             if name not in stream.hello["gestures"]:
-                print(f"no gesture of this daemon: {name} ({', '.join(stream.hello['gestures'])})", file=sys.stderr)
+                say(f"no gesture of this daemon: {name} ({', '.join(stream.hello['gestures'])})", to=sys.stderr)
         for line, event in stream.raw():
             if event.get("type") == "error":
                 raise Refused(f"the daemon refused the request: {event.get('reason')}")
-            print(line if args.json else readable(event), flush=True)
+            if args.json:
+                _repeat(line, event)
+            else:
+                say(readable(event))
             if left is not None and event.get("type") != "lost":
                 left -= 1
                 if left <= 0:
@@ -93,10 +97,18 @@ def readable(event: dict[str, Any]) -> str:
 def _greet(stream: Stream, as_json: bool) -> None:
     hello = stream.hello
     if as_json:
-        print(stream.hello_line, flush=True)
+        _repeat(stream.hello_line, hello)
         return
     names = ", ".join(hello["sensors"]) or "none yet"
-    print(f"gestured {hello['version']}, model {hello['model']}, sensors: {names}", file=sys.stderr)
+    say(f"gestured {hello['version']}, model {hello['model']}, sensors: {names}", to=sys.stderr)
+
+
+def _repeat(line: str, event: dict[str, Any]) -> None:
+    """A daemon's line to the letter; written anew where it is more than printable ASCII."""
+    if line.isascii() and line.isprintable():
+        say_drawn(line)
+    else:
+        say_json(event)
 
 
 def _types(text: str) -> list[str]:

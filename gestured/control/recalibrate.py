@@ -1,8 +1,8 @@
 """`gesturectl recalibrate`: learn the idle sensor anew."""
 
 import argparse
-import json
 
+from gestured.client.say import tell
 from gestured.control.address import add_control, connect
 
 
@@ -27,5 +27,5 @@ def run(args: argparse.Namespace) -> int:
     with connect(args) as control:
         answer = control.ask("recalibrate", sensor=args.sensor)
     words = f"learning {', '.join(answer['sensors'])} anew; do not touch for a second"
-    print(json.dumps(answer) if args.json else words)
+    tell(args.json, answer, words)
     return 0

@@ -2,7 +2,6 @@
 
 import argparse
 import base64
-import json
 import queue
 import sys
 import threading
@@ -14,6 +13,7 @@ from typing import Any
 
 from gestured.client.control import Control
 from gestured.client.lines import Refused, Unreachable
+from gestured.client.say import say, say_json
 from gestured.control.address import add_control, connect, finish_on_signals
 from gestured.core.errors import GesturedError
 from gestured.core.wire import Decoder
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
         finish_on_signals(control)
         scene = control.ask("tap")
         with Writer(args.file, scene, args.max_mib << 20) as tape:
-            print(f"recording into {args.file}; Ctrl-C ends", file=sys.stderr, flush=True)
+            say(f"recording into {args.file}; Ctrl-C ends", to=sys.stderr)
             if args.seconds:
                 timer = threading.Timer(args.seconds, control.finish)
                 timer.daemon = True
@@ -63,10 +63,10 @@ def run(args: argparse.Namespace) -> int:
             why = keeper.follow(control)
     summary = {"file": str(args.file), "packets": keeper.packets, "events": keeper.events, "lost": keeper.lost}
     if args.json:
-        print(json.dumps(summary | {"ended": why}))
+        say_json(summary | {"ended": why})
     else:
         lost = f", {keeper.lost} lost: this disk is too slow" if keeper.lost else ""
-        print(f"{args.file}: {keeper.packets} packets, {keeper.events} events{lost}; ended: {why}")
+        say(f"{args.file}: {keeper.packets} packets, {keeper.events} events{lost}; ended: {why}")
     if why == GONE:
         raise Unreachable(f"the daemon closed the connection; {args.file} is good up to there")
     return 1 if keeper.lost else 0

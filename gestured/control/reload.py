@@ -1,8 +1,8 @@
 """`gesturectl reload`: another model or other settings, without losing a gesture."""
 
 import argparse
-import json
 
+from gestured.client.say import tell
 from gestured.control.address import add_control, connect
 
 
@@ -26,5 +26,5 @@ def run(args: argparse.Namespace) -> int:
     """Ask for it, and say which model answers now."""
     with connect(args) as control:
         answer = control.ask("reload")
-    print(json.dumps(answer) if args.json else f"reloaded; {answer['model']} answers")
+    tell(args.json, answer, f"reloaded; {answer['model']} answers")
     return 0

@@ -10,6 +10,7 @@ from contextlib import closing
 from pathlib import Path
 
 from gestured.client.address import host_port
+from gestured.client.say import say, say_drawn, say_json, tell
 from gestured.control.address import default_socket
 from gestured.control.diff import Answer, Knew, Line, Recorded
 from gestured.control.labelled import Labelled
@@ -67,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
     source: Source = Labelled(args.file, args.sensor) if args.file.suffix == ".npz" else Recorded(args.file)
     if not source.tape.whole:
-        print(f"{args.file}: writing was cut off; what is there is played", file=sys.stderr)
+        say(f"{args.file}: writing was cut off; what is there is played", to=sys.stderr)
     if not source.tape.packets:
         raise RecordingError(f"{args.file}: holds no packets")
     if args.to is None:
@@ -100,7 +101,7 @@ def _here(args: argparse.Namespace, source: Source) -> int:
     if args.diff:
         return _compare(args, source, list(lines), _knew(replay))
     for line in lines:
-        print(json.dumps(line) if args.json else readable(line), flush=True)
+        tell(args.json, line, readable(line))
     return 0
 
 
@@ -115,7 +116,7 @@ def _opened(source: Source, model: str | None) -> tuple[Scene, Ladder]:
     else:
         ladder = ladder_for(model)
     if model is None and getattr(ladder.model, "sha256", None) != scene.sha256:
-        print(f"{ladder.name} is not the file that it was when this was recorded", file=sys.stderr)
+        say(f"{ladder.name} is not the file that it was when this was recorded", to=sys.stderr)
     return scene, ladder
 
 
@@ -142,7 +143,7 @@ def _there(args: argparse.Namespace, source: Source) -> int:
         heard = hearing.all(time.time())
     status = _compare(args, source, retimed(heard, sent, source.tape, rehearsal), _knew(rehearsal))
     if status and args.speed != 1:
-        print(f'at --speed {args.speed:g} that daemon must run with clock = "sensor"; does it?', file=sys.stderr)
+        say(f'at --speed {args.speed:g} that daemon must run with clock = "sensor"; does it?', to=sys.stderr)
     return status
 
 
@@ -152,7 +153,7 @@ def _send(args: argparse.Namespace, source: Source) -> list[float]:
     where = f"{args.to[0]}:{args.to[1]}"
     if unheard:
         raise GesturedError(f"nobody listened on {where} for {unheard} of {len(sent)} packets")
-    print(f"sent {len(sent)} packets to {where}", file=sys.stderr)
+    say(f"sent {len(sent)} packets to {where}", to=sys.stderr)
     return sent
 
 
@@ -165,11 +166,11 @@ def _compare(args: argparse.Namespace, source: Source, lines: Iterable[Line], kn
     for difference in differences:
         if args.json:
             sides = {"recorded": difference.recorded, "replayed": difference.replayed}
-            print(json.dumps({side: answer and _as_dict(answer) for side, answer in sides.items()}))
+            say_json({side: answer and _as_dict(answer) for side, answer in sides.items()})
         else:
-            print(difference.words())
+            say_drawn(difference.words())
     early = f", {skipped} before the sensor was known" if skipped else ""
-    print(f"{compared}{early}, {len(differences)} differences", file=sys.stderr)
+    say(f"{compared}{early}, {len(differences)} differences", to=sys.stderr)
     return 1 if differences else 0
 
 

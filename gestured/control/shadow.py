@@ -1,12 +1,13 @@
 """`gesturectl shadow`: a candidate model beside the active one."""
 
 import argparse
-import json
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from gestured.client.lines import Refused
+from gestured.client.say import say, say_json
 from gestured.control.address import add_control, connect
 
 
@@ -44,22 +45,21 @@ def run(args: argparse.Namespace) -> int:
         else:
             report = control.ask("status")["shadow"]
     if args.json:
-        print(json.dumps(report))
+        say_json(report)
     elif report is None:
-        print("no model runs in the shadow")
+        say("no model runs in the shadow")
     else:
-        print(words(report))
+        say(*words(report))
     return 1 if report is None else 0
 
 
-def words(report: dict[str, Any]) -> str:
-    """A report for a person."""
-    lines = [f"{report['model']} in the shadow: {report['segments']} segments, {report['failed']} failed"]
+def words(report: dict[str, Any]) -> Iterator[str]:
+    """The lines of a report for a person."""
+    yield f"{report['model']} in the shadow: {report['segments']} segments, {report['failed']} failed"
     if report["agreement"] is not None:
-        lines.append(
+        yield (
             f"  agreement {100 * report['agreement']:.1f} %, mean confidence {report['confidence']:.2f} "
             f"(active {report['active_confidence']:.2f})"
         )
     for pair in report["disagreements"]:
-        lines.append(f"  {pair['count']:4d} x active {pair['active']}, candidate {pair['candidate']}")
-    return "\n".join(lines)
+        yield f"  {pair['count']:4d} x active {pair['active']}, candidate {pair['candidate']}"

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.client.picture import draw
+from gestured.client.say import shown
 from gestured.client.score import NONE, Outcome, Performed
 
 COLOURS = {"right": 32, "rejected": 32, "wrong": 31, "false": 31, "missed": 33}
@@ -30,7 +31,7 @@ def block(outcome: Outcome, picture: NDArray[np.float32], colour: bool) -> str:
     event, performed = outcome.event, outcome.performed
     if event:
         by = f"  by {event['model']}, degraded" if event["degraded"] else ""
-        answer = f"{event['gesture']}  {event['confidence']:.2f}{by}"
+        answer = shown(f"{event['gesture']}  {event['confidence']:.2f}{by}")
     else:
         answer = "unknown" if performed and performed.unknown else "-"
     when = f"{1000 * outcome.latency_s:.0f} ms after its end" if outcome.latency_s is not None else ""

@@ -1,13 +1,13 @@
 """`gesturectl simulate`: a simulated sensor, and a person who touches it."""
 
 import argparse
-import json
 import re
 import sys
 from collections.abc import Iterator
 from typing import Any
 
 from gestured.client.address import host_port
+from gestured.client.say import say, tell
 from gestured.client.sensor import BLOBS, Form, Sensor
 from gestured.control.play import add_arguments, frames, play_from
 from gestured.core.errors import GesturedError
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         raise GesturedError(f"cannot send to {args.to[0]}:{args.to[1]}: {error.strerror or error}") from None
     host, port = args.to
     what = f"{play.rows} x {play.columns} taxels at {play.rate_hz:g} Hz"
-    print(f"sending {what} to {host}:{port} as {args.sensor}; Ctrl-C ends", file=sys.stderr)
+    say(f"sending {what} to {host}:{port} as {args.sensor}; Ctrl-C ends", to=sys.stderr)
     try:
         for start, take in play.takes(args.seconds):
             sensor.send(_telling(frames(start, take), start, take.events, sensor, args.json))
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         sensor.close()
         if sensor.unheard:
             lost = f"{sensor.unheard} of {sensor.sent} packets"
-            print(f"nobody listened on {host}:{port} for {lost}", file=sys.stderr)
+            say(f"nobody listened on {host}:{port} for {lost}", to=sys.stderr)
     return 0
 
 
@@ -97,7 +97,7 @@ def _tell(event: Event, start: float, sensor: str, as_json: bool) -> None:
     }
     name = event.label if event.label == event.kind else f"no gesture ({event.kind.replace('_', ' ')})"
     words = f"performed {name}, {event.speed}, {event.offset_s - event.onset_s:.2f} s"
-    print(json.dumps(performed) if as_json else words, flush=True)
+    tell(as_json, performed, words)
 
 
 def _sensor(text: str) -> str:

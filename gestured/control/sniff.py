@@ -2,7 +2,6 @@
 
 import argparse
 import base64
-import json
 import re
 import socket
 import sys
@@ -15,6 +14,7 @@ from itertools import groupby
 
 from gestured.client.address import host_port
 from gestured.client.lines import Unreachable
+from gestured.client.say import say, shown, tell
 from gestured.control.address import add_control, connect, finish_on_signals
 from gestured.core import osc
 from gestured.core.errors import GesturedError, ProtocolError
@@ -23,6 +23,9 @@ from gestured.core.wire import is_sensor
 USUAL = "/{sensor}/pressure"
 LEAST_TAXELS = 4  # 2 x 2
 SEEN = 256  # addresses; what comes after that is counted together
+SHOWN = 80  # characters of an address or of type tags
+LONGEST = 255  # characters of an address that is proposed
+TRAJECTORY = "/trajectory"
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -70,15 +73,12 @@ def run(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         pass
     rows = sight.rows()
-    if args.json:
-        found = [
-            {"address": s.address, "types": s.types, "count": s.count, "rate_hz": round(s.rate_hz, 2),
-             "sources": sorted(s.sources)} for s in rows
-        ]  # fmt: skip
-        summary = {"packets": sight.packets, "messages": found, "errors": sight.errors, "proposed": propose(rows)}
-        print(json.dumps(summary))
-    else:
-        print("\n".join(lines(sight)))
+    found = [
+        {"address": s.address, "types": s.types, "count": s.count, "rate_hz": round(s.rate_hz, 2),
+         "sources": sorted(s.sources)} for s in rows
+    ]  # fmt: skip
+    summary = {"packets": sight.packets, "messages": found, "errors": sight.errors, "proposed": propose(rows)}
+    tell(args.json, summary, *lines(sight))
     return 0 if rows else 1
 
 
@@ -91,12 +91,17 @@ def lines(sight: "Sight") -> Iterator[str]:
     rows = sight.rows()
     for s in rows:
         senders = ", ".join(sorted(s.sources))
-        yield f"  {s.address:<32} ,{s.types:<16} {s.count:6d}  {s.rate_hz:7.1f} Hz  from {senders}"
+        address, types = shown(s.address, SHOWN), shown(s.types, SHOWN)
+        yield f"  {address:<32} ,{types:<16} {s.count:6d}  {s.rate_hz:7.1f} Hz  from {senders}"
     for reason, count in sight.errors.items():
         yield f"  {count} packets are no OSC: {reason}"
     for s in rows:
         if _taxels(s.types) and len(s.sources) > 1:
-            yield f"  {s.address} has several senders: the daemon takes the first; give each sensor a name of its own"
+            several = "has several senders: the daemon takes the first; give each sensor a name of its own"
+            yield f"  {shown(s.address, SHOWN)} {several}"
+        if _taxels(s.types) and _sensor(s.address) is None and not s.address.endswith(TRAJECTORY):
+            unsafe = f"is not proposed: expected parts of A-Z a-z 0-9 _ - . and at most {LONGEST} characters"
+            yield f"  {shown(s.address, SHOWN)} {unsafe}"
     yield ""
     yield from propose(rows) or ["nothing that looks like a pressure frame"]
 
@@ -147,7 +152,11 @@ def short_types(message: osc.Message) -> str:
 
 
 def propose(rows: list[Seen]) -> list[str]:
-    """Lines for the configuration file, from what looks like frames: many numbers, or one blob, again and again."""
+    """Lines for the configuration file, from what looks like frames: many numbers, or one blob, again and again.
+
+    Anybody may have sent them. So there is nothing in these lines but numbers and names that were checked, whose
+    characters mean nothing in TOML.
+    """
     patterns: Counter[str] = Counter()
     sizes: dict[tuple[str, str], tuple[int, ...]] = {}
     for seen in rows:
@@ -183,10 +192,15 @@ def _taxels(types: str) -> tuple[int, ...]:
 
 
 def _sensor(address: str) -> tuple[str, str] | None:
-    """(pattern, sensor) of an address: the last part but one that can be a name, else the last."""
+    """(pattern, sensor) of an address: the last part but one that can be a name, else the last.
+
+    None where there is none, or where a part could be more than a name.
+    """
+    if address.endswith(TRAJECTORY) or len(address) > LONGEST or not re.fullmatch(r"(/[A-Za-z0-9_.-]+)+", address):
+        return None
     parts = address.split("/")[1:]
     places = [i for i, part in enumerate(parts) if is_sensor(part)]
-    if address.endswith("/trajectory") or not places:
+    if not places:
         return None
     place = places[0] if len(places) == 1 else places[-2]
     pattern = "/".join(["", *parts[:place], "{sensor}", *parts[place + 1 :]])
@@ -218,7 +232,7 @@ def _listen(address: tuple[str, int], seconds: float) -> Iterator[tuple[float, s
         raise GesturedError(f"cannot listen on {address[0]}:{address[1]}: {error.strerror}{hint}") from None
     with receiver:
         end = time.monotonic() + seconds
-        print(f"listening on {address[0]}:{address[1]}", file=sys.stderr, flush=True)
+        say(f"listening on {address[0]}:{address[1]}", to=sys.stderr)
         while (left := end - time.monotonic()) > 0:
             receiver.settimeout(left)
             try:

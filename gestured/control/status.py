@@ -1,13 +1,13 @@
 """`gesturectl status`: how the daemon is, on one screen."""
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Iterator
 from datetime import datetime
 from typing import Any
 
+from gestured.client.say import say, say_drawn, say_json
 from gestured.control.address import add_control, connect
 from gestured.control.shadow import words as shadow_words
 
@@ -39,10 +39,11 @@ def run(args: argparse.Namespace) -> int:
         while True:
             status = control.ask("status")
             if args.json:
-                print(json.dumps(status), flush=True)
+                say_json(status)
             else:
-                clear = CLEAR if args.watch and sys.stdout.isatty() else ""
-                print(clear + "\n".join(screen(status)), flush=True)
+                if args.watch and sys.stdout.isatty():
+                    say_drawn(CLEAR, end="")
+                say(*screen(status))
             if not args.watch:
                 return 0 if status["ready"]["ready"] else 1
             time.sleep(PERIOD_S)
@@ -76,7 +77,7 @@ def screen(status: dict[str, Any]) -> Iterator[str]:
     yield f"loop: {1000 * status['loop_lag_s']:.0f} ms late, {status['internal_errors']} bugs caught"
     yield f"shift: {_shift(status['shift'])}"
     if status["shadow"]:
-        yield shadow_words(status["shadow"])
+        yield from shadow_words(status["shadow"])
 
 
 def _sensors(sensors: dict[str, dict[str, Any]]) -> Iterator[str]:

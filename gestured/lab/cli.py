@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gestured import __version__
+from gestured.client.say import say
 from gestured.core.errors import GesturedError
 from gestured.lab.recordings import commands as recordings
 
@@ -106,10 +107,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         args.out.mkdir(parents=True, exist_ok=True)  # now, and not after half an hour
         return commands.train_models(args)
     except (GesturedError, OSError) as error:
-        print(f"gestured-lab: {error}", file=sys.stderr)
+        say(f"gestured-lab: {error}", to=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("\ngestured-lab: interrupted; what is finished is kept", file=sys.stderr)
+        say("", "gestured-lab: interrupted; what is finished is kept", to=sys.stderr)
         return 130
 
 

@@ -1,11 +1,11 @@
 """`gestured-lab collect`: a participant, a sensor, a terminal."""
 
 import argparse
-import json
 from collections import Counter
 from contextlib import closing
 from pathlib import Path
 
+from gestured.client.say import say_json
 from gestured.core.errors import RecordingError
 from gestured.lab.recordings.live import LiveSensor
 from gestured.lab.recordings.protocol import order
@@ -26,7 +26,7 @@ def run(args: argparse.Namespace) -> int:
         session.run(trials)
     if args.json:
         labels = Counter(session.kept.labels.tolist()) if session.kept is not None else {}
-        print(json.dumps({"file": str(path), "trials": len(trials), "recordings": labels}))
+        say_json({"file": str(path), "trials": len(trials), "recordings": labels})
     return 0
 
 

@@ -1,7 +1,6 @@
 """`gestured-lab forget`: removes a participant from files of recordings, and says which models learned from them."""
 
 import argparse
-import json
 import sys
 import zipfile
 from collections.abc import Sequence
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gestured.client.say import say, say_drawn, say_json
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.recordings.origin import digest, said
 from gestured.recording import Recordings, read, write
@@ -38,17 +38,17 @@ def run(args: argparse.Namespace) -> int:
     parts, unread = find(args.participant, args.paths)
     models = told(args.participant, parts, args.models)
     for line in [*map(str, parts), *(f"not looked into: {reason}" for reason in unread)]:
-        print(line, file=sys.stderr if args.json else sys.stdout)
+        say(line, to=sys.stderr if args.json else sys.stdout)
     if not parts:
-        print(f"no recording of {args.participant} was found", file=sys.stderr if args.json else sys.stdout)
+        say(f"no recording of {args.participant} was found", to=sys.stderr if args.json else sys.stdout)
     done = bool(parts) and not args.dry_run and (args.yes or _agreed(args.participant))
     if done:
         for part in parts:
             remove(args.participant, part.path)
     if args.json:
         files = [{"file": str(p.path), "sha256": p.sha256, "recordings": p.own, "of": p.all} for p in parts]
-        print(json.dumps({"participant": args.participant, "removed": done, "files": files,
-                          "not_looked_into": unread, "models": models}))  # fmt: skip
+        say_json({"participant": args.participant, "removed": done, "files": files, "not_looked_into": unread,
+                  "models": models})  # fmt: skip
     else:
         _close(args.participant, parts, done, models)
     return 1 if unread else 0
@@ -127,18 +127,18 @@ def told(participant: str, parts: Sequence[Part], folder: Path) -> dict[str, str
 def _agreed(participant: str) -> bool:
     if not sys.stdin.isatty():
         raise GesturedError("nobody can be asked here; expected --yes or --dry-run; nothing was removed")
-    print(f"Remove participant {participant} from these files? It cannot be undone. (yes/no) ", end="", flush=True)
+    say_drawn(f"Remove participant {participant} from these files? It cannot be undone. (yes/no) ", end="")
     return sys.stdin.readline().strip().lower() == "yes"
 
 
 def _close(participant: str, parts: Sequence[Part], done: bool, models: dict[str, Any]) -> None:
     if done:
-        print(f"removed: {sum(part.own for part in parts)} recordings of {participant}")
+        say(f"removed: {sum(part.own for part in parts)} recordings of {participant}")
     elif parts:
-        print("nothing was removed")
+        say("nothing was removed")
     for model, answer in models.items():
-        print(f"model {model}: {answer}")
+        say(f"model {model}: {answer}")
     if not models:
-        print("no models were found; name their folder with --models")
+        say("no models were found; name their folder with --models")
     if done:
-        print("Not looked for: copies, backups, and what was computed from the recordings (caches, reports).")
+        say("Not looked for: copies, backups, and what was computed from the recordings (caches, reports).")

@@ -1,12 +1,12 @@
 """`gestured-lab import`: files of other forms -> one file of recordings."""
 
 import argparse
-import json
 import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from gestured.client.say import say, tell
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.recordings.safe import LeftOut
 from gestured.lab.recordings.sources import SESSION, Csv, read_capfingerid, read_csv
@@ -37,18 +37,15 @@ def run(args: argparse.Namespace) -> int:
         left += gone
     more = [f"and {len(left) - SHOWN} lines more"] if len(left) > SHOWN else []
     for line in [*refused, *map(str, left[:SHOWN]), *more]:
-        print(line, file=sys.stderr if args.json else sys.stdout)
+        say(line, to=sys.stderr if args.json else sys.stdout)
     if not parts:
         raise GesturedError("nothing could be imported, so nothing was written")
     together = join(parts)
     write(args.out, together)
     found = {"recordings": len(together), "frames": len(together.frames), "lines_left_out": len(left),
              "files_left_out": len(refused)}  # fmt: skip
-    if args.json:
-        print(json.dumps(found))
-    else:
-        print(f"{args.out}: {len(together)} recordings, {len(together.frames)} frames; left out: "
-              f"{len(refused)} files, {len(left)} lines")  # fmt: skip
+    words = f"{len(together)} recordings, {len(together.frames)} frames"
+    tell(args.json, found, f"{args.out}: {words}; left out: {len(refused)} files, {len(left)} lines")
     return 0
 
 

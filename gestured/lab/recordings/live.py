@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gestured.client.say import shown
 from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Frame
@@ -81,7 +82,7 @@ class LiveSensor:
     def trouble(self) -> str:
         """What keeps frames from arriving, in words."""
         who = f"no frames of {self.name or 'a sensor'} arrive on {self.where}"
-        return f"{who} ({self._wrong})" if self._wrong else who
+        return shown(f"{who} ({self._wrong})" if self._wrong else who)
 
     def pump(self) -> None:
         """Take what waits in the socket."""

@@ -1,7 +1,6 @@
 """`gestured-lab inspect`: what a file of recordings holds, in figures and drawn with characters."""
 
 import argparse
-import json
 import sys
 from collections import Counter
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.client.picture import draw, shrunk
+from gestured.client.say import say, say_drawn, say_json
 from gestured.core.errors import GesturedError
 from gestured.lab.recordings.protocol import INCLINATIONS
 from gestured.lab.recordings.quality import gaps
@@ -37,11 +37,12 @@ def run(args: argparse.Namespace) -> int:
         raise GesturedError(f"--index: expected 0 to {len(recordings) - 1}, found {args.index}")
     figures = {"file": str(args.file)} | figures | {"left_out": [str(what) for what in left]}
     if args.json:
-        print(json.dumps(figures))
+        say_json(figures)
         return 0
     _tell(args.file, figures, left)
     colour = sys.stdout.isatty()
-    print("\n".join(_map(recordings, colour) if args.index is None else _gesture(recordings, args.index, colour)))
+    drawn = _map(recordings, colour) if args.index is None else _gesture(recordings, args.index, colour)
+    say_drawn("\n".join(drawn))
     return 0
 
 
@@ -138,23 +139,23 @@ def _spread(values: list[float]) -> dict[str, float]:
 
 
 def _tell(file: Path, figures: dict[str, Any], left: list[LeftOut]) -> None:
-    print(file)
+    say(file)
     for name, value in figures.items():
         if name in ("file", "left_out") or value is None or value == {}:
             continue
         title = name.replace("_", " ")
         if name in ("peak", "touched_s") and isinstance(value, dict):
-            print(f"  {title:<14}{value['median']:g} (5 to 95 %: {value['p5']:g} to {value['p95']:g})")
+            say(f"  {title:<14}{value['median']:g} (5 to 95 %: {value['p5']:g} to {value['p95']:g})")
         elif isinstance(value, dict):
             most = max(value.values())
             for k, (key, count) in enumerate(value.items()):
                 bar = "█" * max(1, round(BAR * count / most))
-                print(f"  {title if not k else '':<14}{key or '(not known)':<26}{count:6d}  {bar}")
+                say(f"  {title if not k else '':<14}{key or '(not known)':<26}{count:6d}  {bar}")
         else:
-            print(f"  {title:<14}{value}")
+            say(f"  {title:<14}{value}")
     for what in left[:SHOWN]:
-        print(f"  {what}")
-    print(f"  {'left out':<14}{len(left)}")
+        say(f"  {what}")
+    say(f"  {'left out':<14}{len(left)}")
 
 
 def _map(r: Recordings, colour: bool) -> list[str]:

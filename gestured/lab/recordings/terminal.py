@@ -8,6 +8,7 @@ import termios
 import tty
 from types import FrameType
 
+from gestured.client.say import say_drawn
 from gestured.core.errors import GesturedError
 
 
@@ -68,8 +69,8 @@ class Terminal:
             tty.setcbreak(self._fd)
 
     def say(self, text: str, end: str = "\n") -> None:
-        """Print."""
-        print(text, end=end, flush=True)
+        """Print; what is foreign in it went through `shown`."""
+        say_drawn(text, end)
 
     def _end(self, number: int, frame: FrameType | None) -> None:
         raise Ended

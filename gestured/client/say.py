@@ -1,0 +1,51 @@
+"""What the programs print: text that somebody else chose is shown, never obeyed.
+
+Names come from packets, sockets and files, and whoever chose them may have chosen what a terminal acts upon. So the
+programs print through this module alone.
+"""
+
+import json
+import sys
+from typing import TextIO
+
+MOST = 2000  # characters of a line: no own one is longer, unless a path in it is
+
+
+def shown(text: object, most: int = MOST) -> str:
+    """Foreign text on one line of at most `most` printable characters; ordinary text is as it was.
+
+    Control characters, line breaks, surrogates and what is invisible or turns the direction of writing are escaped as
+    in Python. Of longer text the middle is left out: both the name before it and the reason after it stay.
+    """
+    told = str(text)
+    if len(told) > 2 * most:
+        told = told[:most] + told[-most:]
+    if not told.isprintable():
+        told = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in told)
+    if len(told) > most:
+        tail = (most - 1) // 2
+        told = f"{told[: most - 1 - tail]}…{told[len(told) - tail :]}"
+    return told
+
+
+def say(*lines: object, to: TextIO | None = None) -> None:
+    """Print lines for a person, each as `shown`; to standard output, or a stream such as sys.stderr."""
+    say_drawn("\n".join(map(shown, lines)), to=to)
+
+
+def say_json(value: object) -> None:
+    """Print a value as one line of JSON. It is ASCII: whatever else a text holds is escaped."""
+    say_drawn(json.dumps(value))
+
+
+def tell(as_json: bool, value: object, *lines: object) -> None:
+    """Print a value as JSON, or what it says in words."""
+    if as_json:
+        say_json(value)
+    else:
+        say(*lines)
+
+
+def say_drawn(text: str, end: str = "\n", to: TextIO | None = None) -> None:
+    """Print what has line breaks, colours or a picture of its own; what is foreign in it went through `shown`."""
+    print(text, end=end, file=to or sys.stdout, flush=True)

@@ -1,0 +1,311 @@
+"""Text that somebody else chose: no command hands it to the terminal as it is."""
+
+import ast
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example as such_as
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gestured import recording, tape
+from gestured.client.say import MOST, shown
+from gestured.control.sniff import Sight, propose
+from gestured.core.wire import Addresses, is_sensor
+from tests.control.conftest import HELLO, ROOT, FakeDaemon, environment, gestures
+from tests.control.test_listen import GESTURE
+from tests.daemon.harness import Hand, floats
+from tests.small_recording import example, save, session
+
+# Sets the title, clears the screen, turns the writing around, begins new lines, ends the string.
+HOSTILE = '\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp.exe\u2028new\nline\r\x7f\x00"x'
+LONG = HOSTILE + "y" * 100_000
+OBEYED = re.compile(r"[^ -~\n\u2026\u2500-\u259f]")  # all but ASCII, what a cut is marked and pictures are drawn with
+
+
+def plain(text: str) -> str:
+    """The output of a command, which holds nothing that a terminal would obey."""
+    assert not (found := OBEYED.findall(text)), (found, text)
+    assert all(len(line) <= MOST for line in text.splitlines())
+    return text
+
+
+@given(st.text())
+@such_as(HOSTILE)
+@such_as("\ud800\udfff")
+@such_as("\u200f\u2066\ufeff\u00ad\u3164\U000e0041")
+def test_foreign_text_is_shown_printable_on_one_line_and_bounded(text: str) -> None:
+    told = shown(text)
+    assert told.isprintable() and len(told.splitlines()) <= 1 and len(told) <= MOST
+    told.encode()
+    assert shown(told) == told
+
+
+@given(st.text(st.characters(whitelist_categories=("L", "N", "P", "S", "M"), whitelist_characters=" "), max_size=MOST))
+def test_ordinary_text_is_shown_as_it_is(text: str) -> None:
+    assert shown(text) == text
+
+
+@given(st.text(), st.integers(1, 40))
+def test_long_text_loses_its_middle(text: str, most: int) -> None:
+    whole, told = shown(text, 10**9), shown(text, most)
+    assert len(told) <= most and shown(told, most) == told
+    if len(whole) > most:
+        head, _, tail = told.partition("…") if "…" not in whole else ("", "", "")
+        assert whole.startswith(head) and whole.endswith(tail)
+    else:
+        assert told == whole
+
+
+def test_only_one_module_prints() -> None:
+    """So no command can forget it."""
+    wrong = []
+    files = [*(ROOT / "gestured/client").glob("*.py"), *(ROOT / "gestured/control").glob("*.py")]
+    files += [*(ROOT / "gestured/lab/recordings").glob("*.py"), ROOT / "gestured/lab/cli.py"]
+    for path in files:
+        for node in ast.walk(ast.parse(path.read_text())):
+            called = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
+            if called == "print" or re.search(r"std(out|err)\.(buffer\.)?write", called):
+                wrong.append(f"{path.relative_to(ROOT)}:{node.lineno}")
+    assert len(files) > 20 and {place.split(":")[0] for place in wrong} == {"gestured/client/say.py"}
+
+
+# Packets
+
+
+def sniffed(*addresses: str) -> list[str]:
+    sight = Sight()
+    for n in range(3):
+        for address in addresses:
+            sight.packet(n / 15, "127.0.0.1:5", raw(address, n))
+    return propose(sight.rows())
+
+
+def raw(address: str, n: int = 0) -> bytes:
+    """A frame of 5 x 5 for any address at all."""
+    head = address.encode() + b"\0" * (4 - len(address.encode()) % 4)
+    return head + floats("/x", Hand().frame()[:5, :5], n)[4:]
+
+
+NASTY = [
+    '/x"\n[sensors.evil]\ngrid = "2x2"/arm/pressure',
+    "/arm/pres\x1b[2Jsure",
+    '/a"/arm/pressure',
+    "/a\\u0022/arm/pressure",
+    "/arm/pressure\u202e",
+    "/{sensor}/arm/pressure",
+    "/a#/arm/pressure",
+    "/" + "a/" * 400 + "arm/pressure",
+]
+
+
+@given(
+    st.lists(st.one_of(st.sampled_from(NASTY), st.text(max_size=30).map(lambda t: f"/{t}/arm/pressure")), max_size=4)
+)
+def test_a_proposal_holds_numbers_and_checked_names_alone(addresses: list[str]) -> None:
+    lines = sniffed(*(a.replace("\0", "") for a in addresses if a.isascii() or "\ud800" > max(a)))
+    text = "\n".join(line for line in lines if line != "the defaults fit what arrives")
+    plain(text)
+    found = tomllib.loads(text)
+    assert set(found) <= {"addresses", "sensors"} and set(found.get("addresses", {})) <= {"pressure"}
+    if "addresses" in found:
+        Addresses(found["addresses"]["pressure"])
+    for name, table in found.get("sensors", {}).items():
+        assert is_sensor(name) and table == {"grid": "5x5"}
+
+
+@pytest.mark.parametrize("address", NASTY)
+def test_what_cannot_be_proposed_is_said_and_not_written(address: str) -> None:
+    assert sniffed(address) == []
+    assert sniffed("/arm/pressure", address)[:2] == ["[sensors.arm]", 'grid = "5x5"']
+
+
+def test_sniff_prints_no_foreign_byte(start) -> None:
+    with socket.socket(type=socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        where = free.getsockname()
+    packets = [*map(raw, NASTY), b"/" + b"\x1b[2J" * 1000 + b"\0\0\0\0,i\0\0\0\0\0\1", b"\x9b\x1b]0;evil\x07"]
+    for more in ([], ["--json"]):
+        sniffer = start("sniff", "--listen", f"127.0.0.1:{where[1]}", "--seconds", "1", *more)
+        assert b"listening" in sniffer.stderr.readline()
+        with socket.socket(type=socket.SOCK_DGRAM) as sender:
+            while sniffer.poll() is None:
+                for packet in packets:
+                    sender.sendto(packet, where)
+        out, err = sniffer.communicate(timeout=30)
+        assert sniffer.returncode == 0 and err == b""
+        if more:
+            assert out.isascii() and out.count(b"\n") == 1 and b"\x1b" not in out
+            assert json.loads(out)["proposed"] == []
+        else:
+            said = plain(out.decode())
+            assert "\\x1b[2J" in said and "[sensors.evil]\n" not in said and "is not proposed" in said
+
+
+# A daemon
+
+STATUS = {
+    "version": HOSTILE, "state": HOSTILE, "uptime_s": 7300.0, "pid": 1, "addresses": {HOSTILE: LONG, "listen": "a:1"},
+    "ready": {"ready": False, "reason": HOSTILE},
+    "model": {"active": HOSTILE, "asked": HOSTILE, "degraded": True, "failures": 2, "version": HOSTILE,
+              "sha256": HOSTILE, "file": HOSTILE.replace("\x00", "") + ".onnx"},
+    "sensors": {HOSTILE: {"state": "ok", "rate_hz": 0.0, "jitter_s": 0.0, "bad_taxels": 0, "drift": 0.0,
+                          "grid": HOSTILE, "source": HOSTILE, "lost": 1}},
+    "answers": {"gestures": {}, "unknown": 3, "cancelled": {HOSTILE: 2}},
+    "recent": [{"time": 1.0, "sensor": HOSTILE, "answer": HOSTILE, "confidence": 0.5, "test": False}],
+    "input": {"dropped": {HOSTILE: 4}, "kernel_drops": 0},
+    "output": {"subscribers": 0, "backlog_bytes": 0, "lines_lost": 0, "evicted": {}, "osc": {HOSTILE: 1}},
+    "loop_lag_s": 0.0, "internal_errors": 0, "reloads": {},
+    "shadow": {"model": HOSTILE, "segments": 1, "failed": 0, "agreement": None,
+               "disagreements": [{"count": 1, "active": HOSTILE, "candidate": LONG}]},
+    "shift": {"gestures": 40, "outside": {HOSTILE: 0.5}, "unlike": [HOSTILE]},
+}  # fmt: skip
+ANSWERS = [
+    (["status"], STATUS),
+    (["doctor"], STATUS),
+    (["shadow"], STATUS),
+    (["reload"], {"model": HOSTILE}),
+    (["recalibrate"], {"sensors": [HOSTILE, LONG]}),
+    (["emit", "one_tap"], {"gesture": HOSTILE, "sensor": HOSTILE, "sequence": HOSTILE}),
+    (["reload"], {"ok": False, "reason": LONG}),
+]
+
+
+@pytest.mark.parametrize("more", [[], ["--json"]])
+@pytest.mark.parametrize(("command", "answer"), ANSWERS)
+def test_what_a_daemon_says_is_shown(start, fake: FakeDaemon, command, answer, more) -> None:
+    process = start(*command, *more, "--control", fake.path)
+    fake.accept({"ok": True} | answer)
+    out, err = process.communicate(timeout=60)
+    assert b"Traceback" not in err
+    assert b"owned" in out + err
+    plain(err.decode())
+    if more:
+        assert out.isascii() and b"\x1b" not in out and b"\x7f" not in out
+    else:
+        plain(out.decode())
+
+
+EVENTS = [
+    GESTURE | {"sensor": HOSTILE, "gesture": HOSTILE, "model": HOSTILE, "degraded": True, "sequence": LONG},
+    {"type": "status", "state": HOSTILE, "sensors": {HOSTILE: HOSTILE}, "model": "m", "time": 1.0},
+    {"type": "cancelled", "sensor": HOSTILE, "id": 4, "reason": HOSTILE},
+    {"type": "lost", "count": HOSTILE},
+    {"type": HOSTILE, "sensor": HOSTILE},
+]
+
+
+@pytest.mark.parametrize("more", [[], ["--json"]])
+def test_what_it_publishes_is_shown(start, fake: FakeDaemon, more) -> None:
+    names = ["--gesture", "wave"]
+    process = start("listen", "--socket", fake.path, *names, *more)
+    hello = HELLO | {"version": HOSTILE, "model": HOSTILE, "gestures": [HOSTILE], "sensors": {HOSTILE: 1}}
+    fake.accept(hello)
+    fake.say(*EVENTS)
+    # Valid JSON that is not ASCII: the C1 control that begins a sequence, and a bare carriage return between two keys.
+    fake.say('{"type":"onset",\r"sensor":"\x9b2J\u202e\x7f"}\n'.encode())
+    fake.say({"type": "error", "reason": HOSTILE})
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 1 and b"Traceback" not in err
+    plain(err.decode())
+    lines = out.decode().splitlines()
+    assert len(lines) == len(EVENTS) + (2 if more else 1)
+    if more:
+        assert out.isascii() and not {0x1B, 0x7F, 0x0D} & set(out)
+        assert [json.loads(line) for line in lines[:-1]] == [hello, *EVENTS]
+        assert json.loads(lines[-1])["sensor"] == "\x9b2J\u202e\x7f"
+    else:
+        plain(out.decode())
+
+
+@pytest.mark.parametrize("line", [b"[" * 100_000 + b"\n", b'{"a":"\xff"}\n', '{"a":1}\n'.encode("utf-16-le"), LONG])
+def test_what_is_no_json_is_one_sentence(start, fake: FakeDaemon, line) -> None:
+    process = start("status", "--control", fake.path)
+    fake.accept(line.encode() + b"\n" if isinstance(line, str) else line)
+    out, err = process.communicate(timeout=30)
+    assert (process.returncode, out, err.count(b"\n")) == (1, b"", 1)
+    plain(err.decode())
+
+
+# Files
+
+
+def lab(*arguments: object) -> tuple[int, str, str]:
+    command = [sys.executable, "-m", "gestured.lab.cli", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, env=environment(), timeout=120)
+    return done.returncode, done.stdout.decode(), done.stderr.decode()
+
+
+@pytest.fixture
+def hostile(tmp_path: Path) -> Path:
+    """Recordings whose every name is foreign, in a file whose name is."""
+    name = HOSTILE.replace("\x00", "").replace("/", "")
+    texts = {field: np.array([name, LONG[:500]]) for field in ("subjects", "speeds", "kinds")}
+    kinds = np.array([name, LONG[:500], "swipe"])
+    return save(tmp_path / f"{name}.npz", session(), **texts, event_kinds=kinds, inclinations=np.array([name, name]))
+
+
+@pytest.mark.parametrize("more", [[], ["--index", "0"], ["--json"], ["--index", "1", "--json"]])
+def test_inspect_shows_names_of_recordings(hostile: Path, more) -> None:
+    status, out, err = lab("inspect", hostile, *more)
+    assert status == 0, err
+    assert "owned" in plain(out) if "--json" not in more else out.isascii() and "owned" in out
+    plain(err)
+
+
+def test_forget_shows_names_of_files(hostile: Path, tmp_path: Path) -> None:
+    (tmp_path / "models").mkdir()
+    (tmp_path / "models" / "\x1b[2J.onnx").write_bytes(b"\x1b[2J")
+    save(hostile.with_name("b.npz"), example(), subjects=np.array(["somebody", HOSTILE[:9]]))
+    hostile.with_name("\x1b[2Jc.npz").write_bytes(b"nothing")
+    status, out, err = lab("forget", "somebody", tmp_path, "--dry-run", "--models", tmp_path / "models")
+    assert status == 1 and "\\x1b[2Jc.npz" in plain(out + err)
+
+
+def test_import_shows_what_a_line_says(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text(f"{HOSTILE};left;index;TAP;-1;1,2,3\n" * 3)
+    status, out, err = lab("import", "--format", "capfingerid", path, "--out", tmp_path / "b.npz")
+    assert status == 1
+    plain(out + err)
+
+
+def test_an_error_about_a_file_is_one_line(run, tmp_path: Path) -> None:
+    for command in (["check"], ["replay"], ["export"]):
+        more = [tmp_path / "out.npz"] if command == ["export"] else []
+        status, out, err = run(*command, tmp_path / "\x1b[2J\n.mcap", *more)
+        assert status in (1, 3) and (out, err.count("\n")) == ("", 1)
+        plain(err)
+
+
+def test_replay_shows_what_was_recorded(recorded, run, daemon, tmp_path: Path) -> None:
+    pytest.importorskip("mcap", reason="recordings need the extra [record]")
+    path, _ = recorded(gestures(daemon, "tape", "left", "tap"))
+    found = tape.read(path)
+    with tape.Writer(tmp_path / "hostile.mcap", found.scene, 1 << 30) as writer:
+        for packet in found.packets:
+            writer.packet(packet.t_ns, f"{packet.source[0]}:{packet.source[1]}", packet.data)
+        for event in found.events:
+            changed = {"gesture": HOSTILE} if event["type"] == "gesture" else {}
+            writer.event(found.packets[-1].t_ns, event | changed)
+    for more in ([], ["--json"]):
+        status, out, err = run("replay", tmp_path / "hostile.mcap", "--diff", *more)
+        assert status == 1 and "owned" in out, err
+        plain(out + err)
+
+
+def test_replay_shows_labels(run, tmp_path: Path) -> None:
+    """Labels are checked names; the file's own name is not."""
+    path = save(tmp_path / "\x1b[2Jone.npz", example(), labels=np.array([HOSTILE, "none"]))
+    with pytest.raises(recording.RecordingError):
+        recording.read(path)
+    status, out, err = run("replay", path, "--diff")
+    assert status == 1 and os.fsencode("\x1b").decode() not in plain(out + err)
