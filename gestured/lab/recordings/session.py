@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from gestured.client.picture import draw, trace
-from gestured.client.say import shown
 from gestured.lab.recordings.live import LiveSensor
 from gestured.lab.recordings.protocol import INCLINATIONS, Trial, left
 from gestured.lab.recordings.quality import Take, faults
@@ -76,7 +75,7 @@ class Session:
     def _agree(self) -> bool:
         if self.kept is not None and self.kept.consents is not None and self.kept.consents[0]:
             self._consent = str(self.kept.consents[0])
-            self._terminal.say(f"Participant {self.participant} gave consent on {shown(self._consent)}.")
+            self._terminal.say(f"Participant {self.participant} gave consent on {self._consent}.")
             return True
         self._terminal.say(CONSENT.format(participant=self.participant, path=self.path))
         if self._terminal.line("Do you agree? (yes/no) ").strip().lower() != "yes":

@@ -107,16 +107,6 @@ def test_frames_of_another_size_are_told(live: LiveSensor, sender: Send) -> None
     assert "expected 9x9 values, found 37 numbers" in live.trouble()
 
 
-@pytest.mark.parametrize(
-    "packet", [b"\x1b[2J\x9b\n", b"/\x1b[2J\0\0\0,f\0\0\0\0\0\0", b"/arm/pressure\0\0\0,\x1b[\n\0\0\0\0"]
-)
-def test_what_is_wrong_is_told_without_foreign_bytes(live: LiveSensor, packet: bytes) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-        out.sendto(packet, live.socket.getsockname())
-    live.pump()
-    assert live.trouble().isprintable()
-
-
 def test_an_address_that_is_taken_is_named() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
