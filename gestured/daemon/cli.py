@@ -69,10 +69,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     given: dict[str, Any] = vars(parser().parse_args(arguments))
     explain = given.pop("explain")
+    from gestured.daemon import log
+
     try:
         settings, sources = load(given, os.environ)
-        from gestured.daemon import log
-
         log.configure(settings.log_level)
         if explain:
             from gestured.daemon.explain import explain as describe
@@ -83,8 +83,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         run(settings, lambda: load(given, os.environ)[0])
     except GesturedError as error:
-        print(f"gestured: {error}", file=sys.stderr)
+        log.say(f"gestured: {error}")
         return 2 if isinstance(error, SettingsError) else 3 if isinstance(error, ModelError) else 4
     except KeyboardInterrupt:  # before the daemon could take signals itself
         return 0
+    finally:
+        log.close()
     return 0

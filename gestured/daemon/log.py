@@ -1,17 +1,27 @@
-"""Logs go to standard error: readable at a terminal, JSON otherwise. Nothing is logged per packet."""
+"""Logs go to standard error: readable at a terminal, JSON otherwise. Nothing is logged per packet.
+
+A thread of its own writes, so that a reader who has stopped reading holds up neither the loop nor the end.
+"""
 
 import math
 import os
+import select
+import signal
 import sys
+import threading
 import time
+from collections import deque
 from collections.abc import Callable
-from typing import Any, TextIO
+from typing import Any
 
 import structlog
 
 LEVELS = {"debug": 10, "info": 20, "warning": 30, "error": 40}
-PERIOD_S = 10.0  # at most one line a reason in this time
+PERIOD_S = 10.0  # the time in which lines of one reason are bounded
 REASONS = 64  # more reasons than there are; a bound in case one slips in that a peer can choose
+WAITING_BYTES = 256 << 10  # of lines that nobody has read so far; what comes after them is thrown away, and counted
+LAST_S = 0.5  # how long the end waits for a reader to take the last lines
+STDOUT, STDERR = 1, 2
 
 
 def configure(level: str) -> None:
@@ -30,24 +40,101 @@ def configure(level: str) -> None:
     )
 
 
+class Writer:
+    """Writes lines to a descriptor, in their order, without making anybody wait.
+
+    A thread, because the descriptor is shared: one that we made non-blocking would be so for the shell that started us.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._lines: deque[bytes] = deque()  # the first one stays until it is written
+        self._size = 0
+        self._lost = 0
+        self._closed = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._run, name="log", daemon=True)
+        self._thread.start()
+
+    def put(self, line: str) -> None:
+        """Have a line written, or count it as lost where too much waits already."""
+        data = line.encode(errors="backslashreplace") + b"\n"
+        with self._changed:
+            if self._lost or self._size + len(data) > WAITING_BYTES:
+                self._lost += 1  # and those that follow, until it is said: so it is said where they are missing
+            else:
+                self._lines.append(data)
+                self._size += len(data)
+                self._changed.notify()
+
+    def close(self) -> None:
+        """Take no more lines and end, once all are written; waits LAST_S for that, not longer."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self._thread.join(LAST_S)
+
+    def _run(self) -> None:
+        signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # they are for the loop's thread
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._lines or self._lost or self._closed)
+                line = self._lines[0] if self._lines else None
+                if line is None:
+                    lost, self._lost = self._lost, 0
+                    if not lost:
+                        return
+            if line is None:
+                log.warning("log lines were thrown away, nobody read them", count=lost)
+                continue
+            self._write(line)
+            with self._changed:
+                self._size -= len(self._lines.popleft())
+
+    def _write(self, data: bytes) -> None:
+        while data:
+            try:
+                data = data[os.write(self._descriptor, data) :]
+            except BlockingIOError:  # somebody who shares it has made it so
+                select.select([], [self._descriptor], [])
+            except OSError:
+                return  # the other end is gone, or the disk full: thrown away
+
+
+_errors: Writer | None = None
+
+
+def say(line: str) -> None:
+    """Have a line written to standard error, where there is one."""
+    global _errors
+    if sys.stderr is not None:
+        _errors = _errors or Writer(STDERR)
+        _errors.put(line)
+
+
+def answer(line: str) -> None:
+    """Write one line to standard output, where there is one; waits LAST_S for a reader, not longer."""
+    if sys.stdout is not None:
+        writer = Writer(STDOUT)
+        writer.put(line)
+        writer.close()
+
+
+def close() -> None:
+    """Give whoever reads the log a moment to take the last lines. Another line begins anew."""
+    global _errors
+    if _errors is not None:
+        _errors.close()
+        _errors = None
+
+
 class _Printer:
-    """Writes lines to standard error; one that nobody reads any more must not stop the daemon."""
+    """What structlog hands finished lines to."""
 
     def msg(self, line: str) -> None:
-        if sys.stderr is not None:
-            say(sys.stderr, line)
+        say(line)
 
     debug = info = warning = error = exception = critical = msg
-
-
-def say(stream: TextIO, line: str) -> None:
-    """Write a line at once. Where the other end is gone, this and all that follows is thrown away."""
-    try:
-        print(line, file=stream, flush=True)
-    except OSError:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, stream.fileno())  # what is still buffered must not fail at the end either
-        os.close(nowhere)
 
 
 log: Any = structlog.get_logger()

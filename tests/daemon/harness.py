@@ -92,20 +92,18 @@ class Daemon:
         *flags: object,
         env: dict[str, str] | None = None,
         python: Iterable[str] = (),
-        pipes: bool = False,
+        stderr: int | None = None,
     ) -> None:
-        """`python` are flags of the interpreter; `pipes` makes standard error a pipe that nobody reads."""
+        """`python` are flags of the interpreter; `stderr` is a descriptor, or by default a file in `folder`."""
         self.folder = folder
         self.stderr_path = folder / "stderr.txt"
         clean = {key: value for key, value in os.environ.items() if not key.startswith("GESTURED_")}
         with self.stderr_path.open("ab") as errors:
             self.process = subprocess.Popen(
                 [sys.executable, *python, "-m", "gestured.daemon", *map(str, flags)],
-                stdout=subprocess.PIPE, stderr=subprocess.PIPE if pipes else errors,
+                stdout=subprocess.PIPE, stderr=errors if stderr is None else stderr,
                 env=clean | (env or {}), text=True,
             )  # fmt: skip
-        if self.process.stderr is not None:
-            self.process.stderr.close()
         self.ready: Line = {}
 
     @classmethod

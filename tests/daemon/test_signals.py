@@ -1,5 +1,6 @@
 """SIGTERM, SIGINT, SIGHUP; and what systemd is told."""
 
+import os
 import signal
 import socket
 from pathlib import Path
@@ -39,7 +40,8 @@ def test_reload_takes_a_new_model_and_configuration_and_keeps_what_was_learned(s
     path.write_bytes(model.read_bytes())
     config = tmp_path / "gestured.toml"
     config.write_text("")
-    daemon = start("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0", model=path)
+    flags = ("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0", "--stale-s", 30)
+    daemon = start(*flags, model=path)
     client = daemon.client().subscribe("gesture", "unknown")
     sensor = Sensor(daemon, "arm").begin().perform("left")
     assert client.line()["gesture"] == "swipe_left"
@@ -79,7 +81,7 @@ def test_reload_of_something_invalid_changes_nothing(start, model: Path, tmp_pat
     path.write_bytes(model.read_bytes())
     config = tmp_path / "gestured.toml"
     config.write_text("")
-    flags: tuple[object, ...] = ("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0")
+    flags: tuple[object, ...] = ("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0", "--stale-s", 30)
     if what == "model with a fallback":
         flags += ("--fallback", model)  # good enough to start with, but not to leave a good model for
     daemon = start(*flags, model=path)
@@ -125,7 +127,10 @@ def test_systemd_is_told(start, tmp_path: Path) -> None:
 
 
 def test_nobody_reads_its_output_any_more(start) -> None:
-    daemon = start("--clock", "sensor", "--log-level", "debug", pipes=True)
+    reader, writer = os.pipe()
+    daemon = start("--clock", "sensor", "--log-level", "debug", stderr=writer)
+    os.close(writer)
+    os.close(reader)
     daemon.process.stdout.close()
     client = daemon.client()
     Sensor(daemon, "arm").begin().perform("left", "tap")  # each event is logged to a pipe without a reader

@@ -1,0 +1,92 @@
+"""A log that nobody reads stops neither the daemon nor its end; what was thrown away is counted."""
+
+import json
+import os
+import pty
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gestured.daemon import log
+from tests.daemon.harness import DEADLINE_S, Daemon, Sensor, lines_of
+
+
+@pytest.fixture(params=["pipe", "terminal", "socket"])
+def unread(request: pytest.FixtureRequest) -> Iterator[int]:
+    """A descriptor that takes not one byte more, as those are that nobody reads."""
+    if request.param == "socket":  # as journald's is
+        ours, theirs = (sock.detach() for sock in socket.socketpair())
+    else:
+        ours, theirs = os.pipe() if request.param == "pipe" else pty.openpty()
+    os.set_blocking(theirs, False)
+    for size in (4096, 1):
+        try:
+            while True:
+                os.write(theirs, b"x" * size)
+        except BlockingIOError:
+            pass
+    os.set_blocking(theirs, True)
+    yield theirs
+    os.close(ours)
+    os.close(theirs)
+
+
+def test_a_daemon_whose_log_is_not_read_serves_and_ends(start, unread: int) -> None:
+    daemon = start("--clock", "sensor", "--log-level", "debug", stderr=unread)
+    client = daemon.client()
+    Sensor(daemon, "arm").begin().perform("left", "tap")
+    assert [line["gesture"] for line in client.events("gesture", "arm", 2)] == ["swipe_left", "one_tap"]
+    daemon.signal(signal.SIGTERM)
+    assert daemon.wait() == 0
+    assert os.get_blocking(unread)  # it is shared with others: whoever started the daemon finds it as it was
+
+
+def test_a_start_that_fails_ends_even_where_nobody_reads_why(tmp_path: Path, unread: int) -> None:
+    daemon = Daemon(tmp_path, "--config", tmp_path / "none.toml", stderr=unread)
+    assert daemon.wait() == 2
+
+
+def test_the_last_words_reach_a_reader_that_is_slow(start) -> None:
+    reader, writer = os.pipe()
+    daemon = start("--clock", "sensor", "--log-level", "debug", stderr=writer)
+    os.close(writer)
+    daemon.signal(signal.SIGTERM)
+    with open(reader) as lines:
+        assert list(lines_of(lines.read()))[-1]["event"] == "ended"
+    assert daemon.wait() == 0
+
+
+def test_what_was_thrown_away_is_counted_where_it_is_missing() -> None:
+    program = """if True:
+        import json, sys
+        from gestured.daemon import log
+        log.configure("info")
+        for number in range(5000):
+            log.log.info("a line", number=number, words="x" * 1000)
+        print(flush=True)
+        sys.stdin.read(1)
+        log.log.info("goodbye")
+        log.close()
+    """
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None and process.stderr is not None and process.stdin is not None
+        process.stdout.readline()
+        found: list[dict[str, object]] = []
+        while not found or "number" in found[-1]:
+            found.append(json.loads(process.stderr.readline()))
+        process.stdin.write(b".")
+        process.stdin.close()
+        rest = [json.loads(line) for line in process.stderr]
+        assert process.wait(DEADLINE_S) == 0
+    *lines, lost = found
+    assert [line["number"] for line in lines] == list(range(len(lines)))
+    assert lost["level"] == "warning" and lost["count"] == 5000 - len(lines) > 0
+    assert len(lines) * 1000 <= log.WAITING_BYTES + (1 << 20)  # and what the pipe itself holds
+    assert [line["event"] for line in rest] == ["goodbye"]
