@@ -2,7 +2,8 @@
 
 A request is `{"verb": NAME, ...}`, checked as a whole before anything happens; what a verb takes stands in one
 table (`operations.verbs`). An answer is `{"ok": true, ...}` or `{"ok": false, "reason": "..."}`. Requests of one
-connection are answered one after the other. The event socket knows none of this: it stays read-only.
+connection are answered one after the other, and those of all in turns between which the loop looks after its frames.
+The event socket knows none of this: it stays read-only.
 """
 
 import asyncio
@@ -10,72 +11,25 @@ import json
 import os
 import socket
 import struct
-from collections.abc import Awaitable, Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+import time
+from collections.abc import AsyncIterator, Iterator, Mapping
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from typing import Any
 
 from gestured.core.errors import GesturedError
-from gestured.daemon.log import Throttle, log
+from gestured.daemon.log import Throttle
+from gestured.daemon.request import MAX_LINE, Answer, Refusal, Stream, Verb, parse_request
 
-MAX_LINE = 4096  # bytes of a request
 CONNECTIONS = 16
+KEPT = 4  # more connections for root and our own user: no member of the group can lock them out
+IDLE_S = 60.0  # who asks nothing for so long, and is no tap, gives its place to others
+STALLED_S = 10.0  # the same for who does not read an answer
+LOGGED = 8  # lines of one verb and user in a log.PERIOD_S; what is more is counted
+PIECE_BYTES = 16 << 10  # of a stream that are made in one turn: less than a millisecond's work
+PAUSE_S = 0.1  # the longest pause after a turn
 BACKLOG_BYTES = 8 << 20  # of a connection that packets are streamed to; what is above is lost, and counted
 SO_PEERGROUPS = 59  # Linux 4.13; not in Python's socket module
-
-Answer = dict[str, Any]
-
-
-class Refusal(GesturedError):
-    """A request that is not carried out; the text is the reason."""
-
-
-@dataclass(frozen=True, slots=True)
-class Parameter:
-    """What a request may say: a JSON type, in words for those who got it wrong, and whether it must be there."""
-
-    kind: type | tuple[type, ...]
-    words: str
-    required: bool = False
-    check: Callable[[Any], bool] = lambda value: True
-
-
-@dataclass(frozen=True, slots=True)
-class Verb:
-    """What `run(connection, **parameters)` does; it gives the answer or raises Refusal."""
-
-    run: Callable[..., Awaitable[Answer]]
-    parameters: Mapping[str, Parameter] = field(default_factory=dict)
-    changes: bool = True  # and so is logged
-
-
-def parse_request(line: bytes, verbs: Mapping[str, Verb]) -> tuple[str, dict[str, Any]]:
-    """(verb, parameters) of one line; raises Refusal with the key, what was found and what was expected."""
-    try:
-        request = json.loads(line)
-    except (ValueError, RecursionError):
-        raise Refusal('expected one JSON object a line, such as {"verb":"status"}') from None
-    if not isinstance(request, dict) or not isinstance(request.get("verb"), str):
-        raise Refusal('verb: expected one JSON object with a "verb", such as {"verb":"status"}')
-    name = request.pop("verb")
-    if name not in verbs:
-        raise Refusal(f"verb: unknown {_short(name)}, expected one of {', '.join(verbs)}")
-    known = verbs[name].parameters
-    for key, value in request.items():
-        if key not in known:
-            raise Refusal(f"{name}: unknown key {_short(key)}, expected {', '.join(known) or 'no key'}")
-        parameter = known[key]
-        wrong = isinstance(value, bool) and parameter.kind is not bool
-        if wrong or not isinstance(value, parameter.kind) or not parameter.check(value):
-            raise Refusal(f"{name}.{key}: expected {parameter.words}, found {_short(value)}")
-    for key, parameter in known.items():
-        if parameter.required and key not in request:
-            raise Refusal(f"{name}.{key}: is missing, expected {parameter.words}")
-    return name, request
-
-
-def _short(value: object) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 class Connection:
@@ -84,6 +38,7 @@ class Connection:
     def __init__(self, writer: asyncio.StreamWriter) -> None:
         self._writer = writer
         self.lost = 0  # lines that found no room
+        self.tap = False  # it is sent packets and events, and need not ask for anything
         self._over = False
 
     def send(self, line: bytes) -> bool:
@@ -95,15 +50,6 @@ class Connection:
             return False
         self._writer.write(line)
         return True
-
-    async def pour(self, lines: Iterable[bytes]) -> None:
-        """Send them all, as fast as they are read."""
-        try:
-            for line in lines:
-                self._writer.write(line)
-                await self._writer.drain()
-        except OSError:
-            pass  # the reader went
 
     @property
     def closed(self) -> bool:
@@ -120,8 +66,11 @@ class ControlServer:
 
     def __init__(self, sock: socket.socket, verbs: Mapping[str, Verb]) -> None:
         self._sock, self._verbs = sock, verbs
-        self._throttle = Throttle()
+        self._throttle, self._journal = Throttle(), Throttle(burst=LOGGED)
         self._open: set[asyncio.StreamWriter] = set()
+        self._served = 0  # connections that have a place
+        self._streaming = False  # one at a time: each keeps what it sends in memory
+        self._quick, self._slow = asyncio.Lock(), asyncio.Lock()
 
     async def start(self) -> None:
         """Take connections from now on."""
@@ -137,14 +86,21 @@ class ControlServer:
         self._open.add(writer)
         try:
             who = _peer(writer.get_extra_info("socket"))
+            places = CONNECTIONS + (KEPT if who.ours else 0)
             if not who.may:
                 self._throttle.warn("control refused", "peer", uid=who.uid, pid=who.pid)
                 writer.write(_refusal("only root, the daemon's user and its group may control it"))
-            elif len(self._open) > CONNECTIONS:
-                writer.write(_refusal(f"more than {CONNECTIONS} connections"))
+            elif self._served >= places:
+                self._throttle.warn("control refused", "places", uid=who.uid, pid=who.pid, limit=places)
+                writer.write(_refusal(f"more than {places} connections"))
             else:
-                await self._answer_all(reader, writer, who)
-            await writer.drain()
+                self._served += 1
+                try:
+                    await self._answer_all(reader, writer, who)
+                finally:
+                    self._served -= 1
+            writer.transport.set_write_buffer_limits(0)
+            await _drain(writer)
         except (OSError, asyncio.CancelledError):
             pass  # gone, or we end
         finally:
@@ -155,7 +111,11 @@ class ControlServer:
         connection = Connection(writer)
         while True:
             try:
-                line = await reader.readline()
+                async with asyncio.timeout(None if connection.tap else IDLE_S):
+                    line = await reader.readline()
+            except TimeoutError:
+                writer.write(_refusal(f"nothing was asked for {IDLE_S:g} s; connect again"))
+                return
             except ValueError:  # what is longer cannot be told from what follows it
                 writer.write(_refusal(f"a request has at most {MAX_LINE} bytes"))
                 return
@@ -163,22 +123,75 @@ class ControlServer:
                 connection.end()
                 return
             if line.strip():
-                # On its way before what the verb streams after it.
-                writer.write(_line(await self._answer(connection, line, who)))
-                await writer.drain()
+                await self._answer(connection, writer, line, who)
+                await _drain(writer)
 
-    async def _answer(self, connection: Connection, line: bytes, who: "Peer") -> Answer:
-        try:
-            name, parameters = parse_request(line, self._verbs)
+    async def _answer(self, connection: Connection, writer: asyncio.StreamWriter, line: bytes, who: "Peer") -> None:
+        async with self._turn(self._quick):
+            try:
+                name, parameters = parse_request(line, self._verbs)
+            except Refusal as refusal:
+                writer.write(_refusal(str(refusal)))
+                return
             verb = self._verbs[name]
             if verb.changes:
-                log.info("control", verb=name, uid=who.uid, pid=who.pid, **parameters)
-            return {"ok": True, **await verb.run(connection, **parameters)}
+                user = {"verb": name, "uid": who.uid, "pid": who.pid}
+                self._journal.info("control", f"{name} by {who.uid}", **user, **parameters)
+        async with self._turn(self._slow if verb.slow else self._quick):
+            found = await self._run(connection, verb, parameters)
+            # On its way before what the verb streams after it.
+            writer.write(_line(found.answer if isinstance(found, Stream) else found))
+        if isinstance(found, Stream):
+            self._streaming = True
+            try:
+                await self._stream(connection, writer, found.lines)
+            finally:
+                self._streaming = False
+
+    async def _run(self, connection: Connection, verb: Verb, parameters: Mapping[str, Any]) -> Answer | Stream:
+        try:
+            found = await verb.run(connection, **parameters)
+            if not isinstance(found, Stream):
+                return {"ok": True, **found}
+            if self._streaming:
+                raise Refusal("it is being sent to somebody else; ask again when that is over")
+            return Stream({"ok": True, **found.answer}, found.lines)
         except GesturedError as error:
             return {"ok": False, "reason": str(error)}
         except Exception:  # a bug in a verb is this answer's end, not the daemon's
             self._throttle.error("a bug in a verb", "control")
             return {"ok": False, "reason": "a bug; the daemon's log has the traceback"}
+
+    async def _stream(self, connection: Connection, writer: asyncio.StreamWriter, lines: Iterator[bytes]) -> None:
+        while not connection.closed:
+            async with self._turn(self._quick):
+                size = 0
+                for line in lines:
+                    writer.write(line)
+                    size += len(line)
+                    if size >= PIECE_BYTES:
+                        break
+            if size < PIECE_BYTES:
+                return
+            await _drain(writer)
+
+    @asynccontextmanager
+    async def _turn(self, lock: asyncio.Lock) -> AsyncIterator[None]:
+        """For one operator. A pause as long as it took follows, so that half of the loop's time is left to frames."""
+        async with lock:
+            began = time.perf_counter()
+            yield
+            await asyncio.sleep(min(time.perf_counter() - began, PAUSE_S))
+
+
+async def _drain(writer: asyncio.StreamWriter) -> None:
+    """Wait until it is read, but for what the kernel keeps; raises TimeoutError where nobody reads."""
+    try:
+        async with asyncio.timeout(STALLED_S):
+            await writer.drain()
+    except TimeoutError:
+        writer.transport.abort()
+        raise
 
 
 def _line(answer: Mapping[str, Any]) -> bytes:
@@ -195,6 +208,7 @@ class Peer:
 
     pid: int
     uid: int
+    ours: bool  # root, or the daemon's own user
     may: bool
 
 
@@ -207,4 +221,5 @@ def _peer(sock: Any) -> Peer:
         groups |= set(struct.unpack(f"{len(raw) // 4}I", raw))
     except OSError:
         pass  # an old kernel, or in more groups than fit: its first group counts
-    return Peer(pid, uid, uid in (0, os.geteuid()) or os.getegid() in groups)
+    ours = uid in (0, os.geteuid())
+    return Peer(pid, uid, ours, ours or os.getegid() in groups)

@@ -141,14 +141,19 @@ log: Any = structlog.get_logger()
 
 
 class Throttle:
-    """Say the first of each reason at once, then at most one line in PERIOD_S with how many there were."""
+    """Say the first ones of each reason at once, then nothing until PERIOD_S are over, and then how many there were."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
-        self._state: dict[str, list[float]] = {}  # reason -> [time of the last line, count since]
+    def __init__(self, clock: Callable[[], float] = time.monotonic, burst: int = 1) -> None:
+        """`burst` is how many lines of one reason there are in PERIOD_S."""
+        self._clock, self._burst = clock, burst
+        self._state: dict[str, list[float]] = {}  # reason -> [when its period began, lines in it, count since the last]
+
+    def info(self, event: str, reason: str, /, **fields: Any) -> None:
+        """Log `event` with `reason` at a bounded rate: something that somebody did."""
+        self._say(log.info, event, reason, fields)
 
     def warn(self, event: str, reason: str, /, **fields: Any) -> None:
-        """Log `event` with `reason` at a bounded rate."""
+        """The same for something that is wrong."""
         self._say(log.warning, event, reason, fields)
 
     def error(self, event: str, reason: str, /, **fields: Any) -> None:
@@ -159,8 +164,10 @@ class Throttle:
         now = self._clock()
         if reason not in self._state and len(self._state) >= REASONS:
             reason = "other"
-        state = self._state.setdefault(reason, [-math.inf, 0])
-        state[1] += 1
+        state = self._state.setdefault(reason, [-math.inf, 0, 0])
         if now - state[0] >= PERIOD_S:
-            method(event, reason=reason, count=int(state[1]), **fields)
-            state[0], state[1] = now, 0
+            state[:2] = now, 0
+        state[2] += 1
+        if state[1] < self._burst:
+            method(event, reason=reason, count=int(state[2]), **fields)
+            state[1:] = state[1] + 1, 0

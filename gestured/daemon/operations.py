@@ -3,12 +3,14 @@
 import asyncio
 import time
 from collections.abc import Mapping
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from gestured import __version__
 from gestured.core.events import Gesture, Onset, Release
 from gestured.core.wire import is_sensor
-from gestured.daemon.control import Answer, Connection, Parameter, Refusal, Verb
+from gestured.daemon.control import Connection
+from gestured.daemon.request import Answer, Parameter, Refusal, Stream, Verb
 from gestured.daemon.status import status
 from gestured.daemon.tap import as_lines
 from gestured.models import open_model
@@ -31,10 +33,10 @@ def verbs(service: "Service") -> dict[str, Verb]:
     do = Operations(service)
     return {
         "status": Verb(do.status, changes=False),
-        "reload": Verb(do.reload),
+        "reload": Verb(do.reload, slow=True),
         "recalibrate": Verb(do.recalibrate, {"sensor": SENSOR}),
         "emit": Verb(do.emit, {"gesture": LABEL, "sensor": SENSOR}),
-        "shadow": Verb(do.shadow, {"model": MODEL}),
+        "shadow": Verb(do.shadow, {"model": MODEL}, slow=True),
         "tap": Verb(do.tap),
         "flight": Verb(do.flight),
     }
@@ -110,19 +112,18 @@ class Operations:
 
     async def tap(self, connection: Connection) -> Answer:
         """Stream packets and events over this connection from now on."""
+        if connection.tap:
+            raise Refusal("this connection is a tap already")
         self._service.tap(connection)
         return self.scene()
 
-    async def flight(self, connection: Connection) -> Answer:
+    async def flight(self, connection: Connection) -> Stream:
         """Stream what the flight recorder holds, then `{"type":"end"}`."""
         taps = self._service.taps
         if not taps.ring_bytes:
             raise Refusal("the flight recorder is off; set flight_recorder = MiB (or --flight-recorder) and restart")
         held = taps.flight()
-        task = asyncio.ensure_future(connection.pour([*as_lines(held), b'{"type":"end"}\n']))
-        self._service.tasks.add(task)
-        task.add_done_callback(self._service.tasks.discard)
-        return self.scene() | {"lines": len(held)}
+        return Stream(self.scene() | {"lines": len(held)}, chain(as_lines(held), (b'{"type":"end"}\n',)))
 
     def scene(self) -> dict[str, Any]:
         """What a recording must know to be understood without this daemon."""

@@ -9,7 +9,7 @@ import base64
 import json
 import time
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 
 from gestured.core import messages
 from gestured.core.events import Event, Status
@@ -43,6 +43,7 @@ class Taps:
 
     def join(self, connection: Connection) -> None:
         """Stream to this connection from now on."""
+        connection.tap = True
         self._live.append(connection)
 
     def packets(self, waiting: Sequence[tuple[bytes, Source]], now: float) -> None:
@@ -62,10 +63,10 @@ class Taps:
             if self.ring_bytes:
                 self._keep(time.monotonic_ns(), len(line) + OVERHEAD_BYTES, line)
 
-    def flight(self) -> list[Kept]:
-        """What the ring holds, oldest first."""
+    def flight(self) -> deque[Kept]:
+        """What the ring holds now, oldest first: the packets themselves, not copies of them."""
         self._forget(time.monotonic_ns())
-        return [what for _, _, what in self._ring]
+        return deque(what for _, _, what in self._ring)
 
     @property
     def held_bytes(self) -> int:
@@ -102,6 +103,8 @@ def packet_line(t_ns: int, source: Source, packet: bytes) -> bytes:
     return json.dumps(line, separators=(",", ":")).encode() + b"\n"
 
 
-def as_lines(flight: Iterable[Kept]) -> Iterable[bytes]:
-    """The ring's content as a tap would have streamed it."""
-    return (what if isinstance(what, bytes) else packet_line(*what) for what in flight)
+def as_lines(flight: deque[Kept]) -> Iterator[bytes]:
+    """The ring's content as a tap would have streamed it. It is taken out of `flight`: what was sent is let go."""
+    while flight:
+        what = flight.popleft()
+        yield what if isinstance(what, bytes) else packet_line(*what)

@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 
 from gestured.client.control import Control
 from gestured.client.stream import Refused, Unreachable
-from gestured.daemon.control import Parameter, Refusal, Verb, parse_request
 from gestured.daemon.operations import verbs
+from gestured.daemon.request import Parameter, Refusal, Verb, parse_request
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
 

@@ -1,0 +1,74 @@
+"""A request to the control socket: one line of JSON, held against the table of verbs as a whole."""
+
+import json
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from gestured.core.errors import GesturedError
+
+MAX_LINE = 4096  # bytes of a request
+
+Answer = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """An answer that lines follow. They are made as they are read."""
+
+    answer: Answer
+    lines: Iterator[bytes]
+
+
+class Refusal(GesturedError):
+    """A request that is not carried out; the text is the reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """What a request may say: a JSON type, in words for those who got it wrong, and whether it must be there."""
+
+    kind: type | tuple[type, ...]
+    words: str
+    required: bool = False
+    check: Callable[[Any], bool] = lambda value: True
+
+
+@dataclass(frozen=True, slots=True)
+class Verb:
+    """What `run(connection, **parameters)` does; it gives the answer or raises Refusal."""
+
+    run: Callable[..., Awaitable[Answer | Stream]]
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    changes: bool = True  # and so is logged
+    slow: bool = False  # it waits for another thread; what is quick need not wait for it
+
+
+def parse_request(line: bytes, verbs: Mapping[str, Verb]) -> tuple[str, dict[str, Any]]:
+    """(verb, parameters) of one line; raises Refusal with the key, what was found and what was expected."""
+    try:
+        request = json.loads(line)
+    except (ValueError, RecursionError):
+        raise Refusal('expected one JSON object a line, such as {"verb":"status"}') from None
+    if not isinstance(request, dict) or not isinstance(request.get("verb"), str):
+        raise Refusal('verb: expected one JSON object with a "verb", such as {"verb":"status"}')
+    name = request.pop("verb")
+    if name not in verbs:
+        raise Refusal(f"verb: unknown {_short(name)}, expected one of {', '.join(verbs)}")
+    known = verbs[name].parameters
+    for key, value in request.items():
+        if key not in known:
+            raise Refusal(f"{name}: unknown key {_short(key)}, expected {', '.join(known) or 'no key'}")
+        parameter = known[key]
+        wrong = isinstance(value, bool) and parameter.kind is not bool
+        if wrong or not isinstance(value, parameter.kind) or not parameter.check(value):
+            raise Refusal(f"{name}.{key}: expected {parameter.words}, found {_short(value)}")
+    for key, parameter in known.items():
+        if parameter.required and key not in request:
+            raise Refusal(f"{name}.{key}: is missing, expected {parameter.words}")
+    return name, request
+
+
+def _short(value: object) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else text[:57] + "..."
