@@ -5,8 +5,9 @@ merged first and validated once, as a whole; an error names the key, the value, 
 was expected. pydantic-settings would do the merging for 105 ms more at every start.
 """
 
+import os
+import stat
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
@@ -15,13 +16,22 @@ from gestured.core.errors import SettingsError
 from gestured.daemon.settings import FLAGS, AddressSettings, GestureSettings, Part, SensorSettings, Settings
 
 ENVIRONMENT = "GESTURED_"
+MAX_BYTES = 1 << 20  # of a configuration: many times what the largest number of sensors takes
+
+
+def _read(path: str) -> str:
+    # A FIFO or a device would make a plain open, or the read after it, wait for ever.
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY)) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode) or len(data := file.read(MAX_BYTES + 1)) > MAX_BYTES:
+            raise SettingsError(f"config: {path}: expected a regular file of at most {MAX_BYTES >> 20} MiB")
+    return data.decode()
 
 
 def _from_file(path: str) -> dict[str, Any]:
     import tomllib
 
     try:
-        found = tomllib.loads(Path(path).read_text("utf-8"))
+        found = tomllib.loads(_read(path))
     except OSError as error:
         raise SettingsError(f"config: cannot read {path}: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:

@@ -197,7 +197,7 @@ class Service:
         async with self._reloading:
             systemd.notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
             try:
-                settings = self._load()
+                settings = await asyncio.to_thread(self._load)  # a long file, or a slow disk
                 ladder, osc = await asyncio.to_thread(self._open, settings)  # frames are served meanwhile
             except Exception as error:
                 bug = not isinstance(error, GesturedError)

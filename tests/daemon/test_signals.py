@@ -75,7 +75,7 @@ def test_reload_with_other_gestures_changes_what_is_waited_for(start, tmp_path: 
     assert set(quick["scores"]) == {"one_tap", "swipe_left"} == set(daemon.client().hello["gestures"])
 
 
-@pytest.mark.parametrize("what", ["configuration", "model", "model with a fallback"])
+@pytest.mark.parametrize("what", ["configuration", "FIFO for a configuration", "model", "model with a fallback"])
 def test_reload_of_something_invalid_changes_nothing(start, model: Path, tmp_path: Path, what: str) -> None:
     path = tmp_path / "mine.onnx"
     path.write_bytes(model.read_bytes())
@@ -90,14 +90,17 @@ def test_reload_of_something_invalid_changes_nothing(start, model: Path, tmp_pat
     config.write_text(
         "[gestures.swipe_left]\nthreshold = 1.0\n" + ("nonsense = 1\n" if what == "configuration" else "")
     )
-    if what != "configuration":
+    if what == "FIFO for a configuration":
+        config.unlink()
+        os.mkfifo(config)
+    elif what != "configuration":
         path.write_bytes(model.read_bytes()[:3000])
     reload(daemon, "refused")
     sensor.perform("left")
     (event,) = client.events("gesture", "arm")
     assert (event["gesture"], event["model"]) == ("swipe_left", "mine")
     (said,) = (line for line in lines_of(daemon.stderr()) if "refused" in line["event"])
-    assert ("nonsense" if what == "configuration" else str(path)) in said["reason"]
+    assert {"configuration": "nonsense", "FIFO for a configuration": str(config)}.get(what, str(path)) in said["reason"]
 
 
 def test_systemd_is_told(start, tmp_path: Path) -> None:

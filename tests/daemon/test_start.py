@@ -143,6 +143,20 @@ def test_settings_that_are_not_valid(model, tmp_path, flags, env, file, said) ->
     assert all(word in text for word in said), text
 
 
+@pytest.mark.parametrize("what", ["a FIFO", "a device", "too large"])
+def test_a_configuration_that_is_no_small_file(model: Path, tmp_path: Path, what: str) -> None:
+    path = tmp_path / "gestured.toml"
+    if what == "a FIFO":
+        os.mkfifo(path)
+    elif what == "a device":
+        path = Path("/dev/zero")
+    else:
+        path.touch()
+        os.truncate(path, 300 << 20)
+    text = refused(2, "--model", model, "--socket", tmp_path / "s", "--config", path)
+    assert f"config: {path}" in text and "expected a regular file of at most 1 MiB" in text
+
+
 def test_flags_nobody_knows_and_help() -> None:
     assert run("--bogus")[0] == 2
     status, out, _ = run("--help")
