@@ -1,8 +1,8 @@
 """/metrics, /healthz and /readyz, from a thread with an event loop of its own.
 
 So they answer while the daemon's loop hangs, and then /healthz says 503. A connection has DEADLINE_S in all
-and a bounded request; slow clients wait on their own and hold nobody up. Only loaded where `--metrics` is
-set.
+and a bounded request; where there are too many, the oldest goes: slow clients hold up nobody who asks at once.
+Only loaded where `--metrics` is set.
 """
 
 import asyncio
@@ -10,6 +10,8 @@ import json
 import socket
 import threading
 from collections.abc import Callable, Mapping
+
+from gestured.daemon.sockets import AddressError
 
 DEADLINE_S = 5.0
 REQUEST_BYTES = 8192
@@ -32,15 +34,21 @@ def as_json(status: int, body: Mapping[str, object]) -> Answer:
 
 
 class HttpThread:
-    """Serves GET and HEAD of `routes` (path -> function that makes the answer) on a listening socket."""
+    """Serves GET and HEAD of `routes` (path -> function that makes the answer) on a listening socket.
+
+    Raises AddressError where it cannot, because there are too few descriptors for one.
+    """
 
     def __init__(self, sock: socket.socket, routes: dict[str, Callable[[], Answer]]) -> None:
         self._sock, self._routes = sock, routes
-        self._open = 0
+        self._open: dict[asyncio.StreamWriter, None] = {}  # oldest first
         self._started = threading.Event()
+        self._failed: OSError | None = None
         self._thread = threading.Thread(target=self._run, name="http", daemon=True)
         self._thread.start()
         self._started.wait()
+        if self._failed is not None:
+            raise AddressError(f"metrics: cannot serve: {self._failed.strerror}")
 
     def close(self) -> None:
         """Stop serving and close the socket."""
@@ -48,8 +56,14 @@ class HttpThread:
         self._thread.join(1.0)
 
     def _run(self) -> None:
-        with asyncio.Runner(loop_factory=asyncio.SelectorEventLoop) as runner:
-            runner.run(self._main())
+        try:
+            with asyncio.Runner(loop_factory=asyncio.SelectorEventLoop) as runner:
+                runner.run(self._main())
+        except OSError as error:
+            if self._started.is_set():
+                raise
+            self._failed = error
+            self._started.set()
 
     async def _main(self) -> None:
         self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
@@ -59,17 +73,20 @@ class HttpThread:
         server.close()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._open += 1
+        if len(self._open) >= CONNECTIONS:
+            oldest = next(iter(self._open))
+            del self._open[oldest]
+            oldest.transport.abort()
+        self._open[writer] = None
         try:
-            if self._open <= CONNECTIONS:
-                async with asyncio.timeout(DEADLINE_S):
-                    head = await reader.readuntil(b"\r\n\r\n")
-                    writer.write(self._answer(head))
-                    await writer.drain()
-        except (OSError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
-            pass  # too slow, too long or gone: not worth an answer
+            async with asyncio.timeout(DEADLINE_S):
+                head = await reader.readuntil(b"\r\n\r\n")
+                writer.write(self._answer(head))
+                await writer.drain()
+        except (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, asyncio.CancelledError):
+            pass  # too slow, too long or gone, or we end: not worth an answer
         finally:
-            self._open -= 1
+            self._open.pop(writer, None)
             writer.transport.abort() if writer.transport.get_write_buffer_size() else writer.close()
 
     def _answer(self, head: bytes) -> bytes:

@@ -19,13 +19,16 @@ from gestured.daemon.ladder import open_ladder
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.service import Loader, Service
 from gestured.daemon.settings import Settings
+from gestured.daemon.sockets import AddressError
 
 DESCRIPTORS = 4096  # for 1024 clients; the usual soft limit is 1024 in all
+FEWEST_DESCRIPTORS = 64  # for itself, operators, destinations and a few clients
 SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 
 def run(settings: Settings, load: Loader) -> None:
     """Run a daemon until it is asked to end. Raises AddressError, ModelError, SettingsError."""
+    _raise_descriptor_limit()
     import uvloop
 
     if sys.stderr is not None:
@@ -46,7 +49,6 @@ async def _run(settings: Settings, load: Loader) -> None:
     )
     for number, asked in zip(SIGNALS, (stop, stop, reload), strict=True):
         _when(number, partial(loop.call_soon_threadsafe, asked.set))
-    _raise_descriptor_limit()
     bound = bind_all(settings, systemd.passed_sockets())
     try:
         service = Service(settings, open_ladder(settings), bound, load)  # it alone holds them: a reload lets them go
@@ -91,5 +93,10 @@ def _announce(service: Service) -> None:
 def _raise_descriptor_limit() -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(DESCRIPTORS, hard)
+    if wanted < FEWEST_DESCRIPTORS:
+        raise AddressError(
+            f"the limit of open files (ulimit -n, LimitNOFILE=) is too low: expected at least {FEWEST_DESCRIPTORS}, "
+            f"found {hard}"
+        )
     if soft != resource.RLIM_INFINITY and soft < wanted:
         resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))

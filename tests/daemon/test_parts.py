@@ -1,11 +1,13 @@
 """Parts of the daemon by themselves, where a whole one cannot be brought into the state."""
 
 import asyncio
+import errno
 import ipaddress
 import json
 import socket
 import time
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -13,14 +15,14 @@ import pytest
 from gestured.core.errors import SettingsError
 from gestured.core.events import Event
 from gestured.core.wire import Arrival, Decoder
-from gestured.daemon import log
+from gestured.daemon import http, log
 from gestured.daemon.health import Health
 from gestured.daemon.http import HttpThread, as_json
 from gestured.daemon.merge import load
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.pipeline import Pipeline, allowed
 from gestured.daemon.settings import FLAGS, Settings
-from gestured.daemon.sockets import bind_udp
+from gestured.daemon.sockets import AddressError, bind_udp
 from gestured.daemon.udp import Receiver
 from gestured.daemon.values import Address
 from gestured.ladder import ladder_for
@@ -216,11 +218,40 @@ def test_http_answers_whatever_it_is_asked(web) -> None:
     assert ask(address, b"x" * 20_000) == b""
 
 
+def slow(address: tuple[str, int], count: int) -> list[socket.socket]:
+    """Connections that have begun a request and go no further."""
+    socks = [socket.create_connection(address, DEADLINE_S) for _ in range(count)]
+    for sock in socks:
+        with suppress(OSError):  # it had to make place already
+            sock.sendall(b"GET /ok HT")
+    return socks
+
+
 def test_slow_http_clients_hold_nobody_up(web) -> None:
     address, _ = web
-    slow = [socket.create_connection(address) for _ in range(30)]
-    for sock in slow:
-        sock.sendall(b"GET /ok HT")
-    assert ask(address, b"GET /ok HTTP/1.1\r\n\r\n").startswith(b"HTTP/1.1 200")
-    for sock in slow:
+    socks = slow(address, 3 * http.CONNECTIONS)
+    for _ in range(3):
+        assert ask(address, b"GET /ok HTTP/1.1\r\n\r\n").startswith(b"HTTP/1.1 200")
+        socks += slow(address, http.CONNECTIONS)
+    for sock in socks[: http.CONNECTIONS]:  # those that came first made place
+        with suppress(ConnectionResetError):
+            assert sock.recv(1) == b""
+    for sock in socks:
         sock.close()
+
+
+def test_a_request_has_so_much_time_in_all_however_it_trickles(web, monkeypatch) -> None:
+    monkeypatch.setattr(http, "DEADLINE_S", 0.05)
+    (sock,) = slow(web[0], 1)
+    with sock, pytest.raises(OSError):
+        while True:
+            sock.sendall(b"x")
+
+
+def test_http_that_cannot_start_says_so_instead_of_waiting(monkeypatch) -> None:
+    def broken() -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(asyncio, "SelectorEventLoop", broken)
+    with socket.create_server(("127.0.0.1", 0)) as sock, pytest.raises(AddressError, match="metrics: .*Too many open"):
+        HttpThread(sock, {})

@@ -157,6 +157,17 @@ def test_a_configuration_that_is_no_small_file(model: Path, tmp_path: Path, what
     assert f"config: {path}" in text and "expected a regular file of at most 1 MiB" in text
 
 
+@pytest.mark.parametrize("limit", [8, 20])
+def test_a_limit_of_open_files_that_is_too_low(model: Path, tmp_path: Path, limit: int) -> None:
+    command = [sys.executable, "-m", "gestured.daemon", "--model", model, "--listen", "127.0.0.1:0"]
+    command += ["--socket", tmp_path / "s", "--metrics", "127.0.0.1:0"]
+    done = subprocess.run(
+        ["prlimit", f"--nofile={limit}:{limit}", *map(str, command)], capture_output=True, text=True, timeout=DEADLINE_S
+    )
+    assert done.returncode == 4 and done.stderr.count("\n") == 1, done.stderr
+    assert f"found {limit}" in done.stderr and "expected at least 64" in done.stderr
+
+
 def test_flags_nobody_knows_and_help() -> None:
     assert run("--bogus")[0] == 2
     status, out, _ = run("--help")
