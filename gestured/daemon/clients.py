@@ -25,6 +25,9 @@ BACKLOG_BYTES = 256 << 10
 STALLED_S = 30.0  # a client that takes nothing for this long is cut off
 END, TEST = b"}\n", b',"test":true}\n'  # how a line ends
 READ_BYTES = 1024  # small: a client that sends rubbish waits its turn
+TURNS = 20  # reads and lines of one client in a second; what is more waits
+LINES = 16  # of all clients that are answered before the loop looks after its frames again
+RUBBISH = 100  # bad lines without a good one between them after which a client is cut off: some seconds of nothing else
 
 
 class Client:
@@ -39,7 +42,10 @@ class Client:
         self._waiting: deque[bytes] = deque()
         self._size = 0
         self._lost = 0
-        self._request = bytearray()
+        self.turns = TURNS  # that it has left in this second
+        self._request = bytearray()  # a line that is not complete
+        self._asked: deque[bytes] = deque()  # lines that wait for an answer
+        self._rubbish = 0
 
     @property
     def backlog(self) -> int:
@@ -77,33 +83,62 @@ class Client:
             self.blocked_since = time.monotonic()
 
     def read(self) -> None:
-        """Take requests; an end of file only means that no more will come."""
+        """Take requests; an end of file only means that no more will come. No more is read until they are answered."""
+        self._server.loop.remove_reader(self.sock)
+        self.turns -= 1
         try:
             data = self.sock.recv(READ_BYTES)
         except (BlockingIOError, InterruptedError):
+            self.go_on()
             return
         except OSError:
             self._server.remove(self)
             return
         if not data:
             self.half_closed = True
-            self._server.loop.remove_reader(self.sock)
             self._server.check(self)
             return
         *lines, rest = data.split(b"\n")
         for line in lines:
             self._request += line
-            self._answer(bytes(self._request))
+            if self._request.strip():
+                self._asked.append(bytes(self._request))
             self._request.clear()
         self._request += rest
-        del self._request[MAX_LINE + 1 :]  # one byte too many is enough to refuse it
+        if len(self._request) > MAX_LINE:
+            del self._request[MAX_LINE + 1 :]  # one byte too many is enough to refuse it
+            self._refuse()
+        self.go_on()
 
-    def _answer(self, line: bytes) -> None:
+    def answer(self) -> None:
+        """Answer one line."""
+        self.turns -= 1
         try:
-            if line.strip():
-                self._server.subscribe(self, parse_subscription(line))
+            self._server.subscribe(self, parse_subscription(self._asked.popleft()))
+            self._rubbish = 0
         except ProtocolError as error:
             self.send(messages.error_json(str(error)))
+            self._refuse()
+        self.go_on()
+
+    def go_on(self) -> None:
+        """See to what comes next, a line or a read, unless its turns are used up or it is gone."""
+        if self.turns > 0 and self.sock.fileno() >= 0:
+            if self._asked:
+                self._server.queue(self)
+            elif not self.half_closed:
+                self._server.loop.add_reader(self.sock, self.read)
+
+    def new_second(self) -> None:
+        """It has all its turns again."""
+        used_up, self.turns = self.turns <= 0, TURNS
+        if used_up:
+            self.go_on()
+
+    def _refuse(self) -> None:
+        self._rubbish += 1
+        if self._rubbish > RUBBISH:
+            self._server.cut_off(self, "rubbish")
 
     def _write(self, line: bytes) -> bytes | None:
         """What the socket did not take, or None if it took everything (or is gone)."""
@@ -137,6 +172,7 @@ class EventServer:
         self._listener, self._hello, self._throttle = listener, hello, Throttle()
         self._classes: dict[Subscription, set[Client]] = {}
         self._clients: set[Client] = set()
+        self._queue: deque[Client] = deque()  # each once, with a line that waits for its answer
         self.loop.add_reader(listener, self._accept)
 
     @property
@@ -187,14 +223,34 @@ class EventServer:
                 self.remove(client)
                 return
         if client.blocked_since is not None and time.monotonic() - client.blocked_since > STALLED_S:
-            self.metrics.evicted.add("stalled")
-            self._throttle.warn("client cut off", "stalled", seconds=STALLED_S)
+            self.cut_off(client, "stalled")
+
+    def cut_off(self, client: Client, reason: str) -> None:
+        """Remove a client that is a burden, and say so."""
+        if client in self._clients:
+            self.metrics.evicted.add(reason)
+            self._throttle.warn("client cut off", reason)
             self.remove(client)
+
+    def queue(self, client: Client) -> None:
+        """Answer a client's next line when it is its turn."""
+        self._queue.append(client)
+        if len(self._queue) == 1:
+            self.loop.call_soon(self._answer)
+
+    def _answer(self) -> None:
+        turn = [self._queue.popleft() for _ in range(min(LINES, len(self._queue)))]
+        if self._queue:
+            self.loop.call_soon(self._answer)
+        for client in turn:
+            if client in self._clients:
+                client.answer()  # it may queue again, for a later turn
 
     def tick(self) -> None:
         """Look after all clients; call it about once a second."""
         for client in tuple(self._clients):
             self.check(client)
+            client.new_second()
 
     async def close(self, drain_s: float) -> None:
         """Take no new clients, give the others `drain_s` seconds to read what waits, and end."""

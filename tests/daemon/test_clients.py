@@ -4,11 +4,13 @@ import asyncio
 import json
 import socket
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from gestured.core import messages
+from gestured.core.errors import ProtocolError
 from gestured.core.events import Onset
 from gestured.core.subscription import Subscription
 from gestured.daemon import clients
@@ -167,5 +169,65 @@ def test_an_event_is_encoded_once_for_all(listener, monkeypatch) -> None:
         await turn()
         assert server.count == 0
         await server.close(0)
+
+    asyncio.run(main())
+
+
+def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> None:
+    turn_of: list[int] = []  # in which turn of the loop each line was looked at
+    now = 0
+
+    def parse(line: bytes) -> Subscription:
+        turn_of.append(now)
+        raise ProtocolError("subscription", "rubbish")
+
+    monkeypatch.setattr(clients, "parse_subscription", parse)
+
+    async def main() -> None:
+        nonlocal now
+        server = EventServer(listener, lambda: b"", Metrics())
+        socks = [connect(listener) for _ in range(40)]
+        for sock in socks:
+            sock.send(b"x\n" * 500)
+        for seconds in range(1, 4):
+            looked_at = -1
+            while len(turn_of) != looked_at:  # until all have had their share of this second
+                looked_at = len(turn_of)
+                for _ in range(10):
+                    now += 1
+                    await asyncio.sleep(0)
+            assert 40 < len(turn_of) <= 40 * clients.TURNS * seconds
+            server.tick()
+        assert max(map(turn_of.count, set(turn_of))) <= clients.LINES
+        for sock in socks:
+            sock.close()
+        await server.close(0)
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("rubbish", [b"?\n" * 400, b"[" * 1000])
+def test_who_sends_nothing_but_rubbish_for_long_is_cut_off(listener, monkeypatch, rubbish: bytes) -> None:
+    monkeypatch.setattr(clients, "RUBBISH", 50)
+
+    async def main() -> None:
+        metrics = Metrics()
+        server = EventServer(listener, lambda: b"", metrics)
+        with connect(listener) as rude, connect(listener) as clumsy:
+            while server.count < 2:
+                await asyncio.sleep(0)
+            lines = b"?\n" * 20 + b'{"subscribe":{}}\n'
+            while not metrics.evicted.values:
+                with suppress(BlockingIOError):
+                    rude.send(rubbish)
+                with suppress(BlockingIOError):
+                    clumsy.send(lines)
+                await turn()
+                server.tick()
+            assert server.count == 1 and metrics.evicted.values == {("rubbish",): 1}
+            with suppress(ConnectionResetError):
+                while rude.recv(1 << 16):
+                    pass
+            await server.close(0)
 
     asyncio.run(main())

@@ -55,7 +55,10 @@ def test_there_are_at_most_200_series_whatever_arrives() -> None:
         metrics.dropped.add(reason)
     for result in ("sent", "refused", "full", "unreachable", "unresolved"):
         metrics.sent.add(result)
-    for counter, labels in ((metrics.evicted, ("stalled", "too_many")), (metrics.reloads, ("done", "refused"))):
+    for counter, labels in (
+        (metrics.evicted, ("stalled", "too_many", "rubbish")),
+        (metrics.reloads, ("done", "refused")),
+    ):
         for label in labels:
             counter.add(label)
     readings = {name: Reading(STATES[n % len(STATES)]) for n, name in enumerate(names)}

@@ -5,6 +5,8 @@ import resource
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import suppress
 
 import pytest
 
@@ -67,12 +69,19 @@ def connect(daemon: Daemon) -> socket.socket:
     return sock
 
 
-@pytest.mark.hostile
-def test_a_thousand_clients_of_which_some_never_read(start) -> None:
+@pytest.fixture
+def descriptors() -> Iterator[None]:
+    """Enough of them for a thousand clients."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if hard < 2048:
         pytest.skip(f"this test needs 2048 descriptors, there are {hard}")
     resource.setrlimit(resource.RLIMIT_NOFILE, (2048, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+@pytest.mark.hostile
+def test_a_thousand_clients_of_which_some_never_read(start, descriptors) -> None:
     daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0")
     readers = [connect(daemon) for _ in range(950)]
     stalled = [connect(daemon) for _ in range(50)]
@@ -91,7 +100,6 @@ def test_a_thousand_clients_of_which_some_never_read(start) -> None:
     watch.subscribe("status")
     while daemon.metric("gestured_clients") > 1:
         watch.line()
-    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
 def read_until(sock: socket.socket, last: int) -> list[int]:
@@ -118,7 +126,30 @@ def test_clients_that_send_rubbish_without_end_hold_nobody_up(start) -> None:
                 sock.send(b'{"subscribe":7}\n' * 1000 if n % 2 else b"[" * 16_000)
             except BlockingIOError:
                 pass  # the daemon has read as much as is its turn
+            except OSError:
+                pass  # it has had enough of this one
         sensor.perform("left")
         assert client.line()["sequence"] == n
+    for sock in rude:
+        sock.close()
+
+
+@pytest.mark.hostile
+def test_nine_hundred_clients_that_send_rubbish_hold_nobody_up(start, descriptors) -> None:
+    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0")
+    client = daemon.client()
+    rude = [connect(daemon) for _ in range(900)]
+    sensor = Sensor(daemon, "arm").begin()
+    for sock in rude:
+        sock.setblocking(False)
+    n = 0
+    while daemon.metric("gestured_clients_evicted_total", reason="rubbish") < 900:
+        for sock in rude:
+            with suppress(OSError):
+                sock.send(b"?\n" * 4000)
+        n += 1
+        sensor.begin().perform("left")
+        assert client.line()["sequence"] == n
+        assert daemon.get("/healthz")[0] == 200
     for sock in rude:
         sock.close()
