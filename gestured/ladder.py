@@ -12,7 +12,7 @@ import numpy as np
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Classifier, Scores
-from gestured.models import LADDER, gestures_of, open_model, shipped, shipped_name
+from gestured.models import LADDER, look_at, open_model, shipped, shipped_name
 
 
 class Rung:
@@ -24,19 +24,44 @@ class Rung:
         self.name = str(getattr(source, "name", None) or Path(str(source)).stem)
         self.slow = 0  # runs in a row
         self.aside_until = -math.inf
+        self._ships = isinstance(source, str | Path) and shipped_name(source) is not None
+        self._tried = ""  # sha256
+        self._refused: ModelError | None = None
 
     def open(self) -> Classifier:
+        """Its model. Not to be waited for: a file that does not ship is opened only after `gestures` has tried it."""
+        if self._refused is not None:
+            raise self._refused
         if self.model is None:
             assert isinstance(self.source, str | Path)
-            self.model = open_model(self.source)
+            self.model = open_model(self.source, self._tried)
         return self.model
 
+    def open_first(self) -> Classifier:
+        """Its model, however long it takes to try it."""
+        if self.model is None and not self._ships:
+            self.gestures()
+        return self.open()
+
     def gestures(self) -> tuple[str, ...]:
-        """Of a file without opening it: its metadata alone."""
-        if self.model is None:
-            assert isinstance(self.source, str | Path)
-            return gestures_of(self.source)
-        return tuple(self.model.gestures)
+        """What it knows. A file that ships is not opened for it; any other is tried, now and not again."""
+        if self.model is not None:
+            return tuple(self.model.gestures)
+        assert isinstance(self.source, str | Path)
+        if self._refused is not None:
+            raise self._refused
+        try:
+            gestures, self._tried = look_at(self.source)
+        except ModelError as error:
+            if not self._ships:
+                self._refused = error
+            raise
+        return gestures
+
+    @property
+    def gone(self) -> bool:
+        """Whether it cannot come back before a reload."""
+        return self._refused is not None
 
 
 class Ladder:
@@ -135,7 +160,7 @@ class Ladder:
         reasons = []
         for rung in self.rungs:
             try:
-                return rung, rung.open()
+                return rung, rung.open_first()
             except ModelError as error:
                 reasons.append(str(error))
                 self._put_aside(rung, str(error))
@@ -147,7 +172,10 @@ class Ladder:
             gestures = rung.gestures()
         except ModelError as error:
             if rung.aside_until == -math.inf:
-                self._report(f"{rung.name} could not be used: {error}")
+                if rung.gone:
+                    self._put_aside(rung, str(error))
+                else:
+                    self._report(f"{rung.name} could not be used: {error}")
             return
         if gestures != self.gestures:
             raise ModelError(
@@ -157,9 +185,10 @@ class Ladder:
 
     def _put_aside(self, rung: Rung, reason: str) -> None:
         rung.slow = 0
-        rung.aside_until = self._clock() + self.retry_after
+        rung.aside_until = math.inf if rung.gone else self._clock() + self.retry_after
         self.failures += 1
-        self._report(f"{rung.name} is put aside for {self.retry_after:g} s: {reason}")
+        until = "until a reload" if rung.gone else f"for {self.retry_after:g} s"
+        self._report(f"{rung.name} is put aside {until}: {reason}")
 
     def _timed(self, rung: Rung, took: float) -> None:
         rung.slow = rung.slow + 1 if took > self.slow_s else 0

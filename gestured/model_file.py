@@ -28,7 +28,12 @@ from gestured.core.window import Window
 MAX_BYTES = 64 * 1024 * 1024
 MAX_FIELDS = 500_000  # protobuf fields that are looked at; a shipped model has some thousands
 MAX_DEPTH = 16  # messages inside messages
-MAX_SELF_TEST = 1_000_000  # values
+MAX_PROPERTIES = 64  # metadata; a shipped model has a dozen
+MAX_TEXT = 2 << 20  # bytes of one of them; the largest is the self-test, some kilobytes
+MAX_METADATA = 4 << 20  # bytes of all of them
+MAX_ITEMS = 50_000  # of the lists and objects in one; each costs a hundred times as much memory as text
+MAX_NESTING = 16  # lists and objects inside each other in one
+MAX_SELF_TEST = 400_000  # values; more are no MAX_TEXT
 LABEL = re.compile(r"[a-z0-9_]{1,64}")
 
 # (message, field number) -> the message inside that is looked at; everything else is skipped.
@@ -179,13 +184,20 @@ def _add_property(data: bytes, fields: list[tuple[int, int, int, int]], properti
     texts = {1: "", 2: ""}
     for number, wire, first, last in fields:
         if wire == 2 and number in texts:
+            if last - first > MAX_TEXT:
+                # What is too long may come before its own name, or be it.
+                raise ValueError(f"has metadata {texts[1][:64]!r} of {last - first} bytes, expected at most {MAX_TEXT}")
             try:
                 texts[number] = data[first:last].decode()
             except UnicodeDecodeError:
                 raise ValueError("has metadata that is not UTF-8") from None
     if texts[1] in properties:
-        raise ValueError(f"has the metadata key {texts[1]!r} twice")
+        raise ValueError(f"has the metadata key {texts[1][:64]!r} twice")
     properties[texts[1]] = texts[2]
+    if len(properties) > MAX_PROPERTIES:
+        raise ValueError(f"has too many metadata, expected at most {MAX_PROPERTIES}")
+    if sum(len(key) + len(text) for key, text in properties.items()) > MAX_METADATA:
+        raise ValueError(f"has too long metadata, expected at most {MAX_METADATA} bytes in all")
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,6 +273,8 @@ class Metadata:
         missing = [k for k in (*required, "self_test", "training_data", "quantiles") if k not in properties]
         if missing:
             raise ValueError(f"has no metadata {', '.join(map(repr, missing))}, expected gestured's own")
+        for key, text in properties.items():
+            _check_extent(key, text)
         gestures = _names(properties, "gestures", 2, 64)
         if not all(LABEL.fullmatch(name) for name in (*gestures, properties["kind"])):
             raise ValueError("metadata 'gestures' and 'kind': expected 1 to 64 of a-z, 0-9, _ each")
@@ -295,6 +309,18 @@ class Metadata:
             quantiles=_json(properties["quantiles"], "quantiles", dict),
             self_test=SelfTest.from_json(properties["self_test"]),
         )
+
+
+def _check_extent(key: str, text: str) -> None:
+    """Counts what JSON in a value would become, before it is parsed."""
+    items = depth = 0
+    for found in re.finditer(r"[][{},]", text):
+        items += found[0] in "[{,"
+        depth += (found[0] in "[{") - (found[0] in "]}")
+        if items > MAX_ITEMS or depth > MAX_NESTING:
+            raise ValueError(
+                f"metadata {key[:64]!r}: expected at most {MAX_ITEMS} items, {MAX_NESTING} inside each other"
+            )
 
 
 def _names(properties: Mapping[str, str], key: str, least: int, most: int) -> tuple[str, ...]:

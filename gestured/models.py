@@ -1,17 +1,15 @@
 """Open, verify and self-test an .onnx file -> Classifier.
 
-A file is read once, checked against the manifest (where it is a shipped one), inspected without onnxruntime,
-opened from those bytes, held against its own metadata and made to reproduce its self-test. Whatever is wrong
-is one `ModelError`: the file, what is wrong, what was expected.
+A file is read once, checked against the manifest (where it is a shipped one) or opened in a process of its own first
+(where it is not: `model_process`), inspected without onnxruntime, opened from those bytes, held against its own metadata
+and made to reproduce its self-test. Whatever is wrong is one `ModelError`: the file, what is wrong, what was expected.
 """
 
 import hashlib
 import json
 import os
 import re
-import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -25,6 +23,7 @@ from gestured.core.features import feature_names, touch_pattern
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Scores
 from gestured.model_file import Metadata, inspect, read_bytes
+from gestured.model_process import ModelProcess, try_out
 from gestured.run_limit import limited
 
 LADDER = ("cnn_lstm", "lstm", "touch_pattern_rf")  # the shipped models, best first
@@ -32,7 +31,6 @@ TOLERANCE = 1e-3  # of the self-test: other processors round differently, anothe
 RUN_S = 1.5  # for one segment; it takes some milliseconds
 SELF_TEST_S = 10.0
 BATCH_S = 3600.0  # for any number of segments at once
-OPENING_BYTES = 512 << 20  # of address space that opening and self-testing may take; a shipped one needs 30 MiB
 
 
 class Model:
@@ -55,10 +53,9 @@ class Model:
                     f"metadata 'features': expected the {len(expected)} touch-pattern features of a "
                     f"{self.rows} x {self.columns} grid in their order"
                 )
-        with _bounded_memory():
-            self._session = _open_session(data)
-            self._input = self._check_shapes()
-            self.self_test_error = self._self_test()
+        self._session = _open_session(data)
+        self._input = self._check_shapes()
+        self.self_test_error = self._self_test()
 
     def classify(self, segment: Segment) -> Scores:
         """Scores of one segment. What is empty or not finite is unknown, whatever a net would say of it.
@@ -108,6 +105,22 @@ class Model:
         if not (both.min() >= -1e-4 and both.max() <= 1.0 + 1e-4 and np.abs(sums - 1.0).max() <= 1e-3):
             raise ValueError("outputs are not probabilities: expected 0 to 1, scores that add up to 1")
         return np.clip(scores, 0.0, 1.0), np.clip(unknown, 0.0, 1.0)
+
+    def report(self) -> dict[str, Any]:
+        """What is known of it, as JSON values."""
+        known = self.metadata
+        return {
+            "kind": known.kind,
+            "version": known.version,
+            "size": self.size,
+            "sha256": self.sha256,
+            "input": self._input,
+            "gestures": list(self.gestures),
+            "window": asdict(known.window),
+            "calibration": dict(known.calibration),
+            "training_data": known.training_data,
+            "self_test": {"largest_difference": self.self_test_error, "tolerance": TOLERANCE},
+        }
 
     def _check_shapes(self) -> str:
         """The input's name, once names, types and shapes agree with the metadata."""
@@ -180,34 +193,6 @@ def _open_session(data: bytes) -> Any:
         raise ValueError(f"onnxruntime cannot open it: {_brief(error)}") from None
 
 
-_opening = threading.Lock()
-
-
-@contextmanager
-def _bounded_memory() -> Iterator[None]:
-    """Bounds this process's address space: some 20 bytes of ONNX can ask for a tensor of any size.
-
-    Only where the system can say how much is in use (Linux); elsewhere nothing is bounded. One at a time: the
-    limit is the process's (other threads share what it leaves), and a reload may open models while the loop
-    opens a fallback.
-    """
-    with _opening:
-        try:
-            import resource
-
-            used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-        except (ImportError, OSError, ValueError, IndexError):
-            yield
-            return
-        soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-        limits = [limit for limit in (soft, hard) if limit != resource.RLIM_INFINITY]
-        resource.setrlimit(resource.RLIMIT_AS, (min([used + OPENING_BYTES, *limits]), hard))
-        try:
-            yield
-        finally:
-            resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
-
-
 def _brief(error: BaseException) -> str:
     text = " ".join(str(error).split()) or type(error).__name__
     text = re.sub(r"^\[ONNXRuntimeError\] : \d+ : ", "", text)
@@ -241,29 +226,31 @@ def shipped_name(source: str | Path) -> str | None:
 
 
 def _locate(source: str | Path) -> tuple[Path, str | None]:
-    """(path, the shipped model's name where it is one)."""
+    """(path, the shipped model's name where it is one).
+
+    A text without a slash is a shipped model's name. With `.onnx` at its end it is a file, too, where there is one.
+    """
     path = Path(source)
     known = shipped()
-    if isinstance(source, str) and os.sep not in source and not os.path.lexists(source):
+    if isinstance(source, str) and os.sep not in source and not (path.suffix == ".onnx" and os.path.lexists(source)):
         name = source.removesuffix(".onnx")
         if name not in known:
-            raise ModelError(f"{source}: no such file, and no shipped model ({', '.join(known)})")
+            missing = "no such file, and " if path.suffix == ".onnx" else ""
+            raise ModelError(
+                f"{source}: {missing}no shipped model (these are {', '.join(known)}); "
+                f"a file of another name is given with its folder, as ./{source}"
+            )
         return known[name], name
     try:
         if path.resolve() == known[path.stem].resolve():
             return path, path.stem
-    except (
-        KeyError,
-        OSError,
-        ValueError,
-        RuntimeError,
-    ):  # not one of them, or no path at all: reading says it
-        pass
+    except (KeyError, OSError, ValueError, RuntimeError):
+        pass  # not one of them, or no path at all: reading says it
     return path, None
 
 
-def _read(source: str | Path) -> tuple[Path, bytes]:
-    """The file's bytes; a shipped file's are those that its manifest knows."""
+def _read(source: str | Path) -> tuple[Path, str | None, bytes]:
+    """As `_locate`, and the file's bytes; a shipped file's are those that its manifest knows."""
     path, name = _locate(source)
     try:
         data = read_bytes(path)
@@ -273,7 +260,7 @@ def _read(source: str | Path) -> tuple[Path, bytes]:
                 raise ValueError(f"is not the shipped file: expected the sha256 {expected} of manifest.json")
     except ValueError as error:
         raise ModelError(f"{path}: {error}") from None
-    return path, data
+    return path, name, data
 
 
 def _manifest_sha256(path: Path) -> str:
@@ -284,41 +271,53 @@ def _manifest_sha256(path: Path) -> str:
         raise ValueError("is a shipped model, expected its sha256 in the manifest.json beside it") from None
 
 
-def open_model(source: str | Path) -> Model:
-    """Open and verify a model: a path, or the bare name of a shipped one. Raises ModelError."""
-    path, data = _read(source)
+def open_model(source: str | Path, tried: str | None = None) -> Model:
+    """Open and verify a model: a path, or the bare name of a shipped one. Raises ModelError.
+
+    What does not ship is tried in a process of its own first, which takes about half a second, at most some seconds;
+    not where its sha256 is that of a file that was `tried` before.
+    """
+    path, name, data = _read(source)
     try:
+        if name is None and tried is None:
+            try_out(data)
+        elif name is None and hashlib.sha256(data).hexdigest() != tried:
+            raise ValueError("is not the file that was tried any more; a reload takes the new one")
         return Model(data, path.stem)
     except ValueError as error:
         raise ModelError(f"{path}: {error}") from None
 
 
-def gestures_of(source: str | Path) -> tuple[str, ...]:
-    """What a model says it knows, without opening it: its metadata alone. Raises ModelError."""
-    path, data = _read(source)
+def look_at(source: str | Path) -> tuple[tuple[str, ...], str]:
+    """(gestures, sha256) of a model that `open_model` will open at once, because it ships or was tried here.
+
+    Raises ModelError.
+    """
+    path, name, data = _read(source)
     try:
-        return Metadata.parse(inspect(data)).gestures
+        if name is None:
+            report = try_out(data)
+            return tuple(report["gestures"]), report["sha256"]
+        return Metadata.parse(inspect(data)).gestures, hashlib.sha256(data).hexdigest()
+    except ValueError as error:
+        raise ModelError(f"{path}: {error}") from None
+
+
+def open_apart(source: str | Path) -> ModelProcess:
+    """Open and verify a model in a process of its own, and leave it there. Raises ModelError."""
+    path, _, data = _read(source)
+    try:
+        return ModelProcess(data, path.stem)
     except ValueError as error:
         raise ModelError(f"{path}: {error}") from None
 
 
 def check(source: str | Path) -> dict[str, Any]:
     """What `gesturectl check` reports of a good model, as JSON values; raises ModelError for any other."""
-    path, name = _locate(source)
-    model = open_model(source)
-    known = model.metadata
-    return {
-        "file": str(path),
-        "name": model.name,
-        "kind": known.kind,
-        "version": known.version,
-        "shipped": name is not None,
-        "size": model.size,
-        "sha256": model.sha256,
-        "input": "frames" if known.features is None else "features",
-        "gestures": list(model.gestures),
-        "window": asdict(known.window),
-        "calibration": dict(known.calibration),
-        "training_data": known.training_data,
-        "self_test": {"largest_difference": model.self_test_error, "tolerance": TOLERANCE},
-    }
+    path, name, data = _read(source)
+    try:
+        report = try_out(data) if name is None else Model(data, path.stem).report()
+    except ValueError as error:
+        raise ModelError(f"{path}: {error}") from None
+    first = {key: report[key] for key in ("kind", "version")}
+    return {"file": str(path), "name": path.stem, **first, "shipped": name is not None} | report

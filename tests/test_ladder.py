@@ -151,7 +151,9 @@ def test_some_rung_answers_whenever_one_can(story: list[tuple[list[bool], float]
 
 def test_fallback_is_opened_only_when_it_is_needed(shelf: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
-    monkeypatch.setattr("gestured.ladder.open_model", lambda source: opened.append(str(source)) or open_model(source))
+    monkeypatch.setattr(
+        "gestured.ladder.open_model", lambda source, *more: opened.append(str(source)) or open_model(source, *more)
+    )
     ladder = ladder_for("cnn_lstm")
     ladder.classify(segment())
     assert opened == ["cnn_lstm"]
@@ -192,3 +194,40 @@ def test_all_rungs_that_cannot_be_opened_are_named(shelf: Path) -> None:
     with pytest.raises(ModelError) as caught:
         ladder_for("cnn_lstm")
     assert all(f"{name}.onnx" in str(caught.value) for name in LADDER)
+
+
+def test_a_fallback_of_ones_own_is_tried_before_and_opened_without_delay(
+    shelf: Path, tmp_path: Path, monkeypatch
+) -> None:
+    one, other = build(tmp_path / "one.onnx"), build(tmp_path / "other.onnx")
+    ladder = ladder_for(one, [other])
+    monkeypatch.setattr("gestured.models.try_out", lambda data: pytest.fail("while something waits for an answer"))
+    ladder.rungs[0].model = Fake("one", Clock(), error=ModelError("broken"))
+    assert ladder.classify(segment()).model == "other"
+
+
+def test_a_fallback_that_was_replaced_is_not_opened_before_a_reload(shelf: Path, tmp_path: Path) -> None:
+    one, other = build(tmp_path / "one.onnx"), build(tmp_path / "other.onnx")
+    ladder = ladder_for(one, [other])
+    ladder.rungs[0].model = Fake("one", Clock(), error=ModelError("broken"))
+    build(other, version="another")
+    said: list[str] = []
+    ladder._report = said.append
+    with pytest.raises(ModelError):
+        ladder.classify(segment())
+    assert "other.onnx: is not the file that was tried" in said[-1]
+
+
+def test_a_file_of_ones_own_that_was_refused_is_not_tried_again_before_a_reload(
+    shelf: Path, tmp_path: Path, monkeypatch
+) -> None:
+    clock = Clock()
+    said: list[str] = []
+    bad, good = tmp_path / "bad.onnx", build(tmp_path / "good.onnx")
+    bad.write_bytes(b"damaged")
+    ladder = ladder_for(bad, [good], clock=clock, report=said.append)
+    assert said[0].startswith("bad is put aside until a reload")
+    monkeypatch.setattr("gestured.models.try_out", lambda data: pytest.fail("while something waits for an answer"))
+    build(bad)
+    clock.now += 1000.0
+    assert ladder.classify(segment()).model == "good"

@@ -14,10 +14,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured import model_file, models
+from gestured import model_file, model_process, models
 from gestured.core.errors import ModelError
 from gestured.core.features import touch_pattern
 from gestured.models import LADDER, open_model
+from tests.daemon import tiny_model
+from tests.hostile import bad_models
 from tests.small_model import GESTURES, WINDOW, build, oracle, segment
 
 
@@ -209,13 +211,81 @@ def test_self_test_of_another_shape_than_the_input(tmp_path: Path) -> None:
     assert "self-test" in refusal(build(tmp_path / "m.onnx", self_test=stored))
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("quantiles", '{"at": [' + "[]," * 100_000 + "[]]}", "'quantiles'"),  # small as text, large as lists
+        ("calibration", '{"a": ' + "[" * 50 + "]" * 50 + "}", "'calibration'"),
+        ("learned_from", "x" * 3_000_000, "'learned_from'"),  # one that nobody reads
+        ("window", "[" * 5000, "'window'"),
+    ],
+)
+def test_metadata_are_bounded_before_they_are_parsed(tmp_path: Path, key: str, value: str, words: str) -> None:
+    message = refusal(build(tmp_path / "m.onnx", **{key: value}))
+    assert words in message and "expected at most" in message
+
+
+def test_many_metadata_are_refused_too(tmp_path: Path) -> None:
+    message = refusal(build(tmp_path / "m.onnx", **{f"more_{i}": "x" * 1_000_000 for i in range(10)}))
+    assert "metadata" in message and "expected at most" in message
+
+
+def test_a_large_file_of_metadata_costs_little_more_than_its_size(tmp_path: Path) -> None:
+    path = bad_models.verbose(build(tmp_path / "good.onnx"), tmp_path / "bad.onnx")
+    script = (
+        "import resource, sys\nfrom gestured.models import check, ModelError\n"
+        "try: check(sys.argv[1])\nexcept ModelError as error: print(error)\n"
+        "print(max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)))"
+    )
+    done = subprocess.run([sys.executable, "-c", script, path], capture_output=True, text=True, check=True)
+    message, kib = done.stdout.splitlines()
+    assert "'quantiles'" in message
+    assert int(kib) < 300 << 10
+
+
+def test_a_file_whose_opening_never_ends_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_process, "OPEN_S", 2)
+    path = bad_models.endless(tiny_model.make(tmp_path / "tiny.onnx"), tmp_path / "endless.onnx")
+    assert "2 s" in refusal(path)
+
+
+def test_what_kills_onnxruntime_kills_a_process_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_process, "START", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    assert "SIGSEGV" in refusal(build(tmp_path / "m.onnx"))
+
+
+def test_a_file_is_tried_with_few_variables_and_no_descriptors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NOTIFY_SOCKET", "/run/somewhere")
+    monkeypatch.setattr(
+        model_process, "START",
+        "import json, os, sys; print(json.dumps({'error': f'{sorted(os.environ)} {os.getcwd()} '"
+        " + str(sorted(map(int, os.listdir('/proc/self/fd')))[:-1])}), flush=True)",
+    )  # fmt: skip
+    with open(tmp_path / "open", "w") as file:
+        os.set_inheritable(file.fileno(), True)
+        message = refusal(build(tmp_path / "m.onnx"))
+    assert "ORT_DISABLE_TELEMETRY" in message and "NOTIFY_SOCKET" not in message and "HOME" not in message
+    assert message.endswith(" / [0, 1, 2]")
+
+
+def test_a_folder_of_the_same_name_is_not_taken_for_the_program(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "gestured").mkdir()
+    (tmp_path / "gestured" / "__init__.py").write_text("raise SystemExit('not this one')")
+    build(tmp_path / "mine.onnx")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend("")
+    assert open_model("mine.onnx").name == "mine"
+
+
 def test_opening_leaves_the_limits_of_the_process_as_they_were(tmp_path: Path) -> None:
     before = resource.getrlimit(resource.RLIMIT_AS)
     open_model(build(tmp_path / "good.onnx"))
     refusal(build(tmp_path / "bad.onnx", extra="bomb"))
     assert resource.getrlimit(resource.RLIMIT_AS) == before
     with ThreadPoolExecutor(2) as pool:  # as a reload does it beside the loop
-        assert len(list(pool.map(open_model, [tmp_path / "good.onnx"] * 40))) == 40
+        assert len(list(pool.map(open_model, [tmp_path / "good.onnx"] * 4))) == 4
     assert resource.getrlimit(resource.RLIMIT_AS) == before
 
 
@@ -275,14 +345,23 @@ def test_bare_name_is_the_shipped_model(shelf: Path, source: str) -> None:
     assert models.check(source)["shipped"]
 
 
-def test_file_of_that_name_comes_before_the_shipped_model(shelf: Path) -> None:
+def test_a_name_without_a_suffix_is_a_shipped_models_always(shelf: Path) -> None:
+    build(Path("lstm"), version="mine")
+    assert open_model("lstm").metadata.version == "3"
+    assert models.check("lstm")["shipped"]
+    assert open_model("./lstm").metadata.version == "mine"
+
+
+def test_a_file_whose_name_ends_in_onnx_comes_before_the_shipped_model(shelf: Path) -> None:
     build(Path("lstm.onnx"), version="mine")
     assert open_model("lstm.onnx").metadata.version == "mine"
     assert open_model("lstm").metadata.version == "3"
 
 
-def test_unknown_bare_name_lists_the_shipped_ones(shelf: Path) -> None:
-    message = refusal("cnn_lsmt.onnx")
+@pytest.mark.parametrize("source", ["cnn_lsmt.onnx", "cnn_lsmt", "mine"])
+def test_unknown_bare_name_lists_the_shipped_ones(shelf: Path, source: str) -> None:
+    build(Path("mine"))
+    message = refusal(source)
     assert all(name in message for name in LADDER)
 
 

@@ -1,8 +1,11 @@
-"""Model files that pass every check, and misbehave when a touch lasts for more than two seconds."""
+"""Model files that misbehave: when they are read, when they are opened, or when a touch lasts for more than two seconds."""
 
 from pathlib import Path
 
-FRAMES = 30  # of a segment; up to here they answer like the model that they are made from
+import numpy as np
+
+FRAMES = 30  # of a segment; up to here those that pass every check answer like the model that they are made from
+KERNEL = 1_000_000  # values that one operator looks at for each of its answers
 
 
 def failing(good: Path, path: Path) -> Path:
@@ -38,9 +41,57 @@ def hanging(good: Path, path: Path) -> Path:
     return _make(good, path, nodes)
 
 
-def _make(good: Path, path: Path, nodes: list) -> Path:
+def stuck(good: Path, path: Path) -> Path:
+    """Never comes back, from a single operator, so that nobody can end the run: a norm of a million values, a million times."""
+    from onnx import TensorProto, helper
+
+    nodes = [
+        helper.make_node("Sub", ["duration", "room"], ["over"]),
+        helper.make_node("Relu", ["over"], ["above"]),
+        helper.make_node("Min", ["above", "at_most"], ["few"]),
+        helper.make_node("Mul", ["few", "kernel"], ["further"]),
+        helper.make_node("Add", ["further", "kernel"], ["width"]),
+        helper.make_node("Cast", ["width"], ["count"], to=TensorProto.INT64),
+        helper.make_node("Reshape", ["count", "as_vector"], ["vector"]),
+        helper.make_node("Concat", ["one_row", "vector"], ["line"], axis=0),
+        helper.make_node("Expand", ["nothing", "line"], ["values"]),
+        helper.make_node("LpPool", ["values"], ["norms"], kernel_shape=[KERNEL], strides=[1]),
+        helper.make_node("ReduceMax", ["norms"], ["extra"], keepdims=0),
+    ]
+    numbers = {
+        "kernel": np.float32(KERNEL),
+        "at_most": np.float32(1),
+        "as_vector": np.array([1]),
+        "one_row": np.array([1, 1]),
+    }
+    return _make(good, path, nodes, numbers)
+
+
+def endless(good: Path, path: Path) -> Path:
+    """Cannot be opened within hours: what is constant is worked out before anything runs, and that is what `stuck` does."""
+    from onnx import helper
+
+    nodes = [
+        helper.make_node("Expand", ["nothing", "line"], ["values"]),
+        helper.make_node("LpPool", ["values"], ["norms"], kernel_shape=[KERNEL], strides=[1]),
+        helper.make_node("ReduceMax", ["norms"], ["extra"], keepdims=0),
+    ]
+    return _make(good, path, nodes, {"line": np.array([1, 1, 2 * KERNEL])})
+
+
+def verbose(good: Path, path: Path) -> Path:
+    """Some 60 MB of metadata, which would be gigabytes once they are parsed."""
+    import onnx
+
+    model = onnx.load(good)
+    (quantiles,) = (entry for entry in model.metadata_props if entry.key == "quantiles")
+    quantiles.value = '{"at": [' + "[]," * 19_000_000 + "[]]}"
+    path.write_bytes(model.SerializeToString())
+    return path
+
+
+def _make(good: Path, path: Path, nodes: list, numbers: dict | None = None) -> Path:
     """`nodes` make `extra` (0 in a short segment) of `duration` (frames of the segment); it is added to the logits."""
-    import numpy as np
     import onnx
     from onnx import TensorProto, helper, numpy_helper
 
@@ -58,5 +109,7 @@ def _make(good: Path, path: Path, nodes: list) -> Path:
         model.graph.node.insert(at, node)
     for name, number in (("room", FRAMES), ("nothing", 0), ("many", 1e15)):
         model.graph.initializer.append(numpy_helper.from_array(np.array(number, np.float32), name))
+    for name, number in (numbers or {}).items():
+        model.graph.initializer.append(numpy_helper.from_array(np.asarray(number), name))
     path.write_bytes(model.SerializeToString())
     return path

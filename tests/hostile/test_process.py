@@ -1,5 +1,6 @@
 """What happens to the process and to what it stands on: its clock, its model, its memory, its output, its end."""
 
+import json
 import os
 import resource
 import signal
@@ -7,9 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from gestured.client.control import Control
+from gestured.client.lines import Refused
 from gestured.core.errors import ModelError
 from gestured.models import open_model
-from tests.daemon.harness import Sensor, counted, lines_of
+from tests.daemon.harness import Daemon, Sensor, counted, lines_of
 from tests.hostile import bad_models
 from tests.hostile.grammar import TYPES, violations
 
@@ -144,6 +147,108 @@ def test_a_model_that_hangs_is_ended_and_hands_over_to_the_next(start, model: Pa
     assert answers == [("tiny", True), ("tiny", True)]
     assert daemon.get("/healthz")[0] == 200 and daemon.metric("gestured_model_failures_total") == 1
     assert "did not answer" in daemon.stderr()
+
+
+def test_a_model_whose_opening_never_ends_is_no_model_to_start_with(model: Path, tmp_path: Path) -> None:
+    bad = bad_models.endless(model, tmp_path / "bad.onnx")
+    daemon = Daemon(tmp_path, "--model", bad, "--listen", "127.0.0.1:0", "--socket", tmp_path / "events.sock")
+    assert daemon.wait() == 3
+    assert "bad.onnx: could not be opened within" in daemon.stderr().splitlines()[-1]
+    daemon.stop()
+
+
+def test_the_end_does_not_wait_for_a_model_at_the_start(model: Path, tmp_path: Path) -> None:
+    bad = bad_models.endless(model, tmp_path / "bad.onnx")
+    daemon = Daemon(tmp_path, "--model", bad, "--listen", "127.0.0.1:0", "--socket", tmp_path / "events.sock")
+    tried = trial_of(daemon)
+    daemon.signal(signal.SIGTERM)
+    assert daemon.stop() == 0 and daemon.stderr() == ""
+    assert not alive(tried) and not (tmp_path / "events.sock").exists()
+
+
+@pytest.mark.parametrize("verb", ["reload", "shadow"])
+def test_the_end_does_not_wait_for_a_model_that_is_being_opened(start, model: Path, tmp_path: Path, verb: str) -> None:
+    path = tmp_path / "mine.onnx"
+    path.write_bytes(model.read_bytes())
+    daemon = start("--clock", "sensor", model=path)
+    client = daemon.client()
+    bad_models.endless(model, tmp_path / "bad.onnx").replace(path)
+    with Control(Path(daemon.ready["control"])) as control:
+        control.socket.sendall(
+            json.dumps({"verb": verb} | ({"model": str(path)} if verb == "shadow" else {})).encode() + b"\n"
+        )
+        tried = trial_of(daemon)
+        Sensor(daemon, "arm").begin().perform("left")
+        assert client.line()["gesture"] == "swipe_left"  # frames are served meanwhile
+        assert alive(tried)
+        assert daemon.stop() == 0
+    assert not alive(tried) and "Traceback" not in daemon.stderr()
+
+
+def test_a_model_whose_opening_never_ends_changes_nothing(start, model: Path, tmp_path: Path) -> None:
+    path = tmp_path / "mine.onnx"
+    path.write_bytes(model.read_bytes())
+    daemon = start("--clock", "sensor", model=path)
+    bad_models.endless(model, tmp_path / "bad.onnx").replace(path)
+    with Control(Path(daemon.ready["control"])) as control:
+        with pytest.raises(Refused, match="could not be opened within"):
+            control.ask("reload")
+        with pytest.raises(Refused, match="could not be opened within"):
+            control.ask("shadow", model=str(path))
+    client = daemon.client()
+    Sensor(daemon, "arm").begin().perform("left")
+    assert client.line()["gesture"] == "swipe_left"
+    assert daemon.stop() == 0
+
+
+def test_a_shadow_that_never_answers_holds_nobody_up(start, model: Path, tmp_path: Path) -> None:
+    bad = bad_models.stuck(model, tmp_path / "bad.onnx")
+    daemon = start("--clock", "sensor")
+    client = daemon.client().subscribe("gesture", "unknown")
+    with Control(Path(daemon.ready["control"])) as control:
+        control.ask("shadow", model=str(bad))
+        sensor = Sensor(daemon, "arm").begin().perform("left")
+        press(sensor)  # from here on it hangs
+        sensor.perform(*["left"] * 20)
+        assert [client.line().get("gesture") for _ in range(22)] == ["swipe_left", None, *["swipe_left"] * 20]
+        while (report := control.ask("status")["shadow"])["ended"] is None:
+            pass
+        assert "did not answer" in report["ended"] and report["dropped"] > 0
+        assert report["segments"] == 1 and report["agreement"] == 1.0
+        assert control.ask("shadow", model=str(model))["shadow"]["ended"] is None  # the next one can be tried
+
+
+def test_the_end_does_not_wait_for_a_shadow_that_never_answers(start, model: Path, tmp_path: Path) -> None:
+    bad = bad_models.stuck(model, tmp_path / "bad.onnx")
+    daemon = start("--clock", "sensor")
+    client = daemon.client().subscribe("unknown")
+    with Control(Path(daemon.ready["control"])) as control:
+        control.ask("shadow", model=str(bad))
+        candidate = trial_of(daemon)
+        press(Sensor(daemon, "arm").begin())
+        client.line()
+        assert daemon.stop() == 0
+    assert not alive(candidate) and "Traceback" not in daemon.stderr()
+
+
+def trial_of(daemon: Daemon) -> int:
+    """The process that a daemon has started to open a model, once there is one."""
+    children = Path(f"/proc/{daemon.process.pid}/task/{daemon.process.pid}/children")
+    if not children.exists():
+        pytest.skip("this kernel does not list children")
+    while True:
+        assert daemon.process.poll() is None, daemon.stderr()
+        for task in Path(f"/proc/{daemon.process.pid}/task").iterdir():
+            if found := (task / "children").read_text().split():
+                return int(found[0])
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs; one that is dead and waits to be collected does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 @pytest.mark.parametrize("how", ["replaced", "truncated", "removed"])
