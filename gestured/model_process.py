@@ -1,11 +1,12 @@
 """A model file that is opened in a process of its own: whatever it does there, it costs the daemon nothing.
 
-A graph of some kilobytes can ask onnxruntime for hours, for all memory, or for what crashes it; and a run that does not
-return cannot be ended from within a process. So a file that nobody has vouched for is opened, tested, and as a candidate
-also run, by `model_worker` in a child that has bounds for memory and for time.
+A graph of some kilobytes can ask onnxruntime for hours, for all memory, or for what crashes it; and a run that does
+not return cannot be ended from within a process. So a file that nobody has vouched for is opened, tested, and as a
+candidate also run, by `model_worker` in a child that has bounds for memory and for time.
 
-The protocol: the parent writes messages, 8 bytes of length and then the content; the first is the model file, each other a
-segment (`numpy.savez`). The child answers each with one line of JSON. It ends when its standard input does.
+The protocol: the parent writes messages: 8 bytes of length, a byte of seconds that the answer may take, the content.
+The first content is the model file, each other a segment (`numpy.savez`). The child answers each with one line of JSON.
+It ends when its standard input does.
 """
 
 import io
@@ -15,6 +16,7 @@ import signal
 import subprocess
 import sys
 import threading
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +35,7 @@ START = "import sys; sys.path[:] = sys.argv[1:]; from gestured.model_worker impo
 KEPT = ("LD_LIBRARY_PATH",)  # of the environment: some systems find the C++ library by it
 
 _turn = threading.Lock()  # one file is opened at a time: each child may take memory of the same service
-_children: "set[subprocess.Popen[bytes]]" = set()
+_children: "weakref.WeakSet[subprocess.Popen[bytes]]" = weakref.WeakSet()  # one that nobody holds ends by itself
 _ending = False
 
 
@@ -155,7 +157,6 @@ def _start() -> "subprocess.Popen[bytes]":
 
 def _collect(child: "subprocess.Popen[bytes]") -> None:
     child.wait()
-    _children.discard(child)
     for pipe in (child.stdin, child.stdout):
         if pipe is not None:
             try:

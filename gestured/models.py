@@ -1,8 +1,9 @@
 """Open, verify and self-test an .onnx file -> Classifier.
 
-A file is read once, checked against the manifest (where it is a shipped one) or opened in a process of its own first
-(where it is not: `model_process`), inspected without onnxruntime, opened from those bytes, held against its own metadata
-and made to reproduce its self-test. Whatever is wrong is one `ModelError`: the file, what is wrong, what was expected.
+A file is read once, checked against the manifest (where it is a shipped one) or opened in a process of its own
+first (where it is not: `model_process`), inspected without onnxruntime, opened from those bytes, held against its own
+metadata and made to reproduce its self-test. Whatever is wrong is one `ModelError`: the file, what is wrong, what was
+expected.
 """
 
 import hashlib

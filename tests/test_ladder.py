@@ -225,7 +225,7 @@ def test_a_file_of_ones_own_that_was_refused_is_not_tried_again_before_a_reload(
     said: list[str] = []
     bad, good = tmp_path / "bad.onnx", build(tmp_path / "good.onnx")
     bad.write_bytes(b"damaged")
-    ladder = ladder_for(bad, [good], clock=clock, report=said.append)
+    ladder = ladder_for(str(bad), [good], clock=clock, report=said.append)
     assert said[0].startswith("bad is put aside until a reload")
     monkeypatch.setattr("gestured.models.try_out", lambda data: pytest.fail("while something waits for an answer"))
     build(bad)

@@ -34,9 +34,10 @@ def run(args: argparse.Namespace) -> int:
         if args.stop:
             report = control.ask("shadow", model=None)["shadow"]
         elif args.model is not None:
-            # The daemon stands in another folder.
+            # The daemon stands in another folder. What has neither a slash nor .onnx is a shipped model's name.
             path = Path(args.model)
-            model = str(path.absolute()) if path.exists() or os.sep in args.model else args.model
+            is_file = os.sep in args.model or (path.suffix == ".onnx" and path.exists())
+            model = str(path.absolute()) if is_file else args.model
             try:
                 report = control.ask("shadow", model=model)["shadow"]
             except Refused as error:
@@ -55,7 +56,10 @@ def run(args: argparse.Namespace) -> int:
 
 def words(report: dict[str, Any]) -> Iterator[str]:
     """The lines of a report for a person."""
-    yield f"{report['model']} in the shadow: {report['segments']} segments, {report['failed']} failed"
+    dropped = f", {report['dropped']} dropped" if report["dropped"] else ""
+    yield f"{report['model']} in the shadow: {report['segments']} segments, {report['failed']} failed{dropped}"
+    if report["ended"] is not None:
+        yield f"  {report['ended']}"
     if report["agreement"] is not None:
         yield (
             f"  agreement {100 * report['agreement']:.1f} %, mean confidence {report['confidence']:.2f} "

@@ -13,7 +13,7 @@ from gestured.daemon.control import Connection
 from gestured.daemon.request import Answer, Parameter, Refusal, Stream, Verb
 from gestured.daemon.status import status
 from gestured.daemon.tap import as_lines
-from gestured.models import open_model
+from gestured.models import open_apart
 
 if TYPE_CHECKING:
     from gestured.daemon.service import Service
@@ -105,9 +105,9 @@ class Operations:
         watched = self._service.pipeline.watched
         if model is None:
             last, watched.shadow = watched.shadow, None
-            return {"shadow": last.report() if last else None}
-        opened = await asyncio.to_thread(open_model, model)
-        shadow = self._service.pipeline.watched.compare(opened)  # not `watched`: a reload may have come in between
+            return {"shadow": await asyncio.to_thread(last.finish) if last else None}
+        candidate = await asyncio.to_thread(open_apart, model)
+        shadow = self._service.pipeline.watched.compare(candidate)  # not `watched`: a reload may have come in between
         return {"shadow": shadow.report()}
 
     async def tap(self, connection: Connection) -> Answer:

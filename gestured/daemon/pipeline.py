@@ -226,6 +226,8 @@ class Pipeline:
         watched, shadow = Watched(ladder), self.watched.shadow
         if shadow is not None and shadow.candidate.gestures == watched.gestures:
             watched.shadow = shadow
+        elif shadow is not None:
+            shadow.close()
         self.watched = watched
         self._configure()
         for name, sensor in self.sensors.items():

@@ -20,10 +20,11 @@ from gestured.daemon.log import Throttle, log
 from gestured.daemon.service import Loader, Service
 from gestured.daemon.settings import Settings
 from gestured.daemon.sockets import AddressError
+from gestured.model_process import end_all
 
 DESCRIPTORS = 4096  # for 1024 clients; the usual soft limit is 1024 in all
 FEWEST_DESCRIPTORS = 64  # for itself, operators, destinations and a few clients
-SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+STOPS = (signal.SIGTERM, signal.SIGINT)
 
 
 def run(settings: Settings, load: Loader) -> None:
@@ -47,20 +48,24 @@ async def _run(settings: Settings, load: Loader) -> None:
     loop.set_exception_handler(
         lambda _, what: throttle.error("a bug in a callback", what["message"], exc_info=what.get("exception"))
     )
-    for number, asked in zip(SIGNALS, (stop, stop, reload), strict=True):
-        _when(number, partial(loop.call_soon_threadsafe, asked.set))
+    _when(signal.SIGHUP, partial(loop.call_soon_threadsafe, reload.set))
+    for number in STOPS:
+        _when(number, partial(sys.exit, 0))  # nobody waits for a model whose opening never ends
     bound = bind_all(settings, systemd.passed_sockets())
     try:
         service = Service(settings, open_ladder(settings), bound, load)  # it alone holds them: a reload lets them go
+        for number in STOPS:
+            _when(number, partial(loop.call_soon_threadsafe, stop.set))
         gc.freeze()  # what the start has made stays: later collections need not walk through it
         await service.start()
         _abort(signal.SIG_UNBLOCK)
         _announce(service)
         await service.serve(stop, reload)
-        for number in SIGNALS:  # nothing is left to be asked: a stop that is repeated must not look like a crash
+        for number in (*STOPS, signal.SIGHUP):  # a stop that is repeated now must not look like a crash
             signal.signal(number, signal.SIG_IGN)
     finally:
         bound.close()
+        end_all()  # threads may wait for a model that is being opened, and the end waits for threads
 
 
 def _abort(how: int) -> None:

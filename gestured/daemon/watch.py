@@ -1,7 +1,7 @@
 """The classifier that the daemon's recognizers use: a ladder, and who looks on once it has answered.
 
-Looking on takes some tenths of a millisecond (the shift) or one more inference (a shadow). It comes after the answer
-went out, and cannot change or prevent it.
+Looking on takes some tenths of a millisecond (the shift); a shadow's inference is another process's business. It comes
+after the answer went out, and cannot change or prevent it.
 """
 
 from gestured.core.errors import ModelError
@@ -11,6 +11,7 @@ from gestured.daemon.log import Throttle
 from gestured.daemon.shadow import Shadow
 from gestured.daemon.shift import Shift
 from gestured.ladder import Ladder
+from gestured.model_process import ModelProcess
 from gestured.models import Model
 
 
@@ -45,12 +46,15 @@ class Watched:
             except Exception:
                 self._throttle.error("a bug, caught", "in what looks on while models answer")
 
-    def compare(self, model: Model) -> Shadow:
+    def compare(self, candidate: ModelProcess) -> Shadow:
         """Run a candidate beside the ladder from now on. Raises ModelError for one that knows other gestures."""
-        if model.gestures != self.gestures:
+        if candidate.gestures != self.gestures:
+            candidate.close()
             raise ModelError(
-                f"{model.name}: expected the gestures of {self.ladder.name} in the same order "
-                f"({', '.join(self.gestures)}), found {', '.join(model.gestures)}"
+                f"{candidate.name}: expected the gestures of {self.ladder.name} in the same order "
+                f"({', '.join(self.gestures)}), found {', '.join(candidate.gestures)}"
             )
-        self.shadow = Shadow(model, model.name)
+        if self.shadow is not None:
+            self.shadow.close()
+        self.shadow = Shadow(candidate)
         return self.shadow

@@ -202,8 +202,10 @@ def test_a_shadow_sees_the_same_and_publishes_nothing(start, model: Path, tmp_pa
         assert control.ask("shadow", model=str(other))["shadow"]["segments"] == 0
         Sensor(daemon, "arm").begin().perform("left", "up")
         assert {e["model"] for e in client.events("gesture", "arm", 2)} == {"tiny"}
-        report = control.ask("status")["shadow"]
+        while (report := control.ask("status")["shadow"])["segments"] < 2:
+            pass  # it answers in its own time
         assert (report["model"], report["segments"], report["agreement"]) == ("candidate", 2, 1.0)
+        assert (report["failed"], report["dropped"], report["ended"]) == (0, 0, None)
         assert report["confidence"] == report["active_confidence"]
         control.socket.sendall(b'{"verb":"shadow","model":null}\n')
         assert next(control.lines())["shadow"]["segments"] == 2

@@ -17,11 +17,12 @@ from gestured.core.recognizer import Scores
 from gestured.core.window import Window
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.reading import STATES, Reading, by_label, together
-from gestured.daemon.shadow import Shadow
+from gestured.daemon.shadow import Comparison, Shadow
 from gestured.daemon.shift import LAST, LEAST, Shift, measured
 from gestured.daemon.vitals import Vitals, faulty
 from gestured.daemon.watch import Watched
 from gestured.ladder import ladder_for
+from gestured.models import open_apart
 from tests.daemon.harness import Daemon, Hand, Sensor
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
@@ -241,30 +242,34 @@ def test_what_is_measured_is_what_the_lab_measures_of_its_training_data() -> Non
         assert ours[name] == pytest.approx(expected, rel=0.02, abs=2e-3), name
 
 
-class Fixed:
-    gestures = ("tap", "swipe")
-
-    def __init__(self, *answers: tuple[float, float]) -> None:
-        self.answers = iter(answers)
-
-    def classify(self, segment: Segment) -> Scores:
-        tap, unknown = next(self.answers)  # in the end a StopIteration: any bug
-        return Scores(np.array([tap, 1 - tap], np.float32), unknown, "fixed")
-
-
 def test_a_shadow_counts_where_it_agrees() -> None:
-    segment = Segment(np.zeros((1, 2, 2), np.float32), np.zeros(1), 0, 0, 1.0)
-    shadow = Shadow(Fixed((0.9, 0.0), (0.2, 0.0), (0.9, 0.9), (0.8, 0.0)), "candidate")
-    active = [Scores(np.array(s, np.float32), u, "a") for s, u in (((1, 0), 0), ((1, 0), 0), ((1, 0), 0), ((1, 0), 0))]
-    assert shadow.report()["agreement"] is None
-    for scores in [*active, active[0]]:
-        shadow.see(segment, scores)
-    report = shadow.report()
-    assert (report["segments"], report["failed"]) == (5, 1)
-    assert (report["agreement"], report["active_confidence"]) == (0.5, 1.0)
+    seen = Comparison()
+    assert seen.report()["agreement"] is None
+    for candidate in (("tap", 0.9), ("swipe", 0.8), ("unknown", 0.1), ("tap", 0.8)):
+        seen.add(("tap", 1.0), candidate)
+    report = seen.report()
+    assert (report["agreement"], report["confidence"], report["active_confidence"]) == (0.5, 0.65, 1.0)
     assert report["disagreements"] == [
         {"active": "tap", "candidate": "swipe", "count": 1}, {"active": "tap", "candidate": "unknown", "count": 1},
     ]  # fmt: skip
+
+
+def test_a_shadow_that_dies_says_so_and_drops_the_rest(model: Path) -> None:
+    segment = Segment(np.ones((6, 9, 9), np.float32), np.arange(6) / 15, 1, 4, 1.0)
+    watched = Watched(ladder_for(model))
+    scores = watched.classify(segment)
+    shadow = watched.compare(open_apart(model))
+    shadow.see(segment, scores)
+    while shadow.report()["agreement"] is None:
+        pass
+    shadow.candidate.kill()
+    shadow.see(segment, scores)
+    while shadow.report()["ended"] is None:
+        pass
+    for _ in range(20):
+        shadow.see(segment, scores)
+    report = shadow.finish()
+    assert (report["segments"], report["failed"], report["dropped"], report["agreement"]) == (2, 1, 20, 1.0)
 
 
 def test_what_looks_on_cannot_prevent_an_answer(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -273,10 +278,11 @@ def test_what_looks_on_cannot_prevent_an_answer(model: Path, monkeypatch: pytest
     segment = Segment(frames, np.arange(6) / 15, 1, 4, 1.0)
     watched = Watched(ladder_for(model))
     expected = watched.classify(segment)
-    watched.shadow = Shadow(Fixed(), "candidate")
+    shadow = watched.compare(open_apart(model))
     monkeypatch.setattr(Shadow, "see", lambda self, segment, scores: 1 / 0)
     for _ in range(2):
         answer = watched.classify(segment)
         assert np.array_equal(answer.values, expected.values) and answer.unknown == expected.unknown
         watched.note(segment, answer, True)
         watched.look_on()
+    shadow.close()

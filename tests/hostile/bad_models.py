@@ -1,4 +1,4 @@
-"""Model files that misbehave: when they are read, when they are opened, or when a touch lasts for more than two seconds."""
+"""Model files that misbehave: when they are read, when they are opened, or when a touch lasts longer than usual."""
 
 from pathlib import Path
 
@@ -42,7 +42,7 @@ def hanging(good: Path, path: Path) -> Path:
 
 
 def stuck(good: Path, path: Path) -> Path:
-    """Never comes back, from a single operator, so that nobody can end the run: a norm of a million values, a million times."""
+    """Never comes back from a single operator, so that nobody can end the run: a million norms of a million values."""
     from onnx import TensorProto, helper
 
     nodes = [
@@ -68,7 +68,7 @@ def stuck(good: Path, path: Path) -> Path:
 
 
 def endless(good: Path, path: Path) -> Path:
-    """Cannot be opened within hours: what is constant is worked out before anything runs, and that is what `stuck` does."""
+    """Cannot be opened within hours: what is constant is worked out before anything runs, here the norms of `stuck`."""
     from onnx import helper
 
     nodes = [
