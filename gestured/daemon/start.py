@@ -4,9 +4,13 @@ import asyncio
 import faulthandler
 import gc
 import json
+import os
 import resource
 import signal
+import socket
 import sys
+import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -25,6 +29,7 @@ from gestured.model_process import end_all
 DESCRIPTORS = 4096  # for 1024 clients; the usual soft limit is 1024 in all
 FEWEST_DESCRIPTORS = 64  # for itself, operators, destinations and a few clients
 STOPS = (signal.SIGTERM, signal.SIGINT)
+END_S = 4.0  # for what is in flight, and for clients to read it; the units give it 5
 
 
 def run(settings: Settings, load: Loader) -> None:
@@ -49,6 +54,7 @@ async def _run(settings: Settings, load: Loader) -> None:
         lambda _, what: throttle.error("a bug in a callback", what["message"], exc_info=what.get("exception"))
     )
     _when(signal.SIGHUP, partial(loop.call_soon_threadsafe, reload.set))
+    _end_surely(loop)
     for number in STOPS:
         _when(number, partial(sys.exit, 0))  # nobody waits for a model whose opening never ends
     bound = bind_all(settings, systemd.passed_sockets())
@@ -83,6 +89,30 @@ def _when(number: signal.Signals, act: Callable[[], object]) -> None:
     A signal that comes in that moment may find a thread that does not block it, and there are some.
     """
     signal.signal(number, lambda *_: act())
+
+
+def _end_surely(loop: asyncio.AbstractEventLoop) -> None:
+    """See to it that a stop ends the process even where the loop's thread never comes back from a model.
+
+    Python's own handlers wait for that thread. What a signal writes to the wakeup descriptor any thread can read; we
+    take the loop's place there, so we wake it, too.
+    """
+    signals, wakeup = socket.socketpair()
+    wakeup.setblocking(False)
+    signal.set_wakeup_fd(wakeup.detach(), warn_on_full_buffer=False)
+
+    def watch() -> None:
+        while number := signals.recv(1):
+            try:
+                loop.call_soon_threadsafe(lambda: None)
+            except RuntimeError:
+                pass  # the loop is closed: what is left is the end of the process
+            if number[0] in STOPS:
+                time.sleep(END_S)
+                log.error("ended by force: it did not end by itself", seconds=END_S)
+                os._exit(1)
+
+    threading.Thread(target=watch, name="signals", daemon=True).start()
 
 
 def _announce(service: Service) -> None:

@@ -185,6 +185,16 @@ def test_the_end_does_not_wait_for_a_model_that_is_being_opened(start, model: Pa
     assert not alive(tried) and "Traceback" not in daemon.stderr()
 
 
+def test_the_end_does_not_wait_for_an_answer_that_never_comes(start, model: Path, tmp_path: Path) -> None:
+    bad = bad_models.stuck(model, tmp_path / "bad.onnx")
+    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", model=bad)
+    press(Sensor(daemon, "arm").begin())
+    while daemon.get("/healthz")[0] == 200:
+        pass
+    assert daemon.stop() == 1
+    assert "ended by force" in daemon.stderr()
+
+
 def test_a_model_whose_opening_never_ends_changes_nothing(start, model: Path, tmp_path: Path) -> None:
     path = tmp_path / "mine.onnx"
     path.write_bytes(model.read_bytes())
