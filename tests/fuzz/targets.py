@@ -20,6 +20,7 @@ from gestured.core.stamping import Stamper
 from gestured.core.subscription import parse_subscription
 from gestured.core.wire import Addresses, Arrival, Decoder
 from gestured.daemon.clients import Client, EventServer
+from tests.bounds import little_memory
 
 CORPUS = Path(__file__).with_name("corpus")
 BIG = "big"  # the sensor with 9 x 9 taxels; the others have 2 x 2, which a fuzzer hits more easily
@@ -156,12 +157,14 @@ def _touch() -> Segment:
 def model(data: bytes) -> None:
     """A file opens, and then gives probabilities, or is refused with a reason."""
     try:
-        opened = models.Model(data, "fuzzed")
+        with little_memory():
+            opened = models.Model(data, "fuzzed")
     except ValueError as error:
         assert str(error)
         return
     try:
-        scores = opened.classify(_touch())
+        with little_memory():
+            scores = opened.classify(_touch())
     except models.ModelError:
         return  # the ladder's next rung answers
     assert abs(float(scores.values.sum()) - 1.0) <= 2e-3 and 0.0 <= scores.unknown <= 1.0
