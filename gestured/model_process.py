@@ -105,11 +105,8 @@ class ModelProcess:
         """What it died of."""
         self.kill()
         status = self._child.wait()
-        doing = "answer" if hasattr(self, "report") else "open"
         if status == -signal.SIGALRM:
-            return (
-                f"could not be opened within {seconds} s" if doing == "open" else f"did not answer within {seconds} s"
-            )
+            return f"{'did not answer' if hasattr(self, 'report') else 'could not be opened'} within {seconds} s"
         if status == -signal.SIGKILL:
             return "was ended from outside: the program ends, or the machine has no memory left"
         what = signal.Signals(-status).name if status < 0 else f"status {status}"
