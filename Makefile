@@ -3,7 +3,7 @@
 # Two environments: .venv holds the runtime alone (what a vehicle gets), .venv-dev what tests and training need.
 # A stamp in each says that it is complete, so that the second run asks pip for nothing and works offline.
 
-.PHONY: help demo test lint bench lab hostile fuzz soak install uninstall system-test clean
+.PHONY: help demo test golden lint bench lab hostile fuzz soak install uninstall system-test clean
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
 MAKEFLAGS += --no-builtin-rules
@@ -32,6 +32,9 @@ demo: .venv/.runtime  ## recognise simulated gestures with the real daemon: SECO
 test: .venv-dev/.dev  ## run the tests: ARGS="tests/core -k tap"
 	@$(MAKE) -s --no-print-directory .venv-dev/.lab || echo "note: without the lab's packages its tests are skipped" >&2
 	@.venv-dev/bin/python -m pytest $(ARGS)
+
+golden: .venv-dev/.dev  ## play all golden tapes: the same packets give the same events (tests/golden)
+	@.venv-dev/bin/python -m pytest tests/golden -m "hostile or not hostile" $(ARGS)
 
 lint: .venv-dev/.dev  ## ruff and mypy
 	@.venv-dev/bin/ruff check .

@@ -38,7 +38,7 @@ def people() -> list[Tape]:
         "5, 30, 100 and 1000 frames a second, two sensors without counter and time tag",
         sent(hands(5, 90, replace(QUIET, rate_hz=5.0, jitter_s=0.01)), Form("slow", "uint16")),
         sent(hands(6, 60, replace(small, rate_hz=30.0)), Form("mid", "float32", plain=True), LEG, 0.02),
-        sent(hands(7, 40, replace(small, rate_hz=100.0)), Form("fast", "uint8"), ("10.0.0.3", 5003), 1.0),
+        sent(hands(7, 30, replace(small, rate_hz=100.0)), Form("fast", "uint8"), ("10.0.0.3", 5003), 1.0),
         sent(
             hands(8, 12, replace(small, rows=4, columns=4, pitch_mm=18.0, rate_hz=1000.0, jitter_s=0.0002)),
             Form("rapid", "uint8", plain=True),
@@ -51,19 +51,19 @@ def people() -> list[Tape]:
 
 
 def _wide(number: int) -> Tape:
-    """Five sensors as strange as the simulator knows them."""
+    """Four sensors as strange as the simulator knows them."""
     rng, found = generator(number, 0x31DE), list[tuple[int, Sensor]]()
     for seed in itertools.count(100 * number):
         sensor = Sensor.wide(rng, 0.8)
         if sensor.rows * sensor.columns <= 120 and sensor.gain < 400 and sensor.rate_hz < 40:
             found.append((seed, sensor))
-        if len(found) == 5:
+        if len(found) == 4:
             break
     packets = [
         sent(hands(seed, 40, sensor), Form(f"s{seed}", "ints"), ("10.0.1.1", 6000 + seed)) for seed, sensor in found
     ]
     grids = {f"s{seed}": {"grid": f"{sensor.rows}x{sensor.columns}"} for seed, sensor in found}
-    return tape(f"wide {number}", "five strange sensors", *packets, sensors=grids)
+    return tape(f"wide {number}", "four strange sensors", *packets, sensors=grids)
 
 
 def hand() -> list[Tape]:
@@ -121,7 +121,7 @@ def hand() -> list[Tape]:
             "clipped",
             "whole counts without the baseline; the usual sensor at its usual gain",
             sent(hands(35, 50, clipped), Form("arm", "uint8")),
-            sent(hands(36, 40, Sensor.nominal()), Form("leg", "uint16"), LEG, 0.03),
+            sent(hands(36, 25, Sensor.nominal()), Form("leg", "uint16"), LEG, 0.03),
         ),
     ]
 
