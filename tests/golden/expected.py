@@ -20,7 +20,7 @@ from tests.golden.path import Line
 from tests.golden.tape import Tape
 
 FOLDER = Path(__file__).parent / "expected"
-MACHINE = FOLDER / "machine.json"
+MACHINE = "machine.json"  # in each group's folder: where its lines were recorded
 # On another machine: how far these may be off, and what cannot be compared there at all.
 NEAR = {"confidence": 1e-4, "scores": 1e-4, "noise": 1e-6, "sums": 1e-3}
 EXACT_ONLY = {"digests", "looks"}
@@ -47,9 +47,9 @@ def machine() -> dict[str, str]:
     }
 
 
-def same_machine() -> bool:
-    """Whether the lines were recorded on a machine whose last bits are the same."""
-    return bool(json.loads(MACHINE.read_text()) == machine())
+def same_machine(group: str) -> bool:
+    """Whether a group's lines were recorded on a machine whose last bits are the same."""
+    return bool(json.loads((FOLDER / group / MACHINE).read_text()) == machine())
 
 
 def path_of(group: str, tape: Tape, kind: str = "events") -> Path:

@@ -43,7 +43,7 @@ def main() -> int:
             print(f"  {len(one.packets)} packets, {events.total()} events")
             kinds += events
             tapes += 1
-    expected.MACHINE.write_text(json.dumps(expected.machine(), indent=2) + "\n")
+        (expected.FOLDER / group / expected.MACHINE).write_text(json.dumps(expected.machine(), indent=2) + "\n")
     by_type = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
     print(f"{tapes} tapes, {kinds.total()} events ({by_type}), {size:,} bytes of expected lines")
     return 0

@@ -43,7 +43,7 @@ def some(groups: Iterable[str], long: Iterable[str]) -> list[Any]:
 
 def changes(group: str, tapes: list[Tape], kind: str, lines_of: Callable[[Tape], list[Line]]) -> Iterator[str]:
     """What differs, tape by tape."""
-    exact = expected.same_machine()
+    exact = expected.same_machine(group)
     for one in tapes:
         file = expected.path_of(group, one, kind)
         if found := expected.difference(file.read_text(), expected.written(one, lines_of(one)), exact):

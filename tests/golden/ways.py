@@ -112,11 +112,15 @@ def one_shot() -> list[Tape]:
     each = [(t, ("10.0.0.1", next(ports)), data) for t, _, data in sent(take, UINT16)]
     tool = [(t, ("10.0.0.1", next(ports)), data) for t, _, data in sent(other, UINT16, ARM, 0.03)[::40]]
     far = [(t, ("10.0.0.7", next(ports)), data) for t, _, data in sent(other, UINT16, ARM, 0.03)]
+    twice = [(t, ("10.0.0.1", 20_000 + i // 2), data) for i, (t, _, data) in enumerate(each)]
+    both = [*sent(take, UINT16), *sent(other, UINT16, ("10.0.0.1", 6001), 0.03)]
     return [
         tape("one-shot", "every packet from a port of its own", each),
         tape("one-shot, and a stranger", "and another host does the same", each, far[100:200]),
         tape("one-shot beside an owner", "a tool on the sensor's host", sent(take, UINT16), tool),
         tape("two one-shots", "two tools of one host under one name", each, tool),
+        tape("two packets a port", "a new port for every second packet", twice),
+        tape("two of one host", "two programs of one host under one name, each with a port of its own", both),
         tape("owner after one-shot", "a packet of a tool, then the sensor", tool[:1], sent(take, UINT16, ARM, 0.1)),
     ]
 
