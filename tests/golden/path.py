@@ -1,13 +1,10 @@
 """The one place where golden tapes meet today's code: whoever moves that code rewrites this file, and only this one.
 
-`play` is the daemon's own receiver and pipeline, with a socket and a clock that are written down. `replay` is the same
+`play` is the daemon's own pipeline, at times that are written down. `replay` is the same
 tape as a file that `gesturectl replay` plays. `front_ends` is the path up to the segments, without a classifier.
 """
 
-import asyncio
 import math
-import socket
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -22,11 +19,9 @@ from gestured.core.stamping import Stamp
 from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.pipeline import Pipeline
-from gestured.daemon.service import make_decoder
 from gestured.daemon.settings import Settings
-from gestured.daemon.udp import Receiver
 from gestured.ladder import Ladder
-from tests.golden.tape import Source, Tape
+from tests.golden.tape import Tape
 
 Line = dict[str, Any]
 MODEL = Path(__file__).parent / "models" / "cnn_lstm.onnx"
@@ -37,40 +32,18 @@ def open_model() -> Ladder:
     return Ladder([MODEL], slow_s=math.inf)
 
 
-class Waiting(socket.socket):
-    """A UDP socket on which nothing waits but what it was given."""
-
-    def __init__(self) -> None:
-        super().__init__(socket.AF_INET, socket.SOCK_DGRAM)
-        self.waiting: deque[tuple[bytes, Source]] = deque()
-
-    def recvfrom(self, size: int, flags: int = 0) -> Any:  # type: ignore[override]
-        """The next packet."""
-        if not self.waiting:
-            raise BlockingIOError
-        return self.waiting.popleft()
-
-
 def play(tape: Tape, model: Ladder) -> list[Line]:
     """What the daemon publishes, each event with the time at which it does; then its counts and its sensors."""
-    return asyncio.run(_play(tape, model))
-
-
-async def _play(tape: Tape, model: Ladder) -> list[Line]:
     lines: list[Line] = []
     now = 0.0
     settings = Settings.model_validate(dict(tape.settings))
     metrics = Metrics()
     pipeline = Pipeline(settings, model, metrics, lambda event: lines.append({"at": now} | _line(event)))
-    with Waiting() as sock:
-        receiver = Receiver(sock, pipeline, make_decoder(settings, pipeline), settings.allow, lambda: now)
-        for now, waiting in tape.steps():
-            if waiting is None:
-                pipeline.tick(now)
-            else:
-                sock.waiting.extend(waiting)
-                receiver.read_all()
-        receiver.close()
+    for now, waiting in tape.steps():
+        if waiting is None:
+            pipeline.tick(now)
+        else:
+            pipeline.receive(waiting, now)
     now = tape.end_ns / 1e9
     states = pipeline.states(now)
     for sensor in pipeline.sensors.values():
