@@ -165,7 +165,7 @@ STATUS = {
     "output": {"subscribers": 0, "backlog_bytes": 0, "lines_lost": 0, "evicted": {}, "osc": {HOSTILE: 1}},
     "loop_lag_s": 0.0, "internal_errors": 0, "reloads": {},
     "shadow": {"model": HOSTILE, "segments": 1, "failed": 0, "agreement": None,
-               "disagreements": [{"count": 1, "active": HOSTILE, "candidate": LONG}]},
+               "dropped": 0, "ended": HOSTILE, "disagreements": [{"count": 1, "active": HOSTILE, "candidate": LONG}]},
     "shift": {"gestures": 40, "outside": {HOSTILE: 0.5}, "unlike": [HOSTILE]},
 }  # fmt: skip
 ANSWERS = [
