@@ -11,7 +11,7 @@ from gestured.client.engine import Engine
 from gestured.client.sensor import Form, Sensor
 from gestured.client.stream import Stream
 from gestured.core.frames import Frame
-from gestured.models import open_model, shipped
+from gestured.model.model import open_model, shipped
 
 REPEATS = 7
 MORE = 200  # further sensors

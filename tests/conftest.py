@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from gestured import models
-from gestured.models import LADDER
+from gestured.model import model as models
+from gestured.model.model import LADDER
 from tests.small_model import build
 
 # No test asserts a time, and on a loaded machine Hypothesis' own limits would be one.

@@ -39,7 +39,7 @@ def npz(path: Path) -> object:
 
 def npz_alone(path: Path) -> object:
     """As whoever needs no more than the recordings reads it."""
-    from gestured.recording import read
+    from gestured.record.arrays import read
 
     return read(path)
 
@@ -48,8 +48,8 @@ def mcap(path: Path) -> object:
     """As `replay --diff` and `export` read it, with a model that has no answers."""
     from gestured.control import export
     from gestured.control.diff import Recorded
-    from gestured.offline import Mute, Replay
-    from gestured.recording_check import check
+    from gestured.record.check import check
+    from gestured.record.replay import Mute, Replay
 
     recorded = Recorded(path)
     replay = Replay(recorded.tape, recorded.scene, Mute(recorded.scene.gestures))
@@ -116,7 +116,7 @@ def main() -> None:
     missing = Path("/nowhere/at/all")
     refused(kind, missing)  # whatever is imported and started for it is there now
     if kind == "mcap":
-        from gestured.tape import library
+        from gestured.record.tape import library
 
         library()
     before, mapped = _kib("VmRSS"), _kib("VmSize")

@@ -9,7 +9,7 @@ import pytest
 from gestured.core.features import feature_names
 from gestured.core.frames import Segment
 from gestured.core.window import Window
-from gestured.model_file import SelfTest
+from gestured.model.file import SelfTest
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=0.1, tail_s=0.1, floor=4.0)
 GESTURES = ("one_tap", "swipe_up")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gestured.core.errors import RecordingError
-from gestured.recording import Recordings, read
+from gestured.record.arrays import Recordings, read
 
 FIELDS = [field.name for field in fields(Recordings)]
 

@@ -182,8 +182,8 @@ def test_a_member_that_unpacks_to_another_size_than_the_archive_says(tmp_path: P
 
 
 def test_nothing_is_written_that_could_not_be_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from gestured import recording
     from gestured.core.errors import RecordingError
+    from gestured.record import arrays as recording
 
     monkeypatch.setattr(recording, "MAX_BYTES", 500)
     with pytest.raises(RecordingError, match="not written: unpacks to"):

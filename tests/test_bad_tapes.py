@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from gestured import tape
 from gestured.control.cli import main
+from gestured.record import tape
 from tests.opening import in_bounds, refused
 
 pytest.importorskip("mcap", reason="recordings need the extra [record]")
@@ -193,7 +193,7 @@ def test_a_scene_that_is_no_json(tmp_path: Path, said: str) -> None:
 
 def test_sensors_are_as_many_as_the_daemon_would_have_taken(tmp_path: Path) -> None:
     from gestured.core import osc
-    from gestured.offline import Mute, Replay, Scene
+    from gestured.record.replay import Mute, Replay, Scene
 
     packets = [message(1, k * 10**7, osc.encode_message(f"/s{k}/pressure", "b", [bytes(81)])) for k in range(1000)]
     found = tape.read(write(tmp_path / "a.mcap", CHANNELS, *packets))
@@ -206,7 +206,7 @@ def test_sensors_are_as_many_as_the_daemon_would_have_taken(tmp_path: Path) -> N
 def test_a_model_that_only_the_tape_names_is_not_opened(
     tmp_path: Path, how: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from gestured import models
+    from gestured.model import model as models
 
     opened = []
     monkeypatch.setattr(models, "read_bytes", lambda path: opened.append(str(path)) or b"")

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from gestured import recording, tape
 from gestured.core.errors import RecordingError
-from gestured.files import PUBLIC, atomic_write, open_regular
+from gestured.record import arrays as recording
+from gestured.record import tape
+from gestured.record.files import PUBLIC, atomic_write, open_regular
 from tests.small_recording import example, session
 
 PACKAGE = Path(__file__).parent.parent / "gestured"

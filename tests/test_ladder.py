@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Scores
-from gestured.ladder import Ladder, ladder_for
-from gestured.models import LADDER, open_model
+from gestured.model.ladder import Ladder, ladder_for
+from gestured.model.model import LADDER, open_model
 from tests.small_model import GESTURES, build, segment
 
 
@@ -152,7 +152,8 @@ def test_some_rung_answers_whenever_one_can(story: list[tuple[list[bool], float]
 def test_fallback_is_opened_only_when_it_is_needed(shelf: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
     monkeypatch.setattr(
-        "gestured.ladder.open_model", lambda source, *more: opened.append(str(source)) or open_model(source, *more)
+        "gestured.model.ladder.open_model",
+        lambda source, *more: opened.append(str(source)) or open_model(source, *more),
     )
     ladder = ladder_for("cnn_lstm")
     ladder.classify(segment())
@@ -201,7 +202,7 @@ def test_a_fallback_of_ones_own_is_tried_before_and_opened_without_delay(
 ) -> None:
     one, other = build(tmp_path / "one.onnx"), build(tmp_path / "other.onnx")
     ladder = ladder_for(one, [other])
-    monkeypatch.setattr("gestured.models.try_out", lambda data: pytest.fail("while something waits for an answer"))
+    monkeypatch.setattr("gestured.model.model.try_out", lambda data: pytest.fail("while something waits for an answer"))
     ladder.rungs[0].model = Fake("one", Clock(), error=ModelError("broken"))
     assert ladder.classify(segment()).model == "other"
 
@@ -227,7 +228,7 @@ def test_a_file_of_ones_own_that_was_refused_is_not_tried_again_before_a_reload(
     bad.write_bytes(b"damaged")
     ladder = ladder_for(str(bad), [good], clock=clock, report=said.append)
     assert said[0].startswith("bad is put aside until a reload")
-    monkeypatch.setattr("gestured.models.try_out", lambda data: pytest.fail("while something waits for an answer"))
+    monkeypatch.setattr("gestured.model.model.try_out", lambda data: pytest.fail("while something waits for an answer"))
     build(bad)
     clock.now += 1000.0
     assert ladder.classify(segment()).model == "good"

@@ -1,4 +1,4 @@
-"""The import rule of ARCHITECTURE.md: core <- models, recording, simulator <- daemon | control | lab."""
+"""The import rule of ARCHITECTURE.md: core <- model, record, simulator, client <- daemon | control | lab."""
 
 import ast
 import subprocess
@@ -15,8 +15,8 @@ CORE_MAY = {"numpy", "dataclasses", "enum", "math", "struct", "json", "typing", 
 LAYERS = {"core": 0, "daemon": 2, "control": 2, "lab": 2}  # everything else is between them
 LAB_ONLY = {"torch", "sklearn", "onnx", "joblib", "scipy"}
 ONLY_IN = {
-    "onnxruntime": {"gestured/models.py"},
-    "mcap": {"gestured/tape.py"},
+    "onnxruntime": {"gestured/model/model.py"},
+    "mcap": {"gestured/record/tape.py"},
     "prometheus_client": {"gestured/daemon/metrics.py", "gestured/daemon/http.py"},
 }
 
@@ -79,10 +79,10 @@ def test_imports_go_downwards_only(path: Path) -> None:
         ("core/x.py", "import asyncio"),
         ("core/x.py", "from os import path"),
         ("core/x.py", "def f():\n    import pythonosc"),
-        ("core/x.py", "from gestured import models"),
-        ("core/x.py", "from ..recording import read"),
-        ("models.py", "import onnxruntime"),
-        ("models.py", "from gestured.daemon import log"),
+        ("core/x.py", "from gestured.model import model"),
+        ("core/x.py", "from ..record.arrays import read"),
+        ("model/model.py", "import onnxruntime"),
+        ("model/x.py", "from gestured.daemon import log"),
         ("daemon/x.py", "from gestured.lab import nets"),
         ("daemon/x.py", "from ..control import cli"),
         ("control/x.py", "def f():\n    import gestured.daemon.settings"),
@@ -95,9 +95,8 @@ def test_imports_go_downwards_only(path: Path) -> None:
 def test_the_rule_notices(where: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules[__name__], "ROOT", tmp_path)
     monkeypatch.setattr(sys.modules[__name__], "PACKAGE", tmp_path / "gestured")
-    for name in ("models.py", "recording.py"):
-        (tmp_path / "gestured").mkdir(exist_ok=True)
-        (tmp_path / "gestured" / name).touch()
+    for room in ("model", "record"):
+        (tmp_path / "gestured" / room).mkdir(parents=True)
     path = tmp_path / "gestured" / where
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(line)

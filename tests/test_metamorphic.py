@@ -25,7 +25,7 @@ from gestured.lab.stability.metamorphic import (
     turned,
 )
 from gestured.lab.stability.path import Stream, events, labels, segments, simulated
-from gestured.models import LADDER, Model, open_model, shipped
+from gestured.model.model import LADDER, Model, open_model, shipped
 
 COUNT = 40
 LEAST = 0.98  # of the labels, where a learned net decides

@@ -14,10 +14,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured import model_file, model_process, models
 from gestured.core.errors import ModelError
 from gestured.core.features import touch_pattern
-from gestured.models import LADDER, open_model
+from gestured.model import file as model_file
+from gestured.model import model as models
+from gestured.model import process as model_process
+from gestured.model.model import LADDER, open_model
 from tests.bounds import little_memory
 from tests.daemon import tiny_model
 from tests.hostile import bad_models
@@ -83,7 +85,7 @@ def test_opening_writes_nothing_prints_nothing_and_loads_no_lab(tmp_path: Path) 
     home.mkdir()
     good, bad = build(tmp_path / "good.onnx"), build(tmp_path / "bad.onnx", extra="bomb")
     script = (
-        "import sys\nfrom gestured.models import open_model, ModelError\nopen_model(sys.argv[1])\n"
+        "import sys\nfrom gestured.model.model import open_model, ModelError\nopen_model(sys.argv[1])\n"
         "try: open_model(sys.argv[2])\nexcept ModelError: pass\nelse: sys.exit('opened the bad one')\n"
         "sys.exit(str({'torch', 'onnx', 'sklearn'} & set(sys.modules) or ''))"
     )
@@ -236,7 +238,7 @@ def test_a_large_file_of_metadata_costs_little_more_than_its_size(tmp_path: Path
     path = bad_models.verbose(build(tmp_path / "good.onnx"), tmp_path / "bad.onnx")
     # The largest size of the process itself is read from /proc: getrusage's would be ours, from before the exec.
     script = (
-        "import re, resource, sys\nfrom gestured.models import check, ModelError\n"
+        "import re, resource, sys\nfrom gestured.model.model import check, ModelError\n"
         "try: check(sys.argv[1])\nexcept ModelError as error: print(error)\n"
         "print(max(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss,"
         " int(re.search(r'VmHWM:\\s+(\\d+)', open('/proc/self/status').read())[1])))"

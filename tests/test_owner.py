@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.owner import Owner
+from gestured.core.owner import Owner
 
 STALE_S = 1.0
 HOST = "10.0.0.1"

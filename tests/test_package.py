@@ -87,7 +87,7 @@ def test_the_wheel_holds_models_types_and_licences_and_nothing_else(installed: P
 
 
 def test_shipped_models_are_found_where_they_are_installed(installed: Path, tmp_path: Path):
-    code = "from gestured.models import shipped\nfor path in shipped().values(): print(path)"
+    code = "from gestured.model.model import shipped\nfor path in shipped().values(): print(path)"
     done = python_without(EXTRAS, code, installed, tmp_path)
     assert done.returncode == 0, done.stderr
     assert {Path(line).parent for line in done.stdout.splitlines()} == {installed / "gestured_models"}

@@ -17,7 +17,7 @@ import pytest
 
 from gestured.client.stream import Stream
 from gestured.core.osc import encode_bundle, encode_message
-from gestured.models import shipped
+from gestured.model.model import shipped
 
 ROOT = Path(__file__).resolve().parents[1]
 SESSIONS = ROOT.parent / "shared" / "data" / "capfingerid_sessions_dev.npz"

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured import recording
 from gestured.core.errors import RecordingError
-from gestured.recording import read, write
+from gestured.record import arrays as recording
+from gestured.record.arrays import read, write
 from tests.small_recording import FIELDS, example, refusal, same, save, session
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gestured.client.say import shown
-from gestured.offline import opened
+from gestured.record.replay import opened
 
 ONSET_S = 0.25  # answers whose onsets lie closer are about the same contact
 CONFIDENCE = 0.05  # what a baseline learned at another moment may change

@@ -18,7 +18,7 @@ from gestured.client.peer import Stranger
 from gestured.client.say import say, say_json
 from gestured.control.address import add_control, default_control
 from gestured.core.errors import ModelError
-from gestured.models import check
+from gestured.model.model import check
 
 BUFFER_BYTES = 4 << 20  # what the daemon asks of the kernel
 YEAR_S = 365 * 86_400

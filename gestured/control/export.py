@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from gestured import recording
 from gestured.client.say import tell
 from gestured.core.errors import RecordingError
 from gestured.core.wire import Arrival, Decoder
-from gestured.offline import Scene, opened
-from gestured.tape import Tape
+from gestured.record import arrays as recording
+from gestured.record.replay import Scene, opened
+from gestured.record.tape import Tape
 
 FINGERS = 3
 

@@ -8,7 +8,7 @@ from gestured.client.lines import Unreachable
 from gestured.client.say import tell
 from gestured.control.address import add_control, connect
 from gestured.control.record import Keeper
-from gestured.tape import Writer, library
+from gestured.record.tape import Writer, library
 
 LIMIT_BYTES = 2 << 30  # more than the ring may hold
 

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from gestured import recording
 from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form
 from gestured.control.diff import STOPWATCH_S, Answer, Difference, Knew, Line, Verdict
 from gestured.core.errors import RecordingError
 from gestured.core.stamping import Stamper
 from gestured.core.wire import Addresses
-from gestured.tape import Packet, Tape
+from gestured.record import arrays as recording
+from gestured.record.tape import Packet, Tape
 
 PAUSE_S = 3.0  # between two recordings: whatever is open is answered
 SESSION = "session"

@@ -17,8 +17,8 @@ from gestured.client.say import say, say_json
 from gestured.control.address import add_control, connect, finish_on_signals
 from gestured.core.errors import GesturedError
 from gestured.core.wire import Decoder
-from gestured.offline import Scene
-from gestured.tape import Writer, library
+from gestured.record.replay import Scene
+from gestured.record.tape import Writer, library
 
 FLUSH_S = 1.0  # what a crash or a power cut costs
 WAITING = 50_000  # lines; the daemon counts what finds no room

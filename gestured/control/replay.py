@@ -19,9 +19,9 @@ from gestured.control.sending import Hearing, retimed, send
 from gestured.core import messages
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.core.wire import is_sensor
-from gestured.ladder import Ladder, ladder_for
-from gestured.models import shipped
-from gestured.offline import Mute, Replay, Scene
+from gestured.model.ladder import Ladder, ladder_for
+from gestured.model.model import shipped
+from gestured.record.replay import Mute, Replay, Scene
 
 MODEL = "cnn_lstm"  # for a file that names none
 Source = Recorded | Labelled

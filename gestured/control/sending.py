@@ -18,8 +18,8 @@ from gestured.control.diff import ONSET_S, Line
 from gestured.core import osc
 from gestured.core.errors import GesturedError
 from gestured.core.stamping import Stamper
-from gestured.offline import Replay
-from gestured.tape import Packet, Tape
+from gestured.record.replay import Replay
+from gestured.record.tape import Packet, Tape
 
 Times = NDArray[np.float64]
 

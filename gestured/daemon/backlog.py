@@ -4,8 +4,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
+from gestured.core.owner import Source
 from gestured.daemon.mute import Sender
-from gestured.owner import Source
 
 TOGETHER_S = 0.004  # packets that arrived so close to each other are looked at together
 GROUP_BYTES = 64 << 10  # in one go at the most: 150 frames of 9 x 9 floats

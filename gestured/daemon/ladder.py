@@ -3,7 +3,7 @@
 from gestured.core.errors import ModelError, SettingsError
 from gestured.daemon.log import log
 from gestured.daemon.settings import Settings
-from gestured.ladder import Ladder, ladder_for
+from gestured.model.ladder import Ladder, ladder_for
 
 
 def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:

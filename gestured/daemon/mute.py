@@ -12,7 +12,7 @@ import struct
 from collections.abc import Collection, Iterable, Mapping
 from typing import NamedTuple
 
-from gestured.owner import Source
+from gestured.core.owner import Source
 
 TOO_MANY = 100  # packets of a sender that were dropped within a second
 FIRST_S = 1.0  # for which a sender is muted; each further time twice as long,

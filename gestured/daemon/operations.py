@@ -13,7 +13,7 @@ from gestured.daemon.control import Connection
 from gestured.daemon.request import Answer, Parameter, Refusal, Stream, Verb
 from gestured.daemon.status import status
 from gestured.daemon.tap import as_lines
-from gestured.models import open_apart
+from gestured.model.model import open_apart
 
 if TYPE_CHECKING:
     from gestured.daemon.service import Service

@@ -16,6 +16,7 @@ from gestured.core.conditioning import Mounting
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
+from gestured.core.owner import Owner, Source
 from gestured.core.recognizer import Recognizer, Scores
 from gestured.core.segmentation import Timing
 from gestured.core.stamping import Stamper
@@ -27,8 +28,7 @@ from gestured.daemon.settings import SensorSettings, Settings
 from gestured.daemon.values import Grid
 from gestured.daemon.vitals import Vitals, faulty
 from gestured.daemon.watch import Watched
-from gestured.ladder import Ladder
-from gestured.owner import Owner, Source
+from gestured.model.ladder import Ladder
 
 FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one that sends
 GIVEN = 4096  # names of sensors that are not there, whose numbers are remembered

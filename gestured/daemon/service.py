@@ -28,7 +28,7 @@ from gestured.daemon.sockets import kernel_drops, name_of
 from gestured.daemon.status import Recent
 from gestured.daemon.tap import Taps
 from gestured.daemon.udp import Receiver
-from gestured.ladder import Ladder
+from gestured.model.ladder import Ladder
 
 STATUS_S = 1.0
 DRAIN_S = 0.5

@@ -11,7 +11,7 @@ from typing import Any
 
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Classifier, Scores
-from gestured.model_process import ModelProcess
+from gestured.model.process import ModelProcess
 
 PAIRS = 10  # disagreements that a report names
 WAITING = 8  # segments; each may be some seconds of frames

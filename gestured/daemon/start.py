@@ -24,7 +24,7 @@ from gestured.daemon.log import Throttle, log
 from gestured.daemon.service import Loader, Service
 from gestured.daemon.settings import Settings
 from gestured.daemon.sockets import AddressError
-from gestured.model_process import end_all
+from gestured.model.process import end_all
 
 DESCRIPTORS = 4096  # for 1024 clients; the usual soft limit is 1024 in all
 FEWEST_DESCRIPTORS = 64  # for itself, operators, destinations and a few clients

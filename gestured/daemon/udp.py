@@ -13,11 +13,11 @@ import struct
 import time
 from collections.abc import Callable, Sequence
 
+from gestured.core.owner import Source
 from gestured.daemon.backlog import FLOOD_S, GROUP_BYTES, TOGETHER_S, Backlog, Datagram
 from gestured.daemon.mute import LONGEST_S, Muted, Sender, mute
 from gestured.daemon.pipeline import Pipeline
 from gestured.daemon.sockets import kernel_drops
-from gestured.owner import Source
 
 PACKET_BYTES = 65_536
 BATCH = 256  # packets in one read: half a millisecond, so that the kernel's buffer is empty again soon

@@ -10,9 +10,9 @@ from gestured.core.recognizer import Scores
 from gestured.daemon.log import Throttle
 from gestured.daemon.shadow import Shadow
 from gestured.daemon.shift import Shift
-from gestured.ladder import Ladder
-from gestured.model_process import ModelProcess
-from gestured.models import Model
+from gestured.model.ladder import Ladder
+from gestured.model.model import Model
+from gestured.model.process import ModelProcess
 
 
 class Watched:

@@ -20,7 +20,7 @@ from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Recognizer
 from gestured.lab.online import play
-from gestured.models import open_model
+from gestured.model.model import open_model
 from gestured.simulator import Participant, Sensor, Take, generator, session
 
 SECONDS = 300.0

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from gestured.lab.train import Plan
-from gestured.models import open_model
+from gestured.model.model import open_model
 
 WHAT = {
     "cnn_lstm": "Two convolutions with ReLU and max-pooling on each frame, an LSTM of 32 units over the frames (the paper's "

@@ -14,7 +14,7 @@ from gestured.lab.cli import REAL
 from gestured.lab.evaluate import Outcome, held_out_kinds, real_figures, simulated_figures
 from gestured.lab.export import write_manifest
 from gestured.lab.train import Plan, calibration_set, learn, load, train
-from gestured.models import LADDER, open_model
+from gestured.model.model import LADDER, open_model
 
 
 def _plan(args: argparse.Namespace) -> tuple[Plan, Path | None]:

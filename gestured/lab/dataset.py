@@ -23,8 +23,8 @@ from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
 from gestured.core.window import Window
-from gestured.files import PUBLIC, atomic_write
 from gestured.lab.progress import progress
+from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import (
     NON_GESTURES,
     SPEEDS,
@@ -39,7 +39,7 @@ from gestured.simulator import (
 )  # fmt: skip
 
 if TYPE_CHECKING:
-    from gestured.recording import Recordings
+    from gestured.record.arrays import Recordings
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 NONE = "none"

@@ -21,7 +21,7 @@ from gestured.lab.fit import CLASSES, padded, targets
 from gestured.lab.nets import Perceptron, Recurrent
 from gestured.lab.train import Calibrated, Data, Plan, Trained, folds, judged
 from gestured.lab.trajectory import trajectory_features
-from gestured.models import Model, open_model
+from gestured.model.model import Model, open_model
 from gestured.simulator import GESTURES
 
 GROUPS = 3  # of kinds of non-gestures held out

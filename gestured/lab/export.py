@@ -22,11 +22,11 @@ from sklearn.ensemble import RandomForestClassifier
 
 from gestured.core.errors import ModelError
 from gestured.core.window import Window
-from gestured.files import PUBLIC, atomic_write
 from gestured.lab.forest_graph import OPSET, Outputs, around_thresholds, forest_graph, forest_outputs
 from gestured.lab.recordings import origin
-from gestured.model_file import SelfTest, inspect
-from gestured.models import Model
+from gestured.model.file import SelfTest, inspect
+from gestured.model.model import Model
+from gestured.record.files import PUBLIC, atomic_write
 
 PARITY = 1e-4
 BATCHES = (1, 2, 7)

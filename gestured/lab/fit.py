@@ -15,12 +15,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from gestured.files import PUBLIC, atomic_write
 from gestured.lab.augment import symmetry_table, turned, varied
 from gestured.lab.dataset import NONE, WINDOW, Samples
 from gestured.lab.nets import CnnLstm, Lstm
 from gestured.lab.progress import progress
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features
+from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES, NON_GESTURES
 
 REAL_KINDS = {"tap_hold": "long_press", "drag_diagonal": "diagonal_swipe"}  # what real non-gestures are

@@ -28,7 +28,7 @@ from gestured.lab.fit import CLASSES, FitConfig, finetune, load_nets, logits, pr
 from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.nets import Judged
 from gestured.lab.recordings.origin import origins
-from gestured.recording import read
+from gestured.record.arrays import read
 from gestured.simulator import GESTURES, NONE, wide
 
 REAL = ("capfingerid_gestures_dev.npz", "capfingerid_sessions_dev.npz")

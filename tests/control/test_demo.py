@@ -9,7 +9,7 @@ import pytest
 
 import gestured
 from gestured.client.engine import Engine
-from gestured.models import shipped
+from gestured.model.model import shipped
 
 pytestmark = [
     pytest.mark.e2e,

@@ -16,10 +16,11 @@ from hypothesis import example as such_as
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured import recording, tape
 from gestured.client.say import MOST, shown
 from gestured.control.sniff import Sight, propose
 from gestured.core.wire import Addresses, is_sensor
+from gestured.record import arrays as recording
+from gestured.record import tape
 from tests.control.conftest import HELLO, ROOT, FakeDaemon, environment, gestures
 from tests.control.test_listen import GESTURE
 from tests.daemon.harness import Hand, floats
@@ -286,7 +287,7 @@ def test_an_error_about_a_file_is_one_line(run, tmp_path: Path) -> None:
         plain(err)
 
 
-def test_replay_shows_what_was_recorded(recorded, run, daemon, tmp_path: Path) -> None:
+def test_replay_shows_what_was_recorded(recorded, run, daemon, model: Path, tmp_path: Path) -> None:
     pytest.importorskip("mcap", reason="recordings need the extra [record]")
     path, _ = recorded(gestures(daemon, "tape", "left", "tap"))
     found = tape.read(path)
@@ -297,7 +298,7 @@ def test_replay_shows_what_was_recorded(recorded, run, daemon, tmp_path: Path) -
             changed = {"gesture": HOSTILE} if event["type"] == "gesture" else {}
             writer.event(found.packets[-1].t_ns, event | changed)
     for more in ([], ["--json"]):
-        status, out, err = run("replay", tmp_path / "hostile.mcap", "--diff", *more)
+        status, out, err = run("replay", tmp_path / "hostile.mcap", "--diff", "--model", model, *more)
         assert status == 1 and "owned" in out, err
         plain(out + err)
 

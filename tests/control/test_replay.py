@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gestured import recording
 from gestured.control.cli import main
-from gestured.recording import Recordings
+from gestured.record import arrays as recording
+from gestured.record.arrays import Recordings
 from tests.control.conftest import gestures
 from tests.daemon import tiny_model
 from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gestured import recording, tape
 from gestured.control.cli import main
 from gestured.control.diff import Answer, Difference, differences
 from gestured.core.errors import RecordingError
 from gestured.core.wire import Addresses, Decoder
+from gestured.record import arrays as recording
+from gestured.record import tape
 from tests.control.conftest import gestures
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor

@@ -15,8 +15,8 @@ from gestured.core import osc, wire
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.pipeline import Pipeline
 from gestured.daemon.settings import Settings
-from gestured.ladder import ladder_for
-from gestured.models import shipped
+from gestured.model.ladder import ladder_for
+from gestured.model.model import shipped
 from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor, floats
 
 NEVER = {"torch", "sklearn", "pywt", "matplotlib", "scipy", "onnx", "mcap"}

@@ -21,8 +21,8 @@ from gestured.daemon.shadow import Comparison, Shadow
 from gestured.daemon.shift import LAST, LEAST, Shift, measured
 from gestured.daemon.vitals import Vitals, faulty
 from gestured.daemon.watch import Watched
-from gestured.ladder import ladder_for
-from gestured.models import open_apart
+from gestured.model.ladder import ladder_for
+from gestured.model.model import open_apart
 from tests.daemon.harness import Daemon, Hand, Sensor
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)

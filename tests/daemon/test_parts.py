@@ -25,7 +25,7 @@ from gestured.daemon.settings import FLAGS, Settings
 from gestured.daemon.sockets import AddressError, bind_udp
 from gestured.daemon.udp import Receiver
 from gestured.daemon.values import Address
-from gestured.ladder import ladder_for
+from gestured.model.ladder import ladder_for
 from tests.daemon import harness
 from tests.daemon.harness import DEADLINE_S, Hand
 

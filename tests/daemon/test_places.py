@@ -9,7 +9,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Onset
 from gestured.daemon.merge import load
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.pipeline import FORGET_S, HELD_S, Pipeline
-from gestured.ladder import ladder_for
+from gestured.model.ladder import ladder_for
 from tests.daemon.harness import Daemon, Frame, Hand, Sensor, floats
 
 RATE_HZ = 15.0

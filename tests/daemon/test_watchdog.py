@@ -15,20 +15,20 @@ from gestured.daemon.canary import Canary
 from gestured.daemon.merge import load
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.pipeline import Pipeline
-from gestured.ladder import ladder_for
+from gestured.model.ladder import ladder_for
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
 
 ROOT = Path(__file__).resolve().parents[2]
 HANGING = """
 import os
-import gestured.models
+import gestured.model.model
 from gestured.core.errors import ModelError
 
 def classify(self, segment):
     open(os.environ["HANG"]).read()  # a pipe: waits until somebody has opened its other end, and closed it
     raise ModelError("it hung")
 
-gestured.models.Model.classify = classify
+gestured.model.model.Model.classify = classify
 """
 
 

@@ -25,7 +25,7 @@ def make(
     from onnx import TensorProto, helper, numpy_helper
 
     from gestured.core.window import Window
-    from gestured.model_file import SelfTest
+    from gestured.model.file import SelfTest
 
     count = len(gestures)
     base = np.full(count, -20, np.float32)  # what it can never see

@@ -13,7 +13,7 @@ import pytest
 from pythonosc.osc_message import OscMessage
 
 from gestured.client.control import Control
-from gestured.models import shipped
+from gestured.model.model import shipped
 from tests.daemon.harness import Daemon
 from tests.documents.blocks import ROOT, Block, blocks
 

@@ -136,7 +136,7 @@ def judge(recording: Take, seed: int, level: str, classifier: Any | None) -> Out
 def _open(source: str | None) -> Any | None:
     if source is None:
         return None
-    from gestured.models import open_model
+    from gestured.model.model import open_model
 
     return open_model(source)
 

@@ -12,7 +12,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from gestured import models
 from gestured.core import osc
 from gestured.core.errors import ProtocolError
 from gestured.core.frames import Segment
@@ -20,6 +19,7 @@ from gestured.core.stamping import Stamper
 from gestured.core.subscription import parse_subscription
 from gestured.core.wire import Addresses, Arrival, Decoder
 from gestured.daemon.clients import Client, EventServer
+from gestured.model import model as models
 from tests.bounds import little_memory
 
 CORPUS = Path(__file__).with_name("corpus")

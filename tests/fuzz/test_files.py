@@ -26,8 +26,8 @@ def _npz(folder: Path) -> list[bytes]:
 
 def _mcap(folder: Path) -> list[bytes]:
     pytest.importorskip("mcap", reason="recordings need the extra [record]")
-    from gestured import tape
     from gestured.core import osc
+    from gestured.record import tape
     from tests import test_bad_tapes as tapes
 
     path = folder / "seed.mcap"

@@ -10,8 +10,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from gestured import offline
-from gestured import tape as mcap
 from gestured.core.events import Cancelled, Event, Onset, Release
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
@@ -20,7 +18,9 @@ from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.pipeline import Pipeline
 from gestured.daemon.settings import Settings
-from gestured.ladder import Ladder
+from gestured.model.ladder import Ladder
+from gestured.record import replay as offline
+from gestured.record import tape as mcap
 from tests.golden.tape import Tape
 
 Line = dict[str, Any]

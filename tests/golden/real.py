@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from gestured.client.sensor import Form
-from gestured.recording import read
+from gestured.record.arrays import read
 from tests.golden.making import Sent, moment, tape
 from tests.golden.tape import Tape
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gestured.core.front_end import Cut
-from gestured.ladder import Ladder
+from gestured.model.ladder import Ladder
 from tests.golden import path
 from tests.golden.path import Line
 from tests.golden.tape import Tape

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from gestured.ladder import Ladder
+from gestured.model.ladder import Ladder
 from tests.golden import expected, path, segments, tape
 from tests.golden.groups import GROUPS
 from tests.golden.path import Line

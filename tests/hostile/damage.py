@@ -30,7 +30,7 @@ from gestured.daemon.health import TICK_S
 from gestured.daemon.merge import load
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.pipeline import Pipeline
-from gestured.ladder import ladder_for
+from gestured.model.ladder import ladder_for
 from gestured.simulator import Participant, Sensor, Take, generator, session
 from tests.hostile.faults import FAULTS, Fault
 from tests.hostile.grammar import violations

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gestured.models import shipped
+from gestured.model.model import shipped
 from tests.hostile import damage
 from tests.hostile.faults import FAULTS, Fault
 from tests.hostile.grammar import violations

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from gestured import recording, tape
 from gestured.core.errors import RecordingError
+from gestured.record import arrays as recording
+from gestured.record import tape
 from tests.daemon.harness import Sensor
 from tests.small_recording import example
 

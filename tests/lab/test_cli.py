@@ -12,7 +12,7 @@ import pytest
 
 from gestured.lab import cli, progress
 from gestured.lab.cli import main, parser
-from gestured.models import LADDER, open_model
+from gestured.model.model import LADDER, open_model
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = next(action.choices for action in parser()._actions if isinstance(action, argparse._SubParsersAction))

@@ -28,7 +28,7 @@ from gestured.core.window import Window  # noqa: E402
 from gestured.lab.export import export_forest, export_net, write_manifest  # noqa: E402
 from gestured.lab.forest_graph import forest_outputs  # noqa: E402
 from gestured.lab.recordings.origin import Origin, said  # noqa: E402
-from gestured.models import open_model  # noqa: E402
+from gestured.model.model import open_model  # noqa: E402
 
 GESTURES = ("one_tap", "swipe_up", "swipe_left")
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=0.1, tail_s=0.1, floor=4.0)
@@ -283,7 +283,7 @@ def test_manifest_refuses_a_file_that_says_nothing_of_itself(net: Any, tmp_path:
 def test_exported_file_opens_without_the_lab(net: tuple[Net, Path, dict[str, float]]) -> None:
     script = (
         "import sys\nfor name in ('torch', 'onnx', 'sklearn'): sys.modules[name] = None\n"
-        "from gestured.models import open_model\nprint(open_model(sys.argv[1]).gestures[0])"
+        "from gestured.model.model import open_model\nprint(open_model(sys.argv[1]).gestures[0])"
     )
     done = subprocess.run(
         [sys.executable, "-c", script, net[1]],

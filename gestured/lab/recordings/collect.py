@@ -11,7 +11,7 @@ from gestured.lab.recordings.live import LiveSensor
 from gestured.lab.recordings.protocol import order
 from gestured.lab.recordings.session import Session
 from gestured.lab.recordings.terminal import Terminal
-from gestured.recording import Recordings, read
+from gestured.record.arrays import Recordings, read
 
 
 def run(args: argparse.Namespace) -> int:

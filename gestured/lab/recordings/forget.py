@@ -13,7 +13,7 @@ import numpy as np
 from gestured.client.say import say, say_drawn, say_json
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.recordings.origin import digest, said
-from gestured.recording import Recordings, read, write
+from gestured.record.arrays import Recordings, read, write
 
 FIELDS = {f"{field.name}.npy" for field in fields(Recordings)}
 

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from gestured.model_file import inspect, read_bytes
-from gestured.recording import read
+from gestured.model.file import inspect, read_bytes
+from gestured.record.arrays import read
 
 KEY = "learned_from"  # in an .onnx file's metadata: a JSON list of Origin
 

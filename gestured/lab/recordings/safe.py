@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gestured.core.errors import RecordingError
-from gestured.recording import Recordings, load
-from gestured.recording_check import Wrong, check, structure
+from gestured.record.arrays import Recordings, load
+from gestured.record.check import Wrong, check, structure
 
 # Fields that may be left out, each with those that mean nothing without it.
 OPTIONAL = {field: {field} for field in ("speeds", "inclinations", "kinds", "consents")} | {
@@ -37,7 +37,7 @@ class LeftOut:
 def read_what_is_good(path: str | Path) -> tuple[Recordings, list[LeftOut]]:
     """The recordings of a file that can be used, and what had to be left out, in the file's order.
 
-    RecordingError, as of `gestured.recording.read`, where nothing of the file can be told for sure.
+    RecordingError, as of `gestured.record.arrays.read`, where nothing of the file can be told for sure.
     """
     path = Path(path)
     left: list[LeftOut] = []

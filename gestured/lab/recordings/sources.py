@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
-from gestured.files import open_regular
 from gestured.lab.recordings.protocol import PSEUDONYM
 from gestured.lab.recordings.safe import LeftOut
 from gestured.lab.recordings.store import compact, touched
-from gestured.recording import Recordings
+from gestured.record.arrays import Recordings
+from gestured.record.files import open_regular
 
 SESSION = "session"
 OTHER = "other"  # something was performed, and nobody knows exactly what

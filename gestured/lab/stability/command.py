@@ -18,7 +18,7 @@ from gestured.lab.stability.path import segments, simulated
 from gestured.lab.stability.relaxation import filters_table
 from gestured.lab.stability.table import Table
 from gestured.lab.stability.textbook import RANGES, points, textbook_table
-from gestured.models import LADDER, open_model
+from gestured.model.model import LADDER, open_model
 
 
 def tables(quick: bool, out: Path | None) -> Iterator[Table]:

@@ -20,7 +20,7 @@ from gestured.core.window import Window
 from gestured.lab.dataset import WINDOW
 from gestured.lab.stability.path import Array, Stream, events, fault, labels
 from gestured.lab.stability.table import Cell, Table
-from gestured.models import Model
+from gestured.model.model import Model
 
 SIGNAL, NOISE, LEVEL = 600.0, 2.0, 300.0  # counts of a firm finger, of noise, of an idle taxel
 FINITE = (float(np.finfo(np.float32).max), 1e30, 1.0, 1e-40, 1e-45, 0.0, -0.0, -1e-40, -1.0, -1e30)

@@ -20,7 +20,7 @@ from gestured.core.features import touch_pattern
 from gestured.lab.nets import CnnLstm, Decision, Judged, Lstm, last_active
 from gestured.lab.stability.table import Cell, Table
 from gestured.lab.trajectory import TrajectoryNet
-from gestured.models import LADDER, Model, shipped
+from gestured.model.model import LADDER, Model, shipped
 
 Windows = Sequence[NDArray[np.float32]]  # (T, R, C) each
 Scores = NDArray[np.float64]  # (B, G + 1): the gestures' scores, then unknown

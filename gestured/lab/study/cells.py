@@ -18,10 +18,10 @@ from joblib import Parallel, delayed, parallel_config
 import gestured.core
 import gestured.lab
 from gestured.core.errors import GesturedError
-from gestured.files import PUBLIC, atomic_write
 from gestured.lab.progress import progress
 from gestured.lab.study.material import Data
 from gestured.lab.study.protocols import Result, Task, run
+from gestured.record.files import PUBLIC, atomic_write
 
 SHAPING = (  # the rooms whose code decides what a cell's numbers are
     "dataset", "fit", "nets", "trajectory", "study/shifting", "study/wavelets", "study/touch_patterns",

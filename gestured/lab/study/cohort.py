@@ -19,9 +19,9 @@ import gestured.lab.dataset
 import gestured.simulator
 from gestured.core.frames import Segment
 from gestured.core.window import Window
-from gestured.files import PUBLIC, atomic_write
 from gestured.lab.dataset import TRIALS, WINDOW, Performed, Samples, collect, cuts, matched
 from gestured.lab.progress import progress
+from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import Trial, cohort_take
 
 SEED = 0  # the cohort's

@@ -13,7 +13,6 @@ import torch
 
 import gestured
 from gestured.core.errors import GesturedError
-from gestured.files import PUBLIC, atomic_write
 from gestured.lab.cli import REAL
 from gestured.lab.dataset import NONE, Samples, simulated
 from gestured.lab.study import cohort, elapsed, failures, own, signals, tables
@@ -30,6 +29,7 @@ from gestured.lab.study.run_time import measure
 from gestured.lab.study.sessions import online
 from gestured.lab.study.tuning import tune
 from gestured.lab.study.views import Values
+from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES
 
 WIDE_SEED = 1  # of the stream that the shipped models learn from as well

@@ -20,7 +20,7 @@ from gestured.core.errors import RecordingError
 from gestured.lab.cli import main
 from gestured.lab.recordings.collect import already
 from gestured.lab.recordings.protocol import order
-from gestured.recording import read, write
+from gestured.record.arrays import read, write
 from tests.control.conftest import environment
 from tests.small_recording import example
 

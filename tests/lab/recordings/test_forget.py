@@ -11,7 +11,7 @@ from gestured.lab.cli import main
 from gestured.lab.recordings import forget
 from gestured.lab.recordings.origin import Origin, origins
 from gestured.lab.recordings.store import join
-from gestured.recording import read, write
+from gestured.record.arrays import read, write
 from tests.small_recording import example, same, save, session
 
 

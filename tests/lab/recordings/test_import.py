@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gestured.lab.cli import main
-from gestured.recording import read
+from gestured.record.arrays import read
 from gestured.simulator import Participant, Sensor, Take, generator, gesture_take
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gestured.lab.cli import main
-from gestured.recording import Recordings, write
+from gestured.record.arrays import Recordings, write
 from tests.small_recording import example, save, session
 
 

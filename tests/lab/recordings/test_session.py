@@ -13,7 +13,7 @@ from gestured.lab.recordings.protocol import order
 from gestured.lab.recordings.quality import Take
 from gestured.lab.recordings.session import Session
 from gestured.lab.recordings.terminal import Terminal
-from gestured.recording import read
+from gestured.record.arrays import read
 from tests.lab.recordings.test_quality import performed
 
 TRIALS = order("07", 0, ["one_tap"], 1)

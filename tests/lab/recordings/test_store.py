@@ -7,7 +7,7 @@ import pytest
 
 from gestured.core.errors import RecordingError
 from gestured.lab.recordings.store import compact, join, touched
-from gestured.recording_check import check
+from gestured.record.check import check
 from gestured.simulator import GESTURES, Participant, Sensor, generator, gesture_take
 from tests.small_recording import example, same, session
 

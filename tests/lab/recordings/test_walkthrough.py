@@ -14,7 +14,7 @@ from gestured.lab.recordings.protocol import Trial
 from gestured.lab.recordings.quality import Take
 from gestured.lab.recordings.session import recording
 from gestured.lab.recordings.store import join, touched
-from gestured.recording import read, write
+from gestured.record.arrays import read, write
 from gestured.simulator import GESTURES, Participant, Sensor, generator, gesture_take
 from tests.lab.recordings.test_import import capfingerid_lines, csv_lines, take, written
 

@@ -18,7 +18,7 @@ from gestured.lab.stability.extremes import (
     whole_path_table,
 )
 from gestured.lab.stability.path import Stream, fault
-from gestured.models import LADDER, Model, open_model, shipped
+from gestured.model.model import LADDER, Model, open_model, shipped
 
 
 @pytest.fixture(scope="module")

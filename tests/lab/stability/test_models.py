@@ -12,7 +12,7 @@ from onnx import TensorProto
 
 from gestured.lab.stability.models import NETS, by_frames, by_onnxruntime, by_reference, by_torch, loaded, widened
 from gestured.lab.stability.path import segments, simulated
-from gestured.models import LADDER, open_model, shipped
+from gestured.model.model import LADDER, open_model, shipped
 
 TOLERANCE = 2e-6
 

@@ -11,7 +11,7 @@ pytest.importorskip("pywt")
 
 from gestured.core.errors import GesturedError  # noqa: E402
 from gestured.lab.study.own import own  # noqa: E402
-from gestured.recording import Recordings, write  # noqa: E402
+from gestured.record.arrays import Recordings, write  # noqa: E402
 from gestured.simulator import Participant, Sensor, generator, gesture_take  # noqa: E402
 
 

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.recording_check import CHARACTERS, Wrong
+from gestured.record.check import CHARACTERS, Wrong
 
 DIRECTORY_BYTES = 64 << 10  # of the list of members; a recording's has less than two thousand
 HEADER_BYTES = 16 << 10  # of an array's header; NumPy itself takes no more than 10,000

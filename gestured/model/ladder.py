@@ -12,7 +12,7 @@ import numpy as np
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Classifier, Scores
-from gestured.models import LADDER, look_at, open_model, shipped, shipped_name
+from gestured.model.model import LADDER, look_at, open_model, shipped, shipped_name
 
 
 class Rung:

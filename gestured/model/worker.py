@@ -28,7 +28,7 @@ def main() -> None:
     limit = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
     resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
     try:
-        from gestured.models import Model
+        from gestured.model.model import Model
 
         model = Model(data, "")
     except ValueError as error:

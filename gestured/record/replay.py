@@ -11,12 +11,12 @@ from gestured.core.errors import ModelError, RecordingError
 from gestured.core.events import Event, Onset
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
+from gestured.core.owner import Owner
 from gestured.core.recognizer import Classifier, Recognizer, Scores
 from gestured.core.segmentation import Timing
 from gestured.core.stamping import Stamper
 from gestured.core.wire import Addresses, Arrival, Decoder
-from gestured.owner import Owner
-from gestured.tape import Packet, Tape, read
+from gestured.record.tape import Packet, Tape, read
 
 SENSORS = 4096  # that a daemon's settings allow, at most
 MAX_SENSORS = 64  # where a tape does not say

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame, Touch
-from gestured.files import PRIVATE, atomic_write, open_regular
-from gestured.npz import Archive, brief
-from gestured.recording_check import EVENTS, Wrong, check, check_all_but_frames, check_frames, shapes, structure
+from gestured.record.check import EVENTS, Wrong, check, check_all_but_frames, check_frames, shapes, structure
+from gestured.record.files import PRIVATE, atomic_write, open_regular
+from gestured.record.npz import Archive, brief
 
 MAX_BYTES = 2 << 30  # unpacked
 

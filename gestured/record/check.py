@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from gestured.recording import Recordings
+    from gestured.record.arrays import Recordings
 
 FINGERS = 3
 FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; checking their times takes a multiple of their size

@@ -31,7 +31,7 @@ OPEN_S = 8  # s to start, to open a model and to test it; half a second is usual
 RUN_S = 5  # s for a segment, after which the child ends; what can be ended otherwise is ended after models.RUN_S
 MAX_ANSWER = 16 << 20  # bytes of a line; a report holds some of the metadata, which are bounded
 # The folders of our own interpreter, wherever we were started, and nothing from the environment or the current folder.
-START = "import sys; sys.path[:] = sys.argv[1:]; from gestured.model_worker import main; main()"
+START = "import sys; sys.path[:] = sys.argv[1:]; from gestured.model.worker import main; main()"
 KEPT = ("LD_LIBRARY_PATH",)  # of the environment: some systems find the C++ library by it
 
 _turn = threading.Lock()  # one file is opened at a time: each child may take memory of the same service

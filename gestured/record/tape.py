@@ -24,8 +24,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
-from gestured.files import create, open_regular
-from gestured.mcap_records import CHANNEL, MESSAGE, METADATA, Budget, CutOff, Damaged, Fields, TooLarge, records
+from gestured.record.files import create, open_regular
+from gestured.record.mcap import CHANNEL, MESSAGE, METADATA, Budget, CutOff, Damaged, Fields, TooLarge, records
 
 PACKETS, EVENTS, SCENE = "/gestured/packets", "/gestured/events", "scene"
 TEXT_BYTES = 1 << 20  # of one channel or metadata record that is read; settings have some kilobytes

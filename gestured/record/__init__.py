@@ -1,0 +1,1 @@
+"""Recordings and tapes: read, written, held against the contract, and played."""
