@@ -287,7 +287,7 @@ def test_an_error_about_a_file_is_one_line(run, tmp_path: Path) -> None:
         plain(err)
 
 
-def test_replay_shows_what_was_recorded(recorded, run, daemon, model: Path, tmp_path: Path) -> None:
+def test_replay_shows_what_was_recorded(recorded, run, daemon, tmp_path: Path) -> None:
     pytest.importorskip("mcap", reason="recordings need the extra [record]")
     path, _ = recorded(gestures(daemon, "tape", "left", "tap"))
     found = tape.read(path)
@@ -298,7 +298,7 @@ def test_replay_shows_what_was_recorded(recorded, run, daemon, model: Path, tmp_
             changed = {"gesture": HOSTILE} if event["type"] == "gesture" else {}
             writer.event(found.packets[-1].t_ns, event | changed)
     for more in ([], ["--json"]):
-        status, out, err = run("replay", tmp_path / "hostile.mcap", "--diff", "--model", model, *more)
+        status, out, err = run("replay", tmp_path / "hostile.mcap", "--diff", "--model", found.scene["settings"]["model"], *more)
         assert status == 1 and "owned" in out, err
         plain(out + err)
 
