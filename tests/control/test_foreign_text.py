@@ -298,7 +298,8 @@ def test_replay_shows_what_was_recorded(recorded, run, daemon, tmp_path: Path) -
             changed = {"gesture": HOSTILE} if event["type"] == "gesture" else {}
             writer.event(found.packets[-1].t_ns, event | changed)
     for more in ([], ["--json"]):
-        status, out, err = run("replay", tmp_path / "hostile.mcap", "--diff", "--model", found.scene["settings"]["model"], *more)
+        model = found.scene["settings"]["model"]
+        status, out, err = run("replay", tmp_path / "hostile.mcap", "--diff", "--model", model, *more)
         assert status == 1 and "owned" in out, err
         plain(out + err)
 
