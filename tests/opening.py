@@ -52,11 +52,11 @@ def mcap(path: Path) -> object:
     from gestured.record.replay import Mute, Replay
 
     recorded = Recorded(path)
-    replay = Replay(recorded.tape, recorded.scene, Mute(recorded.scene.gestures))
+    replay = Replay(recorded.tape, recorded.maker.scene, Mute(recorded.maker.scene.gestures))
     list(replay.events())
     verdict = recorded.compare([], lambda sensor, t: True)
     words = [difference.words() for difference in verdict.differences]
-    if replay.streams:
+    if replay.played:
         check(export.sessions_of(path)[1])
     return words
 

@@ -193,13 +193,13 @@ def test_a_scene_that_is_no_json(tmp_path: Path, said: str) -> None:
 
 def test_sensors_are_as_many_as_the_daemon_would_have_taken(tmp_path: Path) -> None:
     from gestured.core import osc
-    from gestured.record.replay import Mute, Replay, Scene
+    from gestured.record.replay import Mute, Replay, maker
 
     packets = [message(1, k * 10**7, osc.encode_message(f"/s{k}/pressure", "b", [bytes(81)])) for k in range(1000)]
     found = tape.read(write(tmp_path / "a.mcap", CHANNELS, *packets))
-    replay = Replay(found, Scene(found.scene), Mute(["one_tap"]))
+    replay = Replay(found, maker(found.scene).scene, Mute(["one_tap"]))
     list(replay.events())
-    assert len(replay.streams) == 64
+    assert len(replay.played) == 64
 
 
 @pytest.mark.parametrize("how", ["model", "fallback"])

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "gestured"
 
-CORE_MAY = {"numpy", "dataclasses", "enum", "math", "struct", "json", "typing", "collections"}
+CORE_MAY = {"numpy", "dataclasses", "enum", "math", "struct", "json", "typing", "collections", "ipaddress"}
 LAYERS = {"core": 0, "daemon": 2, "control": 2, "lab": 2}  # everything else is between them
 LAB_ONLY = {"torch", "sklearn", "onnx", "joblib", "scipy"}
 ONLY_IN = {
@@ -71,6 +71,30 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_imports_go_downwards_only(path: Path) -> None:
     assert faults(path) == []
+
+
+def known() -> dict[str, set[str]]:
+    """Module -> the modules of the package that it imports at its top, those for a type checker alone included."""
+    names = {path: ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in FILES}
+    modules = set(names.values())
+    return {
+        name: {
+            module
+            for found, inside in imports(path)
+            for module in (found, found.rpartition(".")[0])
+            if not inside and module in modules and module != name and "." in module
+        }
+        for path, name in names.items()
+    }
+
+
+def test_no_two_modules_know_each_other() -> None:
+    """A circle of imports: a third thing is missing between them."""
+    left = known()
+    while leaves := [name for name, others in left.items() if not others & left.keys()]:
+        for name in leaves:
+            del left[name]
+    assert left == {}, "these import each other"
 
 
 @pytest.mark.parametrize(

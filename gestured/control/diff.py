@@ -61,7 +61,7 @@ class Recorded:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.tape, self.scene = opened(path)
+        self.tape, self.maker = opened(path)
 
     def compare(self, lines: Iterable[Line], knew: Knew) -> Verdict:
         """Hold the events of a replay against those that were recorded."""

@@ -1,7 +1,7 @@
 """`gesturectl export`: a recording as frames, in the form that NumPy reads."""
 
 import argparse
-from collections.abc import Iterator
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +9,11 @@ import numpy as np
 
 from gestured.client.say import tell
 from gestured.core.errors import RecordingError
-from gestured.core.wire import Arrival, Decoder
+from gestured.core.facts import Taken
+from gestured.core.frames import Frame
+from gestured.core.scene import Scene
 from gestured.record import arrays as recording
-from gestured.record.replay import Scene, opened
+from gestured.record.replay import Mute, Replay, opened
 from gestured.record.tape import Tape
 
 FINGERS = 3
@@ -46,15 +48,11 @@ def run(args: argparse.Namespace) -> int:
 
 def sessions_of(path: Path, sensor: str | None = None) -> tuple[list[str], recording.Recordings]:
     """The sensors of a tape, or the one, and a session of each. Raises RecordingError."""
-    found, scene = opened(path)
-    sessions = {
-        name: stamped
-        for name, arrivals in _arrivals(found, scene).items()
-        if sensor in (None, name) and (stamped := list(_stamped(scene, name, arrivals)))
-    }
+    found, known = opened(path)
+    sessions = {name: used for name, used in _used(found, known.scene).items() if sensor in (None, name)}
     if not sessions:
         raise RecordingError(f"{path}: holds no frame of {sensor or 'any sensor'}")
-    grids = {name: each[0][1].values.shape for name, each in sessions.items()}
+    grids = {name: each[0].values.shape for name, each in sessions.items()}
     if len(set(grids.values())) > 1:
         said = ", ".join(f"{name} {rows}x{columns}" for name, (rows, columns) in grids.items())
         raise RecordingError(f"{path}: sensors of several grids ({said}), choose one with --sensor")
@@ -65,41 +63,24 @@ def _count(labels: Any) -> int:
     return 0 if labels is None else len(labels)
 
 
-def _arrivals(found: Tape, scene: Scene) -> dict[str, list[tuple[float, Arrival]]]:
-    """Sensor -> its frames with their arrival in seconds since the epoch."""
-    decoder = Decoder(scene.addresses, scene.grid)
-    out: dict[str, list[tuple[float, Arrival]]] = {}
-    for packet in found.packets:
-        for arrival in decoder.decode(packet.data, packet.source)[0]:
-            out.setdefault(arrival.sensor, []).append((packet.t_ns / 1e9, arrival))
-    return out
+def _used(found: Tape, scene: Scene) -> dict[str, list[Frame]]:
+    """Sensor -> the frames that the daemon used, at the times that it gave them, in seconds since the epoch."""
+    replay = Replay(found, dataclasses.replace(scene, touches=True), Mute(scene.gestures))
+    used: dict[str, list[Frame]] = {}
+    for fact in replay.facts():
+        if isinstance(fact, Taken):
+            used.setdefault(fact.sensor, []).append(dataclasses.replace(fact.frame, t=fact.frame.t + replay.epoch))
+    return used
 
 
-def _stamped(scene: Scene, name: str, arrivals: list[tuple[float, Arrival]]) -> Iterator[tuple[float, Arrival]]:
-    """The frames that the daemon used, at the times that it gave them."""
-    stamper = scene.stamper(name)
-    last, start = -np.inf, 0
-    while start < len(arrivals):
-        now = arrivals[start][0]
-        end = start
-        while end < len(arrivals) and arrivals[end][0] == now:
-            end += 1
-        batch = [arrival for _, arrival in arrivals[start:end]]
-        for arrival, stamp in zip(batch, stamper.stamp(batch, now), strict=True):
-            if not stamp.dropped and stamp.t > last:
-                last = stamp.t
-                yield last, arrival
-        start = end
-
-
-def _recordings(sessions: dict[str, list[tuple[float, Arrival]]], found: Tape) -> recording.Recordings:
-    frames = [arrival.values for each in sessions.values() for _, arrival in each]
+def _recordings(sessions: dict[str, list[Frame]], found: Tape) -> recording.Recordings:
+    frames = [frame for each in sessions.values() for frame in each]
     touches = np.full((len(frames), FINGERS, 2), np.nan, np.float32)
     ids = np.full((len(frames), FINGERS), -1, np.int32)
-    for n, arrival in enumerate(arrival for each in sessions.values() for _, arrival in each):
-        for k, touch in enumerate(arrival.touches[:FINGERS]):
+    for n, frame in enumerate(frames):
+        for k, touch in enumerate(frame.touches[:FINGERS]):
             touches[n, k], ids[n, k] = (touch.x, touch.y), touch.id
-    spans = {name: (each[0][0], each[-1][0]) for name, each in sessions.items()}
+    spans = {name: (each[0].t, each[-1].t) for name, each in sessions.items()}
     events = [
         (list(sessions).index(e["sensor"]), e["gesture"], e["onset"], e["offset"])
         for e in found.events
@@ -109,8 +90,8 @@ def _recordings(sessions: dict[str, list[tuple[float, Arrival]]], found: Tape) -
     ]
     labels = np.array([label for _, label, _, _ in events], dtype="U64")
     return recording.Recordings(
-        frames=np.stack(frames),
-        times=np.array([t for each in sessions.values() for t, _ in each]),
+        frames=np.stack([frame.values for frame in frames]),
+        times=np.array([frame.t for frame in frames]),
         offsets=np.cumsum([0, *map(len, sessions.values())], dtype=np.int64),
         labels=np.array(["session"] * len(sessions)),
         subjects=np.array(list(sessions)),

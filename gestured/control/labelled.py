@@ -9,8 +9,8 @@ from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form
 from gestured.control.diff import STOPWATCH_S, Answer, Difference, Knew, Line, Verdict
 from gestured.core.errors import RecordingError
+from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
-from gestured.core.wire import Addresses
 from gestured.record import arrays as recording
 from gestured.record.tape import Packet, Tape
 
@@ -36,16 +36,10 @@ class Labelled:
         self._start = begin + np.cumsum([0.0, *lengths])[:-1]  # (G,) s, as it is played
         self.tape = Tape({}, tuple(self._packets()), (), whole=True)
 
-    def scene(self, gestures: Iterable[str]) -> dict[str, object]:
-        """What a tape would say of itself: the defaults, and the sensor's own clock."""
+    def scene(self, gestures: Iterable[str]) -> Scene:
+        """The defaults, with the recording's grid and the sensor's own clock."""
         rows, columns = self._found.frames.shape[1:]
-        addresses = Addresses()
-        settings = {
-            "addresses": {"pressure": addresses.pressure, "trajectory": addresses.trajectory},
-            "model": "", "fallback": [], "grid": [rows, columns], "clock": "sensor", "stale_s": 1.0,
-            "sensors": {}, "per_gesture": {},
-        }  # fmt: skip
-        return {"gestures": list(gestures), "settings": settings, "model": {"rows": rows, "columns": columns}}
+        return Scene(tuple(gestures), (rows, columns), clock="sensor")
 
     def compare(self, lines: Iterable[Line], knew: Knew) -> Verdict:
         """Hold the events of a replay against the labels."""

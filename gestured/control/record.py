@@ -2,6 +2,7 @@
 
 import argparse
 import base64
+import dataclasses
 import queue
 import sys
 import threading
@@ -16,8 +17,9 @@ from gestured.client.lines import Refused, Unreachable
 from gestured.client.say import say, say_json
 from gestured.control.address import add_control, connect, finish_on_signals
 from gestured.core.errors import GesturedError
-from gestured.core.wire import Decoder
-from gestured.record.replay import Scene
+from gestured.core.facts import Taken
+from gestured.core.hub import Hub
+from gestured.record.replay import Mute, maker
 from gestured.record.tape import Writer, library
 
 FLUSH_S = 1.0  # what a crash or a power cut costs
@@ -81,8 +83,8 @@ class Keeper:
     def __init__(self, tape: Writer, scene: Mapping[str, Any]) -> None:
         """`scene` is what the daemon said of itself."""
         self._tape, self._epoch_ns = tape, scene["epoch_ns"]
-        known = Scene(scene)
-        self._decoder = Decoder(known.addresses, known.grid, keep_touches=False)
+        known = maker(scene).scene
+        self._hub = Hub(dataclasses.replace(known, frames=True), Mute(known.gestures))  # which frames the daemon uses
         self._t_ns = time.time_ns()
         self._flushed = 0.0
         self.packets = self.events = self.lost = 0
@@ -94,8 +96,9 @@ class Keeper:
             host, port = line["source"]
             packet = base64.b64decode(line["data"])
             self._tape.packet(self._t_ns, f"{host}:{port}", packet)
-            for arrival in self._decoder.decode(packet)[0]:
-                self._tape.picture(self._t_ns, arrival.sensor, arrival.values)
+            for fact in self._hub.receive([(packet, (host, port))], line["t_ns"] / 1e9):
+                if isinstance(fact, Taken):
+                    self._tape.picture(self._t_ns, fact.sensor, fact.frame.values)
             self.packets += 1
         elif line["type"] == "lost":
             self.lost += line["count"]

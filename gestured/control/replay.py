@@ -18,10 +18,11 @@ from gestured.control.listen import readable
 from gestured.control.sending import Hearing, retimed, send
 from gestured.core import messages
 from gestured.core.errors import GesturedError, RecordingError
+from gestured.core.scene import Scene
 from gestured.core.wire import is_sensor
 from gestured.model.ladder import Ladder, ladder_for
 from gestured.model.model import shipped
-from gestured.record.replay import Mute, Replay, Scene
+from gestured.record.replay import Maker, Mute, Replay
 
 MODEL = "cnn_lstm"  # for a file that names none
 Source = Recorded | Labelled
@@ -108,22 +109,22 @@ def _here(args: argparse.Namespace, source: Source) -> int:
 def _opened(source: Source, model: str | None) -> tuple[Scene, Ladder]:
     if isinstance(source, Labelled):
         ladder = ladder_for(model or MODEL, None)
-        return Scene(source.scene(ladder.gestures)), ladder
-    scene = source.scene
+        return source.scene(ladder.gestures), ladder
+    maker = source.maker
     if model is None:
-        first, *others = _recorded_models(source.path, scene)
+        first, *others = _recorded_models(source.path, maker)
         ladder = ladder_for(first, others or None)
     else:
         ladder = ladder_for(model)
-    if model is None and getattr(ladder.model, "sha256", None) != scene.sha256:
+    if model is None and getattr(ladder.model, "sha256", None) != maker.sha256:
         say(f"{ladder.name} is not the file that it was when this was recorded", to=sys.stderr)
-    return scene, ladder
+    return maker.scene, ladder
 
 
-def _recorded_models(path: Path, scene: Scene) -> list[Path]:
+def _recorded_models(path: Path, maker: Maker) -> list[Path]:
     """The shipped models that a tape names, best first: a file is opened because the user names it, not a tape."""
-    names = [name.removesuffix(".onnx") for name in scene.ladder]
-    foreign = [given for given, name in zip(scene.ladder, names, strict=True) if name not in shipped()]
+    names = [name.removesuffix(".onnx") for name in maker.models]
+    foreign = [given for given, name in zip(maker.models, names, strict=True) if name not in shipped()]
     if foreign:
         raise RecordingError(
             f"{path}: was recorded with the model {foreign[0]!r}, which is not a shipped one; name it with --model"
@@ -134,11 +135,11 @@ def _recorded_models(path: Path, scene: Scene) -> list[Path]:
 def _there(args: argparse.Namespace, source: Source) -> int:
     """To a daemon, whose events are compared."""
     # Which gestures there are is the daemon's business.
-    scene = Scene(source.scene(("none",))) if isinstance(source, Labelled) else source.scene
+    scene = source.scene(("none",)) if isinstance(source, Labelled) else source.maker.scene
     rehearsal = Replay(source.tape, scene, Mute(scene.gestures))  # when sensors are known, and contacts begin
     for _ in rehearsal.events():
         pass
-    with closing(Hearing(args.socket or default_socket(os.environ), frozenset(rehearsal.streams))) as hearing:
+    with closing(Hearing(args.socket or default_socket(os.environ), frozenset(rehearsal.played))) as hearing:
         sent = _send(args, source)
         heard = hearing.all(time.time())
     status = _compare(args, source, retimed(heard, sent, source.tape, rehearsal), _knew(rehearsal))
@@ -158,7 +159,7 @@ def _send(args: argparse.Namespace, source: Source) -> list[float]:
 
 
 def _knew(replay: Replay) -> Knew:
-    return lambda sensor, t: sensor in replay.streams and replay.streams[sensor].knew(t - replay.epoch)
+    return lambda sensor, t: sensor in replay.played and replay.played[sensor].knew(t - replay.epoch)
 
 
 def _compare(args: argparse.Namespace, source: Source, lines: Iterable[Line], knew: Knew) -> int:

@@ -76,7 +76,7 @@ def retimed(heard: Sequence[Line], sent: Sequence[float], found: Tape, rehearsal
     """
     arrivals = [packet.t_ns / 1e9 - rehearsal.epoch for packet in found.packets]
     tables = {}
-    for name, stream in rehearsal.streams.items():
+    for name, stream in rehearsal.played.items():
         arrived, felt = np.array(stream.stamps).T
         told, waited = np.diff(felt), np.diff(np.interp(arrived, arrivals, sent))
         steps = np.where(told <= Stamper.MAX_STEP_S, told, waited)  # no longer ones are believed

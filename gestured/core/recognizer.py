@@ -1,8 +1,8 @@
 """The one path from frames to events: conditioning, segmentation, classification, decision."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,13 +43,26 @@ class Classifier(Protocol):
         ...
 
 
+class Decided(NamedTuple):
+    """A segment that was classified, and whether that was enough for a gesture; it follows its event."""
+
+    sensor: str
+    segment: Segment
+    scores: Scores
+    known: bool
+
+
+def events_of(found: Iterable[Event | Decided]) -> list[Event]:
+    """The events among what a recognizer found."""
+    return [one for one in found if not isinstance(one, Decided)]
+
+
 class Recognizer:
-    """Frames of one sensor in, events out. `classifier` may be replaced between two frames.
+    """Frames of one sensor in, events out, and what was decided. `classifier` may be replaced between two frames.
 
     `gestures` restricts the answer to a subset; what falls to the others is not given to those that are left.
     `thresholds` are the confidences below which a gesture is unknown, where not the model's own is to hold.
     `refractory` are the seconds in which the same gesture is not published again.
-    `witness` is told of each segment that was decided, of its scores, and whether they were enough for a gesture.
 
     What is not sure enough, or has a hole in which the finger may have moved unseen, is unknown.
 
@@ -66,7 +79,6 @@ class Recognizer:
         thresholds: Mapping[str, float] | None = None,
         refractory: Mapping[str, float] | None = None,
         sequence: int = 0,
-        witness: Callable[[Segment, Scores, bool], None] | None = None,
     ) -> None:
         self.front_end = front_end
         self.classifier = classifier
@@ -75,34 +87,35 @@ class Recognizer:
         self._thresholds = dict(thresholds or {})
         self._refractory = dict(refractory or {})
         self._last_offset: dict[str, float] = {}
-        self._witness = witness
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # no scores where it failed
 
-    def due(self, t: float) -> list[Event]:
-        """What is decided as soon as there is a frame at `t` s; see `FrontEnd.due`."""
-        return self._name(self.front_end.due(t))
-
-    def push(self, frame: Frame) -> list[Event]:
+    def push(self, frame: Frame) -> list[Event | Decided]:
         """Take one frame, give what it decides; see `FrontEnd.push`."""
         found = self.front_end.push(frame)
         if self.front_end.draft is not None:
             self._ask(self.front_end.draft)
         return self._name(found) if found else []
 
-    def give_up(self, t: float) -> list[Event]:
+    def give_up(self, t: float) -> list[Event | Decided]:
         """Cancel a contact that goes on; see `FrontEnd.give_up`."""
         return self._name(self.front_end.give_up(t))
 
-    def flush(self, t: float) -> list[Event]:
+    def flush(self, t: float) -> list[Event | Decided]:
         """The stream paused or ended at `t` s: decide what can be decided, cancel the rest."""
         return self._name(self.front_end.flush(t))
 
-    def reset(self) -> list[Event]:
+    def reset(self) -> list[Event | Decided]:
         """The sensor restarted: cancel what is open, learn the idle sensor anew."""
         return self._name(self.front_end.reset())
 
-    def _name(self, found: list[Contact]) -> list[Event]:
-        return [self._decide(x) if isinstance(x, Cut) else x for x in found]
+    def _name(self, found: list[Contact]) -> list[Event | Decided]:
+        out: list[Event | Decided] = []
+        for contact in found:
+            if isinstance(contact, Cut):
+                out += self._decide(contact)
+            else:
+                out.append(contact)
+        return out
 
     def _ask(self, segment: Segment) -> Scores | None:
         """The classifier is asked once for each segment."""
@@ -115,12 +128,12 @@ class Recognizer:
             self._asked = asked
         return asked[2]
 
-    def _decide(self, cut: Cut) -> Gesture | Unknown | Cancelled:
+    def _decide(self, cut: Cut) -> list[Event | Decided]:
         sensor, segment = self.front_end.sensor, cut.segment
         answer = self._ask(segment)
         self._asked = None
         if answer is None:
-            return Cancelled(sensor, cut.id, "model")
+            return [Cancelled(sensor, cut.id, "model")]
         scores = {
             gesture: float(value)
             for gesture, value in zip(self.classifier.gestures, answer.values, strict=True)
@@ -128,22 +141,18 @@ class Recognizer:
         }
         best = max(scores, key=scores.__getitem__)
         confidence = scores[best] * (1.0 - answer.unknown)
-        frames = segment.last - segment.first + 1
         whole = cut.hole_s <= max(HOLE_S, HOLE_FRAMES * self.front_end.interval_s)
         known = whole and confidence >= self._thresholds.get(best, answer.threshold)
-        if self._witness is not None:
-            self._witness(segment, answer, known)
+        decided = Decided(sensor, segment, answer, known)
+        what = (
+            segment.onset, segment.offset, cut.decided, segment.last - segment.first + 1, segment.lost,
+            answer.model, answer.degraded, scores,
+        )  # fmt: skip
         if not known:
-            return Unknown(
-                sensor, cut.id, confidence, segment.onset, segment.offset, cut.decided,
-                frames, segment.lost, answer.model, answer.degraded, scores,
-            )  # fmt: skip
+            return [Unknown(sensor, cut.id, confidence, *what), decided]
         since = segment.onset - self._last_offset.get(best, -np.inf)
         if since < self._refractory.get(best, 0.0):
-            return Cancelled(sensor, cut.id, "refractory")
+            return [Cancelled(sensor, cut.id, "refractory"), decided]
         self._last_offset[best] = segment.offset
         self.sequence += 1
-        return Gesture(
-            sensor, cut.id, best, confidence, self.sequence, segment.onset, segment.offset, cut.decided,
-            frames, segment.lost, answer.model, answer.degraded, scores,
-        )  # fmt: skip
+        return [Gesture(sensor, cut.id, best, confidence, self.sequence, *what), decided]

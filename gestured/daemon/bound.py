@@ -36,6 +36,15 @@ class Bound:
     control: Listener
     http: socket.socket | None
 
+    def addresses(self) -> dict[str, str | None]:
+        """Where the daemon can be reached."""
+        return {
+            "listen": name_of(self.udp),
+            "socket": str(self.events.path),
+            "control": str(self.control.path),
+            "metrics": name_of(self.http) if self.http else None,
+        }
+
     def close(self) -> None:
         """Close them; what stood in the file system because of us goes."""
         self.udp.close()

@@ -6,7 +6,7 @@ import numpy as np
 
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
-from gestured.daemon.pipeline import Pipeline
+from gestured.daemon.desk import Desk
 
 SIDE = 4  # taxels
 
@@ -17,8 +17,8 @@ class Canary:
     No model is asked: one that hangs does so in the loop, which then feeds no watchdog either.
     """
 
-    def __init__(self, pipeline: Pipeline) -> None:
-        self._pipeline = pipeline
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
         self._front_end = FrontEnd("canary", SIDE, SIDE)
         self._random = Random(0)
         self._t = 0.0
@@ -30,6 +30,6 @@ class Canary:
             values = np.array([self._random.gauss(100.0, 1.0) for _ in range(SIDE * SIDE)])
             self._front_end.push(Frame(self._t, values.reshape(SIDE, SIDE)))
         except Exception:
-            self._pipeline.bug("in the way of the watchdog's frame")
+            self._desk.bug("in the way of the watchdog's frame")
             return False
         return True

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from gestured import __version__
+from gestured.core.scene import DOUBLE_TAP
 from gestured.core.segmentation import Timing
 from gestured.daemon import clients
 from gestured.daemon.ladder import open_ladder
-from gestured.daemon.pipeline import DOUBLE_TAP
 from gestured.daemon.settings import Settings, control_beside, default_socket
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S

@@ -11,6 +11,8 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.snapshot import Snapshot
 from gestured.daemon.sockets import AddressError
 
 DEADLINE_S = 5.0
@@ -31,6 +33,22 @@ _REASONS = {
 def as_json(status: int, body: Mapping[str, object]) -> Answer:
     """An answer of one JSON object."""
     return status, "application/json", json.dumps(body).encode() + b"\n"
+
+
+def serve_pages(sock: socket.socket, snapshot: Callable[[], Snapshot], metrics: Metrics) -> "HttpThread":
+    """Serve the daemon's pages on a listening socket; each request takes a snapshot of its own."""
+
+    def exposition() -> Answer:
+        return 200, "text/plain; version=0.0.4; charset=utf-8", metrics.exposition(snapshot())
+
+    return HttpThread(
+        sock,
+        {
+            "/metrics": exposition,
+            "/healthz": lambda: as_json(*snapshot().healthz()),
+            "/readyz": lambda: as_json(*snapshot().readyz()),
+        },
+    )
 
 
 class HttpThread:

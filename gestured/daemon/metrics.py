@@ -7,11 +7,13 @@ labels that a peer can choose (sensors) are folded together after the first few.
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from gestured import __version__
 from gestured.core.events import Cancelled, Event, Gesture, Unknown
-from gestured.daemon.reading import Reading
+from gestured.core.reading import STATES, Reading
+from gestured.daemon.snapshot import Snapshot
 
 # At most 200 series, whatever arrives; a test counts them.
 NAMED_SENSORS = 8  # further sensors are counted together as "other"
@@ -85,10 +87,6 @@ class Metrics:
         )
         self.latency = Histogram("gestured_latency_seconds", "From the last touched frame to the event", LATENCY_S)
         self.confidence = Histogram("gestured_confidence", "Confidence of the published gestures", CONFIDENCE)
-        self.sensors: Callable[[], Mapping[str, Reading]] = dict
-        self.shift: Callable[[], Mapping[str, float]] = dict
-        self.readings: dict[str, tuple[str, Callable[[], float]]] = {}  # gauges, and counters that end in _total
-        self.active_model: Callable[[], str] = str
         self._named: set[str] = set()
 
     def event(self, event: Event) -> None:
@@ -114,16 +112,44 @@ class Metrics:
             return sensor
         return OTHER
 
-    def exposition(self) -> bytes:
+    def exposition(self, snapshot: Snapshot) -> bytes:
         """Everything in the Prometheus text format; imports prometheus_client."""
         from prometheus_client import CollectorRegistry, generate_latest
 
         registry = CollectorRegistry()
-        registry.register(_Collector(self))
+        registry.register(_Collector(self, snapshot))
         return generate_latest(registry)
 
 
-_OF_SENSORS: tuple[tuple[str, str, Callable[[Reading], float]], ...] = (
+@dataclass(frozen=True, slots=True)
+class Gauges:
+    """What the metrics show of one sensor, or of several together."""
+
+    state: str
+    rate_hz: float
+    jitter_s: float
+    bad_taxels: int
+    drift: float
+
+
+def by_label(readings: Mapping[str, Reading], label_of: Callable[[str], str]) -> dict[str, Gauges]:
+    """Readings by sensor -> by label. Where several sensors share one: the worst of each, and all bad taxels."""
+    found: dict[str, list[Reading]] = {}
+    for sensor, reading in readings.items():
+        found.setdefault(label_of(sensor), []).append(reading)
+    return {
+        label: Gauges(
+            max((r.state for r in each), key=STATES.index),
+            min(r.rate_hz for r in each),
+            max(r.jitter_s for r in each),
+            sum(r.bad_taxels for r in each),
+            max(r.drift for r in each),
+        )
+        for label, each in found.items()
+    }
+
+
+_OF_SENSORS: tuple[tuple[str, str, Callable[[Gauges], float]], ...] = (
     ("gestured_sensor_rate_hertz", "Frames a second", lambda r: r.rate_hz),
     ("gestured_sensor_jitter_seconds", "Interarrival jitter of packets", lambda r: r.jitter_s),
     ("gestured_sensor_bad_taxels", "Taxels that are bridged from their neighbours", lambda r: r.bad_taxels),
@@ -135,9 +161,21 @@ _OF_SENSORS: tuple[tuple[str, str, Callable[[Reading], float]], ...] = (
 )
 
 
+_OF_THE_DAEMON: tuple[tuple[str, str, Callable[[Snapshot], float]], ...] = (
+    ("gestured_sensors", "Sensors that were heard", lambda s: sum(r.source is not None for r in s.sensors.values())),
+    ("gestured_clients", "Clients of the event socket", lambda s: s.clients),
+    ("gestured_backlog_bytes", "Bytes that wait for slow clients", lambda s: s.backlog_bytes),
+    ("gestured_kernel_drops_total", "Packets that found no room", lambda s: s.kernel_drops),
+    ("gestured_loop_lag_seconds", "How late the event loop is", lambda s: s.loop_lag_s),
+    ("gestured_model_rung", "How far down the ladder stands what answers", lambda s: s.models.rung),
+    ("gestured_model_failures_total", "Models put aside since the last reload", lambda s: s.models.failures),
+    ("gestured_start_time_seconds", "When the daemon started", lambda s: s.started),
+)
+
+
 class _Collector:
-    def __init__(self, metrics: Metrics) -> None:
-        self._metrics = metrics
+    def __init__(self, metrics: Metrics, snapshot: Snapshot) -> None:
+        self._metrics, self._snapshot = metrics, snapshot
 
     def collect(self) -> Iterator[Any]:
         from prometheus_client.core import (
@@ -162,12 +200,13 @@ class _Collector:
                     cumulated = [sum(buckets[: i + 1]) for i in range(len(buckets))]
                     histogram.add_metric(labels, list(zip(bounds, cumulated, strict=True)), sum_value=total[0])
                 yield histogram
-        for name, (text, read) in self._metrics.readings.items():
+        snapshot = self._snapshot
+        for name, text, read in _OF_THE_DAEMON:
             if name.endswith("_total"):
-                yield CounterMetricFamily(name.removesuffix("_total"), text, value=read())
+                yield CounterMetricFamily(name.removesuffix("_total"), text, value=read(snapshot))
             else:
-                yield GaugeMetricFamily(name, text, value=read())
-        readings = self._metrics.sensors()
+                yield GaugeMetricFamily(name, text, value=read(snapshot))
+        readings = by_label(snapshot.sensors, self._metrics.sensor_label)
         for name, text, value_of in _OF_SENSORS:
             family = GaugeMetricFamily(name, text, labels=["sensor"])
             for sensor, reading in readings.items():
@@ -179,9 +218,9 @@ class _Collector:
         yield state
         text = "Share of the last gestures outside of what the model was trained on"
         shift = GaugeMetricFamily("gestured_shift_ratio", text, labels=["quantity"])
-        for quantity, share in self._metrics.shift().items():
+        for quantity, share in snapshot.models.shift.items():
             shift.add_metric([quantity], share)
         yield shift
         info = InfoMetricFamily("gestured_active_model", "The model that answers")
-        info.add_metric([], {"model": self._metrics.active_model(), "version": __version__})
+        info.add_metric([], {"model": snapshot.models.active, "version": __version__})
         yield info

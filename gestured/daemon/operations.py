@@ -2,24 +2,27 @@
 
 import asyncio
 import time
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
 from itertools import chain
-from typing import TYPE_CHECKING, Any
 
-from gestured import __version__
 from gestured.core.events import Gesture, Onset, Release
+from gestured.core.hub import Hub
 from gestured.core.wire import is_sensor
 from gestured.daemon.control import Connection
+from gestured.daemon.desk import Desk
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.publisher import Publisher
 from gestured.daemon.request import Answer, Parameter, Refusal, Stream, Verb
-from gestured.daemon.status import status
-from gestured.daemon.tap import as_lines
+from gestured.daemon.snapshot import Snapshot
+from gestured.daemon.status import scene, status
+from gestured.daemon.tap import Taps, as_lines
+from gestured.daemon.watch import Watch
 from gestured.model.model import open_apart
-
-if TYPE_CHECKING:
-    from gestured.daemon.service import Service
 
 TEST_SENSORS = 64  # names of sensors that are not there
 TEST_S = 0.4  # how long a made-up gesture took
+TEST_FRAMES = 6  # of it, at 15 Hz
 
 SENSOR = Parameter(
     (str, type(None)), "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", check=lambda name: name is None or is_sensor(name)
@@ -28,118 +31,102 @@ LABEL = Parameter(str, "a gesture's name", required=True)
 MODEL = Parameter((str, type(None)), "a model's path or name, or null to end it", required=True)
 
 
-def verbs(service: "Service") -> dict[str, Verb]:
-    """Name -> verb. This table is all that the control socket can do."""
-    do = Operations(service)
-    return {
-        "status": Verb(do.status, changes=False),
-        "reload": Verb(do.reload, slow=True),
-        "recalibrate": Verb(do.recalibrate, {"sensor": SENSOR}),
-        "emit": Verb(do.emit, {"gesture": LABEL, "sensor": SENSOR}),
-        "shadow": Verb(do.shadow, {"model": MODEL}, slow=True),
-        "tap": Verb(do.tap),
-        "flight": Verb(do.flight),
-    }
-
-
+@dataclass
 class Operations:
     """The verbs. Each checks everything before it changes anything."""
 
-    def __init__(self, service: "Service") -> None:
-        self._service = service
-        self._tested: set[str] = set()  # names of sensors that were not there
+    hub: Hub
+    desk: Desk
+    publisher: Publisher
+    watch: Watch
+    taps: Taps
+    metrics: Metrics
+    snapshot: Callable[[], Snapshot]
+    reload_all: Callable[[], Awaitable[str | None]]  # None, or why nothing has changed
+    _tested: set[str] = field(default_factory=set)  # names of sensors that were not there
+
+    def verbs(self) -> dict[str, Verb]:
+        """Name -> verb. This table is all that the control socket can do."""
+        return {
+            "status": Verb(self.status, changes=False),
+            "reload": Verb(self.reload, slow=True),
+            "recalibrate": Verb(self.recalibrate, {"sensor": SENSOR}),
+            "emit": Verb(self.emit, {"gesture": LABEL, "sensor": SENSOR}),
+            "shadow": Verb(self.shadow, {"model": MODEL}, slow=True),
+            "tap": Verb(self.tap),
+            "flight": Verb(self.flight),
+        }
 
     async def status(self, connection: Connection) -> Answer:
         """How the daemon is."""
-        return status(self._service)
+        return status(self.snapshot(), self.metrics)
 
     async def reload(self, connection: Connection) -> Answer:
         """Read configuration and model anew; the old ones stay where the new ones are bad."""
-        reason = await self._service.reload()
+        reason = await self.reload_all()
         if reason is not None:
             raise Refusal(f"{reason}; nothing has changed")
-        return {"model": self._service.pipeline.watched.ladder.active}
+        return {"model": self.snapshot().models.active}
 
     async def recalibrate(self, connection: Connection, sensor: str | None = None) -> Answer:
         """Learn the idle sensor anew: one, or all. Refused while one of them is touched: a hand is no baseline."""
-        sensors = self._service.pipeline.sensors
-        if sensor is not None and sensor not in sensors:
-            raise Refusal(f"no sensor {sensor!r}, expected one of {', '.join(sensors) or 'none: no sensor was heard'}")
-        chosen = list(sensors.values()) if sensor is None else [sensors[sensor]]
+        heard = {name: one for name, one in self.snapshot().sensors.items() if one.source is not None}
+        if sensor is not None and sensor not in heard:
+            raise Refusal(f"no sensor {sensor!r}, expected one of {', '.join(heard) or 'none: no sensor was heard'}")
+        chosen = list(heard) if sensor is None else [sensor]
         if not chosen:
             raise Refusal("no sensor was heard so far")
-        touched = [one.name for one in chosen if one.recognizer.front_end.touched]
+        touched = [name for name in chosen if heard[name].touched]
         if touched:
             raise Refusal(f"touched: {', '.join(touched)}; take the hand off, and whatever lies there")
-        for one in chosen:
-            self._service.pipeline.restart(one)
-        return {"sensors": [one.name for one in chosen]}
+        self.desk.take(self.hub.restart(chosen, time.monotonic()))
+        return {"sensors": chosen}
 
     async def emit(self, connection: Connection, gesture: str, sensor: str | None = None) -> Answer:
         """A made-up gesture through every output, marked as a test; it takes the sensor's next numbers."""
-        pipeline, sensor = self._service.pipeline, sensor or "test"
-        if gesture not in pipeline.gestures:
-            raise Refusal(f"no gesture {gesture!r} is in use, expected one of {', '.join(pipeline.gestures)}")
-        now = time.monotonic()
-        live = pipeline.sensors.get(sensor)
-        if live is None:
+        snapshot, sensor = self.snapshot(), sensor or "test"
+        if gesture not in snapshot.gestures:
+            raise Refusal(f"no gesture {gesture!r} is in use, expected one of {', '.join(snapshot.gestures)}")
+        reading = snapshot.sensors.get(sensor)
+        if reading is None or reading.source is None:
             if sensor not in self._tested and len(self._tested) >= TEST_SENSORS:
                 raise Refusal(f"tests used {TEST_SENSORS} names of sensors that are not there; use one of them again")
             self._tested.add(sensor)
-        elif live.recognizer.front_end.touched or live.open is not None:
+        elif reading.touched or reading.contact is not None:
             raise Refusal(f"{sensor} is touched; a test would mix with what is being done there")
-        sequence, number = pipeline.number(sensor)
-        scores = {name: float(name == gesture) for name in pipeline.gestures}
-        onset, frames = now - TEST_S, round(TEST_S * 15)
-        model = pipeline.watched.ladder.active
+        sequence, number = self.hub.number(sensor)
+        scores = {name: float(name == gesture) for name in snapshot.gestures}
+        now, model = snapshot.now, snapshot.models.active
+        onset = now - TEST_S
         for event in (
             Onset(sensor, number, onset),
-            Gesture(sensor, number, gesture, 1.0, sequence, onset, now, now, frames, 0, model, False, scores),
+            Gesture(sensor, number, gesture, 1.0, sequence, onset, now, now, TEST_FRAMES, 0, model, False, scores),
             Release(sensor, number, now),
         ):
-            self._service.emit(event, test=True)
+            self.publisher.publish(event, test=True)
         return {"sensor": sensor, "gesture": gesture, "sequence": sequence}
 
     async def shadow(self, connection: Connection, model: str | None) -> Answer:
         """Run a candidate beside the active model; null ends it. Gives what the last one was worth."""
-        watched = self._service.pipeline.watched
         if model is None:
-            last, watched.shadow = watched.shadow, None
+            last, self.watch.shadow = self.watch.shadow, None
             return {"shadow": await asyncio.to_thread(last.finish) if last else None}
         candidate = await asyncio.to_thread(open_apart, model)
-        shadow = self._service.pipeline.watched.compare(candidate)  # not `watched`: a reload may have come in between
-        return {"shadow": shadow.report()}
+        return {"shadow": self.watch.compare(candidate).report()}
 
     async def tap(self, connection: Connection) -> Answer:
         """Stream packets and events over this connection from now on."""
         if connection.tap:
             raise Refusal("this connection is a tap already")
-        self._service.tap(connection)
-        return self.scene()
+        self.taps.join(connection)
+        return self._scene()
 
     async def flight(self, connection: Connection) -> Stream:
         """Stream what the flight recorder holds, then `{"type":"end"}`."""
-        taps = self._service.taps
-        if not taps.ring_bytes:
+        if not self.taps.ring_bytes:
             raise Refusal("the flight recorder is off; set flight_recorder = MiB (or --flight-recorder) and restart")
-        held = taps.flight()
-        return Stream(self.scene() | {"lines": len(held)}, chain(as_lines(held), (b'{"type":"end"}\n',)))
+        held = self.taps.flight()
+        return Stream(self._scene() | {"lines": len(held)}, chain(as_lines(held), (b'{"type":"end"}\n',)))
 
-    def scene(self) -> dict[str, Any]:
-        """What a recording must know to be understood without this daemon."""
-        pipeline = self._service.pipeline
-        model: Any = pipeline.watched.ladder.model
-        settings: Mapping[str, Any] = self._service.settings.model_dump(mode="json")
-        return {
-            "version": __version__,
-            "instance": self._service.health.instance,
-            "epoch_ns": time.time_ns() - time.monotonic_ns(),
-            "model": {
-                "name": pipeline.watched.ladder.active,
-                "sha256": model.sha256,
-                "rows": model.rows,
-                "columns": model.columns,
-            },
-            "gestures": list(pipeline.gestures),
-            "settings": settings,
-        }
+    def _scene(self) -> Answer:
+        return scene(self.snapshot(), time.time_ns() - time.monotonic_ns())

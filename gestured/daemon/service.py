@@ -1,38 +1,43 @@
-"""One daemon: pipeline, sinks, timers and reloads, from start to end."""
+"""One daemon: it puts the parts together, and runs timers and reloads from start to end."""
 
 import asyncio
-import socket
+import secrets
 import time
 from collections.abc import Callable
 from typing import Any
 
+from gestured import __version__
 from gestured.core import messages
 from gestured.core.errors import GesturedError
-from gestured.core.events import Event, Gesture, Status
+from gestured.core.events import Status
+from gestured.core.hub import Hub
 from gestured.daemon import log as logging
 from gestured.daemon import systemd
 from gestured.daemon.bound import Bound
 from gestured.daemon.canary import Canary
 from gestured.daemon.clients import EventServer
-from gestured.daemon.control import Connection, ControlServer
-from gestured.daemon.health import TICK_S, Health
+from gestured.daemon.control import ControlServer
+from gestured.daemon.desk import Desk
+from gestured.daemon.health import TICK_S, Pulse
 from gestured.daemon.ladder import open_ladder
-from gestured.daemon.log import Throttle, log
+from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.operations import verbs
-from gestured.daemon.pipeline import Pipeline
-from gestured.daemon.reading import by_label
+from gestured.daemon.operations import Operations
+from gestured.daemon.publisher import Publisher
+from gestured.daemon.scene import scene_of
 from gestured.daemon.settings import Settings
-from gestured.daemon.sinks import OscSink, Sink
-from gestured.daemon.sockets import kernel_drops, name_of
-from gestured.daemon.status import Recent
+from gestured.daemon.sinks import OscSink
+from gestured.daemon.snapshot import Models, Snapshot
+from gestured.daemon.sockets import kernel_drops
 from gestured.daemon.tap import Taps
 from gestured.daemon.udp import Receiver
+from gestured.daemon.watch import Watch
 from gestured.model.ladder import Ladder
 
 STATUS_S = 1.0
 DRAIN_S = 0.5
 SHOWN = 4  # sensors in systemd's status line
+AT_A_RESTART = ("listen", "socket", "control", "metrics", "flight_recorder")  # settings that a reload cannot change
 
 Loader = Callable[[], Settings]
 
@@ -42,78 +47,64 @@ class Service:
 
     def __init__(self, settings: Settings, ladder: Ladder, bound: Bound, load: Loader) -> None:
         """Serves from now on. `load` reads the configuration again, for a reload."""
-        self.settings, self._load, self._bound = settings, load, bound
-        self.started = time.monotonic()
-        self.tasks: set[asyncio.Future[Any]] = set()  # a task that nobody holds may be collected
-        self._throttle = Throttle()
+        self._settings, self._ladder, self._bound, self._load = settings, ladder, bound, load
+        self._instance, self._started, self._stopping = secrets.token_hex(8), time.time(), False
+        self._begun = time.monotonic()
+        self._tasks: set[asyncio.Future[Any]] = set()  # a task that nobody holds may be collected
         self._said = ""  # to systemd
         self._reloading = asyncio.Lock()
-        self.metrics = Metrics()
+        self._pulse, self._metrics = Pulse(), Metrics()
         for name in settings.sensors:
-            self.metrics.sensor_label(name)  # those in the file are named first
-        self.pipeline = Pipeline(settings, ladder, self.metrics, self.emit)
-        self.health = Health(self.pipeline)
-        self.recent = Recent()
-        self.taps = Taps(settings.flight_recorder << 20)
-        self.clients = EventServer(bound.events.sock, self.health.hello, self.metrics)
-        self._osc = [OscSink(address, self.metrics) for address in settings.publish]
-        self._receiver = Receiver(bound.udp, self.pipeline)
-        self._control = ControlServer(bound.control.sock, verbs(self))
+            self._metrics.sensor_label(name)  # those in the file are named first
+        self._hub = Hub(scene_of(settings, ladder), ladder)
+        self._watch, self._taps = Watch(ladder), Taps(settings.flight_recorder << 20)
+        self._clients = EventServer(bound.events.sock, self._hello, self._metrics)
+        self._osc = [OscSink(address, self._metrics) for address in settings.publish]
+        self._publisher = Publisher(self._metrics, (self._clients, self._taps, *self._osc))
+        self._desk = Desk(self._metrics, self._publisher, self._watch)
+        self._receiver = Receiver(bound.udp, self._hub, self._desk, self._taps)
+        operations = Operations(
+            self._hub, self._desk, self._publisher, self._watch, self._taps, self._metrics, self.snapshot, self.reload
+        )
+        self._control = ControlServer(bound.control.sock, operations.verbs())
         self._http: Any = None
         if bound.http is not None:
-            self._serve_http(bound.http)
-        self._listen_in()
+            from gestured.daemon.http import serve_pages
 
-    def addresses(self) -> dict[str, str | None]:
-        """Where it can be reached."""
-        bound = self._bound
-        return {
-            "listen": name_of(bound.udp),
-            "socket": str(bound.events.path),
-            "control": str(bound.control.path),
-            "metrics": name_of(bound.http) if bound.http else None,
-        }
+            self._http = serve_pages(bound.http, self.snapshot, self._metrics)
 
-    def kernel_drops(self) -> int:
-        """Packets that found no room in the socket's buffer."""
-        return kernel_drops(self._bound.udp)
+    def snapshot(self) -> Snapshot:
+        """How the daemon is now. Any thread may ask."""
+        now = time.monotonic()
+        shadow = self._watch.shadow
+        return Snapshot(
+            instance=self._instance,
+            time=time.time(),
+            now=now,
+            started=self._started,
+            uptime_s=now - self._begun,
+            stopping=self._stopping,
+            loop_age_s=self._pulse.age_s,
+            loop_lag_s=self._pulse.lag_s,
+            models=Models.of(self._ladder, self._watch.shift, self._publisher.models_failed),
+            gestures=self._hub.scene.gestures,
+            sensors=self._hub.readings(self._receiver.served(now)),
+            recent=self._publisher.recent(),
+            shadow=shadow.report() if shadow else None,
+            clients=self._clients.count,
+            backlog_bytes=self._clients.backlog,
+            kernel_drops=kernel_drops(self._bound.udp),
+            taps=self._taps.count,
+            flight_limit_bytes=self._taps.ring_bytes,
+            flight_held_bytes=self._taps.held_bytes,
+            addresses=self._bound.addresses(),
+            settings=self._settings.model_dump(mode="json"),
+        )
 
-    def tap(self, connection: Connection) -> None:
-        """Stream packets and events to an operator."""
-        self.taps.join(connection)
-        self._listen_in()
-
-    def _listen_in(self) -> None:
-        self._receiver.tap = self.taps.packets if self.taps.active else None
-
-    def _serve_http(self, sock: socket.socket) -> None:
-        """Answer HTTP on a listening socket, in a thread; imports prometheus_client with the first scrape."""
-        from gestured.daemon.http import HttpThread, as_json
-
-        started, metrics, health, pipeline = time.time(), self.metrics, self.health, self.pipeline
-
-        def ladder() -> Ladder:
-            return pipeline.watched.ladder
-
-        metrics.active_model = lambda: ladder().active
-        metrics.shift = lambda: pipeline.watched.shift.shares()
-        metrics.sensors = lambda: by_label(pipeline.readings(time.monotonic()), metrics.sensor_label)
-        metrics.readings = {
-            "gestured_sensors": ("Sensors that were heard", lambda: len(pipeline.sensors)),
-            "gestured_clients": ("Clients of the event socket", lambda: self.clients.count),
-            "gestured_backlog_bytes": ("Bytes that wait for slow clients", lambda: self.clients.backlog),
-            "gestured_kernel_drops_total": ("Packets that found no room", self.kernel_drops),
-            "gestured_loop_lag_seconds": ("How late the event loop is", lambda: health.lag_s),
-            "gestured_model_rung": ("How far down the ladder stands what answers", lambda: ladder().rung),
-            "gestured_model_failures_total": ("Models put aside since the last reload", lambda: ladder().failures),
-            "gestured_start_time_seconds": ("When the daemon started", lambda: started),
-        }
-        routes = {
-            "/metrics": lambda: (200, "text/plain; version=0.0.4; charset=utf-8", metrics.exposition()),
-            "/healthz": lambda: as_json(*health.healthz()),
-            "/readyz": lambda: as_json(*health.readyz()),
-        }
-        self._http = HttpThread(sock, routes)
+    def _hello(self) -> bytes:
+        """The first line to a client."""
+        gestures, sequences = self._hub.scene.gestures, self._hub.sequences()
+        return messages.hello_json(__version__, self._instance, self._ladder.active, gestures, sequences)
 
     async def start(self) -> None:
         """Take what needs a loop that turns: the operators' connections."""
@@ -122,15 +113,15 @@ class Service:
     async def serve(self, stop: asyncio.Event, reload: asyncio.Event) -> None:
         """Look after timers, until `stop`; then finish what is in flight."""
         watchdog = systemd.watchdog_period()
-        canary = Canary(self.pipeline)
+        canary = Canary(self._desk)
         period = min(TICK_S, watchdog or TICK_S)
         status_at = time.monotonic()
         due = status_at
         while not stop.is_set():
-            self.health.woke(time.monotonic() - due)
+            self._pulse.woke(time.monotonic() - due)
             self._receiver.read()
             now = time.monotonic()
-            self.pipeline.tick(now)
+            self._desk.take(self._hub.tick(self._receiver.served(now)))
             if now >= status_at:
                 status_at = max(status_at + STATUS_S, now)  # on time, but not all at once after a stall
                 self._every_second(now)
@@ -146,42 +137,35 @@ class Service:
                     await stop.wait()
             except TimeoutError:
                 pass
-        for task in tuple(self.tasks):
+        for task in tuple(self._tasks):
             task.cancel()
         await self._finish()
 
     def _spawn(self, work: Any) -> None:
         task = asyncio.ensure_future(work)
-        self.tasks.add(task)
-        task.add_done_callback(self.tasks.discard)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
     def _every_second(self, now: float) -> None:
-        self.clients.tick()
-        self.pipeline.review()
-        self.taps.tick()
-        self._listen_in()
-        status = self.health.status(now)
-        self.emit(status)
-        self._tell_systemd(status)
-
-    def _tell_systemd(self, status: Status) -> None:
-        states = ", ".join(f"{name} {state}" for name, state in list(status.sensors.items())[:SHOWN])
-        words = f"{status.state}: {status.model} answers; sensors: {states or 'none yet'}"
+        self._clients.tick()
+        self._taps.tick()
+        snapshot = self.snapshot()
+        self._publisher.publish(Status(snapshot.state, snapshot.states, snapshot.models.active, snapshot.time))
+        states = ", ".join(f"{name} {state}" for name, state in list(snapshot.states.items())[:SHOWN])
+        words = f"{snapshot.state}: {snapshot.models.active} answers; sensors: {states or 'none yet'}"
         if words != self._said:
             self._said = words
             systemd.notify(f"STATUS={words}")
 
     async def _finish(self) -> None:
         """Answer what is in flight, give clients a moment to read it, and say goodbye."""
-        self.health.stopping = True
+        self._stopping = True
         systemd.notify("STOPPING=1")
         self._receiver.drain()
         self._receiver.close()
         self._control.close()
-        now = time.monotonic()
-        for sensor in tuple(self.pipeline.sensors.values()):
-            self.pipeline.flush(sensor, now)
-        await self.clients.close(DRAIN_S)
+        self._desk.take(self._hub.flush(time.monotonic()))
+        await self._clients.close(DRAIN_S)
         for sink in self._osc:
             sink.close()
         if self._http is not None:
@@ -190,7 +174,7 @@ class Service:
 
     def _open(self, settings: Settings) -> tuple[Ladder, list[OscSink]]:
         """What may take long: models, and names of hosts."""
-        return open_ladder(settings, insist=True), [OscSink(address, self.metrics) for address in settings.publish]
+        return open_ladder(settings, insist=True), [OscSink(address, self._metrics) for address in settings.publish]
 
     async def reload(self) -> str | None:
         """Read everything anew, and only where all of it is valid, change anything; else the reason."""
@@ -203,7 +187,7 @@ class Service:
                 bug = not isinstance(error, GesturedError)
                 said = log.exception if bug else log.error
                 said("reload refused, nothing has changed", reason=str(error))
-                self.metrics.reloads.add("refused")
+                self._metrics.reloads.add("refused")
                 return f"a bug: {error!r}" if bug else str(error)
             else:
                 self._swap(settings, ladder, osc)
@@ -212,34 +196,16 @@ class Service:
                 systemd.notify("READY=1")
 
     def _swap(self, settings: Settings, ladder: Ladder, osc: list[OscSink]) -> None:
-        for key in ("listen", "socket", "control", "metrics", "flight_recorder"):
-            if getattr(settings, key) != getattr(self.settings, key):
+        for key in AT_A_RESTART:
+            if getattr(settings, key) != getattr(self._settings, key):
                 log.warning("this setting changes at a restart only", key=key)
         logging.configure(settings.log_level)
-        self.settings = settings
-        self.pipeline.reload(settings, ladder)
+        self._settings, self._ladder = settings, ladder
+        self._watch.follow(ladder)
+        self._desk.take(self._hub.change(scene_of(settings, ladder), ladder, time.monotonic()))
         for sink in self._osc:
             sink.close()
         self._osc = osc
-        self.metrics.reloads.add("done")
+        self._publisher.sinks = (self._clients, self._taps, *osc)
+        self._metrics.reloads.add("done")
         log.info("reloaded", model=ladder.active)
-
-    def emit(self, event: Event, *, test: bool = False) -> None:
-        """Give an event to every sink, then count it; a test's is no answer of a model."""
-        epoch = time.time() - time.monotonic()
-        sinks: tuple[Sink, ...] = (self.clients, self.taps, *self._osc)
-        for sink in sinks:
-            try:
-                sink.publish(event, epoch, test=test)
-            except Exception:  # a bug in one sink is not the others' business
-                self.metrics.internal_errors.add()
-                self._throttle.error("a bug in a sink", type(sink).__name__)
-        if not test:
-            self.metrics.event(event)
-            self.health.note(event)
-        elif isinstance(event, Gesture):
-            self.metrics.tests.add()
-        self.recent.note(event, epoch, test)
-        if not isinstance(event, Status):
-            name = getattr(event, "gesture", None)
-            log.debug(messages.event_type(event), sensor=event.sensor, id=event.id, gesture=name)

@@ -5,9 +5,9 @@ from typing import Protocol
 
 from gestured.core import messages, osc
 from gestured.core.events import Event, Gesture, Status
+from gestured.core.reading import SILENT
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.pipeline import SILENT
 from gestured.daemon.sockets import resolve
 from gestured.daemon.values import Address
 

@@ -116,8 +116,9 @@ def _end_surely(loop: asyncio.AbstractEventLoop) -> None:
 
 
 def _announce(service: Service) -> None:
-    model = service.pipeline.watched.ladder.active
-    where = {key: value for key, value in service.addresses().items() if value is not None}
+    snapshot = service.snapshot()
+    model = snapshot.models.active
+    where = {key: value for key, value in snapshot.addresses.items() if value is not None}
     control = where.pop("control")
     ready: dict[str, Any] = {"type": "ready", **where, "model": model, "control": control}
     log.info("ready", **where, model=model)

@@ -1,83 +1,41 @@
-"""What `gesturectl status` shows: one object that says how the daemon is."""
+"""What `gesturectl status` shows: a snapshot and what was counted, as one JSON object."""
 
 import os
-import time
-from collections import deque
 from collections.abc import Mapping
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gestured import __version__
-from gestured.core.events import Cancelled, Event, Gesture, Unknown
-
-if TYPE_CHECKING:
-    from gestured.daemon.service import Service
-
-RECENT = 10  # answers that are shown
+from gestured.core.reading import Reading
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.snapshot import Snapshot
+from gestured.daemon.values import Grid
 
 
-class Recent:
-    """The last answers, as a person wants to see them."""
-
-    def __init__(self) -> None:
-        self._lines: deque[dict[str, Any]] = deque(maxlen=RECENT)
-
-    def note(self, event: Event, epoch: float, test: bool) -> None:
-        """Remember an answer; whatever else happened is passed over."""
-        if isinstance(event, Gesture | Unknown | Cancelled):
-            self._lines.append(
-                {
-                    "time": time.time() if isinstance(event, Cancelled) else event.decided + epoch,
-                    "sensor": event.sensor,
-                    "answer": _answer(event),
-                    "confidence": None if isinstance(event, Cancelled) else round(event.confidence, 3),
-                    "test": test,
-                }
-            )
-
-    def lines(self) -> list[dict[str, Any]]:
-        """Oldest first."""
-        return list(self._lines)
-
-
-def _answer(event: Gesture | Unknown | Cancelled) -> str:
-    match event:
-        case Gesture():
-            return event.gesture
-        case Unknown():
-            return "unknown"
-        case _:
-            return f"cancelled: {event.reason}"
-
-
-def status(service: "Service") -> dict[str, Any]:
+def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
     """Everything at once; durations in seconds, `time` since the Unix epoch."""
-    now = time.monotonic()
-    pipeline, health, metrics = service.pipeline, service.health, service.metrics
-    ladder, watched = pipeline.watched.ladder, pipeline.watched
-    model: Any = ladder.model
+    models = snapshot.models
     return {
         "version": __version__,
-        "instance": health.instance,
+        "instance": snapshot.instance,
         "pid": os.getpid(),
-        "time": time.time(),
-        "uptime_s": round(now - service.started, 1),
-        "state": health.status(now).state,
-        "ready": health.readyz()[1],
-        "addresses": service.addresses(),
+        "time": snapshot.time,
+        "uptime_s": round(snapshot.uptime_s, 1),
+        "state": snapshot.state,
+        "ready": snapshot.readyz()[1],
+        "addresses": snapshot.addresses,
         "model": {
-            "active": ladder.active,
-            "asked": ladder.name,
-            "rung": ladder.rung,
-            "degraded": ladder.degraded,
-            "failures": ladder.failures,
-            "file": ladder.source,
-            "version": model.metadata.version,
-            "sha256": model.sha256,
-            "gestures": list(pipeline.gestures),
+            "active": models.active,
+            "asked": models.asked,
+            "rung": models.rung,
+            "degraded": models.degraded,
+            "failures": models.failures,
+            "file": models.file,
+            "version": models.version,
+            "sha256": models.sha256,
+            "gestures": list(snapshot.gestures),
         },
-        "sensors": {name: _sensor(service, name, asdict(r), now) for name, r in pipeline.readings(now).items()},
-        "recent": service.recent.lines(),
+        "sensors": {name: _sensor(reading, snapshot.now) for name, reading in snapshot.sensors.items()},
+        "recent": list(snapshot.recent),
         "answers": {
             "gestures": _by_label(metrics.gestures.values),
             "unknown": metrics.unknown.total(),
@@ -85,40 +43,63 @@ def status(service: "Service") -> dict[str, Any]:
             "tests": metrics.tests.total(),
         },
         "shift": {
-            "gestures": watched.shift.count,
-            "outside": {name: round(share, 3) for name, share in watched.shift.shares().items()},
-            "unlike": watched.shift.unlike(),
+            "gestures": models.shift_count,
+            "outside": {name: round(share, 3) for name, share in models.shift.items()},
+            "unlike": list(models.unlike),
         },
-        "shadow": watched.shadow.report() if watched.shadow else None,
-        "input": {"dropped": _by_label(metrics.dropped.values), "kernel_drops": service.kernel_drops()},
+        "shadow": snapshot.shadow,
+        "input": {"dropped": _by_label(metrics.dropped.values), "kernel_drops": snapshot.kernel_drops},
         "output": {
-            "subscribers": service.clients.count,
-            "backlog_bytes": service.clients.backlog,
+            "subscribers": snapshot.clients,
+            "backlog_bytes": snapshot.backlog_bytes,
             "lines_lost": metrics.lost_lines.total(),
             "evicted": _by_label(metrics.evicted.values),
             "osc": _by_label(metrics.sent.values),
         },
-        "loop_lag_s": round(health.lag_s, 4),
+        "loop_lag_s": round(snapshot.loop_lag_s, 4),
         "internal_errors": metrics.internal_errors.total(),
         "reloads": _by_label(metrics.reloads.values),
-        "taps": service.taps.count,
-        "flight_recorder": {"limit_bytes": service.taps.ring_bytes, "held_bytes": service.taps.held_bytes},
+        "taps": snapshot.taps,
+        "flight_recorder": {"limit_bytes": snapshot.flight_limit_bytes, "held_bytes": snapshot.flight_held_bytes},
     }
 
 
-def _sensor(service: "Service", name: str, reading: dict[str, Any], now: float) -> dict[str, Any]:
-    rounded = {key: round(value, 4) if isinstance(value, float) else value for key, value in reading.items()}
-    rounded["grid"] = str(service.pipeline.grid(name))
-    sensor = service.pipeline.sensors.get(name)
-    if sensor is None:
-        return rounded
-    return rounded | {
-        "source": f"{sensor.owner.source[0]}:{sensor.owner.source[1]}",
-        "heard_s_ago": round(now - sensor.owner.heard, 3),
-        "lost": sensor.lost,
-        "noise": round(sensor.recognizer.front_end.noise, 4),
-        "touched": sensor.recognizer.front_end.touched,
-        "gestures": sensor.recognizer.sequence,
+def scene(snapshot: Snapshot, epoch_ns: int) -> dict[str, Any]:
+    """What a recording must know to be understood without this daemon; `epoch_ns`: from the loop's clock to 1970."""
+    models = snapshot.models
+    return {
+        "version": __version__,
+        "instance": snapshot.instance,
+        "epoch_ns": epoch_ns,
+        "model": {
+            "name": models.active,
+            "sha256": models.sha256,
+            "rows": models.grid[0],
+            "columns": models.grid[1],
+        },
+        "gestures": list(snapshot.gestures),
+        "settings": snapshot.settings,
+    }
+
+
+def _sensor(reading: Reading, now: float) -> dict[str, Any]:
+    shown = {
+        "state": reading.state,
+        "rate_hz": round(reading.rate_hz, 4),
+        "jitter_s": round(reading.jitter_s, 4),
+        "bad_taxels": reading.bad_taxels,
+        "drift": round(reading.drift, 4),
+        "grid": str(Grid(*reading.grid)),
+    }
+    if reading.source is None:
+        return shown
+    return shown | {
+        "source": f"{reading.source[0]}:{reading.source[1]}",
+        "heard_s_ago": round(now - reading.heard, 3),
+        "lost": reading.lost,
+        "noise": round(reading.noise, 4),
+        "touched": reading.touched,
+        "gestures": reading.sequence,
     }
 
 

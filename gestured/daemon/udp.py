@@ -13,11 +13,13 @@ import struct
 import time
 from collections.abc import Callable, Sequence
 
+from gestured.core.hub import Hub
 from gestured.core.owner import Source
 from gestured.daemon.backlog import FLOOD_S, GROUP_BYTES, TOGETHER_S, Backlog, Datagram
+from gestured.daemon.desk import Desk
 from gestured.daemon.mute import LONGEST_S, Muted, Sender, mute
-from gestured.daemon.pipeline import Pipeline
 from gestured.daemon.sockets import kernel_drops
+from gestured.daemon.tap import Taps
 
 PACKET_BYTES = 65_536
 BATCH = 256  # packets in one read: half a millisecond, so that the kernel's buffer is empty again soon
@@ -38,22 +40,29 @@ ANCILLARY_BYTES = socket.CMSG_SPACE(TIMESTAMP.size)
 class Receiver:
     """Reads a UDP socket until it is closed."""
 
-    def __init__(self, sock: socket.socket, pipeline: Pipeline, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, sock: socket.socket, hub: Hub, desk: Desk, taps: Taps, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Gives `hub` what waits, and its facts to `desk`; `taps` are shown what is served."""
         self._loop = asyncio.get_running_loop()
-        self._sock, self._pipeline, self._clock = sock, pipeline, clock
-        self.tap: Callable[[Sequence[tuple[bytes, Source]], float], None] | None = None  # is shown what is served
-        self._backlog = Backlog(lambda source: source in pipeline.owners)
+        self._sock, self._hub, self._desk, self._taps, self._clock = sock, hub, desk, taps, clock
+        self._backlog = Backlog(lambda source: source in hub.owners)
         self._muted = Muted()
         self._wall = time.time() - clock()  # s, from the monotonic clock to the one that the kernel stamps with
         self._empty = clock()  # s, when the socket was last seen empty
         self._drops = 0  # packets that the kernel had dropped then
         self._dropping = -FLOOD_S  # s, when it began to
+        self._behind_s = 0.0  # for so long the oldest packet waits that was read and not yet served
         self._looked = 0.0  # s, when we last looked whether something waits
         self._found = 0  # packets, then
         self._pause: asyncio.TimerHandle | None = None
         self._again: asyncio.Handle | None = None
         sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         self._loop.add_reader(sock, self._wake)
+
+    def served(self, now: float) -> float:
+        """The time until which everything that arrived was served: a sensor whose packets wait is not silent."""
+        return now - self._behind_s
 
     def close(self) -> None:
         """Stop reading; the socket stays its owner's."""
@@ -105,7 +114,7 @@ class Receiver:
         if self._backlog:
             self._work(now)
         self._mute(now, self._muted.over(now))
-        self._pipeline.behind_s = self._backlog.age(now)
+        self._behind_s = self._backlog.age(now)
         if self._backlog or full:
             self._again = self._loop.call_soon(self.read)
 
@@ -121,7 +130,7 @@ class Receiver:
         except (BlockingIOError, InterruptedError):
             pass
         except (OSError, MemoryError) as error:  # the network's complaint about something else; the socket goes on
-            self._pipeline.drop("socket_error", error=str(error))
+            self._desk.drop("socket_error", error=str(error))
         return found, False
 
     def _arrival(self, stamp: bytes, now: float) -> float:
@@ -166,10 +175,10 @@ class Receiver:
             self._backlog.took(datagram, after - before)
             before = after
         if dropped:
-            self._pipeline.drop("flood", count=sum(dropped.values()))
-            self._pipeline.missed()
+            self._desk.drop("flood", count=sum(dropped.values()))
+            self._hub.missed()
             if blamed := self._muted.blame(dropped, now):
-                self._pipeline.muted(blamed)
+                self._desk.muted(blamed)
                 self._mute(now, blamed)
                 self._backlog.flood(now + LONGEST_S + FLOOD_S)  # those who are heard again are held back at once
 
@@ -177,22 +186,22 @@ class Receiver:
         """Have the kernel throw away what comes from senders of a flood: unread, it fills the socket's buffer."""
         if changed:
             try:
-                mute(self._sock, self._muted.rules(now, self._pipeline.owners))
+                mute(self._sock, self._muted.rules(now, self._hub.owners))
             except OSError as error:
-                self._pipeline.drop("socket_error", count=0, error=f"a sender cannot be muted: {error}")
+                self._desk.drop("socket_error", count=0, error=f"a sender cannot be muted: {error}")
 
     def _serve(self, packets: Sequence[tuple[bytes, Source]], now: float) -> None:
-        if self.tap is not None:
-            self.tap(packets, now)
-        self._pipeline.receive(packets, now)
+        if self._taps.active:
+            self._taps.packets(packets, now)
+        self._desk.take(self._hub.receive(packets, now))
 
     def _count_drops(self, now: float) -> None:
-        """Tell the pipeline where the kernel had no room for something."""
+        """Tell the hub where the kernel had no room for something."""
         drops = kernel_drops(self._sock)
         if drops == self._drops:
             return
         self._drops = drops
-        self._pipeline.missed()
+        self._hub.missed()
         if self._dropping <= now - FULL_S <= self._dropping + FLOOD_S:  # again: more comes than we can read
             self._backlog.flood(now + FLOOD_S)
         elif now > self._dropping + FLOOD_S:

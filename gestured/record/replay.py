@@ -1,7 +1,10 @@
-"""A tape through the same code as in the daemon, without one: decode, stamp, recognise, event for event."""
+"""A tape through the hub that the daemon uses: the same packets at the same times give the same events."""
 
+import dataclasses
+import ipaddress
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -9,93 +12,87 @@ from typing import Any
 from gestured.core.conditioning import Mounting
 from gestured.core.errors import ModelError, RecordingError
 from gestured.core.events import Event, Onset
-from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import FrontEnd
-from gestured.core.owner import Owner
-from gestured.core.recognizer import Classifier, Recognizer, Scores
-from gestured.core.segmentation import Timing
-from gestured.core.stamping import Stamper
-from gestured.core.wire import Addresses, Arrival, Decoder
-from gestured.record.tape import Packet, Tape, read
+from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
+from gestured.core.frames import Segment
+from gestured.core.hub import Hub
+from gestured.core.recognizer import Classifier, Decided, Scores
+from gestured.core.scene import Scene, Setup
+from gestured.core.wire import Addresses
+from gestured.record.tape import Tape, read
 
 SENSORS = 4096  # that a daemon's settings allow, at most
 MAX_SENSORS = 64  # where a tape does not say
 STALE_S = 60  # that a daemon's settings allow, at most
 
 
-def opened(path: str | Path) -> tuple[Tape, "Scene"]:
-    """A tape and what of its scene decides. RecordingError names the file."""
+@dataclass(frozen=True)
+class Maker:
+    """What a tape says of the daemon that made it."""
+
+    scene: Scene
+    models: list[str]  # as its settings name them, best first
+    sha256: str  # of the one that answered
+
+
+def opened(path: str | Path) -> tuple[Tape, Maker]:
+    """A tape, and what it says of its daemon. RecordingError names the file."""
     found = read(path)
     try:
-        return found, Scene(found.scene)
+        return found, maker(found.scene)
     except RecordingError as error:
         raise RecordingError(f"{path}: {error}") from None
 
 
-class Scene:
-    """The part of a tape's `scene` that decides. Raises RecordingError for one that says something else."""
-
-    def __init__(self, scene: Mapping[str, Any]) -> None:
-        settings = scene.get("settings")
-        if not isinstance(settings, dict):
-            raise RecordingError("scene: expected settings, as the daemon writes them")
-        try:
-            self.gestures = [_text(name) for name in scene["gestures"]]
-            if not self.gestures:
-                raise ValueError("none were in use")
-            self.addresses = Addresses(settings["addresses"]["pressure"], settings["addresses"]["trajectory"])
-            self.stale_s = float(settings["stale_s"])
-            model = scene["model"]
-            self.sha256 = str(model.get("sha256"))
-            self.ladder = [_text(name) for name in (settings["model"], *settings["fallback"])]  # best first
-            self._grid = tuple(settings["grid"] or (model["rows"], model["columns"]))
-            self._clock = settings["clock"]
-            self._sensors: Mapping[str, Any] = dict(settings["sensors"])
-            parts: Mapping[str, Any] = dict(settings["per_gesture"])
-            self.thresholds = {n: float(p["threshold"]) for n, p in parts.items() if p["threshold"] is not None}
-            self.refractory = {n: float(p["refractory_s"]) for n, p in parts.items()}
-            self._sensors_at_most = int(settings.get("max_sensors", MAX_SENSORS))
-            numbers = [*self.thresholds.values(), *self.refractory.values()]
-            if not all(map(math.isfinite, numbers)) or not 0 < self.stale_s <= STALE_S:
-                raise ValueError(f"stale_s of 0 to {STALE_S} s, and finite thresholds")
-            if len(self._sensors) > SENSORS:
-                raise ValueError(f"{len(self._sensors)} sensors, expected at most {SENSORS}")
-            for name in ("", *self._sensors):  # whatever is wrong is found now
-                self.grid(name), self.front_end(name), self.stamper(name)
-        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            raise RecordingError(
-                f"scene: expected gestures and settings as the daemon writes them: {repr(error)[:200]}"
-            ) from None
-
-    def admits(self, name: str, sensors: Collection[str]) -> bool:
-        """Whether there is a place for one sensor more beside `sensors`; those of the settings have theirs."""
-        strangers = sum(sensor not in self._sensors for sensor in sensors)
-        return name in self._sensors or strangers < self._sensors_at_most - len(self._sensors)
-
-    def grid(self, name: str) -> tuple[int, int]:
-        """Rows and columns of a sensor's frames, as they are sent."""
-        rows, columns = self._sensors.get(name, {}).get("grid") or self._grid
-        if not (2 <= int(rows) <= 64 and 2 <= int(columns) <= 64):
-            raise ValueError(f"a grid of {rows} x {columns}")
-        return int(rows), int(columns)
-
-    def front_end(self, name: str) -> FrontEnd:
-        """A sensor's, new."""
-        own = self._sensors.get(name, {})
-        return FrontEnd(
-            name,
-            *self.grid(name),
-            mounting=Mounting(own.get("rotate", 0), own.get("mirror", False)),
-            wait_for_double_tap="double_tap" in self.gestures,
-            timing=Timing(stale_s=self.stale_s),
+def maker(told: Mapping[str, Any]) -> Maker:
+    """A tape's `scene` as a value. Raises RecordingError for one that says something else than a daemon writes."""
+    settings = told.get("settings")
+    if not isinstance(settings, dict):
+        raise RecordingError("scene: expected settings, as the daemon writes them")
+    try:
+        sensors: Mapping[str, Any] = dict(settings["sensors"])
+        parts: Mapping[str, Any] = dict(settings["per_gesture"])
+        thresholds = {n: _finite(p["threshold"]) for n, p in parts.items() if p["threshold"] is not None}
+        most, stale_s = int(settings.get("max_sensors", MAX_SENSORS)), _finite(settings["stale_s"])
+        if len(sensors) > SENSORS or not 0 < most <= SENSORS:
+            raise ValueError(f"{len(sensors)} sensors of {most}, expected at most {SENSORS}")
+        if not 0 < stale_s <= STALE_S:
+            raise ValueError(f"stale_s: expected up to {STALE_S} s")
+        model = told["model"]
+        scene = Scene(
+            gestures=tuple(_text(name) for name in told["gestures"]),
+            grid=_grid(settings["grid"] or (model["rows"], model["columns"])),
+            sensors={name: _setup(own) for name, own in sensors.items()},
+            addresses=Addresses(settings["addresses"]["pressure"], settings["addresses"]["trajectory"]),
+            clock=settings["clock"],
+            stale_s=stale_s,
+            max_sensors=most,
+            allow=tuple(ipaddress.ip_network(_text(network)) for network in settings.get("allow", ())),
+            thresholds=thresholds,
+            refractory={n: _finite(p["refractory_s"]) for n, p in parts.items()},
         )
+        models = [_text(name) for name in (settings["model"], *settings["fallback"])]
+        return Maker(scene, models, str(model.get("sha256")))
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise RecordingError(
+            f"scene: expected gestures and settings as the daemon writes them: {repr(error)[:200]}"
+        ) from None
 
-    def stamper(self, name: str) -> Stamper:
-        """A sensor's, new."""
-        clock = self._sensors.get(name, {}).get("clock") or self._clock
-        if clock not in ("arrival", "sensor"):
-            raise ValueError(f"clock: {clock!r}")
-        return Stamper(clock)
+
+def _setup(own: Mapping[str, Any]) -> Setup:
+    grid = own.get("grid")
+    return Setup(grid and _grid(grid), Mounting(own.get("rotate", 0), own.get("mirror", False)), own.get("clock"))
+
+
+def _grid(value: Any) -> tuple[int, int]:
+    rows, columns = value
+    return int(rows), int(columns)
+
+
+def _finite(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"expected a number, found {number}")
+    return number
 
 
 def _text(value: object) -> str:
@@ -115,47 +112,27 @@ class Mute:
         raise ModelError("it has no answers")
 
 
-class Stream:
-    """One sensor's."""
+@dataclass
+class Played:
+    """What a replay has seen of one sensor; times in s since the tape's first packet."""
 
-    def __init__(self, scene: Scene, name: str, packet: Packet, classifier: Classifier) -> None:
-        self.owner = Owner(packet.source)
-        self.stamper = scene.stamper(name)
-        self.recognizer = Recognizer(
-            scene.front_end(name),
-            classifier,
-            gestures=scene.gestures,
-            thresholds=scene.thresholds,
-            refractory=scene.refractory,
-        )
-        self.stamps: list[tuple[float, float]] = []  # s: when a frame arrived, and when it was felt
-        self.onsets: list[float] = []  # s
-        self._learned: list[tuple[float, float]] = []  # s: since when it was new, and from when on it was known
+    stamps: list[tuple[float, float]] = field(default_factory=list)  # when a frame arrived, and when it was felt
+    onsets: list[float] = field(default_factory=list)
+    _learned: list[tuple[float, float]] = field(default_factory=list)  # since when it was new, and from when on known
+
+    def see(self, taken: Taken) -> None:
+        """One more frame."""
+        t = taken.frame.t
+        self.stamps.append((taken.arrived, t))
+        if taken.new:
+            self._learned.append((t, math.inf))
+        if taken.ready and self._learned[-1][1] == math.inf:
+            self._learned[-1] = (self._learned[-1][0], t)
 
     def knew(self, t: float) -> bool:
         """Whether the idle sensor had been learned by `t` s, so that a touch could be told from it."""
         since = [known for new, known in self._learned if new <= t]
         return bool(since) and since[-1] <= t
-
-    def take(self, arrivals: Sequence[Arrival], now: float) -> Iterator[Event]:
-        """Push frames that were found waiting at `now` s."""
-        for event in self._push(arrivals, now):
-            if isinstance(event, Onset):
-                self.onsets.append(event.onset)
-            yield event
-
-    def _push(self, arrivals: Sequence[Arrival], now: float) -> Iterator[Event]:
-        for arrival, stamp in zip(arrivals, self.stamper.stamp(arrivals, now), strict=True):
-            if stamp.dropped:
-                continue
-            self.stamps.append((now, stamp.t))
-            if stamp.restarted:
-                yield from self.recognizer.reset()
-            if stamp.restarted or not self._learned:
-                self._learned.append((stamp.t, math.inf))
-            yield from self.recognizer.push(Frame(stamp.t, arrival.values, arrival.touches, stamp.lost))
-            if self._learned[-1][1] == math.inf and self.recognizer.front_end.ready:
-                self._learned[-1] = (self._learned[-1][0], stamp.t)
 
 
 class Replay:
@@ -163,39 +140,36 @@ class Replay:
 
     def __init__(self, tape: Tape, scene: Scene, classifier: Classifier) -> None:
         """Raises RecordingError for a classifier that does not know the gestures that were in use."""
-        self.scene = scene
-        missing = [name for name in self.scene.gestures if name not in classifier.gestures]
-        if missing:
-            known = ", ".join(classifier.gestures)
-            raise RecordingError(f"gestures: {', '.join(missing)} were in use, the model knows {known}")
-        self.streams: dict[str, Stream] = {}
+        try:
+            self._hub = Hub(dataclasses.replace(scene, frames=True), classifier)
+        except ValueError as error:
+            raise RecordingError(str(error)) from None
+        self.played: dict[str, Played] = {}
         self._start = tape.packets[0].t_ns if tape.packets else 0
         self.epoch = self._start / 1e9
-        self._tape, self._classifier = tape, classifier
-        self._decoder = Decoder(self.scene.addresses, self.scene.grid, keep_touches=False)
+        self._tape = tape
 
     def events(self) -> Iterator[Event]:
         """All that comes of it, to the end, where every sensor falls silent."""
+        for fact in self.facts():
+            if not isinstance(fact, Decided | Arrived | Taken | Dropped | Changed):
+                yield fact
+
+    def facts(self) -> Iterator[Event | Decided | Arrived | Taken | Dropped | Changed]:
+        """The same with all else that the hub tells of; frames are told of one by one."""
         now = 0.0
         for t_ns, packets in groupby(self._tape.packets, lambda packet: packet.t_ns):
             now = (t_ns - self._start) / 1e9
-            yield from self._silent(now)
-            waiting: dict[str, list[Arrival]] = {}
-            for packet in packets:
-                for arrival in self._decoder.decode(packet.data, packet.source)[0]:
-                    name = arrival.sensor
-                    if name not in self.streams:
-                        if not self.scene.admits(name, self.streams):
-                            continue
-                        self.streams[name] = Stream(self.scene, name, packet, self._classifier)
-                    if self.streams[name].owner.admits(packet.source, now, self.scene.stale_s):
-                        waiting.setdefault(name, []).append(arrival)
-            for name, arrivals in waiting.items():
-                yield from self.streams[name].take(arrivals, now)
-        for stream in self.streams.values():
-            yield from stream.recognizer.flush(stream.stamper.at(now + self.scene.stale_s))
+            yield from self._seen(self._hub.receive([(packet.data, packet.source) for packet in packets], now))
+            yield from self._seen(self._hub.tick(now))
+        yield from self._seen(self._hub.flush(now + self._hub.scene.stale_s))
 
-    def _silent(self, now: float) -> Iterator[Event]:
-        for stream in self.streams.values():
-            if now - stream.owner.heard > self.scene.stale_s:
-                yield from stream.recognizer.flush(stream.stamper.at(now))
+    def _seen(self, facts: list[Fact]) -> Iterator[Event | Decided | Arrived | Taken | Dropped | Changed]:
+        for fact in facts:
+            if isinstance(fact, Fault):
+                raise fact.error  # here nobody depends on the other sensors
+            if isinstance(fact, Taken):
+                self.played.setdefault(fact.sensor, Played()).see(fact)
+            elif isinstance(fact, Onset):
+                self.played[fact.sensor].onsets.append(fact.onset)
+            yield fact

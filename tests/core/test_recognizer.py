@@ -17,7 +17,7 @@ from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Contact, Cut, FrontEnd
-from gestured.core.recognizer import Recognizer, Scores
+from gestured.core.recognizer import Decided, Recognizer, Scores, events_of
 from gestured.core.segmentation import Timing
 from gestured.core.window import Window
 from tests.scenario import Player, parse
@@ -62,7 +62,7 @@ def recognizer(classifier: Fake, **settings: object) -> Recognizer:
 
 
 def run(subject: Recognizer, stream: Sequence[Frame]) -> list[Event]:
-    return [event for frame in stream for event in subject.push(frame)]
+    return events_of(event for frame in stream for event in subject.push(frame))
 
 
 def answers(events: Sequence[Event]) -> list[Event]:
@@ -123,26 +123,15 @@ def cut_late(stream: Sequence[Frame]) -> list[Segment]:
     return found
 
 
-@pytest.mark.parametrize("lines", [(SWIPE,), (TAP,), (TAP, "quiet for 150ms", TAP), (TAP, "quiet for 150ms", SWIPE)])
-def test_what_is_due_is_what_the_frame_would_decide(lines: tuple[str, ...]) -> None:
-    stream = frames("quiet for 1500ms", *lines, "quiet for 900ms", *lines, "quiet for 900ms")
-    one, other = recognizer(Fake()), recognizer(Fake())
-    early = 0
-    for frame in stream:
-        expected = one.push(frame)
-        due = other.due(frame.t)
-        early += len(answers(due))
-        assert due + other.push(frame) == expected
-    assert early == 2 * len([line for line in lines if line == SWIPE] or [TAP])
-
-
-def test_a_witness_is_told_of_what_was_decided_alone() -> None:
-    told: list[tuple[Segment, Scores, bool]] = []
-    classifier = Fake([SURE, says(0, 0, 1)])
-    events = run(recognizer(classifier, witness=lambda *what: told.append(what)), frames(*DOUBLE))
-    ((segment, scores, known),) = told
-    assert segment is classifier.seen[1] and scores.values[2] == 1 and known
-    assert [segment.offset] == [event.offset for event in answers(events)]
+def test_what_was_decided_follows_its_event() -> None:
+    classifier = Fake([SURE, says(0.2, 0.2, 0.2)])
+    subject = recognizer(classifier)
+    found = [one for frame in swipes(2) for one in subject.push(frame)]
+    kinds = [type(one).__name__ for one in found]
+    assert kinds == ["Onset", "Gesture", "Decided", "Release", "Onset", "Unknown", "Decided", "Release"]
+    decided = [one for one in found if isinstance(one, Decided)]
+    assert [one.known for one in decided] == [True, False]
+    assert all(one.segment is seen for one, seen in zip(decided, classifier.seen, strict=True))
 
 
 def test_what_was_answered_is_not_kept() -> None:

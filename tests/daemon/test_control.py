@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from gestured.client.control import Control
 from gestured.client.stream import Refused, Unreachable
-from gestured.daemon.operations import verbs
+from gestured.daemon.operations import Operations
 from gestured.daemon.request import Parameter, Refusal, Verb, parse_request
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
@@ -325,7 +325,7 @@ DOCUMENT = (Path(__file__).resolve().parents[2] / "docs" / "control.md").read_te
 def test_the_table_of_verbs_in_the_documents(daemon: Daemon) -> None:
     rows = re.findall(r"^\| `(\w+)` \| (.*?) \|", DOCUMENT, re.MULTILINE)
     described = {verb: tuple(re.findall(r"`(\w+)`", keys)) for verb, keys in rows}
-    assert described == {name: tuple(verb.parameters) for name, verb in verbs(None).items()}
+    assert described == {name: tuple(verb.parameters) for name, verb in Operations(*[None] * 8).verbs().items()}
 
 
 def test_the_example_in_the_documents(daemon: Daemon) -> None:

@@ -12,12 +12,9 @@ from typing import Any
 import pytest
 
 from gestured.core import osc, wire
-from gestured.daemon.metrics import Metrics
-from gestured.daemon.pipeline import Pipeline
-from gestured.daemon.settings import Settings
-from gestured.model.ladder import ladder_for
 from gestured.model.model import shipped
 from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor, floats
+from tests.daemon.parts import SOURCE, Parts
 
 NEVER = {"torch", "sklearn", "pywt", "matplotlib", "scipy", "onnx", "mcap"}
 EVERYTHING = ("--metrics", "127.0.0.1:0", "--publish", "osc://127.0.0.1:9", "--flight-recorder", "1")
@@ -156,15 +153,13 @@ def test_finger_positions_cost_nothing_that_is_kept(start: Start) -> None:
 
 
 def test_finger_positions_are_passed_over_at_their_address(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    metrics = Metrics()
-    pipeline = Pipeline(Settings(max_sensors=1000), ladder_for(model), metrics, lambda event: None)
+    parts = Parts(model)
     monkeypatch.setattr(wire, "_touches", None)  # nobody calls it
     frame = floats("/armrest/pressure", Hand().frame(), 0)
     for n in range(100):
         packet = osc.encode_bundle([trajectory(f"s{n}"), frame, trajectory("armrest")], 1.7e9 + n)
-        pipeline.receive([(packet, ("127.0.0.1", 40000))], n / 15)
-    assert metrics.frames.values == {("armrest", "ok"): 100} and metrics.dropped.values == {}
-    assert pipeline._decoder._pending == {}
+        parts.desk.take(parts.hub.receive([(packet, SOURCE)], n / 15))
+    assert parts.metrics.frames.values == {("armrest", "ok"): 100} and parts.metrics.dropped.values == {}
 
 
 def test_the_explanation_names_what_is_left_out() -> None:

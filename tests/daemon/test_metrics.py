@@ -4,26 +4,28 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gestured.core.events import Cancelled, Event, Gesture, Unknown
-from gestured.core.frames import Frame, Segment
+from gestured.core.frames import Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.measures import MEASURES
-from gestured.core.recognizer import Scores
+from gestured.core.reading import STATES, Reading
+from gestured.core.recognizer import Decided, Scores
+from gestured.core.vitals import Vitals, faulty
 from gestured.core.window import Window
-from gestured.daemon.metrics import Metrics
-from gestured.daemon.reading import STATES, Reading, by_label, together
+from gestured.daemon.metrics import Gauges, Metrics, by_label
 from gestured.daemon.shadow import Comparison, Shadow
 from gestured.daemon.shift import LAST, LEAST, Shift, measured
-from gestured.daemon.vitals import Vitals, faulty
-from gestured.daemon.watch import Watched
+from gestured.daemon.watch import Watch
 from gestured.model.ladder import ladder_for
 from gestured.model.model import open_apart
 from tests.daemon.harness import Daemon, Hand, Sensor
+from tests.daemon.parts import SNAPSHOT, Parts
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 ROOT = Path(__file__).resolve().parents[2]
@@ -62,14 +64,15 @@ def test_there_are_at_most_200_series_whatever_arrives() -> None:
     ):
         for label in labels:
             counter.add(label)
-    readings = {name: Reading(STATES[n % len(STATES)]) for n, name in enumerate(names)}
-    metrics.sensors = lambda: by_label(readings, metrics.sensor_label)
-    metrics.shift = lambda: dict.fromkeys(("strength", *MEASURES, "confidence", "unknown"), 0.1)
+    shift = dict.fromkeys(("strength", *MEASURES, "confidence", "unknown"), 0.1)
+    snapshot = replace(
+        SNAPSHOT,
+        sensors={name: Reading(STATES[n % len(STATES)], (9, 9)) for n, name in enumerate(names)},
+        models=replace(SNAPSHOT.models, shift=shift),
+    )
     real = (Path(__file__).parent / "metrics.txt").read_text()
     gauges = set(re.findall(r"^# TYPE (\S+) ", real, re.MULTILINE))
-    known = set(re.findall(r"^# TYPE (\S+) ", metrics.exposition().decode(), re.MULTILINE))
-    metrics.readings = {name: ("what only a daemon can read", lambda: 1.0) for name in gauges - known}
-    text = metrics.exposition().decode()
+    text = metrics.exposition(snapshot).decode()
     assert set(re.findall(r"^# TYPE (\S+) ", text, re.MULTILINE)) == gauges
     series = [line for line in text.splitlines() if not line.startswith("#")]
     assert len(series) == len({line.rsplit(" ", 1)[0] for line in series}) <= 200
@@ -108,8 +111,11 @@ def test_a_sensors_state_and_rate_are_read_from_outside(shared: Daemon) -> None:
 
 
 def test_several_sensors_together_are_as_their_worst() -> None:
-    one, other = Reading("ok", 15.0, 0.001, 1, 0.5), Reading("stale", 0.0, 0.1, 2, 3.0)
-    assert together([one, other]) == Reading("stale", 0.0, 0.1, 3, 3.0)
+    still, gone = np.zeros(81), np.full(81, 3.0)
+    one = Reading("ok", (9, 9), 1 / 15, 0.001, 1, 1.0, first=still, baseline=still)
+    other = Reading("stale", (9, 9), 1 / 15, 0.1, 2, 1.0, first=still, baseline=gone)
+    assert by_label({"a": one, "b": other}, lambda name: "other") == {"other": Gauges("stale", 0.0, 0.1, 3, 3.0)}
+    assert by_label({"a": one}, str)["a"].rate_hz == pytest.approx(15.0)
 
 
 def test_jitter_is_none_for_an_even_stream_and_grows_with_an_uneven_one() -> None:
@@ -120,40 +126,44 @@ def test_jitter_is_none_for_an_even_stream_and_grows_with_an_uneven_one() -> Non
     assert even.jitter_s < 1e-9 and uneven.jitter_s == pytest.approx(0.02, rel=0.01)
 
 
-def test_drift_is_the_way_of_the_baseline_in_units_of_noise() -> None:
-    hand, front_end, vitals = Hand(), FrontEnd("a", 9, 9), Vitals()
-    t = 0.0
-    for _ in range(30):
-        front_end.push(Frame(t := t + 1 / 15, hand.frame()))
-    vitals.review(front_end)
-    assert vitals.drift(front_end) == 0.0
-    for n in range(3000):
-        front_end.push(Frame(t := t + 1 / 15, hand.frame() + n / 300))
-    vitals.review(front_end)
-    assert vitals.drift(front_end) == pytest.approx(10 / front_end.noise, rel=0.2)
-    vitals.restart()
-    vitals.review(front_end)
-    assert vitals.drift(front_end) == 0.0 and not faulty(front_end)
+def test_drift_is_the_way_of_the_baseline_in_units_of_noise(model: Path) -> None:
+    parts, hand = Parts(model), Hand()
+
+    def drift(t: float) -> float:
+        parts.desk.take(parts.hub.tick(t))
+        return parts.hub.readings(t)["a"].drift
+
+    t = parts.feed("a", hand.idle(2.0), 0.0)
+    assert drift(t) == 0.0
+    t = parts.feed("a", [hand.frame() + n / 300 for n in range(3000)], t)
+    assert drift(t) == pytest.approx(10 / parts.hub.readings(t)["a"].noise, rel=0.2)
+    parts.desk.take(parts.hub.restart(["a"], t))
+    t = parts.feed("a", [frame + 10 for frame in hand.idle(2.0)], t)
+    assert drift(t) == 0.0 and parts.hub.readings(t)["a"].state == "ok"
+
+
+def test_too_many_bad_taxels_make_a_sensor_faulty() -> None:
+    front_end = FrontEnd("a", 9, 9)
+    assert not faulty(front_end)
     front_end.conditioner.bad[:21] = True
     assert faulty(front_end)
 
 
-def contacts(*, watched: bool) -> list[str]:
+def contacts(model: Path, *, watched: bool) -> list[str]:
     """What a sensor without any noise, in fractions of one, makes of a touch after five seconds."""
-    front_end, vitals = FrontEnd("armrest", 9, 9), Vitals()
+    parts = Parts(model)
     y, x = np.mgrid[:9, :9]
     touch = 0.37 + np.round(0.5 * np.exp(-((y - 4) ** 2 + (x - 4) ** 2) / 2), 2)
-    found = []
+    t = 0.0
     for k in range(120):
-        found += front_end.push(Frame(k / 15, touch if 75 <= k < 90 else np.full((9, 9), 0.37)))
+        t = parts.feed("arm", [touch if 75 <= k < 90 else np.full((9, 9), 0.37)], t)
         if watched and k % 15 == 0:
-            vitals.review(front_end)
-            vitals.drift(front_end)
-    return [type(event).__name__ for event in found]
+            assert parts.hub.readings(t)["arm"].drift >= 0.0
+    return [type(event).__name__ for event in parts.events]
 
 
-def test_looking_at_a_sensor_changes_nothing() -> None:
-    assert contacts(watched=True) == contacts(watched=False) != []
+def test_looking_at_a_sensor_changes_nothing(model: Path) -> None:
+    assert contacts(model, watched=True) == contacts(model, watched=False) != []
 
 
 QUANTILES = {
@@ -256,9 +266,9 @@ def test_a_shadow_counts_where_it_agrees() -> None:
 
 def test_a_shadow_that_dies_says_so_and_drops_the_rest(model: Path) -> None:
     segment = Segment(np.ones((6, 9, 9), np.float32), np.arange(6) / 15, 1, 4, 1.0)
-    watched = Watched(ladder_for(model))
-    scores = watched.classify(segment)
-    shadow = watched.compare(open_apart(model))
+    ladder = ladder_for(model)
+    scores = ladder.classify(segment)
+    shadow = Watch(ladder).compare(open_apart(model))
     shadow.see(segment, scores)
     while shadow.report()["agreement"] is None:
         pass
@@ -276,13 +286,13 @@ def test_what_looks_on_cannot_prevent_an_answer(model: Path, monkeypatch: pytest
     frames = np.zeros((6, 9, 9), np.float32)
     frames[1:5, 4, 4] = 50
     segment = Segment(frames, np.arange(6) / 15, 1, 4, 1.0)
-    watched = Watched(ladder_for(model))
-    expected = watched.classify(segment)
-    shadow = watched.compare(open_apart(model))
+    ladder = ladder_for(model)
+    watch = Watch(ladder)
+    expected = ladder.classify(segment)
+    shadow = watch.compare(open_apart(model))
     monkeypatch.setattr(Shadow, "see", lambda self, segment, scores: 1 / 0)
     for _ in range(2):
-        answer = watched.classify(segment)
+        answer = ladder.classify(segment)
         assert np.array_equal(answer.values, expected.values) and answer.unknown == expected.unknown
-        watched.note(segment, answer, True)
-        watched.look_on()
+        watch.see(Decided("arm", segment, answer, True))
     shadow.close()

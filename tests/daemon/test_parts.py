@@ -5,29 +5,28 @@ import errno
 import ipaddress
 import json
 import socket
-import time
 import tomllib
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from gestured.core.errors import SettingsError
-from gestured.core.events import Event
-from gestured.core.wire import Arrival, Decoder
+from gestured.core.front_end import FrontEnd
+from gestured.core.scene import Scene
+from gestured.core.wire import Decoder
 from gestured.daemon import http, log
-from gestured.daemon.health import Health
+from gestured.daemon.health import Pulse
 from gestured.daemon.http import HttpThread, as_json
 from gestured.daemon.merge import load
-from gestured.daemon.metrics import Metrics
-from gestured.daemon.pipeline import Pipeline, allowed
 from gestured.daemon.settings import FLAGS, Settings
 from gestured.daemon.sockets import AddressError, bind_udp
 from gestured.daemon.udp import Receiver
 from gestured.daemon.values import Address
-from gestured.model.ladder import ladder_for
 from tests.daemon import harness
 from tests.daemon.harness import DEADLINE_S, Hand
+from tests.daemon.parts import SNAPSHOT, SOURCE, Parts
 
 
 def test_flags_win_over_the_environment_that_over_the_file_that_over_defaults(tmp_path: Path) -> None:
@@ -81,36 +80,23 @@ def test_every_setting_is_described_and_the_defaults_can_be_written_down() -> No
 
 def test_the_allow_list_knows_mapped_and_scoped_addresses() -> None:
     lan = (ipaddress.ip_network("192.168.7.0/24"), ipaddress.ip_network("fe80::/10"))
-    assert allowed("192.168.7.9", lan) and allowed("::ffff:192.168.7.9", lan) and allowed("fe80::1%lo", lan)
-    assert not allowed("192.168.8.9", lan) and not allowed("::1", lan)
-    assert allowed("8.8.8.8", ())
+    scene = Scene(("one_tap",), (9, 9), allow=lan)
+    assert all(map(scene.may_send, ("192.168.7.9", "::ffff:192.168.7.9", "fe80::1%lo")))
+    assert not scene.may_send("192.168.8.9") and not scene.may_send("::1")
+    assert Scene(("one_tap",), (9, 9)).may_send("8.8.8.8")
 
 
 @pytest.fixture
-def pipeline(model: Path) -> tuple[Pipeline, list[Event], Metrics]:
-    events: list[Event] = []
-    metrics = Metrics()
-    settings, _ = load({"model": str(model)}, {})
-    return Pipeline(settings, ladder_for(model), metrics, events.append), events, metrics
+def parts(model: Path) -> Parts:
+    return Parts(model)
 
 
-def feed(pipeline: Pipeline, name: str, frames: list, t: float, source: tuple[str, int] = ("10.0.0.1", 1)) -> float:
-    for frame in frames:
-        t += 1 / 15
-        sensor = pipeline.admit(name, source, t)
-        if sensor is not None:
-            pipeline.take(sensor, [Arrival(name, frame.astype("f4"), None, None, ())], t)
-    return t
-
-
-def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(pipeline, monkeypatch, capfd) -> None:
+def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(parts: Parts, monkeypatch, capfd) -> None:
     log.configure("warning")
-    line, events, metrics = pipeline
-    hand = Hand()
-    t = max(feed(line, name, hand.idle(2.0), 0.0) for name in ("good", "bad"))
-    feed(line, "bad", hand.tap(), t)
-    front_end = type(line.sensors["bad"].recognizer.front_end)
-    push = front_end.push
+    hand, events = Hand(), parts.events
+    t = max(parts.feed(name, hand.idle(2.0), 0.0) for name in ("good", "bad"))
+    parts.feed("bad", hand.tap(), t)
+    push = FrontEnd.push
 
     def broken(self, frame):
         if self.sensor == "bad":
@@ -118,32 +104,32 @@ def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(pipel
         return push(self, frame)
 
     with monkeypatch.context() as patch:
-        patch.setattr(front_end, "push", broken)
-        feed(line, "bad", hand.tap(), t + 0.2)
-        feed(line, "good", hand.swipe("left") + hand.idle(1.0), t)
+        patch.setattr(FrontEnd, "push", broken)
+        parts.feed("bad", hand.tap(), t + 0.2)
+        parts.feed("good", hand.swipe("left") + hand.idle(1.0), t)
     kinds = [(type(e).__name__, e.sensor) for e in events]
     assert kinds[:3] == [("Onset", "bad"), ("Cancelled", "bad"), ("Release", "bad")]
     assert [kind for kind, sensor in kinds if sensor == "good"] == ["Onset", "Gesture", "Release"]
-    assert metrics.internal_errors.total() == 2
+    assert parts.metrics.internal_errors.total() == 2
     log.close()
     assert capfd.readouterr().err.count("ZeroDivisionError: a bug") == 1  # logged at a bounded rate
-    feed(line, "bad", hand.idle(2.0) + hand.swipe("left") + hand.idle(1.0), t + 1)
+    parts.feed("bad", hand.idle(2.0) + hand.swipe("left") + hand.idle(1.0), t + 1)
     assert [type(e).__name__ for e in events[-3:]] == ["Onset", "Gesture", "Release"] and events[-1].sensor == "bad"
 
 
-def test_a_bug_in_the_decoder_costs_one_packet(pipeline, monkeypatch) -> None:
-    line, _, metrics = pipeline
+def test_a_bug_in_the_decoder_costs_one_packet(parts: Parts, monkeypatch) -> None:
     decode = Decoder.decode
     monkeypatch.setattr(Decoder, "decode", lambda self, data, source: decode(self, data, source) if data else 1 / 0)
     good = harness.floats("/a/pressure", Hand().frame(), 0)
-    line.receive([(packet, ("10.0.0.1", 1)) for packet in (good, b"", b"rubbish!", b"", good)], 1.0)
+    parts.desk.take(parts.hub.receive([(packet, SOURCE) for packet in (good, b"", b"rubbish!", b"", good)], 1.0))
+    metrics = parts.metrics
     assert metrics.internal_errors.total() == 2 and metrics.dropped.values == {("not_osc",): 1}
     assert metrics.frames.values == {("a", "ok"): 2}
 
 
 @pytest.mark.parametrize(("apart", "taken"), [(0.067, 5), (0.0, 1)])
-def test_packets_that_come_thick_are_taken_together_and_no_others_wait(pipeline, apart: float, taken: int) -> None:
-    line, _, metrics = pipeline
+def test_packets_that_come_thick_are_taken_together_and_no_others_wait(parts: Parts, apart: float, taken: int) -> None:
+    metrics = parts.metrics
     hand, rests, now = Hand(), [], 0.0
 
     async def main() -> None:
@@ -151,7 +137,7 @@ def test_packets_that_come_thick_are_taken_together_and_no_others_wait(pipeline,
         loop = asyncio.get_running_loop()
         loop.call_later = lambda _, listen: rests.append(listen) or asyncio.Handle(listen, (), loop)
         with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
-            receiver = Receiver(sock, line, lambda: now)
+            receiver = Receiver(sock, parts.hub, parts.desk, parts.taps, lambda: now)
             sender.connect(sock.getsockname())
             for k in range(5):
                 now += apart
@@ -171,15 +157,24 @@ def test_packets_that_come_thick_are_taken_together_and_no_others_wait(pipeline,
     asyncio.run(main())
 
 
-def test_healthz_says_when_the_loop_hangs(pipeline, model: Path) -> None:
-    health = Health(pipeline[0])
-    assert health.healthz()[0] == 200 == health.readyz()[0]
-    health.beat = time.monotonic() - 10
-    assert health.healthz()[0] == 503
-    status, body = health.readyz()
+def test_healthz_and_readyz_say_what_is_wrong() -> None:
+    assert SNAPSHOT.healthz()[0] == 200 == SNAPSHOT.readyz()[0]
+    hanging = replace(SNAPSHOT, loop_age_s=10.0)
+    assert hanging.healthz()[0] == 503
+    status, body = hanging.readyz()
     assert status == 503 and "hangs" in str(body["reason"])
-    health.beat, health.stopping = time.monotonic(), True
-    assert "stopping" in str(health.readyz()[1]["reason"])
+    assert "stopping" in str(replace(SNAPSHOT, stopping=True).readyz()[1]["reason"])
+    failed = replace(SNAPSHOT, models=replace(SNAPSHOT.models, failed=True))
+    assert failed.readyz()[0] == 503 and (failed.state, SNAPSHOT.state) == ("degraded", "ok")
+    assert replace(SNAPSHOT, sensors={}).state == "no_data"
+
+
+def test_while_the_loop_hangs_its_age_grows() -> None:
+    pulse = Pulse()
+    pulse.beat -= 10
+    assert pulse.age_s >= 10 and pulse.lag_s >= 9
+    pulse.woke(0.0)
+    assert pulse.age_s < 10
 
 
 @pytest.fixture

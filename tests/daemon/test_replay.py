@@ -10,7 +10,7 @@ from gestured.core.events import Event
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.messages import event_type
-from gestured.core.recognizer import Recognizer
+from gestured.core.recognizer import Recognizer, events_of
 from gestured.model.model import open_model
 from tests.daemon import harness
 from tests.daemon.harness import Daemon, Hand, Sensor
@@ -46,7 +46,7 @@ def test_online_is_offline(shared: Daemon, model: Path, seed: int) -> None:
     recognizer = Recognizer(FrontEnd(name, 9, 9), open_model(model))
     offline: list[Event] = []
     for t, frame in timed:
-        offline += recognizer.push(Frame(t, frame.astype(np.float32)))
+        offline += events_of(recognizer.push(Frame(t, frame.astype(np.float32))))
     assert len(offline) > 50 and {"gesture", "cancelled"} < {event_type(event) for event in offline}
     client = shared.client().subscribe(*KINDS, sensors=[name])
     sensor = Sensor(shared, name)

@@ -12,11 +12,8 @@ from gestured.client.control import Control
 from gestured.client.stream import Unreachable
 from gestured.core.front_end import FrontEnd
 from gestured.daemon.canary import Canary
-from gestured.daemon.merge import load
-from gestured.daemon.metrics import Metrics
-from gestured.daemon.pipeline import Pipeline
-from gestured.model.ladder import ladder_for
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
+from tests.daemon.parts import Parts
 
 ROOT = Path(__file__).resolve().parents[2]
 HANGING = """
@@ -86,9 +83,8 @@ def test_what_ends_a_hang_finds_out_where_it_hung(start, hanging) -> None:
 
 
 def test_the_canary_says_when_the_way_of_a_frame_is_broken(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    metrics = Metrics()
-    pipeline = Pipeline(load({"model": str(model)}, {})[0], ladder_for(model), metrics, lambda event: None)
-    canary = Canary(pipeline)
+    parts = Parts(model)
+    metrics, canary = parts.metrics, Canary(parts.desk)
     assert all(canary.sings() for _ in range(50)) and metrics.internal_errors.total() == 0
     with monkeypatch.context() as patch:
         patch.setattr(FrontEnd, "push", lambda self, frame: 1 / 0)

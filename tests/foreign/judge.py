@@ -20,7 +20,7 @@ from typing import Any
 from gestured.core.events import Cancelled, Gesture, Onset, Unknown
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
-from gestured.core.recognizer import Recognizer
+from gestured.core.recognizer import Recognizer, events_of
 from tests.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
 
 SEEN = 4.0  # times the noise
@@ -100,8 +100,8 @@ def judge(recording: Take, seed: int, level: str, classifier: Any | None) -> Out
     for frame in _frames(recording):
         if frame.t < onset:
             ready = front.ready
-        events += machine.push(frame)
-    events += machine.flush(float(recording["times"][-1]) + 5.0)
+        events += events_of(machine.push(frame))
+    events += events_of(machine.flush(float(recording["times"][-1]) + 5.0))
     decided, cancelled = _decided(events)
     slack = 2.0 / max(float(len(recording["times"]) / recording["times"][-1]), 1.0)
     inside = [e for e in decided if _span(e)[0] <= release + slack + 0.2 and _span(e)[1] >= onset - slack]

@@ -1,29 +1,35 @@
 """The one place where golden tapes meet today's code: whoever moves that code rewrites this file, and only this one.
 
-`play` is the daemon's own pipeline, at times that are written down. `replay` is the same
-tape as a file that `gesturectl replay` plays. `front_ends` is the path up to the segments, without a classifier.
+`play` is the daemon's own hub, at times that are written down. `replay` is the same tape as a file that `gesturectl
+replay` plays. `front_ends` is the path up to the segments, without a classifier.
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from gestured.core.events import Cancelled, Event, Onset, Release
+from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
+from gestured.core.feed import front_end_of
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
-from gestured.core.stamping import Stamp
-from gestured.core.wire import Addresses, Decoder
-from gestured.daemon.metrics import Metrics
-from gestured.daemon.pipeline import Pipeline
+from gestured.core.hub import Hub
+from gestured.core.reading import Reading
+from gestured.core.stamping import Stamp, Stamper
+from gestured.core.wire import Decoder
+from gestured.daemon.scene import scene_of
 from gestured.daemon.settings import Settings
 from gestured.model.ladder import Ladder
-from gestured.record import replay as offline
 from gestured.record import tape as mcap
+from gestured.record.replay import Replay, maker
 from tests.golden.tape import Tape
 
 Line = dict[str, Any]
+COUNTED = {"taken": "ok", "lost": "lost", "duplicates": "duplicate", "late": "late"}  # as the metrics call them
 MODEL = Path(__file__).parent / "models" / "cnn_lstm.onnx"
 
 
@@ -35,35 +41,49 @@ def open_model() -> Ladder:
 def play(tape: Tape, model: Ladder) -> list[Line]:
     """What the daemon publishes, each event with the time at which it does; then its counts and its sensors."""
     lines: list[Line] = []
-    now = 0.0
-    settings = Settings.model_validate(dict(tape.settings))
-    metrics = Metrics()
-    pipeline = Pipeline(settings, model, metrics, lambda event: lines.append({"at": now} | _line(event)))
+    frames: Counter[str] = Counter()
+    dropped: Counter[str] = Counter()
+    implausible = faults = 0
+    hub = Hub(scene_of(Settings.model_validate(dict(tape.settings)), model), model)
+
+    def take(facts: list[Fact], now: float) -> None:
+        nonlocal implausible, faults
+        for fact in facts:
+            match fact:
+                case Arrived():
+                    implausible += fact.implausible
+                    for result in ("taken", "lost", "duplicates", "late"):
+                        frames[f"{fact.sensor} {COUNTED[result]}"] += getattr(fact, result)
+                case Dropped():
+                    dropped[fact.reason] += 1
+                case Fault():
+                    faults += 1
+                case Decided() | Taken() | Changed():
+                    pass
+                case _:
+                    lines.append({"at": now} | _line(fact))
+
     for now, waiting in tape.steps():
-        if waiting is None:
-            pipeline.tick(now)
-        else:
-            pipeline.receive(waiting, now)
-    now = tape.end_ns / 1e9
-    states = pipeline.states(now)
-    for sensor in pipeline.sensors.values():
-        pipeline.flush(sensor, now)
+        take(hub.tick(now) if waiting is None else hub.receive(waiting, now), now)
+    end = tape.end_ns / 1e9
+    readings = hub.readings(end)
+    take(hub.flush(end), end)
+    after = hub.readings(end)
     counts = {
         "type": "Counts",
-        "dropped": {reason: count for (reason,), count in sorted(metrics.dropped.values.items())},
-        "frames": {f"{name} {result}": n for (name, result), n in sorted(metrics.frames.values.items())},
-        "implausible": metrics.implausible.total(),
-        "internal_errors": metrics.internal_errors.total(),
+        "dropped": dict(sorted(dropped.items())),
+        "frames": {name: count for name, count in sorted(frames.items()) if count},
+        "implausible": implausible,
+        "internal_errors": faults,
     }
-    return [*lines, counts, *(_sensor(pipeline, name, state) for name, state in sorted(states.items()))]
+    return [*lines, counts, *(_sensor(name, readings[name].state, after[name]) for name in sorted(readings))]
 
 
-def _sensor(pipeline: Pipeline, name: str, state: str) -> Line:
+def _sensor(name: str, state: str, reading: Reading) -> Line:
     line: Line = {"type": "Sensor", "sensor": name, "state": state}
-    if (sensor := pipeline.sensors.get(name)) is not None:
-        front_end = sensor.recognizer.front_end
-        line |= {"noise": front_end.noise, "bad_taxels": front_end.bad_taxels, "interval_s": front_end.interval_s}
-        line |= {"lost": sensor.lost, "sequence": sensor.recognizer.sequence, "segments": front_end.segments}
+    if reading.source is not None:
+        line |= {"noise": reading.noise, "bad_taxels": reading.bad_taxels, "interval_s": reading.interval_s}
+        line |= {"lost": reading.lost, "sequence": reading.sequence, "segments": reading.segments}
     return line
 
 
@@ -74,14 +94,13 @@ def _line(event: Event) -> Line:
 def replay(tape: Tape, model: Ladder) -> list[Line]:
     """The events of the tape as `gesturectl replay` has them; without the time at which they were published."""
     settings = Settings.model_validate(dict(tape.settings))
-    used = [g for g in model.gestures if settings.gestures is None or g in settings.gestures]
-    scene = {
-        "gestures": used,
+    told = {
+        "gestures": scene_of(settings, model).gestures,
         "settings": settings.model_dump(mode="json"),
         "model": {"name": model.name, "sha256": "", "rows": model.rows, "columns": model.columns},
     }
     packets = tuple(mcap.Packet(p.t_ns, p.source, p.data) for p in tape.packets)
-    player = offline.Replay(mcap.Tape(scene, packets, (), True), offline.Scene(scene), model)
+    player = Replay(mcap.Tape(told, packets, (), True), maker(told).scene, model)
     return [_line(event) for event in player.events()]
 
 
@@ -94,15 +113,9 @@ def front_ends(tape: Tape) -> Iterator[tuple[FrontEnd, Stamp, list[Found]]]:
     Whoever sends may feed every sensor, and touches are kept. A dropped frame is passed over, but its stamp is given.
     """
     settings = Settings.model_validate(dict(tape.settings))
-    scene = offline.Scene(
-        {
-            "gestures": ["double_tap"] if settings.gestures is None else settings.gestures,
-            "settings": settings.model_dump(mode="json"),
-            "model": {"rows": 9, "columns": 9},
-        }
-    )
-    addresses = Addresses(settings.addresses.pressure, settings.addresses.trajectory)
-    decoder = Decoder(addresses, scene.grid, keep_touches=True)
+    gestures = ("double_tap",) if settings.gestures is None else settings.gestures
+    scene = scene_of(settings, SimpleNamespace(gestures=gestures, rows=9, columns=9))  # type: ignore[arg-type]
+    decoder = Decoder(scene.addresses, scene.grid_of, keep_touches=True)
     sensors: dict[str, tuple[Any, FrontEnd]] = {}
     for now, waiting in tape.steps():
         arrived: dict[str, list[Any]] = {}
@@ -111,7 +124,7 @@ def front_ends(tape: Tape) -> Iterator[tuple[FrontEnd, Stamp, list[Found]]]:
                 arrived.setdefault(arrival.sensor, []).append(arrival)
         for name, arrivals in arrived.items():
             if name not in sensors:
-                sensors[name] = scene.stamper(name), scene.front_end(name)
+                sensors[name] = Stamper(scene.clock_of(name)), front_end_of(name, scene)
             stamper, front_end = sensors[name]
             for arrival, stamp in zip(arrivals, stamper.stamp(arrivals, now), strict=True):
                 found: list[Found] = []

@@ -1,7 +1,7 @@
 """How often a damaged gesture is wrong, for each fault: `python -m tests.hostile.damage`.
 
 Simulated people (the project's own simulator, nominal sensor, people whom the models have not seen) perform
-gestures; a fault damages what the sensor sends; the daemon's own pipeline takes it at times that are written down,
+gestures; a fault damages what the sensor sends; the daemon's own hub takes it at times that are written down,
 so that the same seed gives the same numbers at any speed. "Damaged" are the
 gestures during which a packet or frame was not what it should have been. An untouched sensor has the same fault
 for as long: any gesture there is one too many.
@@ -25,11 +25,11 @@ from gestured.client.sensor import Form
 from gestured.core import messages
 from gestured.core.events import Event
 from gestured.core.frames import Frame
+from gestured.core.hub import Hub
 from gestured.daemon import log
 from gestured.daemon.health import TICK_S
 from gestured.daemon.merge import load
-from gestured.daemon.metrics import Metrics
-from gestured.daemon.pipeline import Pipeline
+from gestured.daemon.scene import scene_of
 from gestured.model.ladder import ladder_for
 from gestured.simulator import Participant, Sensor, Take, generator, session
 from tests.hostile.faults import FAULTS, Fault
@@ -80,32 +80,26 @@ def take(participant: int, seconds: float = SESSION_S, touched: bool = True) -> 
 
 
 class Bench:
-    """The daemon's pipeline, at times that are written down."""
+    """The daemon's hub, at times that are written down."""
 
     def __init__(self, model: str) -> None:
         # Nothing here may depend on how fast this machine is: no rung is ever too slow.
         self._ladder = ladder_for(model, [], slow_s=math.inf)
-        self._settings = load({"model": model}, {})[0]
+        self._scene = scene_of(load({"model": model}, {})[0], self._ladder)
 
     def events(self, arrivals: list[tuple[float, bytes]]) -> list[dict[str, Any]]:
         """What the daemon says to (time in s, packet), in order of arrival, as a client's lines."""
-        lines: list[dict[str, Any]] = []
-
-        def emit(event: Event) -> None:
-            lines.append(json.loads(messages.to_json(event, 0.0)))
-
-        now = 0.0
-        pipeline = Pipeline(self._settings, self._ladder, Metrics(), emit)
+        now, facts = 0.0, []
+        hub = Hub(self._scene, self._ladder)
         tick = arrivals[0][0]
         for t, together in itertools.groupby(arrivals, key=lambda arrival: arrival[0]):
             while tick < t:
-                pipeline.tick(tick)
+                facts += hub.tick(tick)
                 tick += TICK_S
             now = t
-            pipeline.receive([(packet, SOURCE) for _, packet in together], now)
-        for one in pipeline.sensors.values():
-            pipeline.flush(one, now)
-        return lines
+            facts += hub.receive([(packet, SOURCE) for _, packet in together], now)
+        facts += hub.flush(now)
+        return [json.loads(messages.to_json(fact, 0.0)) for fact in facts if isinstance(fact, Event)]
 
 
 @dataclass(frozen=True)

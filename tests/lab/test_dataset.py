@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gestured.core.events import Event
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Recognizer, Scores
+from gestured.core.recognizer import Decided, Recognizer, Scores
 from gestured.lab import dataset
 from gestured.lab.dataset import (
     OTHERS,
@@ -43,14 +44,18 @@ class Sure:
         return Scores(np.ones(1, np.float32), 0.0, "sure")
 
 
+def decided(found: list[Event | Decided]) -> list[Segment]:
+    return [one.segment for one in found if isinstance(one, Decided)]
+
+
 def test_what_is_learned_from_is_what_the_daemon_would_have_classified() -> None:
     take = session(Participant(71), Sensor.nominal(day=71), generator(71, 4), 40.0)
     heard: list[Segment] = []
     front_end = FrontEnd("armrest", *take.frames.shape[1:])
-    recognizer = Recognizer(front_end, Sure(), witness=lambda segment, scores, known: heard.append(segment))
+    recognizer = Recognizer(front_end, Sure())
     for t, values in zip(take.times, take.frames, strict=True):
-        recognizer.push(Frame(float(t), values))
-    recognizer.flush(float(take.times[-1]) + 2)
+        heard += decided(recognizer.push(Frame(float(t), values)))
+    heard += decided(recognizer.flush(float(take.times[-1]) + 2))
     found = cuts(take.frames, take.times)
     assert len(found) == len(heard) > 5
     for ours, theirs in zip(found, heard, strict=True):

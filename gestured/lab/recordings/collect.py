@@ -21,7 +21,7 @@ def run(args: argparse.Namespace) -> int:
     path: Path = args.out / f"{args.participant}.npz"
     kept = already(path, args.participant, (args.rows, args.columns))
     trials = order(args.participant, args.seed, args.gestures, args.repeats)
-    with closing(LiveSensor(args.listen, args.rows, args.columns, args.sensor, args.rate)) as sensor, terminal:
+    with closing(LiveSensor(args.listen, args.rows, args.columns, args.sensor)) as sensor, terminal:
         session = Session(args.participant, path, kept, sensor, terminal, args.countdown)
         session.run(trials)
     if args.json:

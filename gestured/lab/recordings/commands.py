@@ -41,7 +41,6 @@ def add(command: Add) -> None:
     collect.add_argument("--sensor", type=_sensor, metavar="NAME", help="which sensor (the first that sends)")
     collect.add_argument("--rows", type=_side, default=9, metavar="N", help="rows of its grid (9)")
     collect.add_argument("--columns", type=_side, default=9, metavar="N", help="columns of its grid (9)")
-    collect.add_argument("--rate", type=_rate, default=15.0, metavar="HZ", help="frames a second, nominally (15)")
     collect.add_argument("--seed", type=int, default=0, metavar="N", help="another order of the trials (0)")
     collect.add_argument("--gestures", type=_gestures, default=GESTURES, metavar="A,B", help="only these (all ten)")
     collect.add_argument("--repeats", type=_count, default=1, metavar="N", help="times that each trial is done (1)")
@@ -126,6 +125,5 @@ def _within(low: float, high: float, whole: bool) -> Callable[[str], float]:
 
 
 _side = _within(2, 64, whole=True)
-_rate = _within(5, 1000, whole=False)
 _count = _within(1, 100, whole=True)
 _seconds = _within(0, 60, whole=True)

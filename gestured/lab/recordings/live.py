@@ -4,17 +4,19 @@ import math
 import socket
 import time
 from collections import deque
-from collections.abc import Sequence
 
 import numpy as np
 
 from gestured.client.say import shown
 from gestured.core.errors import GesturedError
-from gestured.core.events import Cancelled, Onset, Release
-from gestured.core.frames import Frame
-from gestured.core.front_end import Contact, Cut, FrontEnd
-from gestured.core.stamping import Stamper
-from gestured.core.wire import Addresses, Arrival, Decoder
+from gestured.core.events import Cancelled, Event, Onset, Release, Status
+from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
+from gestured.core.frames import Frame, Segment
+from gestured.core.hub import Hub
+from gestured.core.owner import Source
+from gestured.core.reading import Reading
+from gestured.core.recognizer import Decided, Scores
+from gestured.core.scene import DOUBLE_TAP, Scene
 from gestured.lab.recordings.quality import Take
 
 PACKET_BYTES = 65_536
@@ -31,23 +33,33 @@ WHY = {
 }
 
 
+class Listening:
+    """A `Classifier` that calls everything unknown: what is collected gets its name from whoever performs it."""
+
+    gestures: tuple[str, ...] = (DOUBLE_TAP,)  # so that a tap waits for a second one
+
+    def classify(self, segment: Segment) -> Scores:
+        """No gesture at all."""
+        return Scores(np.ones(1, np.float32), 1.0, "none")
+
+
 class LiveSensor:
     """The first sensor that sends to `address`, or the one called `name`. Raises GesturedError where it cannot listen.
 
-    `pump` reads; what the front end cut since `begin` is `contacts`.
+    `pump` reads; what the hub found of it since `begin` is `found`.
     """
 
-    def __init__(self, address: tuple[str, int], rows: int, columns: int, name: str | None, rate_hz: float) -> None:
+    def __init__(self, address: tuple[str, int], rows: int, columns: int, name: str | None) -> None:
         self.where = f"{address[0]}:{address[1]}"
-        self.front = FrontEnd(name or "sensor", rows, columns)
         self.name = name
-        self.contacts: list[Contact] = []
-        self._decoder = Decoder(Addresses(), lambda _: (rows, columns))
-        self._stamper = Stamper(rate_hz=rate_hz)
+        self.grid = (rows, columns)
+        self.ready = False  # the idle sensor is known
+        self.found: list[Event | Decided] = []
+        classifier = Listening()
+        self._hub = Hub(Scene(classifier.gestures, self.grid, touches=True, frames=True), classifier)
         self._frames: deque[Frame] = deque()
         self._free = -math.inf  # s, when the last contact was over
         self._before = -math.inf  # s, the same at `begin`
-        self._source: object = None
         self._heard = time.monotonic()
         self._wrong = ""
         try:
@@ -84,72 +96,75 @@ class LiveSensor:
         who = f"no frames of {self.name or 'a sensor'} arrive on {self.where}"
         return shown(f"{who} ({self._wrong})" if self._wrong else who)
 
+    @property
+    def touched(self) -> bool:
+        """Whether a contact is going on."""
+        return self._reading is not None and self._reading.touched
+
+    @property
+    def _reading(self) -> Reading | None:
+        return self._hub.readings(time.monotonic()).get(self.name or "")
+
     def pump(self) -> None:
         """Take what waits in the socket."""
-        arrivals: list[Arrival] = []
+        waiting: list[tuple[bytes, Source]] = []
         while True:
             try:
-                packet, source = self.socket.recvfrom(PACKET_BYTES)
+                waiting.append(self.socket.recvfrom(PACKET_BYTES))
             except BlockingIOError:
                 break
             except OSError:  # the network's complaint about something else; the socket goes on
                 continue
-            found, errors = self._decoder.decode(packet, source)
-            if errors:
-                self._wrong = str(errors[-1])
-            arrivals += [arrival for arrival in found if self._ours(arrival, source)]
-        if arrivals:
-            self._take(arrivals, time.monotonic())
-
-    def _ours(self, arrival: Arrival, source: object) -> bool:
-        """As in the daemon: a sensor belongs to the source that sent it first, until it has been silent."""
-        if self.name is None:
-            self.name = arrival.sensor
-        if arrival.sensor != self.name:
-            self._wrong = f"{arrival.sensor} sends"
-            return False
-        if self._source is None or self.silent:
-            self._source = source
-        return source == self._source
-
-    def _take(self, arrivals: Sequence[Arrival], now: float) -> None:
-        self._heard, self._wrong = now, ""
-        for arrival, stamp in zip(arrivals, self._stamper.stamp(arrivals, now), strict=True):
-            if stamp.dropped:
-                continue
-            contacts = self.front.reset() if stamp.restarted else []
-            frame = Frame(stamp.t, arrival.values, arrival.touches, stamp.lost)
-            contacts += self.front.push(frame)
-            self._frames.append(frame)
-            self.contacts += contacts
-            if any(isinstance(contact, Release) for contact in contacts):
-                self._free = stamp.t
-        while self._frames[0].t < self._frames[-1].t - HISTORY_S:
+        now = time.monotonic()
+        for fact in [*self._hub.receive(waiting, now), *self._hub.tick(now)]:
+            self._see(fact, now)
+        while self._frames and self._frames[0].t < self._frames[-1].t - HISTORY_S:
             self._frames.popleft()
+
+    def _see(self, fact: Fact, now: float) -> None:
+        if isinstance(fact, Fault):
+            raise fact.error
+        if isinstance(fact, Dropped):
+            self._wrong = fact.text or self._wrong
+            return
+        if self.name is None and isinstance(fact, Changed):
+            self.name = fact.sensor
+        if isinstance(fact, Arrived | Changed | Status):
+            return
+        if fact.sensor != self.name:
+            self._wrong = f"{fact.sensor} sends"
+        elif isinstance(fact, Taken):
+            self._heard, self._wrong = now, ""
+            self._frames.append(fact.frame)
+            self.ready = fact.ready
+        else:
+            self.found.append(fact)
+            if isinstance(fact, Release):
+                self._free = self.now
 
     def begin(self) -> None:
         """From now on it counts."""
-        self.contacts = []
+        self.found = []
         self._before = self._free
 
     @property
     def onset(self) -> float | None:
         """When the first contact since `begin` began."""
-        return next((contact.onset for contact in self.contacts if isinstance(contact, Onset)), None)
+        return next((contact.onset for contact in self.found if isinstance(contact, Onset)), None)
 
     def quiet(self, seconds: float) -> bool:
         """Whether there was a contact since `begin`, and nothing for so long after it."""
-        over = any(isinstance(contact, Release) for contact in self.contacts)
-        return over and not self.front.touched and self.now - self._free >= seconds
+        over = any(isinstance(contact, Release) for contact in self.found)
+        return over and not self.touched and self.now - self._free >= seconds
 
     def take(self) -> Take | None:
         """What was felt since `begin`; None where nothing was."""
         onset = self.onset
         if onset is None:
             return None
-        cuts = [contact.segment for contact in self.contacts if isinstance(contact, Cut)]
-        released = [contact.offset for contact in self.contacts if isinstance(contact, Release)]
-        reasons = [contact.reason for contact in self.contacts if isinstance(contact, Cancelled)]
+        cuts = [contact.segment for contact in self.found if isinstance(contact, Decided)]
+        released = [contact.offset for contact in self.found if isinstance(contact, Release)]
+        reasons = [contact.reason for contact in self.found if isinstance(contact, Cancelled)]
         first = cuts[0].onset if cuts else onset
         last = cuts[-1].offset if cuts else released[-1] if released else self.now
         trouble = ""
@@ -160,4 +175,10 @@ class LiveSensor:
         start = min(max(first - LEAD_S, self._before), first)
         frames = tuple(frame for frame in self._frames if frame.t >= start)
         marks = np.searchsorted([frame.t for frame in frames], [first, last])
-        return Take(frames, int(marks[0]), min(int(marks[1]), len(frames) - 1), self.front.noise, trouble)
+        return Take(
+            frames,
+            int(marks[0]),
+            min(int(marks[1]), len(frames) - 1),
+            self._reading.noise if self._reading else 0.0,
+            trouble,
+        )

@@ -85,12 +85,12 @@ class Session:
 
     def _await_sensor(self) -> None:
         self._terminal.say(f"Waiting for the sensor on {self._sensor.where}; do not touch it.")
-        while not self._sensor.front.ready:
+        while not self._sensor.ready:
             try:
-                self._until(lambda: self._sensor.front.ready)
+                self._until(lambda: self._sensor.ready)
             except Paused:  # there is nothing to pause yet
                 pass
-        rows, columns = self._sensor.front.sent
+        rows, columns = self._sensor.grid
         self._terminal.say(f"Sensor {self._sensor.name}: {rows} x {columns} at {self._sensor.rate_hz:.0f} Hz.")
 
     def _trial(self, trial: Trial, number: int, total: int) -> Take | None:
@@ -140,7 +140,7 @@ class Session:
                 return key, take
 
     def _free(self) -> bool:
-        return self._sensor.front.ready and not self._sensor.front.touched
+        return self._sensor.ready and not self._sensor.touched
 
     def _show(self, trial: Trial, take: Take | None) -> None:
         if take is None:

@@ -15,7 +15,7 @@ from gestured.core.events import Event, Gesture, Onset
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Classifier, Recognizer
+from gestured.core.recognizer import Classifier, Recognizer, events_of
 from gestured.core.window import Window
 from gestured.lab.dataset import WINDOW
 from gestured.lab.stability.path import Array, Stream, events, fault, labels
@@ -293,15 +293,15 @@ def month_table(classifier: Classifier, days: float) -> Table:
         noise = NOISE * rng.standard_normal((len(part), 9, 9))
         noise += LEVEL + swing * np.sin(2 * np.pi * part / 86_400.0)[:, None, None]
         for t, frame in zip(part, noise, strict=True):
-            heard.update(map(type, recognizer.push(Frame(float(t), frame))))
+            heard.update(map(type, events_of(recognizer.push(Frame(float(t), frame)))))
     end = float(times[-1])
     level = LEVEL + swing * float(np.sin(2 * np.pi * end / 86_400.0))
     off, *_ = front.conditioner.deviation(np.full(81, level))
     after, _ = swipes(1, level=level)
     found: list[Event] = []
     for t, frame in zip(after.times + end + 0.1, after.frames, strict=True):
-        found += recognizer.push(Frame(float(t), frame))
-    found += recognizer.flush(end + 10.0)
+        found += events_of(recognizer.push(Frame(float(t), frame)))
+    found += events_of(recognizer.flush(end + 10.0))
     return Table(
         "Running means after a long time idle",
         ("days", "frames", "contacts", "gestures", "baseline off by (noise)", "noise found / true", "then a swipe is"),

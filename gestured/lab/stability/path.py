@@ -12,7 +12,7 @@ from gestured.core.conditioning import Mounting
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
-from gestured.core.recognizer import Classifier, Recognizer
+from gestured.core.recognizer import Classifier, Recognizer, events_of
 from gestured.simulator import GESTURES, Participant, Sensor, generator, gesture_take
 
 Array = NDArray[Any]
@@ -49,7 +49,7 @@ def segments(stream: Stream) -> list[Segment]:
 def events(stream: Stream, classifier: Classifier, mounting: Mounting | None = None) -> list[Event]:
     """What a recognizer makes of it."""
     recognizer = Recognizer(FrontEnd("stability", *stream.frames.shape[1:], mounting=mounting), classifier)
-    return _run(recognizer.push, recognizer.flush, stream)
+    return events_of(_run(recognizer.push, recognizer.flush, stream))
 
 
 def _run(push: Callable[[Frame], list[Any]], flush: Callable[[float], list[Any]], stream: Stream) -> list[Any]:

@@ -51,10 +51,15 @@ class FakeSensor:
     def __init__(self, *takes: Take | None) -> None:
         self.takes = list(takes)
         self.where, self.name, self.rate_hz, self.silent = "127.0.0.1:9000", "armrest", 15.0, False
-        self.front = SimpleNamespace(ready=True, touched=False, sent=(9, 9))
+        self.grid, self.touched = (9, 9), False
+        self.not_yet: Iterator[bool] = iter(())  # what it answers before it is ready
         self.felt: Take | None = None
         self._fd, self._pipe = os.pipe()
         self.socket = SimpleNamespace(fileno=lambda: self._fd)
+
+    @property
+    def ready(self) -> bool:
+        return next(self.not_yet, True)
 
     def pump(self) -> None:
         pass
@@ -135,19 +140,6 @@ def test_a_pause_while_the_verdict_is_shown_throws_the_take_away(tmp_path: Path)
 def test_a_pause_before_the_sensor_is_there_changes_nothing(tmp_path: Path) -> None:
     sensor = FakeSensor(GOOD)
     answers = iter([False, False, False])
-    sensor.front = Front(answers)
+    sensor.not_yet = answers
     script = run(tmp_path / "07.npz", sensor, ("Waiting for the sensor", "p"), ("in place", "\n"), ("Enter keep", "\n"))
     assert "Ended with 1 recordings" in script.shown
-
-
-class Front:
-    """Not ready for as many looks as there are answers."""
-
-    touched, sent = False, (9, 9)
-
-    def __init__(self, answers: Iterator[bool]) -> None:
-        self.answers = answers
-
-    @property
-    def ready(self) -> bool:
-        return next(self.answers, True)

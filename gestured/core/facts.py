@@ -1,0 +1,55 @@
+"""What a hub found: small facts in a plain union, for those who publish, count, compare or keep them."""
+
+from typing import Literal, NamedTuple
+
+from gestured.core.events import Event
+from gestured.core.frames import Frame
+from gestured.core.owner import Source
+from gestured.core.recognizer import Decided
+
+
+class Arrived(NamedTuple):
+    """What became of the frames of a sensor that were found waiting together."""
+
+    sensor: str
+    taken: int
+    lost: int  # before them, by the sensor's counter, or by what this machine had no room for
+    duplicates: int
+    late: int
+    implausible: int  # time tags that were replaced by the arrival
+
+
+class Taken(NamedTuple):
+    """A frame that was used; told of only where the scene asks for `frames`."""
+
+    sensor: str
+    arrived: float  # s
+    frame: Frame  # stamped, as it was sent
+    new: bool  # the sensor came, or restarted: what was learned of it before does not hold
+    ready: bool  # whether the idle sensor is known, this frame included
+
+
+class Dropped(NamedTuple):
+    """A packet, or a part of one, that was not used."""
+
+    reason: str
+    source: Source
+    text: str = ""  # what was wrong, in words
+
+
+class Changed(NamedTuple):
+    """A sensor came, fell silent, or began anew."""
+
+    sensor: str
+    what: Literal["new", "silent", "restarted"]
+    source: Source
+
+
+class Fault(NamedTuple):
+    """A bug: an exception where none may be. A sensor's contact has been ended."""
+
+    sensor: str | None
+    error: Exception
+
+
+Fact = Event | Decided | Arrived | Taken | Dropped | Changed | Fault

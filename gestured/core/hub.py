@@ -1,0 +1,190 @@
+"""Packets and a time in, facts out: every sensor of a scene, from the bytes that arrived to the events.
+
+The one path. The daemon, a replay, an export and a recording session differ only in where packets come from and in
+what they do with the facts. Nothing here has a socket, a clock, a log or a metric; times are seconds on one clock that
+never goes back, the daemon's monotonic one or a tape's own.
+
+A bug in the path of one sensor is a `Fault`: its contact is ended, and the others go on. That is the one place where
+a bug does not end the program: a daemon in a vehicle that dies of one sensor's odd frame helps nobody.
+"""
+
+from collections.abc import Sequence
+
+from gestured.core.facts import Changed, Dropped, Fact, Fault
+from gestured.core.feed import Feed
+from gestured.core.owner import Source
+from gestured.core.reading import Reading
+from gestured.core.recognizer import Classifier
+from gestured.core.scene import Scene
+from gestured.core.wire import Arrival, Decoder
+
+FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one that sends
+REMEMBERED = 4096  # names of sensors that are not there, whose numbers are known
+HOSTS = 1024  # decisions about who may send that are known
+
+Found = dict[str, tuple[Feed, list[Arrival]]]  # by sensor: its frames among some packets
+
+
+class Hub:
+    """All sensors of a scene."""
+
+    def __init__(self, scene: Scene, classifier: Classifier) -> None:
+        """`classifier` must know the scene's gestures (ValueError)."""
+        self._feeds: dict[str, Feed] = {}
+        self._numbers: dict[str, tuple[int, int]] = {}  # sequence and id that sensors which are not there have used
+        self._missed = 0  # times that this machine had no room for a packet,
+        self._told: dict[str, int] = {}  # and how many of them a sensor knows of
+        self._owners: frozenset[Source] = frozenset()
+        self._set(scene, classifier)
+
+    @property
+    def scene(self) -> Scene:
+        """What decides."""
+        return self._scene
+
+    @property
+    def owners(self) -> frozenset[Source]:
+        """Sources that own a sensor which is there, as of the last tick."""
+        return self._owners
+
+    def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
+        """Take packets that were found waiting at `now`, each with its source."""
+        facts: list[Fact] = []
+        found: Found = {}
+        for packet, source in packets:
+            try:
+                self._decode(packet, source, now, found, facts)
+            except Exception as error:  # what came before and after it is good
+                facts.append(Fault(None, error))
+        for name, (feed, arrivals) in found.items():
+            missed = self._told[name] != self._missed
+            self._told[name] = self._missed
+            feed.take(arrivals, now, facts, missed=missed)
+        return facts
+
+    def tick(self, now: float) -> list[Fact]:
+        """What the time alone decides, once everything that arrived until `now` was received: who fell silent."""
+        facts: list[Fact] = []
+        self._owners = frozenset(feed.owner.source for feed in self._feeds.values() if not feed.silent)
+        for feed in self._feeds.values():
+            feed.review()
+            if not feed.silent and feed.stale(now):
+                facts.append(Changed(feed.name, "silent", feed.owner.source))
+                feed.flush(now, facts)
+        return facts
+
+    def flush(self, now: float) -> list[Fact]:
+        """Nothing more will come: what is open is answered or cancelled."""
+        facts: list[Fact] = []
+        for feed in self._feeds.values():
+            feed.flush(now, facts)
+        return facts
+
+    def missed(self) -> None:
+        """This machine had no room for a packet: whose it was shows where the next frame comes after a pause."""
+        self._missed += 1
+
+    def restart(self, sensors: Sequence[str], now: float) -> list[Fact]:
+        """Learn these sensors anew; their open contacts are cancelled."""
+        facts: list[Fact] = []
+        for name in sensors:
+            self._feeds[name].restart(now, facts)
+        return facts
+
+    def change(self, scene: Scene, classifier: Classifier, now: float) -> list[Fact]:
+        """Go on in another scene, with another classifier; what was learned of a sensor stays where it holds."""
+        facts: list[Fact] = []
+        self._set(scene, classifier)
+        for feed in self._feeds.values():
+            feed.change(scene, classifier, now, facts)
+        return facts
+
+    def number(self, name: str) -> tuple[int, int]:
+        """The next sequence and id of a sensor, for an event that is made up; they count as used."""
+        if name in self._feeds:
+            return self._feeds[name].count()
+        sequence, number = self._numbers.get(name, (0, 0))
+        self._numbers[name] = sequence + 1, number + 1
+        return self._numbers[name]
+
+    def sequences(self) -> dict[str, int]:
+        """The last sequence of each sensor that was heard, or tested."""
+        numbers = self._numbers | {name: feed.numbers for name, feed in self._feeds.items()}
+        return {name: sequence for name, (sequence, _) in numbers.items()}
+
+    def states(self, now: float) -> dict[str, str]:
+        """The state of each sensor, heard or in the scene, at `now`; see `Reading`. Any thread may ask."""
+        silent = dict.fromkeys(self._scene.sensors, "no_data")
+        return silent | {name: feed.state(now) for name, feed in tuple(self._feeds.items())}
+
+    def readings(self, now: float) -> dict[str, Reading]:
+        """What is known of each sensor, heard or in the scene, at `now`. Any thread may ask."""
+        silent = {name: Reading("no_data", self._scene.grid_of(name)) for name in self._scene.sensors}
+        return silent | {name: feed.reading(now) for name, feed in tuple(self._feeds.items())}
+
+    def _set(self, scene: Scene, classifier: Classifier) -> None:
+        missing = [gesture for gesture in scene.gestures if gesture not in classifier.gestures]
+        if missing:
+            known = ", ".join(classifier.gestures)
+            raise ValueError(f"gestures: {', '.join(missing)} were asked for, the classifier knows {known}")
+        self._scene, self._classifier = scene, classifier
+        self._decoder = Decoder(scene.addresses, scene.grid_of, keep_touches=scene.touches)
+        self._allowed: dict[str, bool] = {}  # by host
+
+    def _decode(self, packet: bytes, source: Source, now: float, found: Found, facts: list[Fact]) -> None:
+        if self._scene.allow and not self._may_send(source[0]):
+            facts.append(Dropped("not_allowed", source))
+            return
+        arrivals, errors = self._decoder.decode(packet, source)
+        for error in errors:
+            facts.append(Dropped(error.reason, source, text=str(error)))
+        for arrival in arrivals:
+            feed = self._admit(arrival.sensor, source, now, facts)
+            if feed is not None:
+                found.setdefault(arrival.sensor, (feed, []))[1].append(arrival)
+
+    def _may_send(self, host: str) -> bool:
+        known = self._allowed.get(host)
+        if known is None:
+            if len(self._allowed) >= HOSTS:
+                self._allowed.clear()
+            known = self._allowed[host] = self._scene.may_send(host)
+        return known
+
+    def _admit(self, name: str, source: Source, now: float, facts: list[Fact]) -> Feed | None:
+        """The sensor that a packet of `source` may feed, or None where it may not."""
+        feed = self._feeds.get(name)
+        if feed is None:
+            if self._full(name, now):
+                facts.append(Dropped("too_many_sensors", source))
+                return None
+            numbers = self._numbers.pop(name, (0, 0))
+            feed = self._feeds[name] = Feed(name, source, self._scene, self._classifier, numbers)
+            self._told[name] = self._missed
+            facts.append(Changed(name, "new", source))
+        if not feed.owner.admits(source, now, self._scene.stale_s):
+            facts.append(Dropped("second_source", source))
+            return None
+        feed.silent = False
+        return feed
+
+    def _full(self, name: str, now: float) -> bool:
+        """Whether there is no place for a new sensor; places for those of the scene are kept free."""
+        named = self._scene.sensors
+        if name in named:
+            return False
+        strangers = [feed for feed in self._feeds.values() if feed.name not in named]
+        if len(strangers) < self._scene.max_sensors - len(named):
+            return False
+        for feed in strangers:
+            if now - feed.owner.heard > FORGET_S:
+                self._forget(feed)
+                return False
+        return True
+
+    def _forget(self, feed: Feed) -> None:
+        """Take a sensor off the list; what it has numbered is numbered on should it return."""
+        del self._feeds[feed.name], self._told[feed.name]
+        if len(self._numbers) >= REMEMBERED:
+            self._numbers.pop(next(iter(self._numbers)))
+        self._numbers[feed.name] = feed.numbers

@@ -1,0 +1,74 @@
+"""What becomes of the hub's facts: events are published, the rest is counted, logged and compared."""
+
+from collections.abc import Sequence
+
+from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
+from gestured.core.recognizer import Decided
+from gestured.daemon.log import Throttle, log
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.publisher import Publisher
+from gestured.daemon.watch import Watch
+
+CHANGES = {"silent": "sensor is silent", "restarted": "sensor restarted"}
+
+
+class Desk:
+    """Takes facts, and the complaints of those who read packets."""
+
+    def __init__(self, metrics: Metrics, publisher: Publisher, watch: Watch) -> None:
+        self._metrics, self._publisher, self._watch = metrics, publisher, watch
+        self._throttle = Throttle()
+
+    def take(self, facts: Sequence[Fact]) -> None:
+        """Events go out first; whoever looks on has time after them."""
+        decided: list[Decided] = []
+        for fact in facts:
+            if isinstance(fact, Arrived):
+                self._count(fact)
+            elif isinstance(fact, Decided):
+                self._metrics.inference.observe(fact.scores.took_s, fact.scores.model)
+                decided.append(fact)
+            elif isinstance(fact, Dropped):
+                self.drop(fact.reason, source=fact.source[0], error=fact.text)
+            elif isinstance(fact, Changed):
+                self._changed(fact)
+            elif isinstance(fact, Fault):
+                self.bug("in the path of a sensor; its recognizer is reset", fact.error, sensor=fact.sensor)
+            elif not isinstance(fact, Taken):
+                self._publisher.publish(fact)
+        for one in decided:
+            self._watch.see(one)
+
+    def drop(self, reason: str, count: int = 1, **fields: object) -> None:
+        """Count what was dropped; say so at a bounded rate."""
+        self._metrics.dropped.add(reason, count=count)
+        self._throttle.warn("dropped", reason, **{name: value for name, value in fields.items() if value})
+
+    def muted(self, senders: Sequence[tuple[str, int] | str]) -> None:
+        """Say at a bounded rate that these senders of a flood are not heard for a while."""
+        names = [sender if isinstance(sender, str) else f"{sender[0]}:{sender[1]}" for sender in senders]
+        self._throttle.warn("senders of a flood are not heard for some seconds", "muted", senders=names)
+
+    def bug(self, what: str, error: BaseException | None = None, **fields: object) -> None:
+        """Count a bug that was caught; log its traceback at a bounded rate."""
+        self._metrics.internal_errors.add()
+        self._throttle.error("a bug, caught", what, exc_info=error or True, **fields)
+
+    def _count(self, arrived: Arrived) -> None:
+        frames, label = self._metrics.frames, self._metrics.sensor_label(arrived.sensor)
+        if arrived.taken:
+            frames.add(label, "ok", count=arrived.taken)
+        if arrived.lost:
+            frames.add(label, "lost", count=arrived.lost)
+        if arrived.duplicates:
+            frames.add(label, "duplicate", count=arrived.duplicates)
+        if arrived.late:
+            frames.add(label, "late", count=arrived.late)
+        if arrived.implausible:
+            self._metrics.implausible.add(count=arrived.implausible)
+
+    def _changed(self, change: Changed) -> None:
+        if change.what == "new":
+            log.info("new sensor", sensor=change.sensor, source=f"{change.source[0]}:{change.source[1]}")
+        else:
+            self._throttle.warn(CHANGES[change.what], change.what, sensor=change.sensor)

@@ -1,0 +1,27 @@
+"""The scene that the settings ask for."""
+
+from gestured.core.conditioning import Mounting
+from gestured.core.scene import Scene, Setup
+from gestured.core.wire import Addresses
+from gestured.daemon.settings import Settings
+from gestured.model.ladder import Ladder
+
+
+def scene_of(settings: Settings, ladder: Ladder) -> Scene:
+    """What decides, with the models of `ladder`, which knows all gestures that the settings name."""
+    chosen = settings.gestures
+    parts = settings.per_gesture
+    return Scene(
+        gestures=tuple(name for name in ladder.gestures if chosen is None or name in chosen),
+        grid=settings.grid or (ladder.rows, ladder.columns),
+        sensors={
+            name: Setup(own.grid, Mounting(own.rotate, own.mirror), own.clock) for name, own in settings.sensors.items()
+        },
+        addresses=Addresses(settings.addresses.pressure, settings.addresses.trajectory),
+        clock=settings.clock,
+        stale_s=settings.stale_s,
+        max_sensors=settings.max_sensors,
+        allow=settings.allow,
+        thresholds={name: part.threshold for name, part in parts.items() if part.threshold is not None},
+        refractory={name: part.refractory_s for name, part in parts.items()},
+    )

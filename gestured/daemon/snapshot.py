@@ -1,0 +1,110 @@
+"""How the daemon is at a moment: one frozen value, for everybody who shows, answers or counts it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from gestured.core.reading import SILENT, Reading
+from gestured.daemon.shift import Shift
+from gestured.model.ladder import Ladder
+
+HANG_S = 2.0  # the loop counts as hanging after so long without a beat
+
+
+@dataclass(frozen=True, slots=True)
+class Models:
+    """The models that answer, and what they make of what they see."""
+
+    active: str  # the rung that answers
+    asked: str  # the first one
+    rung: int
+    degraded: bool
+    failures: int
+    file: str
+    version: str
+    sha256: str
+    grid: tuple[int, int]  # rows and columns of its input
+    failed: bool  # no model could answer the last segment
+    shift_count: int  # gestures that the shift was measured on
+    shift: Mapping[str, float]  # share of gestures outside of what it was trained on
+    unlike: tuple[str, ...]  # where that is too many
+
+    @classmethod
+    def of(cls, ladder: Ladder, shift: Shift, failed: bool) -> "Models":
+        """As they are now."""
+        model: Any = ladder.model
+        return cls(
+            ladder.active, ladder.name, ladder.rung, ladder.degraded, ladder.failures, ladder.source,
+            model.metadata.version, model.sha256, (model.rows, model.columns), failed,
+            shift.count, shift.shares(), tuple(shift.unlike()),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Everything at once; durations in seconds."""
+
+    instance: str  # changes at every start
+    time: float  # s since the Unix epoch
+    now: float  # s, monotonic
+    started: float  # s since the Unix epoch
+    uptime_s: float
+    stopping: bool
+    loop_age_s: float  # since the loop last came round
+    loop_lag_s: float  # how late it is
+    models: Models
+    gestures: tuple[str, ...]  # in use
+    sensors: Mapping[str, Reading]
+    recent: tuple[Mapping[str, Any], ...]  # answers
+    shadow: Mapping[str, Any] | None
+    clients: int  # of the event socket
+    backlog_bytes: int  # that wait for slow clients
+    kernel_drops: int  # packets that found no room
+    taps: int
+    flight_limit_bytes: int
+    flight_held_bytes: int
+    addresses: Mapping[str, str | None]  # where it can be reached
+    settings: Mapping[str, Any]
+
+    @property
+    def states(self) -> dict[str, str]:
+        """The state of each sensor."""
+        return {name: reading.state for name, reading in self.sensors.items()}
+
+    @property
+    def state(self) -> str:
+        """ "ok", "degraded" or "no_data"."""
+        if all(reading.state in SILENT for reading in self.sensors.values()):
+            return "no_data"
+        return "degraded" if self.models.degraded or self.models.failed else "ok"
+
+    @property
+    def hangs(self) -> bool:
+        """Whether the loop does not turn."""
+        return self.loop_age_s >= HANG_S
+
+    def healthz(self) -> tuple[int, dict[str, object]]:
+        """HTTP status and body: whether the loop turns."""
+        return 503 if self.hangs else 200, {"healthy": not self.hangs, "loop_age_s": round(self.loop_age_s, 3)}
+
+    def readyz(self) -> tuple[int, dict[str, object]]:
+        """HTTP status and body: whether frames that come now would be answered, and why not."""
+        reasons = [
+            reason
+            for failed, reason in (
+                (self.hangs, "the event loop hangs"),
+                (self.stopping, "the daemon is stopping"),
+                (self.models.failed, "no model could classify the last segment"),
+            )
+            if failed
+        ]
+        return 503 if reasons else 200, {
+            "ready": not reasons,
+            "reason": "; ".join(reasons) or None,
+            "state": self.state,
+            "loop_lag_s": round(self.loop_lag_s, 3),
+            "shift": list(self.models.unlike),
+            "model": self.models.active,
+            "degraded": self.models.degraded,
+            "sensors": self.states,
+        }

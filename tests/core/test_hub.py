@@ -1,0 +1,167 @@
+"""The one path: whoever goes through the hub uses the same frames and says the same."""
+
+import ipaddress
+import socket
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gestured.control.export import sessions_of
+from gestured.core.events import Cancelled, Event, Onset, Release
+from gestured.core.facts import Changed, Dropped, Taken
+from gestured.core.frames import Segment
+from gestured.core.hub import Hub
+from gestured.core.recognizer import Scores
+from gestured.core.scene import Scene, Setup
+from gestured.lab.recordings.live import LiveSensor
+from gestured.record import tape
+from gestured.record.replay import Replay, maker
+from tests.daemon.harness import Frame, Hand, floats
+
+FIRST, SECOND, STRANGER = ("10.0.0.1", 1), ("10.0.0.2", 1), ("192.0.2.1", 1)
+GESTURES = ("swipe", "double_tap")
+Arrived = tuple[float, bytes, tuple[str, int]]  # s, packet, source
+
+
+class Sure:
+    """A classifier that calls everything a swipe."""
+
+    gestures: tuple[str, ...] = GESTURES
+
+    def classify(self, segment: Segment) -> Scores:
+        return Scores(np.array([1.0, 0.0], np.float32), 0.0, "sure")
+
+
+SCENE = Scene(GESTURES, (9, 9), frames=True)
+
+
+def stream(sensor: str, frames: list[Frame], source: tuple[str, int], start: float = 0.0) -> list[Arrived]:
+    return [
+        (start + n / 15, floats(f"/{sensor}/pressure", frame, 0), source) for n, frame in enumerate(frames, start=1)
+    ]
+
+
+def play(scene: Scene, arrived: list[Arrived]) -> list[object]:
+    hub = Hub(scene, Sure())
+    facts: list[object] = []
+    for t, packet, source in sorted(arrived):
+        facts += hub.receive([(packet, source)], t)
+        facts += hub.tick(t)
+    return [*facts, *hub.flush(sorted(arrived)[-1][0] + 2.0)]
+
+
+@pytest.fixture
+def crossed() -> list[Arrived]:
+    """A sensor that is swiped over, and another source that uses its name meanwhile, with frames of another level."""
+    hand = Hand()
+    owner = stream("arm", hand.idle(2.0) + hand.swipe("left") + hand.idle(1.0), FIRST)
+    return owner + [(t + 0.01, floats("/arm/pressure", hand.frame() + 90, 0), SECOND) for t, _, _ in owner[5:40]]
+
+
+def test_a_second_source_feeds_nothing(crossed: list[Arrived]) -> None:
+    facts = play(SCENE, crossed)
+    assert sum(isinstance(fact, Dropped) and fact.reason == "second_source" for fact in facts) == 35
+    taken = [fact.frame for fact in facts if isinstance(fact, Taken)]
+    assert len(taken) == len(crossed) - 35 and max(float(frame.values.max()) for frame in taken) < 205
+    alone = [fact for fact in play(SCENE, [one for one in crossed if one[2] == FIRST]) if isinstance(fact, Event)]
+    assert [fact for fact in facts if isinstance(fact, Event)] == alone != []
+
+
+def write(path: Path, arrived: list[Arrived], **settings: object) -> Path:
+    """A tape as the daemon would have written it."""
+    pytest.importorskip("mcap", reason="recordings need the extra [record]")
+    told = {
+        "gestures": GESTURES,
+        "model": {"name": "sure", "sha256": "", "rows": 9, "columns": 9},
+        "settings": {
+            "model": "sure", "fallback": [], "grid": None, "clock": "arrival", "stale_s": 1.0, "max_sensors": 64,
+            "allow": [], "sensors": {}, "per_gesture": {},
+            "addresses": {"pressure": "/{sensor}/pressure", "trajectory": "/{sensor}/trajectory"},
+        } | settings,
+    }  # fmt: skip
+    with tape.Writer(path, told, 1 << 30) as writer:
+        for t, packet, source in sorted(arrived):
+            writer.packet(round((t + 1e9) * 1e9), f"{source[0]}:{source[1]}", packet)
+    return path
+
+
+def test_an_export_holds_the_frames_that_the_daemon_used(crossed: list[Arrived], tmp_path: Path) -> None:
+    names, made = sessions_of(write(tmp_path / "a.mcap", crossed))
+    used = [fact.frame for fact in play(SCENE, crossed) if isinstance(fact, Taken)]
+    assert names == ["arm"] and np.array_equal(made.frames, np.stack([frame.values for frame in used]))
+    assert np.allclose(np.diff(made.times), np.diff([frame.t for frame in used]), atol=1e-6)
+
+
+def test_a_replay_knows_who_may_send_and_how_many(tmp_path: Path) -> None:
+    hand = Hand()
+    idle = hand.idle(2.0)
+    arrived = stream("arm", idle, FIRST) + stream("leg", idle, SECOND, 0.001) + stream("door", idle, STRANGER, 0.002)
+    for settings, sensors in (
+        ({}, {"arm", "leg", "door"}),
+        ({"allow": ["10.0.0.0/8"]}, {"arm", "leg"}),
+        ({"max_sensors": 1}, {"arm"}),
+        ({"max_sensors": 2, "sensors": {"door": {}}}, {"arm", "door"}),
+    ):
+        path = write(tmp_path / f"{len(sensors)}{len(settings)}.mcap", arrived, **settings)
+        found = tape.read(path)
+        replay = Replay(found, maker(found.scene).scene, Sure())
+        list(replay.events())
+        assert set(replay.played) == sensors
+        path.unlink()
+
+
+@pytest.fixture
+def live() -> Iterator[LiveSensor]:
+    sensor = LiveSensor(("127.0.0.1", 0), 9, 9, None)
+    yield sensor
+    sensor.close()
+
+
+def test_what_is_collected_falls_silent_as_in_the_daemon(live: LiveSensor, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A finger that is down when the sensor goes away: the contact is cancelled, and let go."""
+    now = 100.0
+    monkeypatch.setattr("gestured.lab.recordings.live.time.monotonic", lambda: now)
+    hand = Hand()
+    with socket.socket(type=socket.SOCK_DGRAM) as sender:
+        sender.connect(live.socket.getsockname())
+        for frame in hand.idle(2.0) + hand.swipe("left")[:4]:
+            now += 1 / 15
+            sender.send(floats("/arm/pressure", frame, 0))
+            live.pump()
+    assert live.touched and [type(one) for one in live.found] == [Onset]
+    now += 1.1
+    live.pump()
+    assert [type(one) for one in live.found] == [Onset, Cancelled, Release] and not live.touched
+
+
+def test_what_cannot_be_is_named() -> None:
+    for changes, said in (
+        ({"gestures": ()}, "gestures"),
+        ({"grid": (1, 9)}, "grid"),
+        ({"sensors": {"arm": Setup(grid=(9, 65))}}, "grid"),
+        ({"clock": "wall"}, "clock"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            replace(SCENE, **changes)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="wave"):
+        Hub(replace(SCENE, gestures=("wave",)), Sure())
+
+
+def test_another_scene_keeps_what_was_learned_where_it_holds() -> None:
+    hand = Hand()
+    hub = Hub(replace(SCENE, frames=False), Sure())
+    t = 0.0
+    for n, frame in enumerate(hand.idle(2.0), start=1):
+        t = n / 15
+        hub.receive([(floats("/arm/pressure", frame, 0), FIRST)], t)
+    allowing = replace(hub.scene, allow=(ipaddress.ip_network("10.0.0.0/8"),))
+    assert hub.change(allowing, Sure(), t) == [] and hub.states(t) == {"arm": "ok"}
+    turned = replace(hub.scene, sensors={"arm": Setup(grid=(9, 9), clock="sensor")})
+    hub.change(turned, Sure(), t)
+    assert hub.states(t) == {"arm": "starting"}
+    (fact,) = hub.receive([(b"rubbish!", STRANGER)], t)
+    assert isinstance(fact, Dropped) and fact.reason == "not_allowed"
+    assert [fact.what for fact in hub.tick(t + 2.0) if isinstance(fact, Changed)] == ["silent"]
