@@ -13,7 +13,7 @@ from gestured.lab.recordings import commands as recordings
 CACHE = Path(".cache/lab")
 MODELS = Path("models")
 REAL = Path("../shared/data")
-NEEDED = ("torch", "sklearn", "onnx", "mpmath", "pywt")
+NEEDED = ("torch", "sklearn", "onnx", "mpmath", "pywt", "jinja2", "matplotlib")
 
 
 def parser() -> argparse.ArgumentParser:

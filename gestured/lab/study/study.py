@@ -25,6 +25,7 @@ from gestured.lab.study.material import SHIFT, Data
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import PARTICIPANTS, Result
+from gestured.lab.study.report import write_report
 from gestured.lab.study.run_time import measure
 from gestured.lab.study.sessions import online
 from gestured.lab.study.tuning import tune
@@ -47,8 +48,6 @@ def run(args: argparse.Namespace) -> int:
     study["about"]["command"] = args.words
     args.out.mkdir(parents=True, exist_ok=True)
     write(study, args.out)
-    from gestured.lab.study.report import write_report
-
     page = write_report(study, args.out)
     print(json.dumps(study, indent=2) if args.json else f"{page}: {study['machine']['minutes']} minutes")
     return 0

@@ -77,10 +77,14 @@ def small_study() -> Study:
     """A little of every part: quick to draw."""
     study = made_study()
     few = ("tp_svm", "lstm", "tcn")
-    cells = [cell for cell in study["cells"] if cell["method"] in few and cell["augmentation"] != "wide"]
+    small: Study = {
+        name: [row for row in study[name] if row["method"] in few][:4]
+        for name in ("copies", "tuning", "run_time", "elapsed", "learning", "calibration")
+    }
+    small["cells"] = [cell for cell in study["cells"] if cell["method"] in few and cell["augmentation"] != "wide"]
     by = ("gesture", "participant", "place")
-    failures = [row for row in study["failures"] if row["method"] == "lstm" and row["by"] in by]
-    return {**study, "cells": cells, "failures": failures}
+    small["failures"] = [row for row in study["failures"] if row["method"] == "lstm" and row["by"] in by]
+    return {**study, **small, "signals": {"one_tap": study["signals"]["one_tap"]}}
 
 
 def empty_study() -> Study:

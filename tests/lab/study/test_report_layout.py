@@ -10,6 +10,9 @@ from typing import Any
 
 import pytest
 
+pytest.importorskip("matplotlib", reason="needs the extra [lab]")
+pytest.importorskip("jinja2", reason="needs the extra [lab]")
+
 from gestured.lab.study.report import write_report
 from tests.lab.study.made_study import empty_study, made_study
 
@@ -20,7 +23,7 @@ frame.addEventListener("load", () => {
   const page = frame.contentDocument, root = page.documentElement, window = frame.contentWindow;
   for (const folded of page.querySelectorAll("details")) folded.open = true;
   const clipped = [], collided = [];
-  for (const drawing of page.querySelectorAll("svg")) {
+  for (const drawing of page.querySelectorAll("svg[role=img]")) {
     const edge = drawing.getBoundingClientRect(), words = [...drawing.querySelectorAll("text")];
     const boxes = words.map((word) => word.getBoundingClientRect());
     const title = drawing.querySelector("title").textContent;
@@ -56,7 +59,14 @@ def measured(page: Path, width: int) -> dict[str, Any]:
     wrapper = page.with_name("wrapper.html")
     # The script first waits for the frame's load event, which comes after it has run.
     wrapper.write_text(f'<!doctype html><meta charset="utf-8"><body>{frame}<script>{MEASURE}</script>', "utf-8")
-    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1500,1000", "--virtual-time-budget=10000"]
+    flags = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-quic",
+        "--window-size=1500,1000",
+        "--virtual-time-budget=10000",
+    ]
     command = [str(CHROMIUM), *flags, f"--user-data-dir={page.parent / 'profile'}", "--dump-dom", wrapper.as_uri()]
     done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=True)
     found = re.search(r'data-found="([^"]*)"', done.stdout)

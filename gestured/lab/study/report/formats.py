@@ -1,9 +1,9 @@
-"""How numbers are written: one way for each kind."""
+"""How numbers are written: one way for each kind. What is missing is a dash."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from .markup import Markup, between, join, tag
+from matplotlib.ticker import EngFormatter
 
 NONE = "–"
 THIN = "\u202f"  # a narrow space that does not break
@@ -18,35 +18,19 @@ def with_unit(share: float | None, digits: int = 1) -> str:
     return NONE if share is None else f"{percent(share, digits)}{THIN}%"
 
 
-def points(difference: float) -> str:
+def points(difference: float | None) -> str:
     """A difference of two shares, in percentage points with its sign."""
-    return f"{100 * difference:+.1f}".replace("-", "\u2212")
+    return NONE if difference is None else f"{100 * difference:+.1f}".replace("-", "\u2212")
 
 
-def interval(row: dict[str, Any]) -> str:
+def interval(row: Mapping[str, Any]) -> str:
     low, high = row.get("low"), row.get("high")
     return "" if low is None or high is None else f"{percent(low)}–{percent(high)}"
 
 
-def duration(microseconds: float | None) -> str:
-    if microseconds is None:
-        return NONE
-    for unit in ("µs", "ms"):
-        if microseconds < 999.5:
-            return f"{microseconds:.3g}{THIN}{unit}"
-        microseconds /= 1000
-    return f"{microseconds:.3g}{THIN}s"
-
-
-def size(count: float | None) -> str:
-    """A number of bytes."""
-    if count is None:
-        return NONE
-    for unit in ("B", "KiB", "MiB"):
-        if count < 999.5:
-            return f"{count:.3g}{THIN}{unit}"
-        count /= 1024
-    return f"{count:.3g}{THIN}GiB"
+def duration(value: float | None, unit_s: float = 1e-6) -> str:
+    """Microseconds, or another unit, in three digits and the unit that fits them."""
+    return NONE if value is None else EngFormatter("s", sep=THIN)(float(f"{value:.3g}") * unit_s)
 
 
 def count(number: int | None) -> str:
@@ -58,17 +42,6 @@ def number(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def values(mapping: dict[str, Any] | None) -> Markup:
-    """Hyperparameters: name and value, each kept together."""
-    parts = [tag("span", f"{name} = {number(value)}", class_="value") for name, value in (mapping or {}).items()]
-    return between(", ", parts) if parts else Markup(NONE)
-
-
-def listed(names: Sequence[str]) -> Markup:
-    """a, b and c."""
-    return between(" and ", [between(", ", names[:-1]), names[-1]]) if len(names) > 1 else join(*names)
-
-
-def plain(gesture: str) -> str:
-    """The name of a gesture, as one says it."""
-    return gesture.replace("_", " ")
+def plain(gesture: Any) -> str:
+    """The name of a gesture or group, as one says it."""
+    return str(gesture).replace("_", " ")

@@ -1,26 +1,43 @@
-"""The page: what stands where, in which words, and what is said of a part that is missing."""
+"""The page: study.json in the template page.html, with the charts that matplotlib draws."""
 
+import re
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
-from . import (
-    curves,
-    figures_calibration,
-    figures_failures,
-    figures_right,
-    figures_signal,
-    figures_time,
-    reading,
-    summary,
-    tables,
-    tables_about,
-    tables_right,
-)
-from .layout import Section, absent, folded, paragraph
-from .markup import Markup, join, tag
+import matplotlib.style
+from jinja2 import Environment, PackageLoader, Undefined
+from markupsafe import Markup
+
+from gestured.simulator import GESTURES
+
+from . import charts_course, charts_right, drawing, formats, reading, summary
+from .drawing import Mark
 from .reading import Study
 
-TITLE = "Ten gestures on a textile"
+NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # what no XML may hold
+FILTERS = (
+    formats.count,
+    formats.duration,
+    formats.interval,
+    formats.number,
+    formats.percent,
+    formats.plain,
+    formats.points,
+)
+SOURCES = {
+    "SIMULATED": "simulated data",
+    "MIXED": "simulated data, but for “real”",
+    "REAL": "real recordings",
+    "OWN": "your own recordings",
+}
+
+
+class Missing(Undefined):
+    """What a study lacks is null, in the template as in study.json."""
+
+    def __new__(cls, *args: object, **names: object) -> None:  # type: ignore[misc]
+        return None
 
 
 def write_report(study: Study, out: Path) -> Path:
@@ -31,113 +48,34 @@ def write_report(study: Study, out: Path) -> Path:
     """
     out.mkdir(parents=True, exist_ok=True)
     path = out / "index.html"
-    path.write_text("<!doctype html>\n" + _page(study) + "\n", encoding="utf-8")
+    with matplotlib.style.context(["default", drawing.STYLE]):
+        path.write_text(_environment().get_template("page.html").render(study=_writable(study)), encoding="utf-8")
     return path
 
 
-def _page(study: Study) -> Markup:
-    sections = _sections(study)
-    links = [tag("li", tag("a", section.title, href=f"#{section.name}")) for section in sections]
-    contents = tag("nav", tag("h2", "Contents"), tag("ol", *links), aria_label="Contents")
-    main = tag("main", _opening(study), contents, *(section.markup() for section in sections))
-    style, script = (Markup((files(__package__) / name).read_text("utf-8")) for name in ("style.css", "sort.js"))
-    top = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", name="color-scheme", content="light dark"),
-        tag("title", f"{TITLE}: report of gestured-lab study"),
-        tag("style", style),
-    )
-    return tag("html", top, tag("body", main, tag("script", script)), lang="en")
-
-
-def _opening(study: Study) -> Markup:
-    about, machine = study.get("about") or {}, study.get("machine") or {}
-    facts = [f"gestured {about.get('version', '')}", f"seed {about.get('seed', '')}", str(machine.get("date", ""))]
-    quick = (
-        paragraph(
-            tag("strong", "A quick run."),
-            " Little data and little training, to see that all works: its figures say nothing of the methods.",
-            class_="notice",
-        )
-        if about.get("quick")
-        else Markup("")
-    )
-    found = [join(tag("dt", word), tag("dd", words)) for word, words in summary.findings(study).items()]
-    told = tag("dl", *found, class_="findings") if found else absent("The comparison with the paper was")
-    return join(
-        tag(
-            "header",
-            paragraph("gestured-lab study", class_="kicker"),
-            tag("h1", TITLE),
-            paragraph(
-                "Every method of the paper measured again, and some beyond it: what reproduces, and what does not.",
-                class_="lead",
-            ),
-            paragraph(" · ".join(fact for fact in facts if fact), class_="byline"),
-        ),
-        quick,
-        tag("section", tag("h2", "Summary"), _figures_are(study), told, id="summary"),
-    )
-
-
-def _figures_are(study: Study) -> Markup:
-    real = bool((study.get("data") or {}).get("real"))
-    words = "All figures come from a simulator and are figures about it"
-    words += ", but for those that are marked as real recordings." if real else ": no real recording was used."
-    return paragraph(words, class_="aside")
-
-
-def _sections(study: Study) -> list[Section]:
-    drawn = {
-        "figures": ("The paper's figures and ours", "cells", "The tables of the paper were", _figures),
-        "copies": ("Augmentation and copies", "copies", "Copies of test gestures were", tables.copies),
-        "online": ("Online", "online", "Sessions with the running daemon were", tables.online),
-        "gestures": ("The gestures and their signals", "about", "The gestures were", _gestures),
-        "confusion": ("Which gesture for which", "cells", "Confusions were", _confusion),
-        "run-time": ("Error against run time", "run_time", "Run times were", _run_time),
-        "elapsed": ("Before the gesture has ended", "elapsed", "Error against elapsed time was", curves.elapsed),
-        "failures": ("Where it fails", "failures", "Where the methods fail was", figures_failures.failures),
-        "calibration": ("How sure it is", "calibration", "Calibration was", figures_calibration.calibration),
-        "learning": ("How many people it takes", "learning", "Learning curves were", curves.learning),
-        "methods": ("The methods", "methods", "Methods were", tables_about.methods),
-        "tuning": ("Tuning", "tuning", "Hyperparameters were", tables_about.tuning),
-        "choices": ("What the paper leaves open", "choices", "The effects of open choices were", tables_about.choices),
-        "data": ("The data", "data", "The data were", tables_about.data),
-        "machine": ("The machine, and how to make this again", "about", "The machine was", tables_about.machine),
-    }
-    return [
-        Section(name, title, draw(study) if study.get(part) else absent(words))
-        for name, (title, part, words, draw) in drawn.items()
+def _environment() -> Environment:
+    env = Environment(
+        loader=PackageLoader("gestured.lab.study", "report"), autoescape=True, undefined=Missing,
+        trim_blocks=True, lstrip_blocks=True, finalize=lambda value: "" if value is None else value,
+    )  # fmt: skip
+    env.filters.update({write.__name__: write for write in (*FILTERS, formats.with_unit)})
+    methods = [
+        Mark(k, f"f{k}", filling) for k in range(len(reading.FAMILIES)) for filling in range(len(drawing.DASHES))
     ]
+    marks = [*methods, *(mark for mark, _ in charts_right.PROTOCOLS.values()), charts_right.PUBLISHED]
+    parts = {"style": "style.css", "icons": "icons.svg", "script": "sort.js"}
+    env.globals.update(
+        SOURCES, THIN=formats.THIN, GESTURES=GESTURES, marks=dict.fromkeys(marks), mark_of=drawing.mark_of,
+        families=drawing.families, right=charts_right, course=charts_course, reading=reading, summary=summary,
+        **{name: Markup((files(__package__) / file).read_text("utf-8")) for name, file in parts.items()},
+    )  # fmt: skip
+    return env
 
 
-def _figures(study: Study) -> Markup:
-    explained = [join(tag("dt", name), tag("dd", words)) for name, words in reading.PROTOCOLS.items()]
-    return join(
-        figures_right.overview(study),
-        tag("h3", "What the protocols are"),
-        tag("dl", *explained, class_="protocols"),
-        tag("h3", "The tables"),
-        tables_right.protocols(study),
-        tables_right.own(study),
-    )
-
-
-def _confusion(study: Study) -> Markup:
-    if not any(row.get("confusion") for row in reading.cells(study)):
-        return absent("Confusion matrices were")
-    words = "Rows are what was performed, columns what was answered, in per cent of the row; all are in study.json."
-    return join(paragraph(words), figures_right.confusions(study))
-
-
-def _run_time(study: Study) -> Markup:
-    return join(figures_time.run_time(study), folded("All points in figures", tables.run_time(study)))
-
-
-def _gestures(study: Study) -> Markup:
-    signals, tap = study.get("signals") or {}, study.get("double_tap")
-    cards = figures_signal.gestures(list(study["about"].get("gestures") or []), signals)
-    told = [] if signals else [absent("Signals were")]
-    return join(cards, *told, figures_signal.double_tap(tap) if tap else absent("A double tap's snapshots were"))
+def _writable(value: Any) -> Any:
+    """The same with a sign of its own for what no XML may hold."""
+    if isinstance(value, dict):
+        return {name: _writable(inner) for name, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_writable(inner) for inner in value]
+    return NO_XML.sub("\ufffd", value) if isinstance(value, str) else value

@@ -1,6 +1,9 @@
 """What the rooms of the report ask of a study."""
 
+from collections.abc import Iterable
 from typing import Any
+
+from . import formats
 
 Study = dict[str, Any]
 Row = dict[str, Any]
@@ -33,6 +36,16 @@ SHORT = {  # words of a title that a figure has no room for
     "support vector machine": "SVM",
     " (RBF)": "",
 }
+KINDS = {
+    "gesture": "By gesture",
+    "participant": "By participant",
+    "signal to noise": "By signal to noise",
+    "speed": "By speed",
+    "inclination": "By inclination",
+    "hand size": "By hand size",
+    "pressure": "By pressure",
+    "place": "By place on the sensor",
+}
 NEAR = 0.05  # a figure this close to the published one counts as reproduced
 
 
@@ -41,13 +54,9 @@ def part(study: Study, name: str) -> list[Row]:
     return [row for row in study.get(name) or [] if row.get("right", 0.0) is not None]
 
 
-def full_title(study: Study, method: str) -> str:
-    return str((study.get("methods") or {}).get(method, {}).get("title", method))
-
-
 def title(study: Study, method: str) -> str:
     """A method's name, as short as it is clear."""
-    name = full_title(study, method)
+    name = str((study.get("methods") or {}).get(method, {}).get("title", method))
     for words, fewer in SHORT.items():
         name = name.replace(words, fewer)
     return name
@@ -59,8 +68,13 @@ def family(study: Study, method: str) -> int:
     return FAMILIES.index(name) if name in FAMILIES else len(FAMILIES) - 1
 
 
-def in_order(study: Study, names: set[str]) -> list[str]:
+def family_name(study: Study, method: str) -> str:
+    return FAMILIES[family(study, method)]
+
+
+def in_order(study: Study, names: Iterable[str]) -> list[str]:
     """Methods in the order of the study, families together; unknown ones at the end."""
+    names = set(names)
     known = [name for name in study.get("methods") or {} if name in names]
     return sorted(known, key=lambda name: family(study, name)) + sorted(names - set(known))
 
@@ -80,6 +94,21 @@ def usual(rows: list[Row]) -> list[Row]:
     """Of each method the rows with the paper's settings; with tuned ones where it has no others."""
     given = {row["method"] for row in rows if row["settings"] == "paper"}
     return [row for row in rows if row["settings"] == "paper" or row["method"] not in given]
+
+
+def protocols(rows: list[Row]) -> dict[str, str]:
+    """The protocols that some cells have, each with the data that it was measured on."""
+    data = {name: sorted({row["data"] for row in rows if row["protocol"] == name}) for name in PROTOCOLS}
+    return {name: " and ".join(of) + " data" for name, of in data.items() if of}
+
+
+def lines(study: Study, rows: list[Row]) -> list[tuple[str, str, dict[str, Row]]]:
+    """Method, settings, and the cells of each protocol: the lines of a table."""
+    found: dict[tuple[str, str], dict[str, Row]] = {}
+    for row in rows:
+        found.setdefault((row["method"], row["settings"]), {})[row["protocol"]] = row
+    order = [(method, settings) for method in in_order(study, {row["method"] for row in rows}) for settings in SETTINGS]
+    return [(*place, found[place]) for place in order if place in found]
 
 
 def published(study: Study, method: str, augmentation: str) -> float | None:
@@ -115,12 +144,91 @@ def floor(study: Study) -> float:
     return below(min([*shares, *(ends(row)[0] for row in part(study, "cells"))], default=0.0))
 
 
-def shown(study: Study, method: str) -> Row | None:
-    """The cell whose confusion matrix is drawn: new people first, then tuned, then the most augmented."""
+def most_often(matrix: list[list[int]], names: list[str]) -> str:
+    """The two gravest confusions of a matrix, in words."""
+    wrong = [
+        (count / sum(counts), count, sum(counts), j, k)
+        for j, counts in enumerate(matrix)
+        for k, count in enumerate(counts)
+        if j != k and count
+    ]
+    told = [
+        f"{formats.plain(names[j])} taken for {formats.plain(names[k])} ({count} of {total})"
+        for _, count, total, j, k in sorted(wrong, reverse=True)[:2]
+    ]
+    return "Most often: " + ", then ".join(told) + "." if told else "No gesture is taken for another."
+
+
+def group_names(rows: list[Row]) -> list[str]:
+    """The groups of some rows of failures, each once."""
+    return list(dict.fromkeys(str(group["name"]) for row in rows for group in row["groups"]))
+
+
+def lowest(study: Study, rows: list[Row]) -> str:
+    """The group that is least often right, in words."""
+    row, group = min(
+        ((row, group) for row in rows for group in row["groups"]), key=lambda pair: float(pair[1]["right"])
+    )
+    name = f"{formats.plain(group['name'])}, {title(study, row['method'])}"
+    return f"Lowest: {name}, {formats.with_unit(group['right'])} of {formats.count(group['n'])}."
+
+
+def mean(row: Row) -> float:
+    """The mean share over the groups of a row."""
+    return float(sum(group["right"] for group in row["groups"]) / len(row["groups"]))
+
+
+def failures(study: Study) -> dict[str, list[Row]]:
+    """The rows that have groups, under the title of each way of looking, in the order of KINDS."""
+    rows = [row for row in part(study, "failures") if row["groups"]]
+    kinds = [*KINDS, *sorted({row["by"] for row in rows} - set(KINDS))]
+    found = {KINDS.get(kind, f"By {kind}"): [row for row in rows if row["by"] == kind] for kind in kinds}
+    return {title: of for title, of in found.items() if of}
+
+
+def best_of_families(study: Study) -> list[str]:
+    """Of each family the method with the highest mean over the groups of the first way of looking."""
+    rows = part(study, "failures")
+    first = [row for row in rows if row["by"] == rows[0]["by"] and row["groups"]]
+    means = {row["method"]: mean(row) for row in first}
+    best = {family(study, method): method for method in sorted(means, key=lambda name: means[name])}
+    return in_order(study, set(best.values()))
+
+
+def from_copies(row: Row) -> float | None:
+    """The share of the gain that is lost when only the training part is augmented; None where nothing is gained."""
+    before, after = row.get("gain_leaky"), row.get("gain_clean")
+    if before is None or after is None or before <= 0.005:
+        return None
+    return float(min(1.0, max(0.0, 1.0 - after / before)))
+
+
+def lowest_drawn(found: dict[str, list[Row]], shown: list[str]) -> float:
+    """Where the axis of all groups of the drawn methods begins."""
+    drawn = (group for rows in found.values() for row in rows if row["method"] in shown for group in row["groups"])
+    return below(min(ends(group)[0] for group in drawn))
+
+
+def group(rows: list[Row], method: str, name: str) -> Row | None:
+    groups = (group for row in rows if row["method"] == method for group in row["groups"])
+    return next((group for group in groups if str(group["name"]) == name), None)
+
+
+def matrices(study: Study) -> list[Row]:
+    """Of each method the cell whose confusion matrix is shown: new people first, then tuned, most augmented."""
     order = {
         "protocol": ("participants", "clean", "paper", "real", "online"),
         "settings": ("tuned", "paper"),
         "augmentation": ("wide", "shift", "none"),
     }
-    drawn = [row for row in cells(study, method=method) if row.get("confusion")]
-    return min(drawn, key=lambda row: [names.index(row[key]) for key, names in order.items()], default=None)
+    drawn = [row for row in cells(study) if row.get("confusion")]
+    drawn.sort(key=lambda row: [names.index(row[key]) for key, names in order.items()])
+    return [
+        next(row for row in drawn if row["method"] == name) for name in in_order(study, {r["method"] for r in drawn})
+    ]
+
+
+def names(study: Study, matrix: list[list[int]]) -> list[str]:
+    """The gestures of a confusion matrix; numbers where the study has others."""
+    known = list((study.get("about") or {}).get("gestures") or [])
+    return known if len(known) == len(matrix) else [str(k + 1) for k in range(len(matrix))]

@@ -1,0 +1,228 @@
+"""The charts of who is right how often: the paper's figures and ours, run time, where it fails, how sure it is."""
+
+from itertools import pairwise, product
+
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, PercentFormatter
+from matplotlib.transforms import BboxBase
+
+from . import formats, reading
+from .drawing import GRID, INK, SOFT, Drawing, Mark, mark_of
+from .reading import Row, Study
+
+PUBLISHED = Mark(5)
+PROTOCOLS = {
+    "paper": (Mark(1, "f1", 1), "ours, paper's protocol"),
+    "clean": (Mark(2, "f2"), "ours, clean"),
+    "participants": (Mark(0, "f0"), "ours, participants held out"),
+    "real": (Mark(4, "f3"), "ours, real recordings"),
+    "online": (Mark(3, "f4"), "ours, online"),
+}
+LANE = 9.0  # pixels of one protocol's line
+REACH = (0, 10, 20, 32, 46, 62, 80, 100)  # pixels that a name may be moved away from its point
+MANY = 10  # groups; more are drawn in order of their share instead of by name
+
+
+def shares(axes: Axes, floor: float, ceiling: float = 1.0, side: str = "x") -> None:
+    """An axis of shares in per cent."""
+    axis = axes.xaxis if side == "x" else axes.yaxis
+    axis.set_major_locator(MaxNLocator(5, steps=(1, 2, 5, 10)))
+    axis.set_major_formatter(PercentFormatter(1, decimals=0, symbol=""))
+    (axes.set_xlim if side == "x" else axes.set_ylim)(floor, ceiling)
+
+
+def share(drawing: Drawing, axes: Axes, row: Row, y: float, mark: Mark, words: str) -> None:
+    """A share and its interval on a level line."""
+    low, high = reading.ends(row)
+    axes.plot([low, high], [y, y], color=mark.hue, linewidth=1.8, clip_on=False)
+    told = f"{words}: {formats.with_unit(row['right'])} ({formats.interval(row)})"
+    drawing.point(axes, row["right"], y, mark, told)
+
+
+def overview(study: Study) -> Markup:
+    """Each method a row, each augmentation a panel: the published figure and ours under each protocol."""
+    found = [name for name in reading.AUGMENTATIONS if reading.cells(study, augmentation=name)]
+    methods = reading.in_order(study, {row["method"] for row in reading.cells(study)})
+    lanes = [name for name in PROTOCOLS if reading.cells(study, protocol=name)]
+    pitch = LANE * len(lanes) + 15
+    drawing = Drawing(196 + 268 * len(found), 74 + pitch * len(methods))
+    panels = drawing.figure.subplots(1, len(found), sharey=True, squeeze=False)[0]
+    for axes, augmentation in zip(panels, found, strict=True):
+        axes.set_title(reading.AUGMENTATIONS[augmentation], color=INK, fontweight="bold")
+        axes.grid(axis="x")
+        axes.grid(axis="y", visible=False)
+        axes.hlines([k + 0.5 for k in range(len(methods) - 1)], 0, 1, GRID, linewidth=1)
+        shares(axes, reading.floor(study))
+        axes.set_ylim(len(methods) - 0.5, -0.5)
+        axes.set_yticks(range(len(methods)), [reading.title(study, method) for method in methods], color=INK)
+        for k, method in enumerate(methods):
+            title, published = reading.title(study, method), reading.published(study, method, augmentation)
+            if published is not None:
+                (bar,) = axes.plot([published] * 2, [k - 0.4, k + 0.4], color=INK, linewidth=4, solid_capstyle="butt")
+                drawing.tell(bar, f"{title}, published: {formats.with_unit(published)}")
+            for lane, protocol in enumerate(lanes):
+                row = reading.cell(study, method, augmentation, protocol)
+                if row is not None:
+                    y = k + LANE * (lane - (len(lanes) - 1) / 2) / pitch
+                    share(drawing, axes, row, y, PROTOCOLS[protocol][0], f"{title}, {protocol}")
+    words = "Right in per cent, published and ours, for each method and protocol; the tables below say the same."
+    return drawing.svg("The published figures and ours, simulated data", words)
+
+
+def run_time(study: Study) -> Markup:
+    """1 - right against the median run time of one gesture, both axes logarithmic, with the Pareto front."""
+    rows = reading.part(study, "run_time")
+    drawing = Drawing(960, 540)
+    axes = drawing.figure.subplots()
+    errors = [_error(row) for row in rows]
+    axes.loglog()
+    axes.set_xlim(min(row["median_us"] for row in rows) / 1.5, 1.8 * max(map(_p95, rows)))
+    axes.set_ylim(min(errors) / 1.5, min(1.0, 1.3 * max(errors)))
+    for axis, write in (
+        (axes.xaxis, formats.duration),
+        (axes.yaxis, lambda s: formats.percent(s, 0 if s >= 0.01 else 1)),
+    ):
+        low, high = axis.get_view_interval()
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 500 * low else (1,), numticks=99))
+        axis.set_major_formatter(FuncFormatter(lambda value, _, write=write: write(value)))
+        axis.set_minor_formatter(NullFormatter())
+    axes.grid(axis="x")
+    axes.set_title("error, per cent")
+    axes.set_xlabel("run time of one gesture on one core: median, and a line to the 95th percentile")
+    names = []
+    for row, error in zip(rows, errors, strict=True):
+        mark, time = mark_of(study, row["method"]), row["median_us"]
+        axes.plot([time, _p95(row)], [error, error], color=mark.hue, linewidth=1.8, alpha=0.45)
+        drawing.point(axes, time, error, mark._replace(filling=int(row["precision"] == "int8")), told(study, row))
+        names.append((bool(row.get("front")), time, error, _name(study, row, rows)))
+    front = sorted((time, error) for first, time, error, _ in names if first)
+    if front:
+        stairs = [(front[0][0], axes.get_ylim()[1]), *front, (axes.get_xlim()[1], front[-1][1])]
+        for (x, y), (u, v) in pairwise(stairs):  # each tread and riser by itself, so that names find a place between
+            for ends in (([x, u], [y, y]), ([u, u], [y, v])):
+                axes.plot(*ends, color=INK, linewidth=1.4, linestyle=(0, (1, 3)))
+    _place(drawing, axes, names)
+    return drawing.svg("Error against run time, simulated data", "; ".join(told(study, row) for row in rows))
+
+
+def _place(drawing: Drawing, axes: Axes, names: list[tuple[bool, float, float, str]]) -> None:
+    """Write each name into the nearest free place around its point; those of the front are bold and choose first.
+
+    A name that was moved far gets a line to its point; one that finds no place is left to the mark's own words.
+    """
+    drawing.figure.draw_without_rendering()
+    drawing.figure.set_layout_engine("none")
+    taken = [line.get_window_extent().padded(2) for line in axes.lines]
+    for first, x, y, words in sorted(names, key=lambda name: (not name[0], name)):
+        for reach, dx, dy in product(REACH, (1, -1, 0), (0, 1, -1)):
+            offset = dx * (9 + 0.4 * reach), dy * (reach + (7 if dx else 16))
+            text = axes.annotate(
+                words, (x, y), offset, textcoords="offset points", ha={1: "left", -1: "right", 0: "center"}[dx],
+                va="center", fontweight="bold" if first else "normal",
+            )  # fmt: skip
+            box = text.get_window_extent()
+            if _within(axes.bbox, box) and not box.count_overlaps(taken):
+                taken.append(box)
+                if reach:
+                    line = {"arrowstyle": "-", "color": SOFT, "linewidth": 0.8, "shrinkA": 0}
+                    axes.annotate("", (x, y), offset, textcoords="offset points", arrowprops=line)
+                break
+            text.remove()
+
+
+def _within(outer: BboxBase, inner: BboxBase) -> bool:
+    return all(outer.contains(x, y) for x, y in inner.corners())
+
+
+def _error(row: Row) -> float:
+    """1 - right; at least 1 in 1000, which a logarithm can show."""
+    return max(0.001, 1 - float(row["right"]))
+
+
+def _p95(row: Row) -> float:
+    return float(row.get("p95_us") or row["median_us"])
+
+
+def told(study: Study, row: Row) -> str:
+    wrong, time = formats.with_unit(1 - row["right"]), formats.duration(row["median_us"])
+    return f"{reading.title(study, row['method'])} ({row['settings']}, {row['precision']}): {wrong} wrong in {time}"
+
+
+def _name(study: Study, row: Row, rows: list[Row]) -> str:
+    """The method's title, and what tells it from its other points."""
+    same = [other for other in rows if other["method"] == row["method"]]
+    more = ["tuned"] if row["settings"] == "tuned" and any(other["settings"] != "tuned" for other in same) else []
+    more += ["int8"] if row["precision"] == "int8" else []
+    return ", ".join([reading.title(study, row["method"]), *more])
+
+
+def calibration(study: Study, row: Row) -> Markup:
+    """A reliability diagram: the share that is right at each confidence; the larger a circle, the more answers."""
+    drawing, mark = Drawing(300, 300), mark_of(study, row["method"])
+    axes = drawing.figure.subplots()
+    shares(axes, 0, 1)
+    shares(axes, 0, 1, side="y")
+    axes.set_xticks([0, 0.25, 0.5, 0.75, 1])
+    axes.set_yticks([0, 0.25, 0.5, 0.75, 1])
+    axes.set_title("right, per cent")
+    axes.set_xlabel("confidence, per cent")
+    axes.plot([0, 1], [0, 1], color=SOFT, linewidth=1, linestyle=(0, (4, 4)))
+    bins = [group for group in row["bins"] if group["n"]]
+    at, right = [group["confidence"] for group in bins], [group["right"] for group in bins]
+    axes.plot(at, right, color=mark.hue, linewidth=1.2, linestyle=mark.dashes)
+    total = sum(group["n"] for group in bins)
+    for group in bins:
+        confidence, share = formats.percent(group["confidence"]), formats.percent(group["right"])
+        words = f"confidence {confidence}, right {share}, n = {group['n']}"
+        size = 6 + 18 * (group["n"] / total) ** 0.5
+        style = {"marker": "o", "fillstyle": "full", "markerfacecolor": to_rgba(mark.hue, 0.55), "markeredgewidth": 1}
+        drawing.point(axes, group["confidence"], group["right"], mark, words, markersize=size, **style)
+    title = f"Reliability diagram of {reading.title(study, row['method'])}, simulated data"
+    return drawing.svg(title, f"Expected calibration error {formats.with_unit(row['error'])}.")
+
+
+def failures(study: Study, title: str, rows: list[Row], floor: float) -> Markup:
+    """Groups below each other with the methods on lines of their own; many groups in the order of their share."""
+    drawing = (
+        _ranked(study, rows, floor) if max(len(row["groups"]) for row in rows) > MANY else _named(study, rows, floor)
+    )
+    return drawing.svg(f"{title}: right in per cent, simulated data", reading.lowest(study, rows))
+
+
+def _named(study: Study, rows: list[Row], floor: float) -> Drawing:
+    names = reading.group_names(rows)
+    pitch = 26 + 12 * len(rows)
+    drawing = Drawing(340, 34 + pitch * len(names))
+    axes = drawing.figure.subplots()
+    shares(axes, floor)
+    axes.set_ylim(len(names), 0)
+    axes.set_yticks([])
+    axes.grid(axis="x")
+    for k, name in enumerate(names):
+        axes.text(floor, k + 10 / pitch, formats.plain(name), va="center")
+        for line, row in enumerate(rows):
+            for group in (group for group in row["groups"] if str(group["name"]) == name):
+                words = f"{reading.title(study, row['method'])}, {formats.plain(name)}"
+                share(drawing, axes, group, k + (28 + 12 * line) / pitch, mark_of(study, row["method"]), words)
+    return drawing
+
+
+def _ranked(study: Study, rows: list[Row], floor: float) -> Drawing:
+    most = max(len(row["groups"]) for row in rows)
+    drawing = Drawing(340, 300)
+    axes = drawing.figure.subplots()
+    shares(axes, floor, side="y")
+    axes.set_title("right, per cent")
+    axes.set_xlim(0.5, most + 0.5)
+    axes.set_xticks([1, most], ["lowest", "highest"])
+    axes.set_xlabel(f"{most} groups, each method's own order")
+    for row in rows:
+        mark, groups = mark_of(study, row["method"]), sorted(row["groups"], key=lambda group: float(group["right"]))
+        places = range(1, len(groups) + 1)
+        axes.plot(places, [group["right"] for group in groups], color=mark.hue, linestyle=mark.dashes)
+        for place, group in zip(places, groups, strict=True):
+            words = f"{reading.title(study, row['method'])}, {group['name']}: {formats.with_unit(group['right'])}"
+            drawing.point(axes, place, group["right"], mark, words, markeredgewidth=1, markersize=6)
+    return drawing
