@@ -4,11 +4,12 @@ import io
 import re
 import warnings
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from importlib.resources import files
 from typing import Any, Literal, NamedTuple
 from xml.etree import ElementTree
 
-import matplotlib
+import matplotlib.style
 from markupsafe import Markup
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -33,6 +34,11 @@ FORMS: tuple[Any, ...] = (
 SIZES = (9.5, 8.4, 10.5, 7.8, 13.0, 14.0)  # of them in pixels: all cover about the same area
 DASHES: tuple[Any, ...] = ("-", (0, (3, 1.5)), (0, (1, 1.5)), (0, (4.5, 1.5, 1, 1.5)))  # in widths of the line
 SVG, LINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}href"
+
+
+def styled() -> AbstractContextManager[None]:
+    """Where drawings are made and written: in charts.mplstyle, whatever the user's own matplotlib is set to."""
+    return matplotlib.style.context(["default", STYLE])
 
 
 class Mark(NamedTuple):
@@ -106,6 +112,12 @@ class Drawing:
         words = {name: said for name, said in (("desc", description), ("title", title)) if said}
         return self.markup("svg", title, words, **size, **{"class": "chart", "role": "img"})
 
+    def alone(self, title: str) -> str:
+        """The drawing as a file of its own, with the colours of the light page and on its ground."""
+        self.figure.set_facecolor(PAGE)
+        written = re.sub(r"var\(--(\w+)\)", lambda found: COLOURS[found[1]], self.svg(title))
+        return written.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1) + "\n"
+
     def markup(self, tag: str, salt: str, words: Mapping[str, str] | None = None, /, **attributes: str) -> Markup:
         """What matplotlib writes, as an element of the page.
 
@@ -138,7 +150,7 @@ class Drawing:
             if words is not None:
                 _first(element, "title", words)
         if "style" in element.attrib:
-            style = element.attrib["style"]
+            style = element.attrib["style"].replace("'DejaVu Sans'", "sans-serif")
             element.attrib["style"] = re.sub("#[0-9a-f]{6}", lambda found: NAMES.get(found[0], found[0]), style)
         if LINK in element.attrib:
             element.attrib["href"] = element.attrib.pop(LINK)

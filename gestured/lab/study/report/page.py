@@ -5,7 +5,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import matplotlib.style
 from jinja2 import Environment, PackageLoader, Undefined
 from markupsafe import Markup
 
@@ -48,7 +47,7 @@ def write_report(study: Study, out: Path) -> Path:
     """
     out.mkdir(parents=True, exist_ok=True)
     path = out / "index.html"
-    with matplotlib.style.context(["default", drawing.STYLE]):
+    with drawing.styled():
         path.write_text(_environment().get_template("page.html").render(study=_writable(study)), encoding="utf-8")
     return path
 
