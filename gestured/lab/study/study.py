@@ -20,7 +20,6 @@ from gestured.lab.study.cells import Schedule
 from gestured.lab.study.choices import choices
 from gestured.lab.study.learning import learning
 from gestured.lab.study.machine import machine
-from gestured.lab.study.markdown import tables as tables_of
 from gestured.lab.study.material import SHIFT, Data
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
@@ -138,10 +137,9 @@ def _about(name: str, tuned: Mapping[str, Values]) -> dict[str, Any]:
 
 
 def write(study: Mapping[str, Any], out: Path) -> None:
-    """study.json, the key tables as Markdown, and a CSV file for each section that is a table."""
+    """study.json, and a CSV file for each section that is a table."""
     with atomic_write(out / "study.json", PUBLIC) as file:
         file.write(json.dumps(study).encode())
-    (out / "tables.md").write_text(tables_of(study))
     for name in ("cells", "copies", "run_time", "learning", "online"):
         rows = [{k: v for k, v in row.items() if not isinstance(v, list | dict)} for row in study.get(name, [])]
         if not rows:

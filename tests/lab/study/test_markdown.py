@@ -1,14 +1,25 @@
 """The key tables as Markdown."""
 
 import re
+from pathlib import Path
+from typing import Any
 
-from gestured.lab.study.markdown import tables
-from tests.lab.study.made_study import made_study
+import pytest
+
+pytest.importorskip("matplotlib", reason="needs the extra [lab]")
+pytest.importorskip("jinja2", reason="needs the extra [lab]")
+
+from gestured.lab.study.report import write_report
+from tests.lab.study.made_study import small_study
 
 
-def test_each_table_is_rectangular_and_every_cell_of_the_study_stands_in_it() -> None:
-    study = made_study()
-    text = tables(study)
+def tables(study: dict[str, Any], out: Path) -> str:
+    return write_report(study, out).with_name("tables.md").read_text("utf-8")
+
+
+def test_each_table_is_rectangular_and_every_cell_of_the_study_stands_in_it(tmp_path: Path) -> None:
+    study = small_study()
+    text = tables(study, tmp_path)
     for block in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
         assert len({line.count(" | ") for line in block.splitlines()}) == 1
     for row in study["cells"]:
@@ -16,10 +27,12 @@ def test_each_table_is_rectangular_and_every_cell_of_the_study_stands_in_it() ->
             assert f"{row['right']:.2f} ({row['low']:.2f}-{row['high']:.2f})" in text
 
 
-def test_what_was_not_computed_is_a_dash_or_no_row() -> None:
-    study = made_study() | {"online": [], "online_shipped": [], "choices": [], "copies": []}
+def test_what_was_not_computed_is_a_dash_or_no_row(tmp_path: Path) -> None:
+    study = small_study() | {"online": [], "online_shipped": [], "choices": [], "copies": []}
     for row in study["run_time"]:
         row["memory_bytes"] = None
-    text = tables(study)
+    study["cells"] = [cell for cell in study["cells"] if cell["protocol"] != "real"]
+    text = tables(study, tmp_path)
     assert "None" not in text
     assert text.count("## ") == 5
+    assert re.search(r"\| LSTM \| tuned \| none \|.* \| - \|\n", text)

@@ -5,7 +5,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, Undefined
+from jinja2 import Environment, PackageLoader, Undefined, select_autoescape
 from markupsafe import Markup
 
 from gestured.simulator import GESTURES
@@ -40,7 +40,7 @@ class Missing(Undefined):
 
 
 def write_report(study: Study, out: Path) -> Path:
-    """Write out/index.html: one page that needs nothing else and no network. Returns its path.
+    """Write out/index.html, one page that needs nothing else and no network, and out/tables.md. Returns the page's path.
 
     `study` is what `gestured-lab study` writes as study.json. Parts that are null, empty or absent are left out
     with a sentence.
@@ -48,14 +48,19 @@ def write_report(study: Study, out: Path) -> Path:
     out.mkdir(parents=True, exist_ok=True)
     path = out / "index.html"
     with drawing.styled():
-        path.write_text(_environment().get_template("page.html").render(study=_writable(study)), encoding="utf-8")
+        path.write_text(_written(study, "page.html"), encoding="utf-8")
+    (out / "tables.md").write_text(_written(study, "tables.md"), encoding="utf-8")
     return path
+
+
+def _written(study: Study, template: str) -> str:
+    return _environment().get_template(template).render(study=_writable(study))
 
 
 def _environment() -> Environment:
     env = Environment(
-        loader=PackageLoader("gestured.lab.study", "report"), autoescape=True, undefined=Missing,
-        trim_blocks=True, lstrip_blocks=True, finalize=lambda value: "" if value is None else value,
+        loader=PackageLoader("gestured.lab.study", "report"), autoescape=select_autoescape(), undefined=Missing,
+        trim_blocks=True, keep_trailing_newline=True, lstrip_blocks=True, finalize=lambda value: "" if value is None else value,
     )  # fmt: skip
     env.filters.update({write.__name__: write for write in (*FILTERS, formats.with_unit)})
     methods = [

@@ -102,13 +102,13 @@ def protocols(rows: list[Row]) -> dict[str, str]:
     return {name: " and ".join(of) + " data" for name, of in data.items() if of}
 
 
-def lines(study: Study, rows: list[Row]) -> list[tuple[str, str, dict[str, Row]]]:
-    """Method, settings, and the cells of each protocol: the lines of a table."""
-    found: dict[tuple[str, str], dict[str, Row]] = {}
+def lines(study: Study, rows: list[Row]) -> list[tuple[tuple[str, str, str], dict[str, Row]]]:
+    """(method, settings, augmentation) and the cells of each protocol: the lines of a table."""
+    found: dict[tuple[str, str, str], dict[str, Row]] = {}
     for row in rows:
-        found.setdefault((row["method"], row["settings"]), {})[row["protocol"]] = row
-    order = [(method, settings) for method in in_order(study, {row["method"] for row in rows}) for settings in SETTINGS]
-    return [(*place, found[place]) for place in order if place in found]
+        found.setdefault((row["method"], row["settings"], row["augmentation"]), {})[row["protocol"]] = row
+    order = in_order(study, {row["method"] for row in rows})
+    return sorted(found.items(), key=lambda line: (order.index(line[0][0]), list(SETTINGS).index(line[0][1])))
 
 
 def published(study: Study, method: str, augmentation: str) -> float | None:
