@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.colors import to_rgba
 from matplotlib.patches import ConnectionPatch, Rectangle
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from . import formats, reading
 from .charts_right import shares
@@ -26,11 +26,10 @@ def elapsed(study: Study) -> Markup:
     end = max(place for row in rows for place in row["x"])
     worst = max(error for row in rows for error in row["high"])
     shares(axes, 0, min(1.0, 1.05 * worst), side="y")
-    axes.set_title("error, per cent")
-    axes.set_xlim(0.2, end + 0.02)
+    label = "part of the gesture that has been seen, then time after its end"
+    axes.set(title="error, per cent", xlim=(0.2, end + 0.02), xlabel=label)
     axes.set_xticks(sorted({place for row in rows for place in row["x"]}))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda place, _: _moment(place)))
-    axes.set_xlabel("part of the gesture that has been seen, then time after its end")
     if end > 1:
         axes.axvspan(1, end + 0.02, color=CARD, zorder=0)
         axes.text(1, 1.02, "after the end", color=SOFT, transform=axes.get_xaxis_transform())
@@ -43,12 +42,10 @@ def learning(study: Study) -> Markup:
     drawing, axes = _wide()
     people = sorted({count for row in rows for count in row["x"]})
     shares(axes, reading.below(min(min(reading.bounds(row)[0]) for row in rows)), side="y")
-    axes.set_title("right, per cent")
-    axes.set_xscale("log")
-    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set(title="right, per cent", xscale="log", xlabel="participants in the training set")
     axes.set_xlim(people[0] / 1.1, max(people[-1] * 1.05, people[0] * 2))
-    axes.set_xticks(people, [f"{count:.0f}" for count in people])
-    axes.set_xlabel("participants in the training set")
+    axes.minorticks_off()
+    axes.set_xticks(people, people)
     return _lines(study, drawing, axes, rows, "Learning curves", "right")
 
 
@@ -108,10 +105,7 @@ def signal(gesture: str, signals: dict[str, Row]) -> Markup:
     axes = drawing.figure.add_axes((2 / 148, 16 / 62, 144 / 148, 42 / 62))
     axes.fill_between(times, total, min(0.0, *total), color=SIGNAL, alpha=0.14, linewidth=0)
     axes.plot(times, total, color=SIGNAL, linewidth=1.8, clip_on=False)
-    axes.set_xlim(*span)
-    axes.set_ylim(min(0.0, *total), max(total) or 1.0)
-    axes.set_yticks([])
-    axes.set_xticks([])
+    axes.set(xlim=span, ylim=(min(0.0, *total), max(total) or 1.0), xticks=[], yticks=[])
     for place, moment, align in ((0.0, span[0], "left"), (1.0, span[1], "right")):
         axes.text(place, -0.06, _seconds(moment, ".1f"), color=SOFT, ha=align, va="top", transform=axes.transAxes)
     words = f"{formats.plain(gesture)}: raw signal summed over the taxels, simulated data"
@@ -125,10 +119,8 @@ def double_tap(tap: Row) -> Markup:
     grid = drawing.figure.add_gridspec(5, max(len(shots), 1), wspace=0.2, hspace=0.1)
     axes = drawing.figure.add_subplot(grid[:3, :] if shots else grid[:, :])
     axes.yaxis.set_major_locator(MaxNLocator(4))
-    axes.set_title("summed signal, raw counts")
     axes.plot(times, total, color=SIGNAL, marker="o", markersize=4, clip_on=False)
-    axes.set_xlim(times[0], times[-1])
-    axes.set_ylim(min(0.0, *total), 1.08 * max(total))
+    axes.set(title="summed signal, raw counts", xlim=(times[0], times[-1]), ylim=(min(0.0, *total), 1.08 * max(total)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda moment, _: _seconds(moment, "g")))
     peak = max((value for shot in shots for row in shot["frame"] for value in row), default=0.0) or 1.0
     for k, shot in enumerate(shots):

@@ -5,11 +5,10 @@ from itertools import pairwise, product
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, PercentFormatter
-from matplotlib.transforms import BboxBase
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, PercentFormatter
 
 from . import formats, reading
-from .drawing import GRID, INK, SOFT, Drawing, Mark, mark_of
+from .drawing import DASHES, GRID, INK, SOFT, Drawing, Mark, mark_of
 from .reading import Row, Study
 
 PUBLISHED = Mark(5)
@@ -20,8 +19,13 @@ PROTOCOLS = {
     "real": (Mark(4, "f3"), "ours, real recordings"),
     "online": (Mark(3, "f4"), "ours, online"),
 }
+MARKS = dict.fromkeys(
+    [Mark(k, f"f{k}", filling) for k in range(len(reading.FAMILIES)) for filling in range(len(DASHES))]
+    + [PUBLISHED, *(mark for mark, _ in PROTOCOLS.values())]
+)
 LANE = 9.0  # pixels of one protocol's line
 REACH = (0, 10, 20, 32, 46, 62, 80, 100)  # pixels that a name may be moved away from its point
+QUARTERS = (0, 0.25, 0.5, 0.75, 1)
 MANY = 10  # groups; more are drawn in order of their share instead of by name
 
 
@@ -80,17 +84,13 @@ def run_time(study: Study) -> Markup:
     axes.loglog()
     axes.set_xlim(min(row["median_us"] for row in rows) / 1.5, 1.8 * max(map(_p95, rows)))
     axes.set_ylim(min(errors) / 1.5, min(1.0, 1.3 * max(errors)))
-    for axis, write in (
-        (axes.xaxis, formats.duration),
-        (axes.yaxis, lambda s: formats.percent(s, 0 if s >= 0.01 else 1)),
-    ):
-        low, high = axis.get_view_interval()
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 500 * low else (1,), numticks=99))
-        axis.set_major_formatter(FuncFormatter(lambda value, _, write=write: write(value)))
-        axis.set_minor_formatter(NullFormatter())
+    axes.minorticks_off()
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda error, _: f"{100 * error:g}"))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda time, _: formats.duration(time)))
     axes.grid(axis="x")
-    axes.set_title("error, per cent")
-    axes.set_xlabel("run time of one gesture on one core: median, and a line to the 95th percentile")
+    label = "run time of one gesture on one core: median, and a line to the 95th percentile"
+    axes.set(title="error, per cent", xlabel=label)
     names = []
     for row, error in zip(rows, errors, strict=True):
         mark, time = mark_of(study, row["method"]), row["median_us"]
@@ -123,17 +123,13 @@ def _place(drawing: Drawing, axes: Axes, names: list[tuple[bool, float, float, s
                 va="center", fontweight="bold" if first else "normal",
             )  # fmt: skip
             box = text.get_window_extent()
-            if _within(axes.bbox, box) and not box.count_overlaps(taken):
+            if all(axes.bbox.contains(*corner) for corner in box.corners()) and not box.count_overlaps(taken):
                 taken.append(box)
                 if reach:
                     line = {"arrowstyle": "-", "color": SOFT, "linewidth": 0.8, "shrinkA": 0}
                     axes.annotate("", (x, y), offset, textcoords="offset points", arrowprops=line)
                 break
             text.remove()
-
-
-def _within(outer: BboxBase, inner: BboxBase) -> bool:
-    return all(outer.contains(x, y) for x, y in inner.corners())
 
 
 def _error(row: Row) -> float:
@@ -164,10 +160,7 @@ def calibration(study: Study, row: Row) -> Markup:
     axes = drawing.figure.subplots()
     shares(axes, 0, 1)
     shares(axes, 0, 1, side="y")
-    axes.set_xticks([0, 0.25, 0.5, 0.75, 1])
-    axes.set_yticks([0, 0.25, 0.5, 0.75, 1])
-    axes.set_title("right, per cent")
-    axes.set_xlabel("confidence, per cent")
+    axes.set(xticks=QUARTERS, yticks=QUARTERS, title="right, per cent", xlabel="confidence, per cent")
     axes.plot([0, 1], [0, 1], color=SOFT, linewidth=1, linestyle=(0, (4, 4)))
     bins = [group for group in row["bins"] if group["n"]]
     at, right = [group["confidence"] for group in bins], [group["right"] for group in bins]
@@ -185,9 +178,8 @@ def calibration(study: Study, row: Row) -> Markup:
 
 def failures(study: Study, title: str, rows: list[Row], floor: float) -> Markup:
     """Groups below each other with the methods on lines of their own; many groups in the order of their share."""
-    drawing = (
-        _ranked(study, rows, floor) if max(len(row["groups"]) for row in rows) > MANY else _named(study, rows, floor)
-    )
+    draw = _ranked if max(len(row["groups"]) for row in rows) > MANY else _named
+    drawing = draw(study, rows, floor)
     return drawing.svg(f"{title}: right in per cent, simulated data", reading.lowest(study, rows))
 
 
@@ -197,8 +189,7 @@ def _named(study: Study, rows: list[Row], floor: float) -> Drawing:
     drawing = Drawing(340, 34 + pitch * len(names))
     axes = drawing.figure.subplots()
     shares(axes, floor)
-    axes.set_ylim(len(names), 0)
-    axes.set_yticks([])
+    axes.set(ylim=(len(names), 0), yticks=[])
     axes.grid(axis="x")
     for k, name in enumerate(names):
         axes.text(floor, k + 10 / pitch, formats.plain(name), va="center")
@@ -214,10 +205,8 @@ def _ranked(study: Study, rows: list[Row], floor: float) -> Drawing:
     drawing = Drawing(340, 300)
     axes = drawing.figure.subplots()
     shares(axes, floor, side="y")
-    axes.set_title("right, per cent")
-    axes.set_xlim(0.5, most + 0.5)
+    axes.set(title="right, per cent", xlim=(0.5, most + 0.5), xlabel=f"{most} groups, each method's own order")
     axes.set_xticks([1, most], ["lowest", "highest"])
-    axes.set_xlabel(f"{most} groups, each method's own order")
     for row in rows:
         mark, groups = mark_of(study, row["method"]), sorted(row["groups"], key=lambda group: float(group["right"]))
         places = range(1, len(groups) + 1)

@@ -23,15 +23,9 @@ CSS = (files(__package__) / "style.css").read_text("utf-8")
 COLOURS: dict[str, str] = dict(re.findall(r"--(\w+): (#\w{6});", CSS.split("}")[0]))  # of the light page
 NAMES = {colour: f"var(--{name})" for name, colour in COLOURS.items()}
 INK, SOFT, PAGE, CARD, GRID = (COLOURS[name] for name in ("ink", "soft", "page", "card", "grid"))
-FORMS: tuple[Any, ...] = (
-    "o",
-    "s",
-    "^",
-    "D",
-    (4, 1, 0),
-    "|",
-)  # matplotlib's markers; the last is the published figure's
-SIZES = (9.5, 8.4, 10.5, 7.8, 13.0, 14.0)  # of them in pixels: all cover about the same area
+# matplotlib's markers, the last one the published figure's, and their sizes in pixels: about the same area.
+FORMS: tuple[Any, ...] = ("o", "s", "^", "D", (4, 1, 0), "|")
+SIZES = (9.5, 8.4, 10.5, 7.8, 13.0, 14.0)
 DASHES: tuple[Any, ...] = ("-", (0, (3, 1.5)), (0, (1, 1.5)), (0, (4.5, 1.5, 1, 1.5)))  # in widths of the line
 SVG, LINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}href"
 
@@ -125,10 +119,8 @@ class Drawing:
         """
         written = io.StringIO()
         matplotlib.rcParams["svg.hashsalt"] = salt
-        with warnings.catch_warnings():
-            warnings.filterwarnings(
-                "ignore", "Glyph .* missing"
-            )  # the reader's fonts write the words, not matplotlib's
+        with warnings.catch_warnings():  # the reader's fonts write the words, not matplotlib's
+            warnings.filterwarnings("ignore", "Glyph .* missing")
             self.figure.savefig(written, format="svg", metadata={"Date": None})
         root = ElementTree.fromstring(written.getvalue())
         root.tag, root.attrib = tag, {**attributes, "viewBox": root.attrib["viewBox"]}

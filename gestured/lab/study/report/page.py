@@ -1,35 +1,17 @@
 """The page: study.json in the template page.html, with the charts that matplotlib draws."""
 
 import re
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, Undefined, select_autoescape
-from markupsafe import Markup
 
 from gestured.simulator import GESTURES
 
 from . import charts_course, charts_right, drawing, formats, reading, summary
-from .drawing import Mark
 from .reading import Study
 
 NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # what no XML may hold
-FILTERS = (
-    formats.count,
-    formats.duration,
-    formats.interval,
-    formats.number,
-    formats.percent,
-    formats.plain,
-    formats.points,
-)
-SOURCES = {
-    "SIMULATED": "simulated data",
-    "MIXED": "simulated data, but for “real”",
-    "REAL": "real recordings",
-    "OWN": "your own recordings",
-}
 
 
 class Missing(Undefined):
@@ -40,7 +22,7 @@ class Missing(Undefined):
 
 
 def write_report(study: Study, out: Path) -> Path:
-    """Write out/index.html, one page that needs nothing else and no network, and out/tables.md. Returns the page's path.
+    """Write out/index.html, which needs nothing else and no network, and out/tables.md. Returns the page's path.
 
     `study` is what `gestured-lab study` writes as study.json. Parts that are null, empty or absent are left out
     with a sentence.
@@ -60,18 +42,17 @@ def _written(study: Study, template: str) -> str:
 def _environment() -> Environment:
     env = Environment(
         loader=PackageLoader("gestured.lab.study", "report"), autoescape=select_autoescape(), undefined=Missing,
-        trim_blocks=True, keep_trailing_newline=True, lstrip_blocks=True, finalize=lambda value: "" if value is None else value,
+        finalize=lambda value: "" if value is None else value, trim_blocks=True, lstrip_blocks=True,
+        keep_trailing_newline=True,
     )  # fmt: skip
-    env.filters.update({write.__name__: write for write in (*FILTERS, formats.with_unit)})
-    methods = [
-        Mark(k, f"f{k}", filling) for k in range(len(reading.FAMILIES)) for filling in range(len(drawing.DASHES))
-    ]
-    marks = [*methods, *(mark for mark, _ in charts_right.PROTOCOLS.values()), charts_right.PUBLISHED]
-    parts = {"style": "style.css", "icons": "icons.svg", "script": "sort.js"}
+    written = (
+        formats.count, formats.duration, formats.interval, formats.number, formats.percent, formats.plain,
+        formats.points, formats.with_unit,
+    )  # fmt: skip
+    env.filters.update({write.__name__: write for write in written})
     env.globals.update(
-        SOURCES, THIN=formats.THIN, GESTURES=GESTURES, marks=dict.fromkeys(marks), mark_of=drawing.mark_of,
-        families=drawing.families, right=charts_right, course=charts_course, reading=reading, summary=summary,
-        **{name: Markup((files(__package__) / file).read_text("utf-8")) for name, file in parts.items()},
+        course=charts_course, families=drawing.families, GESTURES=GESTURES, mark_of=drawing.mark_of, reading=reading,
+        right=charts_right, summary=summary,
     )  # fmt: skip
     return env
 

@@ -9,43 +9,13 @@ Study = dict[str, Any]
 Row = dict[str, Any]
 
 FAMILIES = (
-    "spatio-temporal features",
-    "touch-pattern features",
-    "motion history image",
-    "recurrent",
-    "beyond the paper",
-)
-PROTOCOLS = {
-    "paper": "15 % of the gestures are held out at random, after augmentation, as the published figures suggest; all "
-    "are brought to one length. The same people, and copies of the test gestures, are in the training set.",
-    "clean": "Split first, 85 to 15; only the training part is augmented, and each gesture keeps its own length. The "
-    "same people are on both sides.",
-    "participants": "Whole participants are held out: how well it works for somebody new.",
-    "real": "Real recordings of a touchscreen's capacitive sensor, subjects held out in turn.",
-    "online": "Continuous sessions of new participants, sent over UDP to a running daemon.",
-}
-AUGMENTATIONS = {
-    "none": "no augmentation",
-    "shift": "shifted (Algorithm 1)",
-    "wide": "wide randomisation",
-}
+    "spatio-temporal features", "touch-pattern features", "motion history image", "recurrent", "beyond the paper",
+)  # fmt: skip
+PROTOCOLS = ("paper", "clean", "participants", "real", "online")
+AUGMENTATIONS = {"none": "no augmentation", "shift": "shifted (Algorithm 1)", "wide": "wide randomisation"}
 SETTINGS = {"paper": "the paper's", "tuned": "tuned"}
-SHORT = {  # words of a title that a figure has no room for
-    " features, ": " ",
-    "k nearest neighbours": "KNN",
-    "support vector machine": "SVM",
-    " (RBF)": "",
-}
-KINDS = {
-    "gesture": "By gesture",
-    "participant": "By participant",
-    "signal to noise": "By signal to noise",
-    "speed": "By speed",
-    "inclination": "By inclination",
-    "hand size": "By hand size",
-    "pressure": "By pressure",
-    "place": "By place on the sensor",
-}
+SHORT = {" features, ": " ", "k nearest neighbours": "KNN", "support vector machine": "SVM", " (RBF)": ""}  # in figures
+KINDS = ("gesture", "participant", "signal to noise", "speed", "inclination", "hand size", "pressure", "place")
 NEAR = 0.05  # a figure this close to the published one counts as reproduced
 
 
@@ -181,9 +151,9 @@ def mean(row: Row) -> float:
 def failures(study: Study) -> dict[str, list[Row]]:
     """The rows that have groups, under the title of each way of looking, in the order of KINDS."""
     rows = [row for row in part(study, "failures") if row["groups"]]
-    kinds = [*KINDS, *sorted({row["by"] for row in rows} - set(KINDS))]
-    found = {KINDS.get(kind, f"By {kind}"): [row for row in rows if row["by"] == kind] for kind in kinds}
-    return {title: of for title, of in found.items() if of}
+    kinds = dict.fromkeys([*KINDS, *(row["by"] for row in rows)])
+    found = {kind: [row for row in rows if row["by"] == kind] for kind in kinds}
+    return {f"By {kind}" + " on the sensor" * (kind == "place"): of for kind, of in found.items() if of}
 
 
 def best_of_families(study: Study) -> list[str]:
@@ -216,19 +186,9 @@ def group(rows: list[Row], method: str, name: str) -> Row | None:
 
 def matrices(study: Study) -> list[Row]:
     """Of each method the cell whose confusion matrix is shown: new people first, then tuned, most augmented."""
-    order = {
-        "protocol": ("participants", "clean", "paper", "real", "online"),
-        "settings": ("tuned", "paper"),
-        "augmentation": ("wide", "shift", "none"),
-    }
+    first = ("participants", "clean", "paper", "real", "online"), ("tuned", "paper"), ("wide", "shift", "none")
+    keys = ("protocol", "settings", "augmentation")
     drawn = [row for row in cells(study) if row.get("confusion")]
-    drawn.sort(key=lambda row: [names.index(row[key]) for key, names in order.items()])
-    return [
-        next(row for row in drawn if row["method"] == name) for name in in_order(study, {r["method"] for r in drawn})
-    ]
-
-
-def names(study: Study, matrix: list[list[int]]) -> list[str]:
-    """The gestures of a confusion matrix; numbers where the study has others."""
-    known = list((study.get("about") or {}).get("gestures") or [])
-    return known if len(known) == len(matrix) else [str(k + 1) for k in range(len(matrix))]
+    drawn.sort(key=lambda row: [order.index(row[key]) for order, key in zip(first, keys, strict=True)])
+    best = {row["method"]: row for row in reversed(drawn)}
+    return [best[method] for method in in_order(study, best)]
