@@ -52,13 +52,15 @@ class Schedule:
 
     def path(self, task: Task, data: Data) -> Path:
         """A cell's file."""
-        key = json.dumps([code_digest(), data.key, asdict(task)], sort_keys=True)
-        return self.cache / "cells" / f"{task.method}-{hashlib.sha256(key.encode()).hexdigest()[:20]}.json"
+        return self._file(task.method, [data.key, asdict(task)])
+
+    def _file(self, name: str, key: Sequence[Any]) -> Path:
+        text = json.dumps([code_digest(), *key], sort_keys=True, default=str)
+        return self.cache / "cells" / f"{name}-{hashlib.sha256(text.encode()).hexdigest()[:20]}.json"
 
     def once(self, name: str, key: Sequence[Any], make: Callable[[], Any]) -> Any:
         """What `make` gives, from its file where it was made before; `key` is what it depends on besides the code."""
-        digest = hashlib.sha256(json.dumps([code_digest(), *key], sort_keys=True, default=str).encode())
-        path = self.cache / "cells" / f"{name}-{digest.hexdigest()[:20]}.json"
+        path = self._file(name, key)
         found = _read(path) if path.exists() else None
         if found is None:
             found = json.loads(json.dumps(make()))

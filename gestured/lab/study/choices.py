@@ -108,19 +108,10 @@ def choices(
     found = schedule.results(tasks, {**sets, **variants(cohort)}, "open choices")
     out = []
     for choice in asked:
-        rows = []
-        for value, of in choice.tasks.items():
-            result = found[of]
-            rows.append({"value": value, **summary(right(result), result["person"])})
-        out.append(
-            {
-                "choice": choice.choice,
-                "ours": choice.ours,
-                "alternatives": rows,
-                "method": choice.method,
-                "effect": effect(choice.ours, rows),
-            }  # fmt: skip
-        )
+        results = {value: found[task] for value, task in choice.tasks.items()}
+        rows = [{"value": value, **summary(right(of), of["person"])} for value, of in results.items()]
+        told = {"choice": choice.choice, "ours": choice.ours, "method": choice.method}
+        out.append({**told, "alternatives": rows, "effect": effect(choice.ours, rows)})
     return out
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from gestured.lab.study.bootstrap import summary
+from gestured.lab.study.bootstrap import curve
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.material import NONE, Data
 from gestured.lab.study.methods import METHODS
@@ -31,10 +31,8 @@ def learning(
 
     tasks = {(name, count): asked(name, count) for name in SHOWN for count in counts}
     found = schedule.results(list(tasks.values()), sets, "learning curves")
-    out = []
-    for name in SHOWN:
-        points = [found[tasks[name, count]] for count in counts]
-        columns = [summary(right(point), point["person"]) for point in points]
-        shares = {key: [column[key] for column in columns] for key in ("right", "low", "high")}
-        out.append({"method": name, "participants": list(counts), **shares})
-    return out
+    points = {name: [found[tasks[name, count]] for count in counts] for name in SHOWN}
+    return [
+        {"method": name, "participants": list(counts), **curve((right(point), point["person"]) for point in of)}
+        for name, of in points.items()
+    ]

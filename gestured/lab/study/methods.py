@@ -18,9 +18,11 @@ from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
+from torch import nn
 
-from gestured.lab.study import training, views
-from gestured.lab.study.training import Images, Windows
+from gestured.lab.study import views
+from gestured.lab.study.nets import HistoryNet, sequence_net
+from gestured.lab.study.training import Inputs, train
 from gestured.lab.study.views import FRAMES, TOUCHES, TRAJECTORIES, WAVELETS, Values, View
 
 Indices = NDArray[np.int64]
@@ -158,22 +160,23 @@ def _net(
     channels = {"channels": 8} if kind.startswith("cnn_") else {}
     grid = [{"units": u, "rate": r, "steps": STEPS, **channels} for u in widths for r in rates]
     given = {"units": 32, "rate": rates[0], "steps": STEPS, **channels}
+
+    def make(classes: int, values: Values) -> nn.Module:
+        return sequence_net(kind, values["units"], classes, values.get("channels", 16))
+
     return Method(
-        kind, title, RECURRENT if published else BEYOND, what, FRAMES, partial(_sequence, kind), tuple(grid),
+        kind, title, RECURRENT if published else BEYOND, what, FRAMES, partial(_train, make), tuple(grid),
         dict.fromkeys(("none", "shift", "wide"), given) if published else None,
         {"none": published[0], "shift": published[1]} if published else {},
         published_online=published[2] if published else None,
     )  # fmt: skip
 
 
-def _sequence(
-    kind: str, inputs: Windows, index: Indices, labels: Indices, classes: int, values: Values, seed: int
-) -> Scorer:
-    return training.sequence(kind, inputs, index, labels, classes, dict(values), seed)
-
-
-def _images(inputs: Images, index: Indices, labels: Indices, classes: int, values: Values, seed: int) -> Scorer:
-    return training.history(inputs, index, labels, classes, dict(values), seed)
+def _train(
+    make: Callable[[int, Values], nn.Module],
+    inputs: Inputs, index: Indices, labels: Indices, classes: int, values: Values, seed: int,
+) -> Scorer:  # fmt: skip
+    return train(partial(make, classes, values), inputs, index, labels, values["steps"], values["rate"], seed)
 
 
 HISTORY_GRID = [
@@ -205,7 +208,8 @@ METHODS: dict[str, Method] = {
         Method(
             "mhi_cnn", "CNN on motion history images", HISTORY,
             "Four convolutions with leaky ReLU and two fully connected layers on one image of the whole movement.",
-            views.HISTORY, _images, tuple(HISTORY_GRID), dict.fromkeys(("none", "shift", "wide"), HISTORY_GRID[2]),
+            views.HISTORY, partial(_train, lambda classes, values: HistoryNet(classes, values["channels"])),
+            tuple(HISTORY_GRID), dict.fromkeys(("none", "shift", "wide"), HISTORY_GRID[2]),
             {"none": 0.77, "shift": 0.81},
         ),
         _net("lstm", "LSTM", "An LSTM of 32 units on the 81 taxels of each frame (81 -> 32 -> 10).", (8e-3, 4e-3),

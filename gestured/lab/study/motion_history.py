@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.features import PRESSED
-from gestured.lab.dataset import WINDOW, Samples
+from gestured.lab.dataset import WINDOW
 
 WHOLE = 0.0  # the decay takes as long as the gesture
 
@@ -28,8 +28,3 @@ def motion_history(window: NDArray[np.floating], decay_s: float = WHOLE) -> NDAr
     decay = decay_s * WINDOW.rate_hz if decay_s > 0 else float(time)
     image = np.maximum(1.0 - age / decay, 0.0) * pressed.any(axis=0)
     return np.asarray(image, np.float32)
-
-
-def motion_history_images(samples: Samples, decay_s: float = WHOLE) -> NDArray[np.float32]:
-    """(G, R, C) of all samples."""
-    return np.stack([motion_history(samples.window(i), decay_s) for i in range(len(samples))])

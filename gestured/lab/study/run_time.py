@@ -98,18 +98,12 @@ def measure(plan: Plan, tuned: Mapping[str, Values], cohort: Cohort, data: Data)
         rows = []
         for runner, took in zip(found, times, strict=True):
             good = [GESTURES[runner.answer(s)] == label for s, label in zip(segments, truth, strict=True)]
-            rows.append(
-                {
-                    "method": runner.method,
-                    "settings": "tuned",
-                    "precision": runner.precision,
-                    **summary(good, people),
-                    "median_us": round(float(np.median(took)) * 1e6, 1),
-                    "p95_us": round(float(np.quantile(took, 0.95)) * 1e6, 1),
-                    "memory_bytes": None if plan.quick else grown_by(runner, segments[:WARM]),
-                    "file_bytes": runner.size(),
-                }  # fmt: skip
-            )
+            rows.append({
+                "method": runner.method, "settings": "tuned", "precision": runner.precision, **summary(good, people),
+                "median_us": round(float(np.median(took)) * 1e6, 1),
+                "p95_us": round(float(np.quantile(took, 0.95)) * 1e6, 1),
+                "memory_bytes": None if plan.quick else grown_by(runner, segments[:WARM]), "file_bytes": runner.size(),
+            })  # fmt: skip
     for row in rows:
         row["front"] = not any(_beats(other, row) for other in rows)
     return rows

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.lab.study.bootstrap import summary
+from gestured.lab.study.bootstrap import curve, summary
 from gestured.lab.study.material import AUGMENTATIONS, NONE, SHIFT, WIDE, Data
 from gestured.lab.study.methods import METHODS, Method
 from gestured.lab.study.plan import Plan
@@ -110,19 +110,13 @@ def copies(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:
             return float(right(found[Cell(of.method, of.settings, augmentation, protocol, of.data)]).mean())
 
         good, same = right(result), np.array(result["same"])
-        out.append(
-            {
-                "method": cell.method,
-                "settings": cell.settings,
-                "test": len(good),
-                "with_copy": int(same.sum()),
-                "with_version": int(np.sum(result["version"])),
-                "right_with_copy": _mean(good[same]),
-                "right_without_copy": _mean(good[~same]),
-                "gain_leaky": round(share(PAPER, SHIFT) - share(PAPER, NONE), 4),
-                "gain_clean": round(share(CLEAN, SHIFT) - share(CLEAN, NONE), 4),
-            }  # fmt: skip
-        )
+        out.append({
+            "method": cell.method, "settings": cell.settings, "test": len(good),
+            "with_copy": int(same.sum()), "with_version": int(np.sum(result["version"])),
+            "right_with_copy": _mean(good[same]), "right_without_copy": _mean(good[~same]),
+            "gain_leaky": round(share(PAPER, SHIFT) - share(PAPER, NONE), 4),
+            "gain_clean": round(share(CLEAN, SHIFT) - share(CLEAN, NONE), 4),
+        })  # fmt: skip
     return out
 
 
@@ -132,13 +126,11 @@ def _mean(values: NDArray[np.bool_]) -> float | None:
 
 def elapsed_rows(found: Mapping[Cell, Result], points: Sequence[Mapping[str, float]]) -> list[dict[str, Any]]:
     """Right answers over the course of the gesture, of each network that was asked."""
-    out = []
-    for cell, result in found.items():
-        if result["elapsed"]:
-            columns = [summary(column, result["person"]) for column in zip(*result["elapsed"], strict=True)]
-            shares = {name: [column[name] for column in columns] for name in ("right", "low", "high")}
-            out.append({"method": cell.method, "at": list(points), **shares})
-    return out
+    return [
+        {"method": cell.method, "at": list(points), **curve((at, result["person"]) for at in zip(*early, strict=True))}
+        for cell, result in found.items()
+        if (early := result["elapsed"])
+    ]
 
 
 def calibration(found: Mapping[Cell, Result], bins: int = 10) -> list[dict[str, Any]]:

@@ -9,10 +9,9 @@ a taxel is in contact (ours: a fifth of the gesture's peak).
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gestured.core.features import feature_names
-from gestured.lab.dataset import WINDOW, Samples
+from gestured.lab.dataset import WINDOW
 
 PLAIN = ("mean_pressure", "maximum_pressure", "variability", "maximum_area", "mean_area", "duration_s")
 NAMES = feature_names(WINDOW.rows, WINDOW.columns)
@@ -23,9 +22,3 @@ def _plain(name: str) -> bool:
 
 
 PAPER = np.array([_plain(name) for name in NAMES])
-
-
-def touch_pattern_features(samples: Samples, features: str = "paper") -> NDArray[np.float32]:
-    """(G, F): the set `paper` lists, or with `features="daemon"` all that the daemon's forest sees."""
-    found = samples.features()
-    return found[:, PAPER] if features == "paper" else found

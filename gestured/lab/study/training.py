@@ -7,7 +7,6 @@ protocol all are of equal length and are read at the very end, padding included.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import torch
@@ -17,7 +16,6 @@ from torch import Tensor, nn
 from gestured.lab.dataset import Samples
 from gestured.lab.fit import padded
 from gestured.lab.nets import last_active
-from gestured.lab.study.nets import HistoryNet, SequenceNet, sequence_net
 
 BATCH = 64
 LONGEST = 80  # frames
@@ -111,21 +109,3 @@ def _batches(inputs: Inputs, index: Indices, rng: np.random.Generator) -> Iterat
         starts = np.arange(0, len(order), BATCH)
         for start in rng.permutation(starts):
             yield order[start : start + BATCH]
-
-
-def sequence(
-    kind: str, inputs: Inputs, index: Indices, labels: Indices, classes: int, values: dict[str, Any], seed: int
-) -> Net:
-    """A trained sequence net; `values` has units, channels, rate and steps."""
-
-    def make() -> SequenceNet:
-        return sequence_net(kind, values["units"], classes, values.get("channels", 16))
-
-    return train(make, inputs, index, labels, values["steps"], values["rate"], seed)
-
-
-def history(inputs: Inputs, index: Indices, labels: Indices, classes: int, values: dict[str, Any], seed: int) -> Net:
-    """A trained net on motion history images; `values` has channels, rate and steps."""
-    return train(
-        lambda: HistoryNet(classes, values["channels"]), inputs, index, labels, values["steps"], values["rate"], seed
-    )

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from gestured.core.features import touch_pattern
 from gestured.lab.dataset import WINDOW, Samples
-from gestured.lab.study.motion_history import motion_history, motion_history_images
-from gestured.lab.study.touch_patterns import PAPER, touch_pattern_features
+from gestured.lab.study.motion_history import motion_history
+from gestured.lab.study.touch_patterns import PAPER
 from gestured.lab.study.training import Images, Windows
 from gestured.lab.study.trajectory_boosting import trajectory_matrix, trajectory_row
-from gestured.lab.study.wavelets import spatio_temporal, spatio_temporal_features
+from gestured.lab.study.wavelets import spatio_temporal
 
 Values = Mapping[str, Any]  # hyperparameters
 Rows = NDArray[np.float32]
@@ -28,26 +28,29 @@ class View:
     by: tuple[str, ...] = ()
 
 
-WAVELETS = View(
-    lambda samples, values, padded: spatio_temporal_features(samples, values["wavelet"], values["level"]),
-    lambda window, values: spatio_temporal(window, values["wavelet"], values["level"])[None],
-    ("wavelet", "level"),
+def _alone(one: Callable[[Rows, Values], Rows], *by: str, form: Callable[[Rows], Any] = np.asarray) -> View:
+    """A view that looks at each window by itself; `form` is how a net wants all of them."""
+
+    def every(samples: Samples, values: Values, padded: bool) -> Any:
+        return form(np.concatenate([one(samples.window(i), values) for i in range(len(samples))]))
+
+    return View(every, one, by)
+
+
+def _listed(found: Rows, values: Values) -> Rows:
+    """(G, F) touch-pattern features: the set that the paper lists, or all that the daemon's forest sees."""
+    return found[:, PAPER] if values["features"] == "paper" else found
+
+
+WAVELETS = _alone(
+    lambda window, values: spatio_temporal(window, values["wavelet"], values["level"])[None], "wavelet", "level"
 )
-
-
-def _touches(window: Rows, values: Values) -> Rows:
-    found = touch_pattern(window, WINDOW.rate_hz)
-    return (found[PAPER] if values["features"] == "paper" else found)[None]
-
-
 TOUCHES = View(
-    lambda samples, values, padded: touch_pattern_features(samples, values["features"]), _touches, ("features",)
+    lambda samples, values, padded: _listed(samples.features(), values),
+    lambda window, values: _listed(touch_pattern(window, WINDOW.rate_hz)[None], values),
+    ("features",),
 )
-HISTORY = View(
-    lambda samples, values, padded: Images(motion_history_images(samples, values["decay_s"])),
-    lambda window, values: motion_history(window, values["decay_s"])[None],
-    ("decay_s",),
-)
+HISTORY = _alone(lambda window, values: motion_history(window, values["decay_s"])[None], "decay_s", form=Images)
 FRAMES = View(lambda samples, values, padded: Windows(samples, padded), lambda window, values: window[None])
 TRAJECTORIES = View(
     lambda samples, values, padded: trajectory_matrix(samples), lambda window, values: trajectory_row(window)

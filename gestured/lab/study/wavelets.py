@@ -12,8 +12,6 @@ import numpy as np
 import pywt
 from numpy.typing import NDArray
 
-from gestured.lab.dataset import Samples
-
 WAVELET = "haar"
 LEVEL = 3
 STATISTICS = 5
@@ -40,8 +38,3 @@ def spatio_temporal(window: NDArray[np.floating], wavelet: str = WAVELET, level:
     bands = pywt.wavedec(signals, wavelet, mode="symmetric", level=level, axis=0)
     found = np.concatenate([band_statistics(band) for band in bands])  # ((level + 1) * 5, taxels)
     return np.concatenate([found.mean(1), found.max(1), found.var(1)]).astype(np.float32)
-
-
-def spatio_temporal_features(samples: Samples, wavelet: str = WAVELET, level: int = LEVEL) -> NDArray[np.float32]:
-    """(G, F) of all samples."""
-    return np.stack([spatio_temporal(samples.window(i), wavelet, level) for i in range(len(samples))])

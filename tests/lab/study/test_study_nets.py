@@ -8,6 +8,7 @@ torch = pytest.importorskip("torch")
 from gestured.lab.study import onnx_form, training  # noqa: E402
 from gestured.lab.study.elapsed import moments  # noqa: E402
 from gestured.lab.study.material import classes  # noqa: E402
+from gestured.lab.study.methods import METHODS  # noqa: E402
 from gestured.lab.study.nets import HistoryNet, sequence_net  # noqa: E402
 from tests.lab.made import line, window  # noqa: E402
 from tests.lab.study.material_made import samples  # noqa: E402
@@ -51,7 +52,7 @@ def test_the_same_seed_gives_the_same_network_and_another_seed_another() -> None
 
     def scores(seed: int) -> np.ndarray:
         values = {"units": 8, "rate": 5e-3, "steps": 6}
-        return training.sequence("lstm", inputs, index, labels, 10, values, seed).scores(inputs, index)
+        return METHODS["lstm"].fit(inputs, index, labels, 10, values, seed).scores(inputs, index)
 
     assert np.array_equal(scores(1), scores(1))
     assert not np.allclose(scores(1), scores(2))
