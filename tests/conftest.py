@@ -1,7 +1,10 @@
-"""What several tests stand on."""
+"""What all tests stand on: a clean environment; and what several do."""
 
 import hashlib
 import json
+import locale
+import os
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -10,6 +13,42 @@ from hypothesis import HealthCheck, settings
 from gestured.model import model as models
 from gestured.model.model import LADDER
 from tests.small_model import build
+
+ROOT = Path(__file__).resolve().parents[1]
+KEPT = ("PATH", "LD_LIBRARY_PATH")  # programs and libraries are where this machine has them
+LONGEST = 40  # bytes of a folder for temporary files; with a test's name a Unix socket below it must stay under 108
+
+
+def clean_environment() -> tempfile.TemporaryDirectory[str]:
+    """The same environment for every test and the processes that it starts: nobody's settings, home, language, session.
+
+    A test sees nothing of the caller's but `KEPT` and pytest's own variables. The folder that is returned holds the
+    home and the session's sockets until it is deleted.
+    """
+    temporary = os.path.realpath(tempfile.gettempdir())
+    tempfile.tempdir = temporary if len(os.fsencode(temporary)) <= LONGEST else "/tmp"
+    folder = tempfile.TemporaryDirectory(prefix="gestured-tests-")
+    os.chmod(folder.name, 0o755)  # accounts without rights find the way to their own files below it
+    home, session = Path(folder.name, "home"), Path(folder.name, "session")
+    home.mkdir()
+    session.mkdir(mode=0o700)
+    for name in list(os.environ):
+        if name not in KEPT and not name.startswith("PYTEST_"):
+            del os.environ[name]
+    os.environ |= {
+        "HOME": str(home),
+        "LC_ALL": "C.UTF-8",
+        "PYTHONPATH": str(ROOT),  # from any folder a child runs this checkout
+        "TERM": "dumb",
+        "TMPDIR": tempfile.tempdir,
+        "XDG_RUNTIME_DIR": str(session),  # the default sockets are here, not where an installed daemon has them
+    }
+    locale.setlocale(locale.LC_ALL, "C.UTF-8")
+    os.umask(0o022)
+    return folder
+
+
+_cleaned = clean_environment()  # before any test module is imported
 
 # No test asserts a time, and on a loaded machine Hypothesis' own limits would be one.
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])

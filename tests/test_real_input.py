@@ -1,7 +1,6 @@
 """Frames that nobody here wrote or made: an OSC tool of Debian's, python-osc's client, real fingers."""
 
 import json
-import os
 import shutil
 import socket
 import subprocess
@@ -42,11 +41,9 @@ class Daemon:
             "--metrics",
             "127.0.0.1:0",
         ]
-        kept = {name: value for name, value in os.environ.items() if not name.startswith("GESTURED_")}
         self.process = subprocess.Popen(
             [*command, "--socket", str(path), "--model", str(shipped()["cnn_lstm"]), *flags],
             cwd=ROOT,
-            env=kept,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
         )

@@ -28,11 +28,6 @@ HELLO = {
 Start = Callable[..., "subprocess.Popen[bytes]"]
 
 
-def environment() -> dict[str, str]:
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("GESTURED_")}
-    return kept | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
-
-
 @pytest.fixture
 def start() -> Iterator[Start]:
     """Starts gesturectl with these arguments; whatever still runs at the end of the test is ended."""
@@ -45,7 +40,7 @@ def start() -> Iterator[Start]:
             "stderr": subprocess.PIPE,
             "stdin": subprocess.DEVNULL,
         }
-        more["env"] = environment() | more.get("env", {})
+        more["env"] = os.environ | {"PYTHONUNBUFFERED": "1"} | more.get("env", {})
         process = subprocess.Popen(command, **options | more)
         running.append(process)
         return process

@@ -21,7 +21,7 @@ from gestured.control.sniff import Sight, propose
 from gestured.core.wire import Addresses, is_sensor
 from gestured.record import arrays as recording
 from gestured.record import tape
-from tests.control.conftest import HELLO, ROOT, FakeDaemon, environment, gestures
+from tests.control.conftest import HELLO, ROOT, FakeDaemon, gestures
 from tests.control.test_listen import GESTURE
 from tests.daemon.harness import Hand, floats
 from tests.small_recording import example, save, session
@@ -241,7 +241,7 @@ def test_what_is_no_json_is_one_sentence(start, fake: FakeDaemon, line) -> None:
 
 def lab(*arguments: object) -> tuple[int, str, str]:
     command = [sys.executable, "-m", "gestured.lab.cli", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, env=environment(), timeout=120)
+    done = subprocess.run(command, capture_output=True, timeout=120)
     return done.returncode, done.stdout.decode(), done.stderr.decode()
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.control.conftest import HELLO, environment
+from tests.control.conftest import HELLO
 
 OTHER, OPERATOR = 65_533, 65_532  # two accounts that nobody has
 
@@ -156,5 +156,5 @@ def test_a_session_into_which_an_operator_may_not_look_is_no_bug(serve: Serve, s
 def as_operator(*arguments: object, **more: str) -> tuple[int, str, str]:
     """Runs gesturectl as the account OPERATOR, with more in its environment."""
     command = [sys.executable, "-c", CLIENT, str(OPERATOR), *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment() | more, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | more, timeout=60)
     return done.returncode, done.stdout, done.stderr

@@ -97,6 +97,7 @@ class Daemon:
         """`python` are flags of the interpreter; `stderr` is a descriptor, or by default a file in `folder`."""
         self.folder = folder
         self.stderr_path = folder / "stderr.txt"
+        # The soak runs without tests/conftest.py, in its caller's environment.
         clean = {key: value for key, value in os.environ.items() if not key.startswith("GESTURED_")}
         with self.stderr_path.open("ab") as errors:
             self.process = subprocess.Popen(

@@ -30,14 +30,11 @@ class Activated(Daemon):
 
     def __init__(self, folder: Path, *flags: object, sockets: dict[str, socket.socket], **more: object) -> None:
         fds = [sock.fileno() for sock in sockets.values()]
-        clean = {key: value for key, value in os.environ.items() if not key.startswith("GESTURED_")}
         arguments = [",".join(map(str, fds)), ":".join(sockets), *map(str, flags)]
         self.folder, self.stderr_path, self.ready = folder, folder / "stderr.txt", {}
         with self.stderr_path.open("ab") as errors:
             command = [sys.executable, "-c", ACTIVATE, *arguments]
-            self.process = subprocess.Popen(
-                command, stdout=subprocess.PIPE, stderr=errors, env=clean, text=True, pass_fds=fds
-            )
+            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True, pass_fds=fds)
 
 
 @pytest.fixture

@@ -21,7 +21,6 @@ from gestured.lab.cli import main
 from gestured.lab.recordings.collect import already
 from gestured.lab.recordings.protocol import order
 from gestured.record.arrays import read, write
-from tests.control.conftest import environment
 from tests.small_recording import example
 
 PATIENCE_S = 60.0
@@ -39,7 +38,11 @@ class Person:
         command = [sys.executable, "-m", "gestured.lab.cli", "collect", "--participant", "07", "--out", str(folder)]
         command += ["--listen", f"127.0.0.1:{port}", "--gestures", "one_tap", "--countdown", "0", *more]
         self.process = subprocess.Popen(
-            command, stdin=self.terminal, stdout=self.terminal, stderr=self.terminal, env=environment()
+            command,
+            stdin=self.terminal,
+            stdout=self.terminal,
+            stderr=self.terminal,
+            env=os.environ | {"PYTHONUNBUFFERED": "1"},
         )
 
     def sees(self, *texts: str) -> str:
@@ -90,7 +93,7 @@ def port() -> int:
 @pytest.fixture
 def sensor(port: int) -> Iterator[None]:
     command = [sys.executable, "-m", "gestured.control", "simulate", "--to", f"127.0.0.1:{port}", "--kinds", "one_tap"]
-    with subprocess.Popen(command, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         yield
         process.terminate()
 
