@@ -78,10 +78,10 @@ clean:  ## remove the environments and what tools left behind
 
 # $(call venv,DIR): make the environment, or say in one sentence what is missing.
 define venv
-@py=; for p in $(or $(PYTHON),python3 python3.13 python3.12 python3.11); do \
-	"$$p" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && py=$$p && break; \
+@py=; for p in $(or $(PYTHON),python3 python3.14 python3.13 python3.12 python3.11); do \
+	"$$p" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && py=$$p && break; \
 done; \
-[ -n "$$py" ] || { echo "gestured needs Python 3.11, 3.12 or 3.13, and \
+[ -n "$$py" ] || { echo "gestured needs Python 3.11 or newer, and \
 $(if $(PYTHON),$(PYTHON) is none,there is none here: sudo apt install python3 python3-venv)" >&2; exit 1; }; \
 "$$py" -c 'import venv, ensurepip' 2>/dev/null || { echo "$$py has no venv module: sudo apt install" \
 	"$$("$$py" -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')" >&2; exit 1; }; \
