@@ -4,6 +4,7 @@ import hashlib
 import json
 import locale
 import os
+import signal
 import tempfile
 from pathlib import Path
 
@@ -45,6 +46,8 @@ def clean_environment() -> tempfile.TemporaryDirectory[str]:
     }
     locale.setlocale(locale.LC_ALL, "C.UTF-8")
     os.umask(0o022)
+    # A job in a shell's background ignores Ctrl-C, and so would the programs that are tested.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     return folder
 
 

@@ -92,8 +92,11 @@ def test_a_daemon_that_is_not_there_is_one_sentence(run, tmp_path):
 
 
 def test_the_default_socket_is_the_sessions(run, tmp_path):
-    _, _, err = run("listen", env={"XDG_RUNTIME_DIR": str(tmp_path), "RUNTIME_DIRECTORY": ""})
-    assert str(tmp_path / "gestured" / "events.sock") in err
+    own = tmp_path / "gestured" / "events.sock"
+    own.parent.mkdir()
+    own.touch()  # left by a daemon of the session: it comes before one that is installed on this machine
+    _, _, err = run("listen", env={"XDG_RUNTIME_DIR": str(tmp_path)})
+    assert str(own) in err
 
 
 def test_a_daemon_that_ends_is_said(start, fake):
@@ -163,16 +166,17 @@ def test_wrong_usage(run, wrong, tmp_path: Path):
     assert wrong[0] in err
 
 
-def test_the_default_socket_is_where_the_daemon_keeps_it():
-    from gestured.control.address import default_socket
+def test_the_default_socket_is_where_the_daemon_keeps_it(monkeypatch, tmp_path):
+    from gestured.control import address
     from gestured.daemon.settings import default_socket as daemons
 
+    monkeypatch.setattr(address, "SYSTEM", tmp_path / "none" / "events.sock")  # no daemon is installed
     for given in (
         {},
         {"XDG_RUNTIME_DIR": "/run/user/1"},
         {"RUNTIME_DIRECTORY": "/run/a:/run/b", "XDG_RUNTIME_DIR": "/c"},
     ):
-        assert default_socket(given) == daemons(given)
+        assert address.default_socket(given) == daemons(given)
 
 
 def test_a_gesture_that_the_daemon_does_not_know_is_said(start, fake):

@@ -102,6 +102,7 @@ def test_root_asks_nothing_of_whoever_made_the_default_folder_first(
     (seized / "gestured").mkdir()
     os.chown(seized / "gestured", OTHER, OTHER)
     path = seized / "gestured" / "events.ctl"
+    path.with_suffix(".sock").touch()  # so that it comes before a daemon that is installed on this machine
     server = serve(path, EVIL)
     status, out, err = run(*command, env={"XDG_RUNTIME_DIR": str(seized), "RUNTIME_DIRECTORY": ""})
     said = out + err
