@@ -36,7 +36,7 @@ test: .venv-dev/.dev  ## run the tests: ARGS="tests/core -k tap"
 golden: .venv-dev/.dev  ## play all golden tapes: the same packets give the same events (tests/golden)
 	@.venv-dev/bin/python -m pytest tests/golden -m "hostile or not hostile" $(ARGS)
 
-lint: .venv-dev/.dev  ## ruff and mypy
+lint: .venv-dev/.dev .venv-dev/.lab  ## ruff and mypy
 	@.venv-dev/bin/ruff check .
 	@.venv-dev/bin/ruff format --check .
 	@.venv-dev/bin/mypy

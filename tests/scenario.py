@@ -139,8 +139,8 @@ def _step(number: int, text: str, verb: str, rest: str, sensor: Sensor) -> Step:
         centre, _, radius, amplitude = what.split()
         return replace(step, fingers=_round(*_point(centre), float(radius), float(amplitude)))
     if verb == "object":
-        (row, column), amplitude = _point(step.words[0]), float(step.words[1])
-        return replace(step, fingers=lambda share: [(row, column, amplitude)])
+        (row, column), force = _point(step.words[0]), float(step.words[1])
+        return replace(step, fingers=lambda share: [(row, column, force)])
     if verb == "drift":
         return replace(step, words=(what,))
     if verb in ("expect", "check"):

@@ -5,6 +5,7 @@ import os
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from gestured.record.arrays import read, write
 from tests.small_recording import FIELDS, example, refusal, same, save, session
 
 
-def changed(name: str, index: object, value: object) -> np.ndarray:
+def changed(name: str, index: Any, value: object) -> np.ndarray:
     array = np.array(getattr(session(), name))
     if array.dtype.kind == "U":
         array = array.astype("U80")

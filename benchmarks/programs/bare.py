@@ -3,10 +3,11 @@
 import json
 import os
 import sys
+from importlib import import_module
 
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
-import numpy  # noqa: F401
-import onnxruntime
+import_module("numpy")
+onnxruntime = import_module("onnxruntime")
 
 options = onnxruntime.SessionOptions()
 options.intra_op_num_threads = options.inter_op_num_threads = 1

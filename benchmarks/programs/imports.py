@@ -8,7 +8,7 @@ import os
 from importlib import import_module
 
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
-import gestured.daemon  # noqa: F401  what the daemon sets for numpy and pydantic holds here too
+import_module("gestured.daemon")  # what it sets for numpy and pydantic holds here too
 
 
 def loop() -> object:

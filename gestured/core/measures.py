@@ -1,5 +1,6 @@
-"""What a gesture looked like, in a few numbers: those of the training data stand in a model's metadata (`quantiles`),
-those of a deployment are held against them.
+"""What a gesture looked like, in a few numbers.
+
+Those of the training data stand in a model's metadata (`quantiles`), those of a deployment are held against them.
 """
 
 import numpy as np

@@ -1,5 +1,6 @@
-"""What is counted. Plain integers, always; prometheus_client only formats them, and only where `--metrics`
-is set.
+"""What is counted.
+
+Plain integers, always; prometheus_client only formats them, and only where `--metrics` is set.
 
 The loop's thread counts, the HTTP thread reads copies. The number of series is bounded whatever arrives:
 labels that a peer can choose (sensors) are folded together after the first few.

@@ -73,7 +73,7 @@ class Snapshot:
 
     @property
     def state(self) -> str:
-        """ "ok", "degraded" or "no_data"."""
+        """One of "ok", "degraded" and "no_data"."""
         if all(reading.state in SILENT for reading in self.sensors.values()):
             return "no_data"
         return "degraded" if self.models.degraded or self.models.failed else "ok"

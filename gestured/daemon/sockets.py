@@ -1,5 +1,4 @@
-"""Sockets are made here, all before the daemon says that it is ready; what cannot be had ends it with status
-4."""
+"""The daemon's sockets: all are made before it says that it is ready; one that cannot be had ends it with status 4."""
 
 import errno
 import fcntl

@@ -1,5 +1,6 @@
-"""systemd's two conversations: what it passes to us (sockets), and what we tell it (sd_notify). Does nothing
-where nobody asked.
+"""systemd's two conversations: what it passes to us (sockets), and what we tell it (sd_notify).
+
+Does nothing where nobody asked.
 """
 
 import os

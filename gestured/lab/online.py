@@ -39,9 +39,11 @@ def takes(minutes: float, idle_minutes: float, seed: int) -> Iterator[tuple[str,
 
 
 def play(model: str, take: Take, speed: float) -> tuple[list[dict[str, Any]], float, float]:
-    """Send a take `speed` times as fast as it was to a daemon of its own; returns its events, the epoch time of the
-    sensor's time 0, and how many seconds the sending took. The sensor's clock rules: the daemon's first stamp is the
-    arrival of the first frame, and times after it are the sensor's."""
+    """Send a take `speed` times as fast as it was to a daemon of its own.
+
+    Returns its events, the epoch time of the sensor's time 0, and how many seconds the sending took. The sensor's clock
+    rules: the daemon's first stamp is the arrival of the first frame, and times after it are the sensor's.
+    """
     rows, columns = take.frames.shape[1:]
     heard: list[dict[str, Any]] = []
     with Engine(model, rows, columns, "--clock", "sensor") as engine:

@@ -25,8 +25,9 @@ def blob(
     unrest: float = 0.08,
     flatness: float = 1.2,
 ) -> Contact:
-    """A contact that is no fingertip; `size` are its standard deviations in mm, `fades_s` how long it comes
-    and goes.
+    """A contact that is no fingertip.
+
+    `size` are its standard deviations in mm, `fades_s` how long it comes and goes.
     """
     rng, total, ones = scene.rng, float(t[-1]), np.ones_like(t)
     level = np.clip(t / min(fades_s[0], 0.45 * total), 0.0, 1.0)
@@ -54,9 +55,7 @@ def resting_hand(scene: Scene, duration_s: float) -> Contact:
 
 
 def palm(scene: Scene) -> list[Contact]:
-    """A flat hand: large contacts that land within 0.15 s: balls of the hand, finger roots, often one big
-    patch.
-    """
+    """A flat hand: large contacts that land within 0.15 s (balls of the hand, finger roots, often one big patch)."""
     rng = scene.rng
     total = rng.uniform(0.2, 2.2)
     cx, cy = scene.spot(0.1 * scene.width, 0.1 * scene.height)

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 from gestured.client.say import MOST, shown
 from gestured.control.sniff import Sight, propose
+from gestured.core.errors import RecordingError
 from gestured.core.wire import Addresses, is_sensor
 from gestured.record import arrays as recording
 from gestured.record import tape
@@ -73,7 +74,9 @@ def test_only_one_module_prints() -> None:
     files += [*(ROOT / "gestured/lab/recordings").glob("*.py"), ROOT / "gestured/lab/cli.py"]
     for path in files:
         for node in ast.walk(ast.parse(path.read_text())):
-            called = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
+            if not isinstance(node, ast.Call):
+                continue
+            called = ast.unparse(node.func)
             if called == "print" or re.search(r"std(out|err)\.(buffer\.)?write", called):
                 wrong.append(f"{path.relative_to(ROOT)}:{node.lineno}")
     assert len(files) > 20 and {place.split(":")[0] for place in wrong} == {"gestured/client/say.py"}
@@ -296,7 +299,7 @@ def test_replay_shows_what_was_recorded(recorded, run, daemon, tmp_path: Path) -
             writer.packet(packet.t_ns, f"{packet.source[0]}:{packet.source[1]}", packet.data)
         for event in found.events:
             changed = {"gesture": HOSTILE} if event["type"] == "gesture" else {}
-            writer.event(found.packets[-1].t_ns, event | changed)
+            writer.event(found.packets[-1].t_ns, dict(event) | changed)
     for more in ([], ["--json"]):
         model = found.scene["settings"]["model"]
         status, out, err = run("replay", tmp_path / "hostile.mcap", "--diff", "--model", model, *more)
@@ -307,7 +310,7 @@ def test_replay_shows_what_was_recorded(recorded, run, daemon, tmp_path: Path) -
 def test_replay_shows_labels(run, tmp_path: Path) -> None:
     """Labels are checked names; the file's own name is not."""
     path = save(tmp_path / "\x1b[2Jone.npz", example(), labels=np.array([HOSTILE, "none"]))
-    with pytest.raises(recording.RecordingError):
+    with pytest.raises(RecordingError):
         recording.read(path)
     status, out, err = run("replay", path, "--diff")
     assert status == 1 and os.fsencode("\x1b").decode() not in plain(out + err)

@@ -64,7 +64,7 @@ def stream(
     """The actions one after the other; `noise` and `level` in counts, the level differs by 10 % between taxels."""
     rng = np.random.default_rng(seed)
     ends = np.cumsum([seconds for seconds, _ in actions])
-    times = (np.arange(int(ends[-1] * rate)) + 0.37) / rate
+    times: Array = (np.arange(int(ends[-1] * rate), dtype=np.float64) + 0.37) / rate
     frames = level * rng.uniform(0.9, 1.1, shape) + rng.normal(0, noise, (len(times), *shape))
     for t, frame in zip(times, frames, strict=True):
         seconds, pressed = actions[min(int(np.searchsorted(ends, t, side="right")), len(actions) - 1)]

@@ -51,7 +51,9 @@ def test_the_page_shows_the_table() -> None:
 @given(st.lists(st.tuples(waits, activities, places), max_size=60), st.booleans())
 def test_whatever_comes_has_its_row_and_each_onset_its_end(stream: Stream, wait: bool) -> None:
     said = play(stream, wait)
-    after = dict.fromkeys((Action.OPEN, Action.SPLIT), (Action.CLOSE, Action.SPLIT, Action.HELD))
+    after: dict[Action, tuple[Action, ...]] = dict.fromkeys(
+        (Action.OPEN, Action.SPLIT), (Action.CLOSE, Action.SPLIT, Action.HELD)
+    )
     after[Action.HELD] = (Action.LEFT,)
     assert all(other in after.get(one, (Action.OPEN,)) for one, other in pairwise([Action.LEFT, *said]))
     assert wait or Action.SPLIT not in said  # nothing waits for a second contact, so none is split off

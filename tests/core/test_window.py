@@ -293,7 +293,7 @@ def test_json_holds_all_of_it(window: Window) -> None:
     assert Window.from_json(window.to_json()) == window
 
 
-BAD = {
+BAD: dict[str, list[object]] = {
     "rows": [1, 1001, 9.0, "9", None, True],
     "columns": [0, -9, 2.5, [9]],
     "rate_hz": [0, -15, 1e9, math.nan, math.inf, "15", True],

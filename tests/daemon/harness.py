@@ -193,7 +193,7 @@ class Hand:
 
     def frame(self, row: float | None = None, column: float = 4.0) -> Frame:
         """One frame, with a finger at (row, column) unless row is None."""
-        values = 20.0 + self._random.integers(-1, 2, (ROWS, COLUMNS))
+        values: Frame = 20.0 + self._random.integers(-1, 2, (ROWS, COLUMNS)).astype(float)
         if row is not None:
             y, x = np.mgrid[:ROWS, :COLUMNS]
             values += np.rint(180 * np.exp(-((y - row) ** 2 + (x - column) ** 2) / 2))
@@ -290,5 +290,8 @@ def lines_of(text: str) -> Iterator[Line]:
 
 def raw_message(address: bytes, types: bytes, *floats: float) -> bytes:
     """A message put together by hand, right or wrong."""
-    pad = lambda text: text + bytes(4 - len(text) % 4)  # noqa: E731
+
+    def pad(text: bytes) -> bytes:
+        return text + bytes(4 - len(text) % 4)
+
     return pad(address) + pad(types) + b"".join(struct.pack(">f", value) for value in floats)

@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.client.control import Control
-from gestured.client.stream import Refused, Unreachable
+from gestured.client.lines import Refused, Unreachable
 from gestured.daemon.operations import Operations
 from gestured.daemon.request import Parameter, Refusal, Verb, parse_request
 from tests.daemon import tiny_model

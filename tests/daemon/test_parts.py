@@ -128,14 +128,18 @@ def test_a_bug_in_the_decoder_costs_one_packet(parts: Parts, monkeypatch) -> Non
 
 
 @pytest.mark.parametrize(("apart", "taken"), [(0.067, 5), (0.0, 1)])
-def test_packets_that_come_thick_are_taken_together_and_no_others_wait(parts: Parts, apart: float, taken: int) -> None:
+def test_packets_that_come_thick_are_taken_together_and_no_others_wait(
+    parts: Parts, monkeypatch: pytest.MonkeyPatch, apart: float, taken: int
+) -> None:
     metrics = parts.metrics
     hand, rests, now = Hand(), [], 0.0
 
     async def main() -> None:
         nonlocal now
         loop = asyncio.get_running_loop()
-        loop.call_later = lambda _, listen: rests.append(listen) or asyncio.Handle(listen, (), loop)
+        monkeypatch.setattr(
+            loop, "call_later", lambda _, listen: rests.append(listen) or asyncio.Handle(listen, (), loop)
+        )
         with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
             receiver = Receiver(sock, parts.hub, parts.desk, parts.taps, lambda: now)
             sender.connect(sock.getsockname())

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gestured.client.control import Control
-from gestured.client.stream import Unreachable
+from gestured.client.lines import Unreachable
 from gestured.core.front_end import FrontEnd
 from gestured.daemon.canary import Canary
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor

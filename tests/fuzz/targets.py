@@ -13,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 
 from gestured.core import osc
-from gestured.core.errors import ProtocolError
+from gestured.core.errors import ModelError, ProtocolError
 from gestured.core.frames import Segment
 from gestured.core.stamping import Stamper
 from gestured.core.subscription import parse_subscription
@@ -165,7 +165,7 @@ def model(data: bytes) -> None:
     try:
         with little_memory():
             scores = opened.classify(_touch())
-    except models.ModelError:
+    except ModelError:
         return  # the ladder's next rung answers
     assert abs(float(scores.values.sum()) - 1.0) <= 2e-3 and 0.0 <= scores.unknown <= 1.0
 

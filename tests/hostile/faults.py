@@ -27,7 +27,7 @@ class Fault:
 
     def apply(self, stream: Stream, rng: np.random.Generator) -> Stream:
         """What the sensor sends instead."""
-        frames, times, counts = (array.copy() for array in stream)
+        frames, times, counts = stream[0].copy(), stream[1].copy(), stream[2].copy()
         return self.sensor(frames, times, counts, rng) if self.sensor else (frames, times, counts)
 
 

@@ -7,12 +7,14 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra [lab]")
 
-from gestured.lab.augment import symmetry_table, turned, varied  # noqa: E402
-from gestured.lab.dataset import from_take  # noqa: E402
-from gestured.lab.fit import CLASSES  # noqa: E402
-from gestured.lab.nets import ACTIVE  # noqa: E402
-from gestured.simulator import Participant, Sensor, generator, gesture_take  # noqa: E402
-from tests.lab.made import direction, direction_of, gestures  # noqa: E402
+from torch import Tensor
+
+from gestured.lab.augment import symmetry_table, turned, varied
+from gestured.lab.dataset import from_take
+from gestured.lab.fit import CLASSES
+from gestured.lab.nets import ACTIVE
+from gestured.simulator import Participant, Sensor, generator, gesture_take
+from tests.lab.made import direction, direction_of, gestures
 
 TABLE = symmetry_table(CLASSES)
 SYMMETRIES = range(8)
@@ -71,7 +73,7 @@ def test_each_symmetry_can_be_undone() -> None:
         assert torch.equal(TABLE[back[0]][TABLE[symmetry]], torch.arange(len(CLASSES)))
 
 
-def padded_batch(tail: int = 6) -> "torch.Tensor":
+def padded_batch(tail: int = 6) -> Tensor:
     made = list(gestures().values())
     time = max(map(len, made)) + tail
     x = torch.zeros(len(made), time, 9, 9)

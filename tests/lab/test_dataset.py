@@ -1,5 +1,6 @@
 """What is learned from: cut as the daemon cuts, kept once made, and nobody on two sides of a split."""
 
+import multiprocessing
 from collections import Counter
 from pathlib import Path
 
@@ -10,7 +11,6 @@ from gestured.core.events import Event
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Decided, Recognizer, Scores
-from gestured.lab import dataset
 from gestured.lab.dataset import (
     OTHERS,
     STREAMS,
@@ -138,7 +138,7 @@ def test_what_is_simulated_once_is_not_simulated_again(tmp_path: Path, monkeypat
     def refuse(*_: object) -> None:
         raise InterruptedError("simulates")
 
-    monkeypatch.setattr(dataset.multiprocessing, "get_context", refuse)
+    monkeypatch.setattr(multiprocessing, "get_context", refuse)
     again = simulated(tmp_path / "cache", "wide", 9, 6)
     same(made, again)
     assert again.digest() == made.digest()
@@ -163,7 +163,7 @@ class Broken:
 
 def test_an_interrupted_simulation_is_not_taken_for_a_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(dataset.multiprocessing.get_context("spawn").__class__, "Pool", lambda *_: Broken())
+        patch.setattr(multiprocessing.get_context("spawn").__class__, "Pool", lambda *_: Broken())
         with pytest.raises(KeyboardInterrupt):
             simulated(tmp_path, "wide", 9, 3)
     assert list(tmp_path.iterdir()) == []

@@ -5,10 +5,10 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra [lab]")
 
-from torch import Tensor  # noqa: E402
+from torch import Tensor
 
-from gestured.lab.decide import fit_decision, threshold  # noqa: E402
-from gestured.lab.nets import Decision  # noqa: E402
+from gestured.lab.decide import fit_decision, threshold
+from gestured.lab.nets import Decision
 
 GESTURES, KINDS = 5, 4  # of gestures, and of non-gestures
 
@@ -24,8 +24,8 @@ def honest(count: int, seed: int = 0, kinds: int = KINDS) -> tuple[Tensor, np.nd
 def calibration_error(scores: Tensor, labels: np.ndarray, bins: int = 10) -> float:
     """Expected calibration error (Guo et al. 2017) of the best score, over the gestures."""
     known = labels < GESTURES
-    sure, best = scores.max(1)
-    sure, right = sure.numpy()[known], best.numpy()[known] == labels[known]
+    most, best = scores.max(1)
+    sure, right = most.numpy()[known], best.numpy()[known] == labels[known]
     place = np.minimum((sure * bins).astype(int), bins - 1)
     return sum(abs(sure[place == b].sum() - right[place == b].sum()) for b in range(bins)) / known.sum()
 

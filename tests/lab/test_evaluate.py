@@ -7,7 +7,7 @@ pytest.importorskip("torch", reason="needs the extra [lab]")
 pytest.importorskip("sklearn", reason="needs the extra [lab]")
 pytest.importorskip("onnx", reason="needs the extra [lab]")
 
-from gestured.lab.evaluate import Outcome, outcome  # noqa: E402
+from gestured.lab.evaluate import Outcome, outcome
 
 THREE = np.eye(3, dtype=np.float32)
 

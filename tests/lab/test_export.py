@@ -17,18 +17,18 @@ torch = pytest.importorskip("torch", reason="needs the extra [lab]")
 pytest.importorskip("onnx", reason="needs the extra [lab]")
 pytest.importorskip("sklearn", reason="needs the extra [lab]")
 
-import onnx  # noqa: E402
-from sklearn.ensemble import RandomForestClassifier  # noqa: E402
-from torch import nn  # noqa: E402
+import onnx
+from sklearn.ensemble import RandomForestClassifier
+from torch import Tensor, nn
 
-from gestured.core.errors import ModelError  # noqa: E402
-from gestured.core.features import feature_names  # noqa: E402
-from gestured.core.frames import Segment  # noqa: E402
-from gestured.core.window import Window  # noqa: E402
-from gestured.lab.export import export_forest, export_net, write_manifest  # noqa: E402
-from gestured.lab.forest_graph import forest_outputs  # noqa: E402
-from gestured.lab.recordings.origin import Origin, said  # noqa: E402
-from gestured.model.model import open_model  # noqa: E402
+from gestured.core.errors import ModelError
+from gestured.core.features import feature_names
+from gestured.core.frames import Segment
+from gestured.core.window import Window
+from gestured.lab.export import export_forest, export_net, write_manifest
+from gestured.lab.forest_graph import forest_outputs
+from gestured.lab.recordings.origin import Origin, said
+from gestured.model.model import open_model
 
 GESTURES = ("one_tap", "swipe_up", "swipe_left")
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=0.1, tail_s=0.1, floor=4.0)
@@ -56,7 +56,7 @@ class Net(nn.Module):
         rows, columns = torch.meshgrid(torch.arange(9.0), torch.arange(9.0), indexing="ij")
         self.register_buffer("places", torch.stack([columns.flatten(), 8 - rows.flatten()], 1))
 
-    def forward(self, frames: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor]:
         batch, length = frames.shape[0], frames.shape[1]
         x = frames.reshape(-1, 1, 9, 9)
         x = torch.max_pool2d(torch.relu(self.first(x)), 2)
@@ -138,7 +138,7 @@ def test_the_same_module_is_the_same_file(net: tuple[Net, Path, dict[str, float]
 class Frozen(Net):
     """Asks for the length in Python: the answer for the example is built into the graph."""
 
-    def forward(self, frames: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor]:
         scores, unknown = super().forward(frames)
         return (scores, unknown) if int(frames.shape[1]) <= 20 else (scores, unknown * 0.5)
 
@@ -146,7 +146,7 @@ class Frozen(Net):
 class Mixing(Net):
     """One gesture's answer depends on the others in its batch."""
 
-    def forward(self, frames: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor]:
         scores, unknown = super().forward(frames)
         return scores, torch.sigmoid(unknown - 10 * unknown.mean())
 
@@ -154,7 +154,7 @@ class Mixing(Net):
 class Logits(Net):
     """Gives no probabilities."""
 
-    def forward(self, frames: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor]:
         scores, unknown = super().forward(frames)
         return torch.log(scores), unknown
 

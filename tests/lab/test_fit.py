@@ -11,11 +11,11 @@ torch = pytest.importorskip("torch", reason="needs the extra [lab]")
 pytest.importorskip("sklearn", reason="needs the extra [lab]")
 pytest.importorskip("onnx", reason="needs the extra [lab]")
 
-from torch import nn  # noqa: E402
+from torch import nn
 
-from gestured.lab import fit, train  # noqa: E402
-from gestured.lab.dataset import OTHERS, STREAMS, TRIALS, Samples, collect  # noqa: E402
-from gestured.lab.fit import (  # noqa: E402
+from gestured.lab import fit, train
+from gestured.lab.dataset import OTHERS, STREAMS, TRIALS, Samples, collect
+from gestured.lab.fit import (
     CLASSES,
     REAL_KINDS,
     FitConfig,
@@ -29,7 +29,8 @@ from gestured.lab.fit import (  # noqa: E402
     save_nets,
     targets,
 )
-from gestured.simulator import GESTURES  # noqa: E402
+from gestured.lab.progress import progress as shown
+from gestured.simulator import GESTURES
 
 SMALL = FitConfig(epochs=3, batch=16, real_epochs=1, real_samples=32)
 
@@ -65,7 +66,7 @@ def alike(a: nn.ModuleDict, b: nn.ModuleDict) -> None:
 
 def interrupted(samples: Samples, checkpoint: Path, after: int) -> nn.ModuleDict:
     """A run that is ended while epoch `after` (from 0) is going on, and another one that goes on."""
-    real, seen = fit.progress, []
+    real, seen = shown, []
 
     def progress(items: Any, total: int, title: str) -> Any:
         seen.append(title)

@@ -5,12 +5,12 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra [lab]")
 
-from torch import Tensor, nn  # noqa: E402
+from torch import Tensor, nn
 
-from gestured.lab.fit import NETS, build  # noqa: E402
-from gestured.lab.nets import ACTIVE, CnnLstm, Decision, Judged, Lstm  # noqa: E402
-from gestured.lab.trajectory import TrajectoryNet, trajectory_features  # noqa: E402
-from tests.lab.made import gestures  # noqa: E402
+from gestured.lab.fit import NETS, build
+from gestured.lab.nets import ACTIVE, CnnLstm, Decision, Judged, Lstm
+from gestured.lab.trajectory import TrajectoryNet, trajectory_features
+from tests.lab.made import gestures
 
 MADE = gestures()
 TEN = [name for name in MADE if not name.startswith("two_finger_")]

@@ -5,10 +5,10 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra [lab]")
 
-from torch import Tensor  # noqa: E402
+from torch import Tensor
 
-from gestured.lab.trajectory import BLOB, POINTS, trajectory_features  # noqa: E402
-from tests.lab.made import gestures, line, ring, window  # noqa: E402
+from gestured.lab.trajectory import BLOB, POINTS, trajectory_features
+from tests.lab.made import gestures, line, ring, window
 
 MADE = gestures()
 DURATION, RISES, LENGTH, REACH, STRAIGHT, EX, EY = 0, 2, 6, 7, 8, 9, 10

@@ -36,8 +36,10 @@ WORD = 40  # characters of a hand, a finger or a task
 
 @dataclass(frozen=True, slots=True)
 class Csv:
-    """What a CSV file does not say itself. It holds one recording, a row for each frame: time, then rows x columns
-    values, row by row, the top row first; commas between them, a heading or none.
+    """What a CSV file does not say itself.
+
+    It holds one recording, a row for each frame: time, then rows x columns values, row by row, the top row first;
+    commas between them, a heading or none.
     """
 
     rows: int

@@ -46,8 +46,10 @@ class Terminal:
         return self._fd
 
     def key(self) -> str | None:
-        """A key that was pressed, in lower case ("\\n" for Enter), None where there is none; Ended where there is no
-        terminal any more."""
+        r"""A key that was pressed, in lower case ("\n" for Enter), None where there is none.
+
+        Raises Ended where there is no terminal any more.
+        """
         if not select.select([self._fd], [], [], 0)[0]:
             return None
         try:

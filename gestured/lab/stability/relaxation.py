@@ -156,9 +156,10 @@ def exact(
 
 
 def steps(count: int, seed: int, decade: float | None, tau_s: float, *, even: bool = False) -> Array:
-    """(count + 1,) times from 0 s. At one decade of dt / tau, uneven by half; or (None) of every size:
+    """(count + 1,) times from 0 s.
 
-    from 1e-9 to 1e9 tau in disorder, some of them 0 (a repeated time), some a day.
+    At one decade of dt / tau, uneven by half; or (None) of every size: from 1e-9 to 1e9 tau in disorder, some of them 0
+    (a repeated time), some a day.
     """
     rng = np.random.default_rng([seed, count])
     if decade is None:

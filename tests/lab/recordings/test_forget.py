@@ -1,6 +1,7 @@
 """`gestured-lab forget`: whoever is forgotten is gone, everybody else is untouched, and models are asked."""
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +9,6 @@ import numpy as np
 import pytest
 
 from gestured.lab.cli import main
-from gestured.lab.recordings import forget
 from gestured.lab.recordings.origin import Origin, origins
 from gestured.lab.recordings.store import join
 from gestured.record.arrays import read, write
@@ -78,7 +78,7 @@ def test_without_a_yes_nothing_is_removed(
 ) -> None:
     path = folder(tmp_path)
     before = contents(path)
-    monkeypatch.setattr(forget.sys, "stdin", Typed(answer))
+    monkeypatch.setattr(sys, "stdin", Typed(answer))
     status, out, _ = run(capsys, "07", path)
     assert (status, contents(path)) == (0, before)
     assert "nothing was removed" in out
@@ -98,7 +98,7 @@ class Typed:
 
 
 def test_a_yes_removes(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(forget.sys, "stdin", Typed("yes\n"))
+    monkeypatch.setattr(sys, "stdin", Typed("yes\n"))
     assert "removed: 3 recordings" in run(capsys, "07", folder(tmp_path))[1]
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from tests.small_recording import FIELDS, example, same, save, session
 from tests.test_recording import any_recordings
 
 
-def changed(of: Recordings, name: str, index: object, value: object) -> np.ndarray:
+def changed(of: Recordings, name: str, index: Any, value: object) -> np.ndarray:
     array = np.array(getattr(of, name))
     array = array.astype("U80") if array.dtype.kind == "U" else array
     array[index] = value

@@ -216,7 +216,7 @@ def _copies(method: str, chance: random.Random) -> Study:
 
 
 def _tuning(method: str, chance: random.Random) -> Study:
-    tried = [
+    tried: list[Study] = [
         {"values": {"C": 2.0**k, "gamma": 2.0 ** (k - 12)}, "right": 0.6 + chance.random() / 3, "spread": 0.02}
         for k in range(6)
     ]

@@ -11,12 +11,14 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("pywt")
 
-from gestured.core.errors import GesturedError  # noqa: E402
-from gestured.lab.study import cells  # noqa: E402
-from gestured.lab.study.cells import Schedule  # noqa: E402
-from gestured.lab.study.protocols import CLEAN, PARTICIPANTS  # noqa: E402
-from tests.lab.study.material_made import data  # noqa: E402
-from tests.lab.study.test_protocols import task  # noqa: E402
+from joblib import Parallel
+
+from gestured.core.errors import GesturedError
+from gestured.lab.study import cells
+from gestured.lab.study.cells import Schedule
+from gestured.lab.study.protocols import CLEAN, PARTICIPANTS
+from tests.lab.study.material_made import data
+from tests.lab.study.test_protocols import task
 
 TASKS = [task(CLEAN), task(PARTICIPANTS), task(PARTICIPANTS, "none")]
 
@@ -28,7 +30,7 @@ def without_time(found: dict[object, dict[str, object]]) -> list[dict[str, objec
 @pytest.fixture
 def here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Computes in this process: starting others takes longer than the work."""
-    real = cells.Parallel
+    real = Parallel
     monkeypatch.setattr(cells, "Parallel", lambda n_jobs, **more: real(n_jobs=1, **more))
 
 

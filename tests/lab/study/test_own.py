@@ -9,10 +9,10 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("pywt")
 
-from gestured.core.errors import GesturedError  # noqa: E402
-from gestured.lab.study.own import own  # noqa: E402
-from gestured.record.arrays import Recordings, write  # noqa: E402
-from gestured.simulator import Participant, Sensor, generator, gesture_take  # noqa: E402
+from gestured.core.errors import GesturedError
+from gestured.lab.study.own import own
+from gestured.record.arrays import Recordings, write
+from gestured.simulator import Participant, Sensor, generator, gesture_take
 
 
 def recordings(people: tuple[str, ...], labels: tuple[str, ...] = ("swipe_up", "one_tap")) -> Recordings:

@@ -6,11 +6,11 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("pywt")
 
-from gestured.lab.study.bootstrap import interval  # noqa: E402
-from gestured.lab.study.material import NONE, SHIFT  # noqa: E402
-from gestured.lab.study.methods import METHODS  # noqa: E402
-from gestured.lab.study.protocols import CLEAN, PAPER, PARTICIPANTS, Task, material, run, splits, values_of  # noqa: E402
-from tests.lab.study.material_made import data  # noqa: E402
+from gestured.lab.study.bootstrap import interval
+from gestured.lab.study.material import NONE, SHIFT
+from gestured.lab.study.methods import METHODS
+from gestured.lab.study.protocols import CLEAN, PAPER, PARTICIPANTS, Task, material, run, splits, values_of
+from tests.lab.study.material_made import data
 
 
 def task(protocol: str, augmentation: str = SHIFT, method: str = "tp_knn", **more: int) -> Task:

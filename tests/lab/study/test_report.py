@@ -246,7 +246,15 @@ def test_no_string_of_the_study_becomes_markup(tmp_path: Path) -> None:
 
 def test_a_study_without_anything_says_what_is_missing(tmp_path: Path) -> None:
     words = text(report(empty_study(), tmp_path))
-    missing = ("tables of the paper", "Copies", "Sessions", "Confusions", "Run times", "elapsed time", "methods fail")
+    missing: tuple[str, ...] = (
+        "tables of the paper",
+        "Copies",
+        "Sessions",
+        "Confusions",
+        "Run times",
+        "elapsed time",
+        "methods fail",
+    )
     missing += ("Calibration", "Learning curves", "Signals", "double tap", "Methods", "Hyperparameters", "open choices")
     for part in missing:
         assert re.search(rf"[^.]*{part}[^.]* not computed in this run", words, re.IGNORECASE), part

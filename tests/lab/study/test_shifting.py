@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 pytest.importorskip("torch")
 
-from gestured.lab.study.shifting import EDGES, bounding_box, copies, shifted, shifts  # noqa: E402
-from tests.lab.study.material_made import samples  # noqa: E402
+from gestured.lab.study.shifting import EDGES, bounding_box, copies, shifted, shifts
+from tests.lab.study.material_made import samples
 
 
 @given(st.integers(0, 8), st.integers(0, 8), st.integers(1, 4), st.integers(1, 4))

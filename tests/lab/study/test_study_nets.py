@@ -5,13 +5,13 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from gestured.lab.study import onnx_form, training  # noqa: E402
-from gestured.lab.study.elapsed import moments  # noqa: E402
-from gestured.lab.study.material import classes  # noqa: E402
-from gestured.lab.study.methods import METHODS  # noqa: E402
-from gestured.lab.study.nets import HistoryNet, sequence_net  # noqa: E402
-from tests.lab.made import line, window  # noqa: E402
-from tests.lab.study.material_made import samples  # noqa: E402
+from gestured.lab.study import onnx_form, training
+from gestured.lab.study.elapsed import moments
+from gestured.lab.study.material import classes
+from gestured.lab.study.methods import METHODS
+from gestured.lab.study.nets import HistoryNet, sequence_net
+from tests.lab.made import line, window
+from tests.lab.study.material_made import samples
 
 KINDS = ("lstm", "cnn_lstm", "cnn_gru", "tcn", "transformer")
 

@@ -9,10 +9,10 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("pywt")
 
-from gestured.lab import cli  # noqa: E402
-from gestured.lab.dataset import TRIALS  # noqa: E402
-from gestured.lab.study.methods import METHODS  # noqa: E402
-from gestured.lab.study.plan import Plan  # noqa: E402
+from gestured.lab import cli
+from gestured.lab.dataset import TRIALS
+from gestured.lab.study.methods import METHODS
+from gestured.lab.study.plan import Plan
 
 SECTIONS = (
     "about", "machine", "data", "methods", "cells", "copies", "tuning", "choices", "run_time", "elapsed", "learning",

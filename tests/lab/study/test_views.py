@@ -6,12 +6,12 @@ import pytest
 pytest.importorskip("torch")
 pywt = pytest.importorskip("pywt")
 
-from gestured.lab.study.methods import METHODS  # noqa: E402
-from gestured.lab.study.motion_history import motion_history  # noqa: E402
-from gestured.lab.study.training import Images, Windows  # noqa: E402
-from gestured.lab.study.wavelets import band_statistics, spatio_temporal  # noqa: E402
-from tests.lab.made import gestures, line, window  # noqa: E402
-from tests.lab.study.material_made import samples  # noqa: E402
+from gestured.lab.study.methods import METHODS
+from gestured.lab.study.motion_history import motion_history
+from gestured.lab.study.training import Images, Windows
+from gestured.lab.study.wavelets import band_statistics, spatio_temporal
+from tests.lab.made import gestures, line, window
+from tests.lab.study.material_made import samples
 
 
 @pytest.mark.parametrize("name", METHODS)
