@@ -9,10 +9,10 @@ from benchmarks.latency import play
 from benchmarks.timing import Ratio, Row, cpu_s_of, cpu_us, interleaved, percentile, ratio, resident_kib
 from benchmarks.traffic import touched
 from gestured.client.engine import Engine
+from gestured.client.osc_out import dated
 from gestured.client.sensor import Form
 from gestured.client.stream import Stream
 from gestured.core.frames import Frame, Touch
-from gestured.core.osc import encode_bundle, encode_message
 from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.values import Grid
 from gestured.simulator import Participant, Sensor, generator, gesture_take
@@ -64,8 +64,8 @@ def _decoding(keep_touches: bool) -> Ratio:
     """CPU of a bundle of a matrix and three touches, over that of one of a matrix alone."""
     decoder = Decoder(Addresses(), lambda _: Grid(9, 9), keep_touches=keep_touches)
     values = touched(40, 5.0).frames[0]
-    matrix = encode_message("/bench/pressure", "f" * 81, [values.ravel().astype(np.float32)])
-    both, alone = Form("bench").packet(Frame(0.0, values, TOUCHES), 0, 0.0), encode_bundle([matrix], 0.0)
+    matrix = Form("bench", plain=True).packet(Frame(0.0, values), 0, 0.0)
+    both, alone = Form("bench").packet(Frame(0.0, values, TOUCHES), 0, 0.0), dated(0.0, matrix)
     source = ("127.0.0.1", 40000)
     return ratio(
         *interleaved(

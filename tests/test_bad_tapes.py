@@ -192,10 +192,10 @@ def test_a_scene_that_is_no_json(tmp_path: Path, said: str) -> None:
 
 
 def test_sensors_are_as_many_as_the_daemon_would_have_taken(tmp_path: Path) -> None:
-    from gestured.core import osc
     from gestured.record.replay import Mute, Replay, maker
+    from tests import encoding
 
-    packets = [message(1, k * 10**7, osc.encode_message(f"/s{k}/pressure", "b", [bytes(81)])) for k in range(1000)]
+    packets = [message(1, k * 10**7, encoding.message(f"/s{k}/pressure", "b", [bytes(81)])) for k in range(1000)]
     found = tape.read(write(tmp_path / "a.mcap", CHANNELS, *packets))
     replay = Replay(found, maker(found.scene).scene, Mute(["one_tap"]))
     list(replay.events())

@@ -24,7 +24,6 @@ EXTRAS = (
     "hypothesis",
     "setuptools",
     "mcap",
-    "pythonosc",
 )
 ALL_BUT_LAB = """
 import importlib, pkgutil, gestured

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from gestured.client.stream import Stream
-from gestured.core.osc import encode_bundle, encode_message
 from gestured.model.model import shipped
+from tests import encoding
 
 ROOT = Path(__file__).resolve().parents[1]
 SESSIONS = ROOT.parent / "shared" / "data" / "capfingerid_sessions_dev.npz"
@@ -183,8 +183,8 @@ def send_session(daemon: Daemon, sessions: dict[str, np.ndarray], number: int) -
         begun = time.time()
         for n, (t, frame) in enumerate(zip(times.tolist(), sessions["frames"][first:last], strict=True)):
             address = f"/session-{number}/pressure"
-            message = encode_message(address, "ib", [n, frame.astype(np.uint8).tobytes()])
-            sender.send(encode_bundle([message], begun + t))
+            message = encoding.message(address, "ib", [n, frame.astype(np.uint8).tobytes()])
+            sender.send(encoding.bundle([message], begun + t))
             if n % BATCH == BATCH - 1 or n == len(times) - 1:
                 while daemon.frames() < before + n + 1:
                     pass  # each look is a request over HTTP: the daemon sets the pace

@@ -1,6 +1,7 @@
 """A simulated sensor's firmware: frames and finger positions as OSC packets, sent at their times over UDP."""
 
 import socket
+import struct
 import threading
 import time
 from collections.abc import Iterable, Sequence
@@ -10,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.client import osc_out
 from gestured.core.frames import Frame, Touch
-from gestured.core.osc import encode_bundle, encode_message
 
 BLOBS: dict[str, np.dtype[Any]] = {
     "float32": np.dtype(">f4"),
@@ -33,24 +34,26 @@ class Form:
         pressure = self._pressure(frame.values, None if self.plain else counter)
         if self.plain:
             return pressure
-        return encode_bundle([pressure, self._trajectory(frame.touches)], moment)
+        return osc_out.dated(moment, pressure, self._trajectory(frame.touches))
 
     def _pressure(self, values: NDArray[np.generic], counter: int | None) -> bytes:
         address = f"/{self.sensor}/pressure"
         flat = np.ravel(values)
         types, args = ("", []) if counter is None else ("i", [counter])
-        if self.values == "floats":
-            return encode_message(address, types + "f" * flat.size, [*args, flat.astype(np.float32)])
-        if self.values == "ints":
-            return encode_message(address, types + "i" * flat.size, [*args, np.rint(flat).astype(np.int32)])
+        if self.values in ("floats", "ints"):
+            tag, numbers = ("f", flat.astype(">f4")) if self.values == "floats" else ("i", np.rint(flat).astype(">i4"))
+            head = osc_out.head(address, types + tag * flat.size)
+            return head + struct.pack(">" + types, *args) + numbers.tobytes()
         dtype = BLOBS[self.values]
         if dtype.kind == "u":
             flat = np.clip(np.rint(flat), 0, np.iinfo(dtype).max)
-        return encode_message(address, types + "b", [*args, flat.astype(dtype).tobytes()])
+        blob: bytes = osc_out.message(address, types + "b", [*args, flat.astype(dtype).tobytes()]).dgram
+        return blob
 
     def _trajectory(self, touches: Sequence[Touch]) -> bytes:
         args = [value for touch in touches[:3] for value in (touch.id, touch.x, touch.y)]
-        return encode_message(f"/{self.sensor}/trajectory", "iff" * (len(args) // 3), args)
+        types = "iff" * (len(args) // 3)
+        return osc_out.head(f"/{self.sensor}/trajectory", types) + struct.pack(">" + types, *args)
 
 
 def sent_after_refusal(sock: socket.socket, packet: bytes) -> bool:

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.client import osc_out
 from gestured.client.lines import Unreachable
 from gestured.client.sensor import sent_after_refusal
 from gestured.client.stream import Stream
 from gestured.control.diff import ONSET_S, Line
-from gestured.core import osc
 from gestured.core.errors import GesturedError
 from gestured.core.stamping import Stamper
 from gestured.record.replay import Replay
@@ -65,7 +65,7 @@ def _paced(found: Tape, speed: float) -> Iterator[tuple[Packet, bytes]]:
         if wait > 0:
             time.sleep(wait)
         tagged = speed != 1 and not packet.data.startswith(BUNDLE)
-        yield packet, osc.encode_bundle([packet.data], packet.t_ns / 1e9) if tagged else packet.data
+        yield packet, osc_out.dated(packet.t_ns / 1e9, packet.data) if tagged else packet.data
 
 
 def retimed(heard: Sequence[Line], sent: Sequence[float], found: Tape, rehearsal: Replay) -> list[Line]:

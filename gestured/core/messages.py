@@ -1,26 +1,11 @@
-"""What goes out: events as OSC messages and as JSON lines, and the other lines that a client is told."""
+"""What a client of the event socket is told: events and the other lines, as JSON."""
 
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any, get_args
 
-from gestured.core import osc
-from gestured.core.events import Event, Gesture
-
-
-def gesture_osc(event: Gesture, epoch: float) -> bytes:
-    """The OSC message of a gesture; stream time + `epoch` s = time since the Unix epoch."""
-    return osc.encode_message(
-        f"/gestured/{event.sensor}/gesture",
-        "sfidd",
-        (event.gesture, event.confidence, event.sequence, event.onset + epoch, event.offset + epoch),
-    )
-
-
-def status_osc(state: str, sensors: int) -> bytes:
-    """The OSC sign of life: "ok", "degraded" or "no_data", and how many sensors there are."""
-    return osc.encode_message("/gestured/status", "si", (state, sensors))
+from gestured.core.events import Event
 
 
 def event_type(event: Event) -> str:

@@ -1,4 +1,4 @@
-"""Bytes <-> OSC 1.0 (opensoundcontrol.org/spec-1_0): bounded, non-recursive, one error type.
+"""Bytes -> OSC 1.0 (opensoundcontrol.org/spec-1_0): bounded, non-recursive, one error type.
 
 Whatever the bytes are, `decode` gives messages or raises `ProtocolError`, in time linear in their number.
 A sensor sends the same layout over and over: a packet that is laid out as one before is not parsed again, its
@@ -9,10 +9,9 @@ known, a string that is not UTF-8), `truncated` (fewer bytes than the type tags 
 `bundle` (sizes that do not fit, nested too deep), `oversized` (packet, type tags or number of messages).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from struct import Struct
-from struct import error as StructError
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -273,49 +272,3 @@ def _sized(data: bytes, tag: str, at: int, end: int) -> tuple[bytes | str, int]:
         return data[at:stop].decode(), _after(stop, 4 - (stop - at) % 4, end)
     except UnicodeDecodeError:
         raise ProtocolError("types", "a string that is not UTF-8") from None
-
-
-def encode_message(address: str, types: str, args: Sequence[Argument] = ()) -> bytes:
-    """One message. As in `Message`, a one-dimensional array stands for as many equal type tags as it is long.
-
-    Raises ValueError where types and arguments do not agree.
-    """
-    parts = [_padded(address.encode("ascii")), _padded(b"," + types.encode("ascii"))]
-    at = 0
-    for arg in args:
-        tag = types[at : at + 1]
-        count = 1
-        if isinstance(arg, np.ndarray):
-            count = arg.size
-            if tag not in _ARRAYS or types[at : at + count] != tag * count:
-                raise ValueError(f"an array of {count} values where the type tags are {types[at:]!r}")
-            parts.append(arg.astype(_ARRAYS[tag]).tobytes())
-        elif tag == "b":
-            blob = cast(bytes, arg)
-            parts.append(len(blob).to_bytes(4, "big") + blob + bytes(-len(blob) % 4))
-        elif tag == "s":
-            parts.append(_padded(cast(str, arg).encode()))
-        elif tag in _SCALARS:
-            try:
-                parts.append(Struct(">" + _SCALARS[tag]).pack(arg))
-            except (StructError, OverflowError) as error:
-                raise ValueError(f"argument {arg!r} for type tag {tag!r}: {error}") from None
-        else:
-            raise ValueError(f"argument {arg!r} has the type tag {tag!r}, expected one of i f d h t s b")
-        at += count
-    if at != len(types):
-        raise ValueError(f"{len(types)} type tags for {at} arguments")
-    return b"".join(parts)
-
-
-def encode_bundle(elements: Sequence[bytes], timetag: float | None = None) -> bytes:
-    """A bundle of encoded messages or bundles; `timetag` in seconds since 1970, None is "immediately"."""
-    raw = 1 if timetag is None else (round(timetag * 2**32) + (_NTP_EPOCH << 32)) % 2**64
-    sized = (part for element in elements for part in (len(element).to_bytes(4, "big"), element))
-    return b"".join((_BUNDLE, raw.to_bytes(8, "big"), *sized))
-
-
-def _padded(text: bytes) -> bytes:
-    if b"\0" in text:
-        raise ValueError(f"OSC strings hold no zero byte: {text!r}")
-    return text + bytes(4 - len(text) % 4)

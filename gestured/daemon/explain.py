@@ -35,6 +35,8 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     ]
     if settings.metrics:
         loads.append("prometheus_client, and a thread that answers HTTP")
+    if settings.publish:
+        loads.append("python-osc, which writes what is published")
     listens = [
         f"udp {settings.listen} for {settings.addresses.pressure}",
         f"receive buffer {RECEIVE_BYTES >> 20} MiB, as far as the kernel grants it",
@@ -62,7 +64,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     leaves = [
         "finger positions (trajectory): nothing uses them, they are passed over at their address",
         "fallback models: opened when the one above fails",
-        "torch, scikit-learn, python-osc: never loaded by the daemon",
+        "torch, scikit-learn: never loaded by the daemon",
     ]
     if settings.flight_recorder:
         computes.append(f"flight recorder: the last {KEPT_S:g} s of packets, at most {settings.flight_recorder} MiB")
@@ -71,7 +73,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     if not settings.metrics:
         leaves.append("prometheus_client, HTTP: no --metrics")
     if not settings.publish:
-        leaves.append("OSC output: no --publish")
+        leaves.append("python-osc, OSC output: no --publish")
     if not waits:
         leaves.append("waiting for a second tap: double_tap is not in use")
     if len(used) < len(ladder.gestures):

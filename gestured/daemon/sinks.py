@@ -3,7 +3,6 @@
 import socket
 from typing import Protocol
 
-from gestured.core import messages, osc
 from gestured.core.events import Event, Gesture, Status
 from gestured.core.reading import SILENT
 from gestured.daemon.log import Throttle, log
@@ -24,13 +23,16 @@ class Sink(Protocol):
 
 
 class OscSink:
-    """OSC over UDP to one destination: gestures and the status.
+    """OSC over UDP to one destination: gestures and the status; their times are seconds since the Unix epoch.
 
     The socket is connected, so that a port where nobody listens is told to us (by the next call). A
     destination that cannot be reached costs a failed system call an event, nothing more.
     """
 
     def __init__(self, destination: Address, metrics: Metrics) -> None:
+        from gestured.client import osc_out  # python-osc: a daemon that publishes nothing does not load it
+
+        self._out = osc_out
         self.destination = destination
         self._metrics, self._throttle = metrics, Throttle()
         self._socket: socket.socket | None = None
@@ -47,12 +49,13 @@ class OscSink:
         A test's gesture stands in a bundle behind `/gestured/test ,s sensor`: its own arguments are the contract's.
         """
         if isinstance(event, Gesture):
-            packet = messages.gesture_osc(event, epoch)
-            mark = osc.encode_message("/gestured/test", "s", (event.sensor,)) if test else b""
-            self._send(osc.encode_bundle([mark, packet]) if test else packet)
+            args = (event.gesture, event.confidence, event.sequence, event.onset + epoch, event.offset + epoch)
+            gesture = self._out.message(f"/gestured/{event.sensor}/gesture", "sfidd", args)
+            mark = self._out.message("/gestured/test", "s", (event.sensor,)) if test else None
+            self._send(self._out.bundle(mark, gesture).dgram if mark else gesture.dgram)
         elif isinstance(event, Status):
             heard = sum(state not in SILENT for state in event.sensors.values())
-            self._send(messages.status_osc(event.state, heard))
+            self._send(self._out.message("/gestured/status", "si", (event.state, heard)).dgram)
 
     def close(self) -> None:
         """Close the socket."""

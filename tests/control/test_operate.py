@@ -11,7 +11,7 @@ from gestured.control.cli import main
 from gestured.control.doctor import BUFFER_BYTES, _buffer, _clock, _permissions, _port
 from gestured.control.sniff import Sight, lines, propose
 from gestured.control.status import screen
-from gestured.core import osc
+from tests import encoding
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Hand, Sensor, blob, counted, floats, ints
 
@@ -150,13 +150,13 @@ def test_what_sniff_proposes_is_taken_by_the_daemon(address: str, encode, propos
 def test_sniff_proposes_a_grid_and_is_bounded() -> None:
     sight = Sight()
     for n in range(1000):
-        sight.packet(n, "a:1", osc.encode_message(f"/s{n}/pressure", "f" * 25, [0.0] * 25))
+        sight.packet(n, "a:1", encoding.message(f"/s{n}/pressure", "f" * 25, [0.0] * 25))
     assert len(sight.seen) <= 257 and sum(seen.count for seen in sight.seen.values()) == 1000
     one = Sight()
-    one.packet(0, "a:1", osc.encode_message("/arm/pressure", "f" * 25, [0.0] * 25))
+    one.packet(0, "a:1", encoding.message("/arm/pressure", "f" * 25, [0.0] * 25))
     assert propose(list(one.seen.values())) == ["[sensors.arm]", 'grid = "5x5"']
-    one.packet(0, "a:1", osc.encode_message("/foo/7/matrix", "f" * 49, [0.0] * 49))
-    one.packet(0, "a:1", osc.encode_message("/arm/pressure", "f" * 25, [0.0] * 25))
+    one.packet(0, "a:1", encoding.message("/foo/7/matrix", "f" * 49, [0.0] * 49))
+    one.packet(0, "a:1", encoding.message("/arm/pressure", "f" * 25, [0.0] * 25))
     assert propose(list(one.seen.values())) == [
         "[sensors.arm]",
         'grid = "5x5"',
@@ -199,7 +199,7 @@ def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon) -> 
     sensor = Sensor(daemon, "hurt").begin().perform("left")
     client.events("gesture", "hurt")
     sensor.sock.send(floats("/hurt/matrix", Hand().frame(), 0))
-    sensor.sock.send(osc.encode_message("/hurt/pressure", "f" * 25, [0.0] * 25))
+    sensor.sock.send(encoding.message("/hurt/pressure", "f" * 25, [0.0] * 25))
     while not {"address", "size"} <= set(json.loads(_status(daemon))["input"]["dropped"]):
         pass
     status, out, err = ctl("doctor", "--json")

@@ -1,4 +1,4 @@
-"""What goes out: events as JSON lines and OSC, and the other lines that a client is told."""
+"""Events as JSON lines, and the other lines that a client is told."""
 
 import json
 import math
@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pythonosc.osc_message import OscMessage
 
 from gestured.core import events, messages
 from gestured.core.events import Event, Gesture, Onset, Status
@@ -77,11 +76,3 @@ def test_no_nan_leaves_the_house(value: float) -> None:
         messages.to_json(Onset("s", 1, value), 0.0)
     with pytest.raises(ValueError):
         messages.to_json(Status("ok", {"s": value}, "m", 1.0), 0.0)  # type: ignore[dict-item]
-
-
-def test_osc_out_is_read_by_python_osc() -> None:
-    message = OscMessage(messages.gesture_osc(GESTURE, 1_700_000_000.0))
-    assert message.address == "/gestured/armrest/gesture"
-    assert message.params == ["swipe_up", pytest.approx(0.98), 17, 1_700_000_010.0, 1_700_000_010.5]
-    status = OscMessage(messages.status_osc("no_data", 2))
-    assert (status.address, status.params) == ("/gestured/status", ["no_data", 2])

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.core import osc, wire
+from gestured.core import wire
 from gestured.core.frames import Touch
 from gestured.core.wire import Addresses, Arrival, Decoder
+from tests import encoding
 
 GRID = (3, 4)
 SIZE = 12
@@ -27,16 +28,16 @@ def pressure(values: Sequence[float], counter: int | None = None, sensor: str = 
     args = [counter, np.array(values)] if counted else [np.array(values)]
     if counted and tag == "i":
         args = [np.array([counter, *values])]
-    return osc.encode_message(f"/{sensor}/pressure", "i" * counted + tag * len(values), args)
+    return encoding.message(f"/{sensor}/pressure", "i" * counted + tag * len(values), args)
 
 
 def blob(data: bytes, counter: int | None = None) -> bytes:
     counted = counter is not None
-    return osc.encode_message("/s/pressure", "i" * counted + "b", [counter, data] if counted else [data])
+    return encoding.message("/s/pressure", "i" * counted + "b", [counter, data] if counted else [data])
 
 
 def trajectory(*touches: tuple[int, float, float], sensor: str = "s") -> bytes:
-    return osc.encode_message(f"/{sensor}/trajectory", "iff" * len(touches), [x for t in touches for x in t])
+    return encoding.message(f"/{sensor}/trajectory", "iff" * len(touches), [x for t in touches for x in t])
 
 
 def one(packet: bytes) -> Arrival:
@@ -182,20 +183,20 @@ def test_a_frame_with_a_value_that_is_not_finite_is_refused(value: float, at: in
         (blob(b""), "size"),
         (blob(bytes(SIZE + 1)), "size"),
         (blob(bytes(8 * SIZE)), "size"),
-        (osc.encode_message("/s/pressure", ""), "types"),
-        (osc.encode_message("/s/pressure", "s", ("x",)), "types"),
-        (osc.encode_message("/s/pressure", "bi", (bytes(SIZE), 1)), "types"),
-        (osc.encode_message("/s/pressure", "bb", (bytes(SIZE), bytes(SIZE))), "types"),
-        (osc.encode_message("/s/pressure", "d" * SIZE, [0.0] * SIZE), "types"),
-        (osc.encode_message("/s/pressure", "f" * (SIZE - 1) + "i", [0.0] * (SIZE - 1) + [1]), "types"),
-        (osc.encode_message("/s/trajectory", "if", (1, 1.0)), "types"),
-        (osc.encode_message("/s/trajectory", "iif", (1, 1, 1.0)), "types"),
+        (encoding.message("/s/pressure", ""), "types"),
+        (encoding.message("/s/pressure", "s", ("x",)), "types"),
+        (encoding.message("/s/pressure", "bi", (bytes(SIZE), 1)), "types"),
+        (encoding.message("/s/pressure", "bb", (bytes(SIZE), bytes(SIZE))), "types"),
+        (encoding.message("/s/pressure", "d" * SIZE, [0.0] * SIZE), "types"),
+        (encoding.message("/s/pressure", "f" * (SIZE - 1) + "i", [0.0] * (SIZE - 1) + [1]), "types"),
+        (encoding.message("/s/trajectory", "if", (1, 1.0)), "types"),
+        (encoding.message("/s/trajectory", "iif", (1, 1, 1.0)), "types"),
         (trajectory(*[(i, 0.0, 0.0) for i in range(4)]), "too_many_touches"),
         (trajectory((1, math.nan, 0.0)), "not_finite"),
         (trajectory((1, 0.0, math.inf)), "not_finite"),
         (pressure([0.0] * SIZE, sensor="a/b"), "address"),
         (pressure([0.0] * SIZE, sensor="*"), "address"),
-        (osc.encode_message("/tuio/2Dcur", "s", ("alive",)), "address"),
+        (encoding.message("/tuio/2Dcur", "s", ("alive",)), "address"),
         (b"\x00\x01", "not_osc"),
         (pressure([0.0] * SIZE)[:-4], "truncated"),
     ],
@@ -207,7 +208,7 @@ def test_what_is_wrong_is_refused_by_reason(packet: bytes, reason: str) -> None:
 def test_good_messages_survive_bad_siblings() -> None:
     good = [pressure([float(n)] * SIZE, n) for n in range(3)]
     bad = [pressure([math.nan] * SIZE, 7), blob(b"x"), b"/x\0\0", trajectory((1, math.nan, 0.0))]
-    packet = osc.encode_bundle([good[0], bad[0], good[1], *bad[1:], good[2]])
+    packet = encoding.bundle([good[0], bad[0], good[1], *bad[1:], good[2]])
     arrivals, errors = decoder().decode(packet)
     assert [a.counter for a in arrivals] == [0, 1, 2]
     assert sorted(e.reason for e in errors) == ["not_finite", "not_finite", "size", "types"]
@@ -216,7 +217,7 @@ def test_good_messages_survive_bad_siblings() -> None:
 @given(st.binary(max_size=100), st.integers(0, 200))
 def test_whatever_arrives_nothing_is_raised_and_the_stream_goes_on(junk: bytes, at: int) -> None:
     decode = decoder()
-    packet = osc.encode_bundle([pressure([1.0] * SIZE, 1), trajectory((1, 1.0, 2.0))])
+    packet = encoding.bundle([pressure([1.0] * SIZE, 1), trajectory((1, 1.0, 2.0))])
     for damaged in (junk, packet[:at] + junk, packet[:at] + junk + packet[at + len(junk) :]):
         for error in decode.decode(damaged)[1]:
             assert error.reason.isidentifier()
@@ -228,7 +229,7 @@ def test_invented_addresses_cost_no_memory() -> None:
     decode = decoder()
     for n in range(2000):
         decode.decode(trajectory((1, 1.0, 1.0), sensor=f"s{n}"), source=n)
-        decode.decode(osc.encode_message(f"/x{n}", ""))
+        decode.decode(encoding.message(f"/x{n}", ""))
     assert len(decode._routes) <= wire._MAX_ROUTES and len(decode._pending) <= wire._MAX_PENDING
 
 
@@ -242,22 +243,22 @@ FINGER, OTHER = trajectory((1, 0.0, 2.0)), trajectory((2, 3.0, 1.0))
 @pytest.mark.parametrize(
     ("packets", "expected"),
     [
-        ([osc.encode_bundle([FRAME, FINGER])], [(A,)]),
-        ([osc.encode_bundle([FINGER, FRAME])], [(A,)]),
-        ([osc.encode_bundle([FRAME, FINGER, FRAME, OTHER])], [(A,), (B,)]),
-        ([osc.encode_bundle([FINGER, FRAME, OTHER, FRAME])], [(A,), (B,)]),
-        ([osc.encode_bundle([FRAME, FRAME, FINGER])], [(), (A,)]),
+        ([encoding.bundle([FRAME, FINGER])], [(A,)]),
+        ([encoding.bundle([FINGER, FRAME])], [(A,)]),
+        ([encoding.bundle([FRAME, FINGER, FRAME, OTHER])], [(A,), (B,)]),
+        ([encoding.bundle([FINGER, FRAME, OTHER, FRAME])], [(A,), (B,)]),
+        ([encoding.bundle([FRAME, FRAME, FINGER])], [(), (A,)]),
         (
-            [osc.encode_bundle([osc.encode_bundle([FRAME, FINGER]), osc.encode_bundle([OTHER, FRAME])])],
+            [encoding.bundle([encoding.bundle([FRAME, FINGER]), encoding.bundle([OTHER, FRAME])])],
             [(A,), (B,)],
         ),
         ([FINGER, FRAME, FRAME], [(A,), ()]),
         ([FINGER, OTHER, FRAME], [(B,)]),
-        ([FINGER, osc.encode_bundle([FRAME, OTHER]), FRAME], [(B,), ()]),
+        ([FINGER, encoding.bundle([FRAME, OTHER]), FRAME], [(B,), ()]),
         ([trajectory((1, 0.0, 2.0), (2, 3.0, 1.0)), FRAME], [(A, B)]),
         ([FINGER, trajectory(), FRAME], [()]),
         ([FINGER, pressure([1.0] * SIZE, sensor="other"), FRAME], [(), (A,)]),
-        ([osc.encode_bundle([FINGER, pressure([1.0] * SIZE, sensor="other"), FRAME])], [(), (A,)]),
+        ([encoding.bundle([FINGER, pressure([1.0] * SIZE, sensor="other"), FRAME])], [(), (A,)]),
     ],
 )  # fmt: skip
 def test_touches_find_their_frame(packets: list[bytes], expected: list[tuple[Touch, ...]]) -> None:
@@ -273,12 +274,12 @@ def test_a_strangers_touches_do_not_get_into_a_stream() -> None:
 
 def test_touches_nobody_wants_are_passed_over() -> None:
     decode = decoder(keep_touches=False)
-    packet = osc.encode_bundle([FRAME, FINGER, osc.encode_message("/s/trajectory", "if", (1, 1.0))])
+    packet = encoding.bundle([FRAME, FINGER, encoding.message("/s/trajectory", "if", (1, 1.0))])
     (arrival,), errors = decode.decode(packet)
     assert arrival.touches == () and errors == []
 
 
 def test_a_frame_carries_the_time_tag_of_its_bundle() -> None:
-    (arrival,), _ = decoder().decode(osc.encode_bundle([FRAME], 1_700_000_000.5))
+    (arrival,), _ = decoder().decode(encoding.bundle([FRAME], 1_700_000_000.5))
     assert arrival.timetag == 1_700_000_000.5
     assert one(FRAME).timetag is None

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core import osc
+from tests import encoding
 
 DEADLINE_S = 20.0
 RATE_HZ = 15.0
@@ -231,7 +231,7 @@ class Sensor:
         """The next frame as a packet."""
         self.t += 1 / RATE_HZ
         self.count += 1
-        return osc.encode_bundle([self._encode(f"/{self.name}/pressure", frame, self.count)], self.t)
+        return encoding.bundle([self._encode(f"/{self.name}/pressure", frame, self.count)], self.t)
 
     def send(self, *parts: list[Frame]) -> "Sensor":
         """Send the frames of all parts."""
@@ -256,31 +256,31 @@ Encode = Callable[[str, Frame, int], bytes]
 
 def floats(address: str, frame: Frame, count: int) -> bytes:
     """R*C of `f`."""
-    return osc.encode_message(address, "f" * frame.size, (frame.ravel(),))
+    return encoding.message(address, "f" * frame.size, (frame.ravel(),))
 
 
 def ints(address: str, frame: Frame, count: int) -> bytes:
     """R*C of `i`."""
-    return osc.encode_message(address, "i" * frame.size, (frame.ravel(),))
+    return encoding.message(address, "i" * frame.size, (frame.ravel(),))
 
 
 def counted(address: str, frame: Frame, count: int) -> bytes:
     """A frame counter, and R*C of `f`."""
-    return osc.encode_message(address, "i" + "f" * frame.size, (count, frame.ravel()))
+    return encoding.message(address, "i" + "f" * frame.size, (count, frame.ravel()))
 
 
 def blob(dtype: str) -> Encode:
     """One blob of big-endian values."""
 
     def encode(address: str, frame: Frame, count: int) -> bytes:
-        return osc.encode_message(address, "b", (frame.astype(dtype).tobytes(),))
+        return encoding.message(address, "b", (frame.astype(dtype).tobytes(),))
 
     return encode
 
 
 def counted_blob(address: str, frame: Frame, count: int) -> bytes:
     """A frame counter, and a blob of uint16."""
-    return osc.encode_message(address, "ib", (count, frame.astype(">u2").tobytes()))
+    return encoding.message(address, "ib", (count, frame.astype(">u2").tobytes()))
 
 
 def lines_of(text: str) -> Iterator[Line]:

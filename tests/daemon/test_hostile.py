@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from gestured.core import osc
+from tests import encoding
 from tests.daemon import harness
 from tests.daemon.harness import Daemon, Hand, Sensor, raw_message
 
@@ -22,7 +22,7 @@ RUBBISH = {
     "not finite": (raw_message(b"/bad/pressure", b"," + b"f" * 81, *NAN), "not_finite"),
     "strings": (raw_message(b"/bad/pressure", b",s") + b"abc\0", "types"),
     "no type tags": (b"/bad/pressure\0\0\0", "types"),
-    "blob of a wrong size": (osc.encode_message("/bad/pressure", "b", (b"1234",)), "size"),
+    "blob of a wrong size": (encoding.message("/bad/pressure", "b", (b"1234",)), "size"),
     "unknown address": (raw_message(b"/bad/humidity", b",f", 1.0), "address"),
     "wildcard address": (raw_message(b"/[a-z]*/pressure", b",f", 1.0), "address"),
     "wildcard address with commas": (raw_message(b"/{a,b,c}*/pressure", b",f", 1.0), "types"),
@@ -34,7 +34,7 @@ RUBBISH = {
 }
 nested = raw_message(b"/bad/pressure", b",f", 1.0)
 for _ in range(40):
-    nested = osc.encode_bundle([nested])
+    nested = encoding.bundle([nested])
 RUBBISH["deep nesting"] = (nested, "bundle")
 
 

@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 
-from gestured.core import osc, wire
+from gestured.core import wire
 from gestured.model.model import shipped
+from tests import encoding
 from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor, floats
 from tests.daemon.parts import SOURCE, Parts
 
@@ -60,12 +61,12 @@ class Fingers(Sensor):
         self.t += 1 / RATE_HZ
         self.count += 1
         pressure = floats(f"/{self.name}/pressure", frame, self.count)
-        return osc.encode_bundle([pressure, trajectory(self.name)], self.t)
+        return encoding.bundle([pressure, trajectory(self.name)], self.t)
 
 
 def trajectory(sensor: str, types: str = "iffiff") -> bytes:
     """Positions of fingers."""
-    return osc.encode_message(f"/{sensor}/trajectory", types, ([1, 4.0, 4.0] * 5)[: len(types)])
+    return encoding.message(f"/{sensor}/trajectory", types, ([1, 4.0, 4.0] * 5)[: len(types)])
 
 
 SCENES: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
@@ -97,6 +98,13 @@ def test_numpy_brings_no_threads_no_random_numbers_and_no_masked_arrays(start: S
 
 def test_the_metrics_library_comes_with_metrics_alone(start: Start) -> None:
     assert "prometheus_client" not in imported(used(start, "--publish", "osc://127.0.0.1:9"))
+
+
+def test_python_osc_comes_with_osc_output_alone(start: Start) -> None:
+    silent = used(start, "--metrics", "127.0.0.1:0", "--flight-recorder", "1")
+    silent.stop()
+    assert "pythonosc" not in imported(silent)
+    assert "pythonosc" in imported(used(start, "--publish", "osc://127.0.0.1:9"))
 
 
 def test_the_metrics_library_comes_with_the_first_scrape(start: Start) -> None:
@@ -157,7 +165,7 @@ def test_finger_positions_are_passed_over_at_their_address(model: Path, monkeypa
     monkeypatch.setattr(wire, "_touches", None)  # nobody calls it
     frame = floats("/armrest/pressure", Hand().frame(), 0)
     for n in range(100):
-        packet = osc.encode_bundle([trajectory(f"s{n}"), frame, trajectory("armrest")], 1.7e9 + n)
+        packet = encoding.bundle([trajectory(f"s{n}"), frame, trajectory("armrest")], 1.7e9 + n)
         parts.desk.take(parts.hub.receive([(packet, SOURCE)], n / 15))
     assert parts.metrics.frames.values == {("armrest", "ok"): 100} and parts.metrics.dropped.values == {}
 
@@ -168,7 +176,7 @@ def test_the_explanation_names_what_is_left_out() -> None:
         return subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
 
     minimal, everything = explained(), explained(*EVERYTHING)
-    for text in ("no --metrics", "no --publish"):
+    for text in ("no --metrics", "python-osc, OSC output: no --publish"):
         assert text in minimal
         assert text not in everything
     assert "second tap" in explained("--gestures", "swipe_left,swipe_right")

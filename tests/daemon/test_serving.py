@@ -78,7 +78,7 @@ def test_all_forms_of_a_frame_give_the_same_events(shared: Daemon) -> None:
 
 
 def test_many_frames_in_one_packet_and_lost_ones_by_the_counter(shared: Daemon) -> None:
-    from gestured.core import osc
+    from tests import encoding
 
     client = shared.client()
     sensor = Sensor(shared, "packed", harness.counted).begin()
@@ -86,7 +86,7 @@ def test_many_frames_in_one_packet_and_lost_ones_by_the_counter(shared: Daemon) 
         packets = [sensor.packet(frame) for frame in part]
         if len(part) == 7:
             del packets[3]  # lost on the way
-        sensor.sock.send(osc.encode_bundle(packets))
+        sensor.sock.send(encoding.bundle(packets))
     (event,) = client.events("gesture", "packed")
     assert (event["gesture"], event["lost"], event["frames"]) == ("swipe_down", 1, 6)
     assert shared.metric("gestured_frames_total", sensor="packed", result="lost") in (0.0, 1.0)

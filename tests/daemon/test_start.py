@@ -210,7 +210,7 @@ def test_a_fallback_must_know_the_same_gestures(model: Path, tmp_path: Path) -> 
 
 def test_explain_says_what_is_loaded_and_what_is_left_out(model: Path, tmp_path: Path) -> None:
     minimal = run("--model", model, "--explain")[1]
-    assert "prometheus_client, HTTP: no --metrics" in minimal and "OSC output: no --publish" in minimal
+    assert "prometheus_client, HTTP: no --metrics" in minimal and "python-osc, OSC output: no --publish" in minimal
     flags = (
         "--metrics",
         "127.0.0.1:0",

@@ -26,12 +26,12 @@ def _npz(folder: Path) -> list[bytes]:
 
 def _mcap(folder: Path) -> list[bytes]:
     pytest.importorskip("mcap", reason="recordings need the extra [record]")
-    from gestured.core import osc
     from gestured.record import tape
+    from tests import encoding
     from tests import test_bad_tapes as tapes
 
     path = folder / "seed.mcap"
-    packets = [osc.encode_message("/arm/pressure", "b", [bytes(81 * [k % 3])]) for k in range(8)]
+    packets = [encoding.message("/arm/pressure", "b", [bytes(81 * [k % 3])]) for k in range(8)]
     scene = tapes.SCENE | {"settings": tapes.SETTINGS | {"sensors": {"leg": {"rotate": 90, "clock": "sensor"}}}}
     with tape.Writer(path, scene, 1 << 20) as writer:
         for k, packet in enumerate(packets):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gestured.client.sensor import Form
-from gestured.core.osc import encode_bundle, encode_message
+from tests import encoding
 from tests.golden.making import ARM, LEG, UINT16, Sent, damaged, hands, moment, sent, tape
 from tests.golden.tape import Tape
 from tests.hostile.faults import FAULTS, Fault
@@ -35,7 +35,7 @@ def rubbish() -> list[Tape]:
     values = np.full(81, 50.0, np.float32)
 
     def message(types: str = "f" * 81, *args: object, address: str = "/arm/pressure") -> bytes:
-        return encode_message(address, types, list(args) or [values])  # type: ignore[arg-type]
+        return encoding.message(address, types, list(args) or [values])  # type: ignore[arg-type]
 
     nan = values.copy()
     nan[7] = np.nan
@@ -47,8 +47,8 @@ def rubbish() -> list[Tape]:
         message(address="/arm/else"), message(address="/nobody knows/pressure"), message(address="/ar*/pressure"),
         message("iff", 1, 2.0, 3.0, address="/arm/trajectory"), message("if", 1, 2.0, address="/arm/trajectory"),
         message("iff" * 4, *([1, 2.0, 3.0] * 4), address="/arm/trajectory"),
-        encode_bundle([encode_bundle([message()], moment(1.0))], moment(1.0)),
-        encode_bundle([b"abc", message("f" * 81, nan)], moment(2.0)), message() + b"x", message()[:-4],
+        encoding.bundle([encoding.bundle([message()], moment(1.0))], moment(1.0)),
+        encoding.bundle([b"abc", message("f" * 81, nan)], moment(2.0)), message() + b"x", message()[:-4],
         b"#bundle\0" + bytes(8) + struct.pack(">i", -4), b"#bundle\0" + bytes(8) + struct.pack(">i", 2**31 - 4),
     ]  # fmt: skip
     bad: list[Sent] = []

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from gestured.client.sensor import Form
-from gestured.core.osc import encode_bundle
+from tests import encoding
 from tests.golden.making import ARM, LEG, QUIET, UINT16, Sent, damaged, hands, moment, sent, tape
 from tests.golden.tape import Tape
 from tests.hostile.faults import Fault
@@ -45,7 +45,7 @@ def clock_sensor() -> list[Tape]:
     plain = sent(take, replace(UINT16, plain=True))
     mixed = [p if i % 3 else q for i, (p, q) in enumerate(zip(plain, sent(take, UINT16), strict=True))]
     bundles = [
-        (group[-1][0], ARM, encode_bundle([data for _, _, data in group], moment(group[-1][0])))
+        (group[-1][0], ARM, encoding.bundle([data for _, _, data in group], moment(group[-1][0])))
         for group in (plain[i : i + 3] for i in range(0, len(plain), 3))
     ]
     return [

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 
 import numpy as np
 
-from gestured.core import osc
+from tests import encoding
 
 BURST = 50  # packets at a time; fifty microseconds of work
 
@@ -19,11 +19,11 @@ def packets(kind: str) -> list[bytes]:
     if kind == "rubbish":
         return [b"x" * 340]
     if kind == "frames":  # of one sensor
-        return [osc.encode_message("/flood/pressure", "f" * 81, (values,))]
+        return [encoding.message("/flood/pressure", "f" * 81, (values,))]
     if kind == "sensors":  # of a new sensor each time
-        return [osc.encode_message(f"/flood{i}/pressure", "f" * 81, (values,)) for i in range(1000)]
-    frame = osc.encode_message("/flood/pressure", "b", (bytes(81),))
-    return [osc.encode_bundle([frame] * 500)]  # "full": as many frames as a packet can hold
+        return [encoding.message(f"/flood{i}/pressure", "f" * 81, (values,)) for i in range(1000)]
+    frame = encoding.message("/flood/pressure", "b", (bytes(81),))
+    return [encoding.bundle([frame] * 500)]  # "full": as many frames as a packet can hold
 
 
 def main() -> int:

@@ -344,6 +344,6 @@ def big(name: str, n: int) -> bytes:
     """A frame of 64 x 64."""
     import numpy as np
 
-    from gestured.core import osc
+    from tests import encoding
 
-    return osc.encode_message(f"/{name}/pressure", "ib", (n, np.full(4096, n % 7, ">u2").tobytes()))
+    return encoding.message(f"/{name}/pressure", "ib", (n, np.full(4096, n % 7, ">u2").tobytes()))
