@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests import encoding
 from tests.daemon import harness
 from tests.daemon.harness import Daemon, Sensor
 
@@ -78,8 +79,6 @@ def test_all_forms_of_a_frame_give_the_same_events(shared: Daemon) -> None:
 
 
 def test_many_frames_in_one_packet_and_lost_ones_by_the_counter(shared: Daemon) -> None:
-    from tests import encoding
-
     client = shared.client()
     sensor = Sensor(shared, "packed", harness.counted).begin()
     for part in (sensor.hand.swipe("down"), sensor.hand.idle(1.0)):
