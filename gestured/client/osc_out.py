@@ -52,7 +52,7 @@ def dated(moment: float, *elements: bytes) -> bytes:
 def head(address: str, types: str) -> bytes:
     """A message up to its arguments, which are `i` and `f` alone.
 
-    python-osc takes three microseconds for a number, so a frame's numbers are not given to it one by one.
+    python-osc takes a frame's numbers one by one, which is slow; they are packed behind this head instead.
     """
     built: bytes = message(address, types, [0] * len(types)).dgram
     return built[: len(built) - 4 * len(types)]
