@@ -50,7 +50,7 @@ class Lines:
         """Each line as it came, and parsed; ends when the daemon closes the connection. Raises Refused."""
         try:
             for line in self._file:
-                message = _parsed(line, self.path)
+                message = parsed(line, self.path)
                 yield line.decode().rstrip("\n"), message
         except ConnectionError:
             return
@@ -74,7 +74,7 @@ class Lines:
         self.close()
 
 
-def _parsed(line: bytes, path: Path) -> dict[str, Any]:
+def parsed(line: bytes, path: Path) -> dict[str, Any]:
     """One line as an object; raises Refused for anything else."""
     try:
         message = json.loads(line.decode())

@@ -9,6 +9,7 @@ from gestured.client.lines import Lines, Refused, Unreachable
 
 PROTOCOL = 1
 PATIENCE_S = 10.0  # a daemon greets at once
+SILENT = f"says nothing within {PATIENCE_S:g} s: it hangs, or this is not its event socket (--socket)"
 
 
 class Stream(Lines):
@@ -22,14 +23,12 @@ class Stream(Lines):
             try:
                 first = next(self.raw(), None)
             except TimeoutError:
-                said = f"says nothing within {PATIENCE_S:g} s: it hangs, or this is not its event socket (--socket)"
-                raise Unreachable(f"the daemon on {path} {said}") from None
+                raise Unreachable(f"the daemon on {path} {SILENT}") from None
             self.socket.settimeout(None)
             if first is None:
                 raise Unreachable(f"the daemon on {path} closed the connection")
-            self.hello_line, self.hello = first
-            if self.hello.get("type") != "hello" or self.hello.get("protocol") != PROTOCOL:
-                raise Refused(f"{path} does not speak protocol {PROTOCOL} of gestured: {self.hello_line[:80]!r}")
+            line, self.hello = first
+            check_hello(line, self.hello, path)
         except BaseException:
             self.close()
             raise
@@ -38,3 +37,9 @@ class Stream(Lines):
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         return self.lines()
+
+
+def check_hello(line: str, message: Mapping[str, Any], path: Path) -> None:
+    """Raises Refused unless the first line on `path` is the hello of a daemon that this client understands."""
+    if message.get("type") != "hello" or message.get("protocol") != PROTOCOL:
+        raise Refused(f"{path} does not speak protocol {PROTOCOL} of gestured: {line[:80]!r}")

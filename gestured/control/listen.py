@@ -8,13 +8,11 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from gestured.client.lines import Refused, Unreachable
 from gestured.client.say import say, say_drawn, say_json
-from gestured.client.stream import Stream
+from gestured.client.subscriber import Subscriber
 from gestured.control.address import default_socket
 
 TYPES = ("gesture", "unknown", "cancelled", "onset", "release", "status")
-RETRY_S = 0.5
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -42,33 +40,21 @@ def run(args: argparse.Namespace) -> int:
     """Print until the count is reached, the daemon ends, or Ctrl-C."""
     path = args.socket or default_socket(os.environ)
     wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture}
-    subscribe = {key: value for key, value in wanted.items() if value} or None
     left = args.count
-    while True:
-        try:
-            stream = Stream(path, subscribe)
-        except Unreachable:
-            if not args.reconnect:
-                raise
-            time.sleep(RETRY_S)
-            continue
-        _greet(stream, args.json)
-        for name in args.gesture or ():
-            if name not in stream.hello["gestures"]:
-                say(f"no gesture of this daemon: {name} ({', '.join(stream.hello['gestures'])})", to=sys.stderr)
-        for line, event in stream.raw():
-            if event.get("type") == "error":
-                raise Refused(f"the daemon refused the request: {event.get('reason')}")
+    with Subscriber(path, **wanted, reconnect=args.reconnect) as subscriber:
+        for line, event in subscriber.lines():
+            kind = event.get("type")
             if args.json:
                 _repeat(line, event)
-            else:
+            elif kind != "hello":
                 say(readable(event))
-            if left is not None and event.get("type") != "lost":
+            if kind == "hello":
+                _greet(event, args)
+            elif left is not None and kind != "lost":
                 left -= 1
                 if left <= 0:
                     return 0
-        if not args.reconnect:
-            raise Unreachable(f"the daemon on {path} closed the connection")
+    return 0
 
 
 def readable(event: dict[str, Any]) -> str:
@@ -94,13 +80,15 @@ def readable(event: dict[str, Any]) -> str:
     return f"{head}{kind}"
 
 
-def _greet(stream: Stream, as_json: bool) -> None:
-    hello = stream.hello
-    if as_json:
-        _repeat(stream.hello_line, hello)
-        return
-    names = ", ".join(hello["sensors"]) or "none yet"
-    say(f"gestured {hello['version']}, model {hello['model']}, sensors: {names}", to=sys.stderr)
+def _greet(hello: dict[str, Any], args: argparse.Namespace) -> None:
+    """Say whom it listens to, and which gestures that daemon will never send."""
+    known = ", ".join(hello["gestures"])
+    if not args.json:
+        names = ", ".join(hello["sensors"]) or "none yet"
+        say(f"gestured {hello['version']}, model {hello['model']}, sensors: {names}", to=sys.stderr)
+    for name in args.gesture or ():
+        if name not in hello["gestures"]:
+            say(f"no gesture of this daemon: {name} ({known})", to=sys.stderr)
 
 
 def _repeat(line: str, event: dict[str, Any]) -> None:

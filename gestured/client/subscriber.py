@@ -1,0 +1,198 @@
+"""A subscriber: the events of a daemon, or of several, across their restarts."""
+
+import json
+import math
+import selectors
+import socket
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from threading import Lock
+from typing import Any, Self
+
+from gestured.client.lines import Lines, Refused, Unreachable, parsed
+from gestured.client.stream import PATIENCE_S, SILENT, check_hello
+from gestured.core.errors import GesturedError
+
+FIRST_S, LONGEST_S = 0.1, 2.0  # from one attempt to connect to the next: doubled each time, a restart takes a second
+CHUNK = 65536  # bytes read at a time
+
+
+class Subscriber:
+    """An iterator over events, dicts as on the socket, and a context manager.
+
+    It connects when it is first iterated, and again by itself whenever a daemon goes and returns. A `lost` line is
+    given as an event, a `hello` is not: `hello` is that of the daemon whose event was given last, `path` its socket.
+    Its `instance` changes, and `sequence` counts anew, when the daemon has started again.
+
+    One thread iterates; any may `close` it, which ends the iteration.
+    """
+
+    def __init__(
+        self,
+        *paths: str | PathLike[str],
+        types: Sequence[str] | None = None,
+        sensors: Sequence[str] | None = None,
+        gestures: Sequence[str] | None = None,
+        timeout: float | None = None,
+        reconnect: bool = True,
+    ) -> None:
+        """`paths` are event sockets; the filters are those of the protocol, None is its default.
+
+        Iterating raises TimeoutError after `timeout` seconds without an event, and may then go on. It raises Refused
+        where a daemon refuses the subscription or is none, Stranger where the socket is served by an account that is
+        not believed, and without `reconnect` Unreachable where no daemon is (any more): all are GesturedError, and
+        close it.
+        """
+        if not paths:
+            raise TypeError("Subscriber: expected the path of at least one event socket")
+        self.hello: dict[str, Any] = {}
+        self.path = Path(paths[0])
+        self._sources = [_Source(Path(path)) for path in paths]
+        wanted = {"types": types, "sensors": sensors, "gestures": gestures}
+        # A text is passed on: what the daemon says of it is clearer than what it would say of its letters.
+        given = {key: v if isinstance(v, str) else list(v) for key, v in wanted.items() if v is not None}
+        self._request = json.dumps({"subscribe": given}).encode() + b"\n" if given else b""
+        self._timeout, self._reconnect = timeout, reconnect
+        self._unread: deque[tuple[_Source, bytes]] = deque()
+        self._selector = selectors.DefaultSelector()
+        self._wake, self._woken = socket.socketpair()
+        self._selector.register(self._woken, selectors.EVENT_READ)
+        self._iterating = Lock()
+        self._closed = False
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __next__(self) -> dict[str, Any]:
+        for _, event in self.lines():
+            if event.get("type") != "hello":
+                return event
+        raise StopIteration
+
+    def lines(self) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Each line as it came, and parsed; the `hello` of each connection among them."""
+        while (line := self._next_line()) is not None:
+            yield line
+
+    def close(self) -> None:
+        """End the iteration and hang up; again is nothing. Any thread and any signal handler may call it."""
+        self._closed = True
+        with suppress(OSError):  # closed already
+            self._wake.send(b".")
+        if self._iterating.acquire(blocking=False):  # else whoever iterates wakes now, and does it
+            for source in self._sources:
+                if source.lines is not None:
+                    source.lines.close()
+            self._selector.close()
+            self._wake.close()
+            self._woken.close()
+            self._iterating.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _next_line(self) -> tuple[str, dict[str, Any]] | None:
+        """The next line; None when it is closed."""
+        end = math.inf if self._timeout is None else time.monotonic() + self._timeout
+        try:
+            with self._iterating:
+                while not self._closed:
+                    if self._unread:
+                        if (found := self._read(*self._unread.popleft())) is not None:
+                            return found
+                        continue
+                    over = time.monotonic() >= end
+                    self._wait(end)
+                    if over and not self._unread:
+                        raise TimeoutError(f"no event within {self._timeout:g} s")
+        except GesturedError:
+            self._closed = True
+            raise
+        finally:
+            if self._closed:
+                self.close()
+        return None
+
+    def _wait(self, end: float) -> None:
+        """Until something has come, a daemon is to be called, or it is `end` (monotonic seconds)."""
+        now = time.monotonic()
+        for source in self._sources:
+            if source.due <= now and source.lines is None:
+                self._call(source, now)
+            elif source.due <= now:
+                self._gone(source, f"the daemon on {source.path} {SILENT}")
+        until = min(end, *(source.due for source in self._sources))
+        for key, _ in self._selector.select(None if until == math.inf else max(until - now, 0.0)):
+            if key.data is not None:
+                self._receive(key.data)
+
+    def _call(self, source: "_Source", now: float) -> None:
+        try:
+            source.lines = Lines(source.path, "--socket")
+        except Unreachable as error:
+            self._gone(source, str(error))
+            return
+        with suppress(ConnectionError):  # it hung up; what it said before that is read
+            source.lines.socket.sendall(self._request)
+        source.lines.socket.setblocking(False)
+        self._selector.register(source.lines.socket, selectors.EVENT_READ, source)
+        source.due = now + PATIENCE_S  # its hello
+
+    def _receive(self, source: "_Source") -> None:
+        assert source.lines is not None
+        try:
+            data = source.lines.socket.recv(CHUNK)
+        except ConnectionError:
+            data = b""
+        if not data:
+            self._gone(source, f"the daemon on {source.path} closed the connection")
+            return
+        *lines, source.begun = (source.begun + data).split(b"\n")
+        self._unread.extend((source, line) for line in lines)
+
+    def _read(self, source: "_Source", line: bytes) -> tuple[str, dict[str, Any]] | None:
+        """What a line says; None where it only says that there is no place for us now."""
+        message = parsed(line, source.path)
+        text = line.decode()
+        if message.get("type") == "error":
+            refusal = f"the daemon on {source.path} refused the request: {message.get('reason')}"
+            if source.hello:
+                raise Refused(refusal)
+            self._gone(source, refusal)
+            return None
+        if not source.hello:
+            check_hello(text, message, source.path)
+            source.hello, source.due, source.wait_s = message, math.inf, FIRST_S
+        self.hello, self.path = source.hello, source.path
+        return text, message
+
+    def _gone(self, source: "_Source", reason: str) -> None:
+        """There is no daemon (any more): call it again in a while. Without `reconnect` raises Unreachable."""
+        if not self._reconnect:
+            raise Unreachable(reason)
+        if source.lines is not None:
+            self._selector.unregister(source.lines.socket)
+            source.lines.close()
+        source.lines, source.hello, source.begun = None, {}, b""
+        source.due = time.monotonic() + source.wait_s
+        source.wait_s = min(2.0 * source.wait_s, LONGEST_S)
+
+
+@dataclass(eq=False)
+class _Source:
+    """One event socket, connected or not."""
+
+    path: Path
+    lines: Lines | None = None
+    hello: dict[str, Any] = field(default_factory=dict)  # of this connection; empty until it came
+    begun: bytes = b""  # of a line whose end has not come yet
+    due: float = 0.0  # monotonic s: when to call it, or by when it must have said hello
+    wait_s: float = FIRST_S  # after the next failure

@@ -1,0 +1,263 @@
+"""gestured.Subscriber, against scripted daemons and a real one."""
+
+import json
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from gestured.client.control import Control
+from gestured.client.lines import Refused, Unreachable
+from gestured.client.subscriber import LONGEST_S, Subscriber
+from gestured.core.errors import GesturedError
+from tests.control.conftest import HELLO, FakeDaemon
+from tests.daemon import tiny_model
+from tests.daemon.harness import Daemon
+
+GESTURE = {"type": "gesture", "sensor": "armrest", "gesture": "one_tap", "sequence": 4}
+
+
+@pytest.fixture
+def iterate() -> Iterator[Callable[[Subscriber], "Reader"]]:
+    """Iterates over a subscriber in a thread of its own, to its end."""
+    readers: list[Reader] = []
+
+    def begin(subscriber: Subscriber) -> "Reader":
+        readers.append(Reader(subscriber))
+        return readers[-1]
+
+    yield begin
+    for reader in readers:
+        reader.subscriber.close()
+        reader.thread.join(30)
+
+
+class Reader:
+    """A thread that keeps what a subscriber gives."""
+
+    def __init__(self, subscriber: Subscriber) -> None:
+        self.subscriber = subscriber
+        self.events: list[dict[str, Any]] = []
+        self.thread = threading.Thread(target=lambda: self.events.extend(subscriber), daemon=True)
+        self.thread.start()
+
+    def ended(self) -> bool:
+        """Whether the iteration comes to its end."""
+        self.thread.join(30)
+        return not self.thread.is_alive()
+
+
+@contextmanager
+def serving(fake: FakeDaemon, *lines: object, hello: object = HELLO) -> Iterator[None]:
+    """Meanwhile a daemon takes one connection, greets and says these lines."""
+
+    def serve() -> None:
+        fake.accept(hello)
+        fake.say(*lines)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    try:
+        yield
+    finally:
+        thread.join()
+
+
+def asked(fake: FakeDaemon, subscriber: Subscriber, *lines: object, hello: object = HELLO) -> dict[str, Any]:
+    """The next event, where a daemon takes one connection, greets and says these lines."""
+    with serving(fake, *lines, hello=hello):
+        return next(subscriber)
+
+
+def test_events_are_the_lines_and_the_hello_stands_beside_them(fake: FakeDaemon):
+    with Subscriber(fake.path, types=["gesture"], sensors=("armrest",), gestures=["one_tap"]) as subscriber:
+        assert asked(fake, subscriber, GESTURE, {"type": "lost", "count": 7}) == GESTURE
+        assert next(subscriber) == {"type": "lost", "count": 7}
+        assert subscriber.hello == HELLO and subscriber.path == fake.path
+    filters = {"types": ["gesture"], "sensors": ["armrest"], "gestures": ["one_tap"]}
+    assert fake.request() == {"subscribe": filters}
+
+
+def test_without_filters_nothing_is_asked(fake: FakeDaemon):
+    with Subscriber(str(fake.path)) as subscriber:
+        asked(fake, subscriber, GESTURE)
+    assert fake.client.makefile("rb").read() == b""
+
+
+def test_it_connects_again_when_the_daemon_goes_and_returns(fake: FakeDaemon):
+    with Subscriber(fake.path) as subscriber:
+        asked(fake, subscriber, GESTURE)
+        fake.close()
+        fake.listener.close()
+        fake.path.unlink()
+        again = FakeDaemon(fake.path)
+        with again.listener:
+            event = asked(again, subscriber, GESTURE | {"sequence": 1}, hello=HELLO | {"instance": "b"})
+            assert (event["sequence"], subscriber.hello["instance"]) == (1, "b")
+
+
+def test_what_a_daemon_could_not_finish_is_not_given(fake: FakeDaemon):
+    with Subscriber(fake.path) as subscriber:
+        asked(fake, subscriber, GESTURE, b'{"type":"gesture","seq')
+        fake.close()
+        assert asked(fake, subscriber, GESTURE | {"sequence": 5})["sequence"] == 5
+
+
+def test_a_daemon_without_a_place_is_asked_again(fake: FakeDaemon):
+    def crowd() -> None:
+        fake.accept({"type": "error", "reason": "more than 64 clients"})
+        fake.close()
+        fake.accept()
+        fake.say(GESTURE)
+
+    thread = threading.Thread(target=crowd)
+    thread.start()
+    with Subscriber(fake.path) as subscriber:
+        assert next(subscriber) == GESTURE
+    thread.join()
+
+
+def test_two_daemons_are_heard_at_once(fake: FakeDaemon, tmp_path: Path):
+    other = FakeDaemon(tmp_path / "other.sock")
+    in_the_car, at_home = HELLO | {"instance": "car"}, HELLO | {"instance": "home"}
+    with (
+        other.listener,
+        serving(fake, GESTURE | {"sensor": "door"}, hello=in_the_car),
+        serving(other, GESTURE | {"sensor": "sofa"}, hello=at_home),
+        Subscriber(fake.path, other.path) as subscriber,
+    ):
+        heard = {(next(subscriber)["sensor"], subscriber.path, subscriber.hello["instance"]) for _ in range(2)}
+    assert heard == {("door", fake.path, "car"), ("sofa", other.path, "home")}
+
+
+def test_a_pause_is_told_and_loses_nothing(fake: FakeDaemon):
+    half, rest = json.dumps(GESTURE).encode()[:20], json.dumps(GESTURE).encode()[20:] + b"\n"
+    with Subscriber(fake.path, timeout=0.05) as subscriber:
+        with pytest.raises(TimeoutError, match=r"0\.05 s"):
+            asked(fake, subscriber, half)
+        fake.say(rest)
+        events = []
+        while not events:
+            try:
+                events.append(next(subscriber))
+            except TimeoutError:
+                pass
+        assert events == [GESTURE]
+
+
+def test_close_in_another_thread_ends_the_iteration(fake: FakeDaemon, iterate):
+    reader = iterate(Subscriber(fake.path))
+    fake.accept()
+    fake.say(GESTURE)
+    reader.subscriber.close()
+    assert reader.ended() and reader.events in ([], [GESTURE])
+    assert fake.client.recv(1) == b""
+    reader.subscriber.close()
+
+
+def test_close_ends_the_wait_for_a_daemon_that_is_not_there(tmp_path: Path, iterate):
+    reader = iterate(Subscriber(tmp_path / "none.sock"))
+    reader.subscriber.close()
+    assert reader.ended() and reader.events == []
+
+
+def test_close_in_a_signal_handler_ends_the_iteration(fake: FakeDaemon):
+    subscriber = Subscriber(fake.path)
+    before = signal.signal(signal.SIGUSR1, lambda *_: subscriber.close())
+
+    def end() -> None:
+        fake.accept()
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGUSR1)
+
+    thread = threading.Thread(target=end)
+    thread.start()
+    try:
+        assert list(subscriber) == []
+    finally:
+        thread.join()
+        signal.signal(signal.SIGUSR1, before)
+
+
+@pytest.mark.parametrize("first", [{"type": "hello", "protocol": 2}, b"SSH-2.0\n", b"\xff\n", b"[]\n"])
+def test_something_else_on_the_socket_is_refused(fake: FakeDaemon, first: object):
+    subscriber = Subscriber(fake.path)
+    with pytest.raises(Refused, match=str(fake.path)):
+        asked(fake, subscriber, hello=first)
+    assert list(subscriber) == []
+
+
+def test_without_reconnect_a_daemon_that_is_gone_is_an_error(fake: FakeDaemon, tmp_path: Path):
+    with pytest.raises(Unreachable, match="none.sock"):
+        next(Subscriber(tmp_path / "none.sock", reconnect=False))
+    subscriber = Subscriber(fake.path, reconnect=False)
+    assert asked(fake, subscriber, GESTURE) == GESTURE
+    fake.close()
+    with pytest.raises(Unreachable, match="closed the connection"):
+        next(subscriber)
+
+
+def test_no_path_is_a_mistake():
+    with pytest.raises(TypeError, match="event socket"):
+        Subscriber()
+
+
+def test_attempts_come_ever_more_rarely_but_within_bounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A clock that moves only while it waits: so the waits are all the time that passes."""
+    clock, waits = [0.0], []
+    monkeypatch.setattr("gestured.client.subscriber.time", SimpleNamespace(monotonic=lambda: clock[0]))
+    subscriber = Subscriber(tmp_path / "none.sock")
+
+    def select(timeout: float | None) -> list[Any]:
+        assert timeout is not None
+        waits.append(timeout)
+        clock[0] += timeout
+        if len(waits) == 20:
+            subscriber.close()
+        return []
+
+    monkeypatch.setattr(subscriber._selector, "select", select)
+    assert list(subscriber) == []
+    waits = [round(wait, 6) for wait in waits if wait > 1e-9]
+    assert len(waits) >= 19 and waits == sorted(waits)
+    assert waits[-1] == pytest.approx(LONGEST_S)
+
+
+@pytest.mark.e2e
+def test_a_real_daemon_that_is_started_again(tmp_path: Path):
+    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+    model = tiny_model.make(tmp_path / "tiny.onnx")
+    instances = []
+    with Subscriber(tmp_path / "events.sock", types=["gesture", "status"]) as subscriber:
+        for _ in range(2):
+            daemon = Daemon.start(tmp_path, model)
+            try:
+                assert next(subscriber)["type"] == "status"
+                with Control(Path(daemon.ready["control"])) as control:
+                    control.ask("emit", gesture="swipe_left", sensor="armrest")
+                gesture = next(event for event in subscriber if event["type"] == "gesture")
+                assert (gesture["gesture"], gesture["sequence"]) == ("swipe_left", 1)
+                instances.append(subscriber.hello["instance"])
+            finally:
+                daemon.stop()
+    assert len(set(instances)) == 2
+
+
+@pytest.mark.e2e
+@pytest.mark.parametrize(
+    ("filters", "words"),
+    [
+        ({"types": ["gestrue"]}, r"subscribe\.types: unknown \"gestrue\""),
+        ({"types": "gesture"}, r"subscribe\.types: expected a list"),
+        ({"sensors": ["arm rest"]}, "arm rest"),
+    ],
+)
+def test_what_a_daemon_refuses_is_one_sentence(daemon: Daemon, filters: dict[str, Any], words: str):
+    subscriber = Subscriber(daemon.socket, **filters)
+    with pytest.raises(GesturedError, match=words):
+        next(subscriber)
+    assert list(subscriber) == []
