@@ -1,3 +1,59 @@
-"""gestured: a real-time tactile gesture recognition daemon."""
+"""gestured: real-time tactile gesture recognition, as a daemon and as a library (docs/embedding.md)."""
 
 __version__ = "0.1.0"
+
+# Each name comes from its module when it is first used, so that importing the package imports nothing else. Type
+# checkers take this constant for true; typing's own would have to be imported.
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from gestured.client.subscriber import Subscriber
+    from gestured.core.errors import GesturedError
+    from gestured.core.events import Cancelled, Gesture, Onset, Release, Status, Unknown
+    from gestured.core.frames import Frame, Touch
+    from gestured.core.hub import Hub  # type: ignore[import-not-found, unused-ignore]
+    from gestured.core.recognizer import Recognizer
+    from gestured.core.scene import Scene  # type: ignore[import-not-found, unused-ignore]
+    from gestured.model.embedded import open
+
+__all__ = [
+    "Cancelled",
+    "Frame",
+    "Gesture",
+    "GesturedError",
+    "Hub",
+    "Onset",
+    "Recognizer",
+    "Release",
+    "Scene",
+    "Status",
+    "Subscriber",
+    "Touch",
+    "Unknown",
+    "open",
+]
+
+_HOMES = {
+    "client.subscriber": ("Subscriber",),
+    "core.errors": ("GesturedError",),
+    "core.events": ("Cancelled", "Gesture", "Onset", "Release", "Status", "Unknown"),
+    "core.frames": ("Frame", "Touch"),
+    "core.hub": ("Hub",),
+    "core.recognizer": ("Recognizer",),
+    "core.scene": ("Scene",),
+    "model.embedded": ("open",),
+}
+
+
+def __getattr__(name: str) -> object:
+    from importlib import import_module
+
+    for home, names in _HOMES.items():
+        if name in names:
+            found: object = getattr(import_module(f"gestured.{home}"), name)
+            globals()[name] = found
+            return found
+    raise AttributeError(f"module 'gestured' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

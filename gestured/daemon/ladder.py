@@ -1,9 +1,9 @@
 """The models that a configuration asks for."""
 
-from gestured.core.errors import ModelError, SettingsError
+from gestured.core.errors import ModelError
 from gestured.daemon.log import log
 from gestured.daemon.settings import Settings
-from gestured.model.ladder import Ladder, ladder_for
+from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, require_gestures
 
 
 def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
@@ -26,12 +26,6 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
     opened = True
     for sentence in early:
         report(sentence)
-    known = ladder.gestures
-    for name in (*(settings.gestures or ()), *settings.per_gesture):
-        if name not in known:
-            raise SettingsError(
-                f"gestures: {name!r} is no gesture of {ladder.name}, expected any of {', '.join(known)}"
-            )
-    if settings.gestures == ():
-        raise SettingsError("gestures: an empty list, expected at least one gesture")
+    gestures_in_use(ladder, settings.gestures)
+    require_gestures(ladder, settings.per_gesture)
     return ladder

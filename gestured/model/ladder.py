@@ -2,14 +2,14 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gestured.core.errors import ModelError
+from gestured.core.errors import ModelError, SettingsError
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Classifier, Scores
 from gestured.model.model import LADDER, look_at, open_model, shipped, shipped_name
@@ -207,3 +207,23 @@ def ladder_for(source: str | Path, fallbacks: Sequence[str | Path] | None = None
         # By path: a file of that name in the working directory is not the shipped one.
         fallbacks = [shipped()[rung] for rung in below]
     return Ladder([source, *fallbacks], **settings)
+
+
+def require_gestures(ladder: Ladder, names: Iterable[str]) -> None:
+    """Raises SettingsError for a name that is no gesture of the ladder's."""
+    for name in names:
+        if name not in ladder.gestures:
+            known = ", ".join(ladder.gestures)
+            raise SettingsError(f"gestures: {name!r} is no gesture of {ladder.name}, expected any of {known}")
+
+
+def gestures_in_use(ladder: Ladder, chosen: Sequence[str] | None) -> tuple[str, ...]:
+    """The chosen gestures, or all where None is, in the ladder's order. Raises SettingsError."""
+    if chosen is None:
+        return ladder.gestures
+    if isinstance(chosen, str):
+        raise SettingsError(f"gestures: expected a list of names, such as [{chosen!r}], found {chosen!r}")
+    require_gestures(ladder, chosen)
+    if not chosen:
+        raise SettingsError("gestures: an empty list, expected at least one gesture")
+    return tuple(name for name in ladder.gestures if name in chosen)

@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import gestured
 from gestured.core.errors import ModelError
 from gestured.core.features import feature_names, touch_pattern
 from gestured.core.frames import Segment
@@ -215,7 +214,7 @@ def _shipped_directory() -> Path:
 
         return Path(next(iter(gestured_models.__path__)))
     except ImportError:  # run from a checkout, not installed
-        return Path(gestured.__file__).resolve().parent.parent / "models"
+        return Path(__file__).resolve().parents[2] / "models"
 
 
 def shipped_name(source: str | Path) -> str | None:

@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 
-import gestured
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Scores
@@ -129,7 +128,7 @@ def end_all() -> None:
 
 
 def _start() -> "subprocess.Popen[bytes]":
-    root = Path(gestured.__file__).resolve().parent.parent
+    root = Path(__file__).resolve().parents[2]
     folders = [str(root), *(folder for folder in sys.path if os.path.isabs(folder))]
     if _ending:
         raise ValueError("was not opened: the program ends")

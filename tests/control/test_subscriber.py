@@ -1,6 +1,7 @@
 """gestured.Subscriber, against scripted daemons and a real one."""
 
 import json
+import queue
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -42,9 +43,13 @@ class Reader:
 
     def __init__(self, subscriber: Subscriber) -> None:
         self.subscriber = subscriber
-        self.events: list[dict[str, Any]] = []
-        self.thread = threading.Thread(target=lambda: self.events.extend(subscriber), daemon=True)
+        self.events: queue.Queue[dict[str, Any]] = queue.Queue()
+        self.thread = threading.Thread(target=self._read, daemon=True)
         self.thread.start()
+
+    def _read(self) -> None:
+        for event in self.subscriber:
+            self.events.put(event)
 
     def ended(self) -> bool:
         """Whether the iteration comes to its end."""
@@ -154,8 +159,9 @@ def test_close_in_another_thread_ends_the_iteration(fake: FakeDaemon, iterate):
     reader = iterate(Subscriber(fake.path))
     fake.accept()
     fake.say(GESTURE)
+    assert reader.events.get(timeout=30) == GESTURE
     reader.subscriber.close()
-    assert reader.ended() and reader.events in ([], [GESTURE])
+    assert reader.ended() and reader.events.empty()
     assert fake.client.recv(1) == b""
     reader.subscriber.close()
 
@@ -163,7 +169,7 @@ def test_close_in_another_thread_ends_the_iteration(fake: FakeDaemon, iterate):
 def test_close_ends_the_wait_for_a_daemon_that_is_not_there(tmp_path: Path, iterate):
     reader = iterate(Subscriber(tmp_path / "none.sock"))
     reader.subscriber.close()
-    assert reader.ended() and reader.events == []
+    assert reader.ended() and reader.events.empty()
 
 
 def test_close_in_a_signal_handler_ends_the_iteration(fake: FakeDaemon):

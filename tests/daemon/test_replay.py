@@ -1,11 +1,13 @@
 """The daemon over UDP, at any speed, says what the recognizer says in the process: event for event."""
 
 import random
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import gestured
 from gestured.core.events import Event
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
@@ -48,15 +50,42 @@ def test_online_is_offline(shared: Daemon, model: Path, seed: int) -> None:
     for t, frame in timed:
         offline += events_of(recognizer.push(Frame(t, frame.astype(np.float32))))
     assert len(offline) > 50 and {"gesture", "cancelled"} < {event_type(event) for event in offline}
-    client = shared.client().subscribe(*KINDS, sensors=[name])
-    sensor = Sensor(shared, name)
-    taken = shared.frames()
+    same(said(shared, name, timed, len(offline)), offline)
+
+
+def test_a_process_of_ones_own_hears_the_same(start: Callable[..., Daemon], model: Path, tmp_path: Path) -> None:
+    """gestured.open with what the daemon's settings say; a hand stays on the sensor when it falls silent."""
+    used = ["one_tap", "swipe_left", "swipe_up"]
+    settings = tmp_path / "gestured.toml"
+    settings.write_text(f"gestures.use = {used}\n[sensors.turned]\nrotate = 90\nmirror = true\n")
+    timed = session(4)
+    timed += [(timed[-1][0] + n / harness.RATE_HZ, Hand(9).frame(4.0)) for n in range(1, 8)]
+    recognizer = gestured.open(model, sensor="turned", grid=(9, 9), rotate=90, mirror=True, gestures=used)
+    own: list[Event] = []
+    for t, frame in timed:
+        own += recognizer.push(t, frame.tolist())
+    own += recognizer.flush(timed[-1][0] + 60.0)
+    last = [event_type(event) for event in own[-3:]]
+    assert last == ["onset", "cancelled", "release"] and {"gesture", "unknown"} < {event_type(event) for event in own}
+    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", "--config", settings)
+    same(said(daemon, "turned", timed, len(own)), own)
+
+
+def said(daemon: Daemon, name: str, timed: list[tuple[float, harness.Frame]], count: int) -> list[harness.Line]:
+    """The first lines that a daemon says of a sensor whose frames were felt at these times."""
+    client = daemon.client().subscribe(*KINDS, sensors=[name])
+    sensor = Sensor(daemon, name)
+    taken = daemon.frames()
     for n, (t, frame) in enumerate(timed, start=1):
         sensor.t = 1e9 + t - 1 / harness.RATE_HZ
         sensor.send([frame])
-        while n % 100 == 0 and shared.frames() < taken + n:
+        while n % 100 == 0 and daemon.frames() < taken + n:
             pass  # as fast as it goes, without overrunning a socket's buffer
-    online = [client.line() for _ in offline]
+    return [client.line() for _ in range(count)]
+
+
+def same(online: list[harness.Line], offline: list[Event]) -> None:
+    """Event for event, but for where the times begin."""
     began = online[0]["onset"] - offline[0].onset
     for ours, theirs in zip(online, offline, strict=True):
         assert (ours["type"], ours["id"]) == (event_type(theirs), theirs.id)

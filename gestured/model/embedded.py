@@ -1,0 +1,112 @@
+"""The recogniser of one sensor in a process of one's own: what `gestured.open` gives."""
+
+import logging
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gestured.core.conditioning import Mounting
+from gestured.core.errors import SettingsError
+from gestured.core.events import Event
+from gestured.core.frames import Frame, Touch
+from gestured.core.front_end import FrontEnd
+from gestured.core.recognizer import Recognizer
+from gestured.core.wire import is_sensor
+from gestured.model.ladder import gestures_in_use, ladder_for
+
+FEWEST, MOST = 2, 64  # rows, and columns, as in the daemon's settings
+DOUBLE_TAP = "double_tap"
+
+
+class Embedded:
+    """One sensor's recogniser: frames in, the events out that the daemon gives for the same frames.
+
+    Times are seconds on any clock that only goes forward, from frame to frame, across `flush` and `reset` too. The
+    first second without a touch teaches it the idle sensor; until then there are no events.
+    """
+
+    def __init__(self, recognizer: Recognizer, gestures: tuple[str, ...]) -> None:
+        self.gestures = gestures  # in use, in the model's order
+        self._recognizer = recognizer
+        self._shape = recognizer.front_end.sent
+        self._last = -math.inf  # s
+
+    def push(self, t: float, values: ArrayLike, *, touches: Sequence[Touch] = (), lost: int = 0) -> list[Event]:
+        """Take the frame of `t` s, (R, C) counts as the sensor sends them; give what it decides.
+
+        `touches` are the finger positions that the sensor knows, `lost` how many frames went missing just before.
+        A frame with a value that is not finite is passed over, as if it had been lost. Raises ValueError for a time
+        that is not after the last frame's, and for what is no frame of this sensor's grid.
+        """
+        if not self._last < t < math.inf:
+            after = f"a time after the last frame's, {self._last} s" if self._last > -math.inf else "seconds"
+            raise ValueError(f"t: expected {after}, found {t}")
+        frame = _counts(values)
+        if frame.shape != self._shape:
+            raise ValueError(f"values: expected the grid {self._shape} of this sensor, found the shape {frame.shape}")
+        self._last = t
+        return self._recognizer.push(Frame(t, frame, tuple(touches), lost))
+
+    def flush(self, t: float) -> list[Event]:
+        """The stream paused or ended at `t` s: decide what can be decided, cancel the rest.
+
+        A pause of more than a second needs none: the next frame notices it. Raises ValueError for a time before the
+        last frame's.
+        """
+        if not self._last <= t < math.inf:
+            raise ValueError(f"t: expected a time not before the last frame's, {self._last} s, found {t}")
+        return self._recognizer.flush(t)
+
+    def reset(self) -> list[Event]:
+        """The sensor restarted: cancel what is open, learn the idle sensor anew."""
+        return self._recognizer.reset()
+
+
+def open(  # the name by which users call it: gestured.open
+    model: str | Path = "cnn_lstm",
+    *,
+    sensor: str = "sensor",
+    grid: tuple[int, int] | None = None,
+    rotate: int = 0,
+    mirror: bool = False,
+    gestures: Sequence[str] | None = None,
+) -> Embedded:
+    """The recogniser of one sensor with a model: the name of one that ships, or the path of an .onnx file.
+
+    `sensor` is the name in its events; `grid` its rows and columns as it sends them, the model's unless told; `rotate`
+    (degrees clockwise: 0, 90, 180, 270) and `mirror` say how it is mounted; `gestures` are those to use, all unless
+    told. Below a shipped model stand its fallbacks, as in the daemon: that one answers is logged as a warning of the
+    logger `gestured`. Raises ModelError for a model that cannot be used, SettingsError for another mistake.
+    """
+    if not is_sensor(sensor):
+        raise SettingsError(f"sensor: expected 1 to 64 of A-Z, a-z, 0-9, _ and -, found {sensor!r}")
+    ladder = ladder_for(model, report=logging.getLogger("gestured").warning)
+    used = gestures_in_use(ladder, gestures)
+    try:
+        rows, columns = (ladder.rows, ladder.columns) if grid is None else grid
+        if not (FEWEST <= rows <= MOST and FEWEST <= columns <= MOST):
+            raise ValueError
+    except (TypeError, ValueError):
+        raise SettingsError(
+            f"grid: expected rows and columns, each from {FEWEST} to {MOST}, such as (9, 9), found {grid!r}"
+        ) from None
+    try:
+        mounting = Mounting(rotate, mirror)
+    except ValueError as error:
+        raise SettingsError(str(error)) from None
+    front_end = FrontEnd(sensor, rows, columns, mounting=mounting, wait_for_double_tap=DOUBLE_TAP in used)
+    return Embedded(Recognizer(front_end, ladder, gestures=used), used)
+
+
+def _counts(values: ArrayLike) -> np.ndarray[tuple[int, ...], np.dtype[np.generic]]:
+    """An array of numbers; raises ValueError for anything else."""
+    try:
+        frame = np.asarray(values)
+    except ValueError:  # rows of different lengths
+        frame = np.asarray(None)
+    if frame.dtype.kind not in "biuf":
+        raise ValueError("values: expected an array of numbers, rows of equal length")
+    return frame

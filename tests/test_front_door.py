@@ -1,0 +1,141 @@
+"""What `import gestured` offers: cheap until it is used, and clear about mistakes."""
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gestured
+from gestured.core.events import Onset
+from gestured.core.frames import Touch
+from tests.daemon.harness import Hand
+from tests.small_model import build
+
+ROOT = Path(__file__).resolve().parents[1]
+TO_COME = {"Hub": "gestured.core.hub", "Scene": "gestured.core.scene"}
+
+
+@pytest.fixture
+def recognizer(shelf: Path) -> Any:
+    return gestured.open("cnn_lstm", sensor="armrest", grid=(9, 9))
+
+
+def test_importing_the_package_imports_nothing_else():
+    code = "import sys; before = set(sys.modules); import gestured; print(*sorted(set(sys.modules) - before))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["gestured"]
+
+
+def test_what_listens_needs_neither_numpy_nor_a_model():
+    code = "import sys, gestured; gestured.Subscriber; print(*{'numpy', 'onnxruntime', 'pydantic'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+@pytest.mark.parametrize("name", gestured.__all__)
+def test_each_name_is_there_when_it_is_used(name: str):
+    if name in TO_COME and importlib.util.find_spec(TO_COME[name]) is None:
+        pytest.skip(f"{TO_COME[name]} is not there yet")
+    assert getattr(gestured, name).__name__ == name
+    assert name in dir(gestured)
+
+
+def test_another_name_is_an_error_as_of_any_module():
+    with pytest.raises(AttributeError, match="Recogniser"):
+        gestured.Recogniser  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"model": "cnn_lstn"}, r"cnn_lstn: no shipped model \(these are cnn_lstm, "),
+        ({"model": "./none.onnx"}, "none.onnx"),
+        ({"gestures": ["wave"]}, "'wave' is no gesture of cnn_lstm, expected any of .*one_tap"),
+        ({"gestures": []}, "at least one"),
+        ({"gestures": "one_tap"}, r"such as \['one_tap'\]"),
+        ({"sensor": "arm rest"}, "'arm rest'"),
+        ({"grid": (9, 65)}, r"from 2 to 64, such as \(9, 9\), found \(9, 65\)"),
+        ({"grid": 9}, "found 9"),
+        ({"grid": "9x9"}, "found '9x9'"),
+        ({"rotate": 45}, "found 45"),
+    ],
+)
+def test_a_mistake_in_opening_is_one_sentence(shelf: Path, wrong: dict[str, Any], words: str):
+    with pytest.raises(gestured.GesturedError, match=words):
+        gestured.open(**{"model": "cnn_lstm", "sensor": "armrest"} | wrong)
+
+
+@pytest.mark.parametrize(
+    ("t", "values", "words"),
+    [
+        (1.0, np.zeros((9, 9)), r"after the last frame's, 1\.0 s, found 1\.0"),
+        (0.5, np.zeros((9, 9)), r"found 0\.5"),
+        (float("nan"), np.zeros((9, 9)), "found nan"),
+        (2.0, np.zeros((9, 8)), r"grid \(9, 9\) .* shape \(9, 8\)"),
+        (2.0, np.zeros(81), r"shape \(81,\)"),
+        (2.0, [[1, 2], [3]], "rows of equal length"),
+        (2.0, [["a"] * 9] * 9, "numbers"),
+        (2.0, None, "numbers"),
+    ],
+)
+def test_a_mistake_in_pushing_is_one_sentence_and_loses_nothing(recognizer: Any, t: float, values: Any, words: str):
+    recognizer.push(1.0, np.zeros((9, 9)))
+    with pytest.raises(ValueError, match=words):
+        recognizer.push(t, values)
+    assert recognizer.push(1.1, np.zeros((9, 9), np.uint16)) == []
+
+
+def test_time_goes_on_across_flush_and_reset(recognizer: Any):
+    recognizer.push(1.0, np.zeros((9, 9)))
+    with pytest.raises(ValueError, match=r"not before the last frame's, 1\.0 s, found 0\.9"):
+        recognizer.flush(0.9)
+    assert recognizer.flush(1.0) == recognizer.reset() == []
+    with pytest.raises(ValueError, match="after the last"):
+        recognizer.push(1.0, np.zeros((9, 9)))
+
+
+def touched(recognizer: Any, **more: Any) -> list[Any]:
+    """What comes of a second without a touch and one frame with one."""
+    hand = Hand()
+    frames = [*hand.idle(2.0), hand.frame(4.0)]
+    return [event for n, frame in enumerate(frames) for event in recognizer.push(n / 15, frame, **more)]
+
+
+def test_a_frame_may_say_what_the_sensor_knows_of_it(recognizer: Any):
+    (onset,) = touched(recognizer, touches=[Touch(1, 4.0, 4.0)], lost=1)
+    assert (onset.sensor, onset.id) == ("armrest", 1) and isinstance(onset, Onset)
+
+
+def test_a_broken_value_costs_its_frame_alone(recognizer: Any):
+    """Before and after it all is as it would be without."""
+    broken = np.full((9, 9), np.nan)
+    hand = Hand()
+    events = [e for n, frame in enumerate(hand.idle(2.0)) for e in recognizer.push(n / 15, frame)]
+    events += recognizer.push(2.01, broken) + recognizer.push(2.07, hand.frame(4.0))
+    assert [type(event) for event in events] == [Onset]
+
+
+def test_reset_ends_the_contact_that_is_open(recognizer: Any):
+    touched(recognizer)
+    assert [getattr(event, "reason", "") for event in recognizer.reset()] == ["restart", ""]
+
+
+def test_gestures_are_the_models_in_its_order(shelf: Path):
+    known = gestured.open("cnn_lstm").gestures
+    assert gestured.open("cnn_lstm", gestures=list(reversed(known[:2]))).gestures == known[:2]
+
+
+def test_a_fallback_that_answers_is_a_warning(shelf: Path, caplog: pytest.LogCaptureFixture):
+    (shelf / "cnn_lstm.onnx").unlink()
+    gestured.open("cnn_lstm")
+    assert any("cnn_lstm is put aside" in message for message in caplog.messages)
+
+
+def test_a_grid_that_is_not_told_is_the_models(tmp_path: Path):
+    recognizer = gestured.open(build(tmp_path / "own.onnx"))
+    with pytest.raises(ValueError, match=r"grid \(9, 9\)"):
+        recognizer.push(0.0, [[0.0]])
