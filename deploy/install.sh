@@ -28,7 +28,7 @@ keep() {  # keep FILE PATH: an operator's file stays as it is, here and by `make
 
 # The build leaves files beside its sources, so it gets a copy.
 mkdir "$work/source"
-cp -R pyproject.toml README.md LICENSE NOTICE gestured models "$work/source"
+cp -RP pyproject.toml README.md LICENSE NOTICE gestured models gestured_models "$work/source"
 rm -rf "$new" "$old"
 mkdir -p "$(dirname "$new")"
 "$venv/bin/pip" install --no-compile --target "$new" "$work/source[record]" >"$venv/pip.log" 2>&1 </dev/null || {

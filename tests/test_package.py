@@ -2,12 +2,16 @@
 
 import argparse
 import importlib.util
+import os
 import shlex
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tomllib
+import venv
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -52,21 +56,63 @@ def python_without(
 
 
 @pytest.fixture(scope="session")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the contents of the wheel, built from what is in the project."""
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder named gestured with all of the project that is installed."""
     if importlib.util.find_spec("setuptools") is None:
         pytest.skip("setuptools is not installed: no wheel can be built")
-    source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
+    source = tmp_path_factory.mktemp("source") / "gestured"
+    source.mkdir()
     for name in ("pyproject.toml", "README.md", "LICENSE", "NOTICE"):
         shutil.copy(ROOT / name, source / name)
     for name in ("gestured", "models"):
         shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
-    build = f"import setuptools.build_meta as backend; backend.build_wheel({str(out)!r})"
-    done = subprocess.run([sys.executable, "-c", build], cwd=source, capture_output=True, text=True, timeout=120)
+    shutil.copy(ROOT / "gestured_models", source / "gestured_models", follow_symlinks=False)
+    return source
+
+
+def unpack(kind: str, clone: Path, out: Path, folder: Path) -> None:
+    """Build a "wheel" or an "editable" one of the clone, and install what is in it into a folder."""
+    build = f"import setuptools.build_meta as backend; backend.build_{kind}({str(out)!r})"
+    done = subprocess.run([sys.executable, "-c", build], cwd=clone, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     (wheel,) = out.glob("gestured-*-py3-none-any.whl")
-    zipfile.ZipFile(wheel).extractall(out / "installed")
+    zipfile.ZipFile(wheel).extractall(folder)
+
+
+@pytest.fixture(scope="session")
+def installed(clone: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the contents of the wheel, built from what is in the project."""
+    out = tmp_path_factory.mktemp("wheel")
+    unpack("wheel", clone, out, out / "installed")
     return out / "installed"
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A virtual environment with gestured; what it needs is where this interpreter has it."""
+
+    python: Path
+    package: Path  # where its gestured is
+    beside: Path  # the folder that holds the clone
+
+    def run(self, *arguments: object) -> "subprocess.CompletedProcess[str]":
+        """Runs its interpreter beside the clone."""
+        command = [self.python, *map(str, arguments)]
+        clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+        return subprocess.run(command, cwd=self.beside, env=clean, capture_output=True, text=True, timeout=60)
+
+
+@pytest.fixture(scope="session", params=["wheel", "editable"])
+def environment(request: pytest.FixtureRequest, clone: Path, tmp_path_factory: pytest.TempPathFactory) -> Environment:
+    """Installed as a user does (`pip install`), and as a developer does (`pip install --editable`)."""
+    folder = tmp_path_factory.mktemp(request.param)
+    venv.create(folder / "venv", with_pip=False)
+    python = folder / "venv" / "bin" / "python"
+    ask = "import sysconfig; print(sysconfig.get_path('purelib'))"
+    packages = Path(subprocess.run([python, "-c", ask], capture_output=True, text=True, check=True).stdout.strip())
+    (packages / "others.pth").write_text(sysconfig.get_path("purelib"))
+    unpack(request.param, clone, folder, packages)
+    return Environment(python, (packages if request.param == "wheel" else clone) / "gestured", clone.parent)
 
 
 def test_every_folder_with_code_is_installed():
@@ -149,3 +195,45 @@ def test_the_version_is_the_packages():
         timeout=60,
     )
     assert done.stdout == f"gesturectl {gestured.__version__}\n"
+
+
+BESIDE = """
+import gestured, gestured.model.model
+from gestured.core import recognizer
+print(gestured.__file__, gestured.open.__name__)
+print(gestured.model.model.shipped()["cnn_lstm"].is_file())
+"""
+
+
+def test_a_script_beside_a_clone_finds_what_is_installed(environment: Environment):
+    """The clone's folder is named as the package is, and stands first in the path."""
+    script = environment.beside / "script.py"
+    script.write_text(BESIDE)
+    for arguments in ([script], ["-c", BESIDE]):
+        done = environment.run(*arguments)
+        assert done.stdout == f"{environment.package / '__init__.py'} open\nTrue\n", done.stderr
+    assert environment.run("-m", "gestured.control", "--version").returncode == 0
+
+
+USE = """
+import gestured
+
+recognizer = gestured.open("cnn_lstm", sensor="armrest", grid=(9, 9))
+for event in recognizer.push(0.0, [[0.0] * 9] * 9, touches=[gestured.Touch(1, 4.0, 4.0)]):
+    if isinstance(event, gestured.Gesture):
+        reveal_type(event.gesture)
+with gestured.Subscriber("/run/gestured/events.sock", types=["gesture"]) as events:
+    for line in events:
+        print(line["gesture"])
+"""
+
+
+def test_a_type_checker_sees_the_front_door(environment: Environment):
+    pytest.importorskip("mypy")
+    (environment.beside / "use.py").write_text(USE)
+    command = ["-m", "mypy", "--strict", "--cache-dir", os.devnull, "--python-executable", environment.python, "use.py"]
+    done = subprocess.run(
+        [sys.executable, *map(str, command)], cwd=environment.beside, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stdout
+    assert 'use.py:7: note: Revealed type is "str"' in done.stdout.replace("builtins.", "")

@@ -209,12 +209,8 @@ def shipped() -> dict[str, Path]:
 
 
 def _shipped_directory() -> Path:
-    try:
-        import gestured_models  # type: ignore[import-not-found, unused-ignore]
-
-        return Path(next(iter(gestured_models.__path__)))
-    except ImportError:  # run from a checkout, not installed
-        return Path(__file__).resolve().parents[2] / "models"
+    """Beside the package, installed or in a checkout."""
+    return Path(__file__).resolve().parents[2] / "gestured_models"
 
 
 def shipped_name(source: str | Path) -> str | None:
