@@ -1,5 +1,7 @@
 """The examples marked `run: here`: run against a real daemon, but for the addresses."""
 
+import importlib.util
+import os
 import shutil
 import socket
 import subprocess
@@ -8,13 +10,15 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from pythonosc.osc_message import OscMessage
 
 from gestured.client.control import Control
 from gestured.model.model import shipped
-from tests.daemon.harness import Daemon
+from tests.daemon.harness import RATE_HZ, Daemon, Hand, Sensor
 from tests.documents.blocks import ROOT, Block, blocks
 
 WRAPPER = '#!/bin/sh\nPYTHONPATH={root} exec {python} -m gestured.{package} "$@"\n'
@@ -28,6 +32,9 @@ PHRASES = {
     "OscBundleBuilder",
     "measure()",
     "HEADER",
+    "np.load",
+    "gestured.Hub",
+    "gestured.Subscriber",
 }
 
 
@@ -82,10 +89,17 @@ class Place:
 
     def first_line(self, *command: str) -> str:
         """What a program that never ends prints first."""
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=self.folder) as process:
+        with self.running(*command) as process:
             assert process.stdout is not None
+            return next(line for line in process.stdout if "swipe" in line)
+
+    @contextmanager
+    def running(self, *command: str) -> "Iterator[subprocess.Popen[str]]":
+        """A program that never ends, until it is no longer needed."""
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=self.folder, env=environment) as process:
             try:
-                return next(line for line in process.stdout if "swipe" in line)
+                yield process
             finally:
                 process.kill()
 
@@ -136,6 +150,48 @@ def test_osc_subscriber(place: Place):
     with place.gestures():
         line = place.first_line(sys.executable, "-c", place.here(example("BlockingOSCUDPServer").text))
     assert line.startswith("armrest swipe_left 1.00 ")
+
+
+def test_a_subscriber_that_connects_again(place: Place):
+    with place.gestures():
+        line = place.first_line(sys.executable, "-c", place.here(example("gestured.Subscriber").text))
+    assert line == "swipe_left from armrest\n"
+
+
+def test_one_sensor_in_a_process_of_ones_own(place: Place):
+    hand = Hand()
+    frames = np.array([*hand.idle(2.0), *hand.swipe("left"), *hand.idle(1.0), *hand.swipe("up"), *hand.idle(1.0)])
+    np.savez(place.folder / "session.npz", frames=frames, times=np.arange(len(frames)) / RATE_HZ)
+    command = [sys.executable, "-c", example("np.load").text]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=place.folder, env=environment, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert [line.split()[0] for line in done.stdout.splitlines()] == ["swipe_left", "swipe_up"]
+
+
+@pytest.mark.skipif(importlib.util.find_spec("gestured.core.hub") is None, reason="gestured.core.hub is not there yet")
+def test_many_sensors_in_a_process_of_ones_own(place: Place):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = probe.getsockname()
+    code = example("gestured.Hub").text.replace("9000", str(address[1]))
+    with place.running(sys.executable, "-c", code) as process:
+        sensor = Sensor(SimpleNamespace(address=address), "armrest")
+        while refused(sensor.sock):
+            assert process.poll() is None
+        sensor.begin().perform("left")
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("armrest swipe_left ")
+
+
+def refused(sock: socket.socket) -> bool:
+    """Whether nobody is at the address to which a UDP socket is connected; the second packet is told so."""
+    try:
+        sock.send(b"anybody?")
+        sock.send(b"anybody?")
+    except ConnectionRefusedError:
+        return True
+    return False
 
 
 def test_osc_messages():
