@@ -60,6 +60,7 @@ def test_another_name_is_an_error_as_of_any_module():
         ({"sensor": "arm rest"}, "'arm rest'"),
         ({"grid": (9, 65)}, r"from 2 to 64, such as \(9, 9\), found \(9, 65\)"),
         ({"grid": 9}, "found 9"),
+        ({"grid": (9, 9.5)}, r"found \(9, 9\.5\)"),
         ({"grid": "9x9"}, "found '9x9'"),
         ({"rotate": 45}, "found 45"),
     ],

@@ -88,6 +88,7 @@ class Subscriber:
             for source in self._sources:
                 if source.lines is not None:
                     source.lines.close()
+                    source.lines = None
             self._selector.close()
             self._wake.close()
             self._woken.close()
@@ -111,7 +112,7 @@ class Subscriber:
                         continue
                     over = time.monotonic() >= end
                     self._wait(end)
-                    if over and not self._unread:
+                    if over and not self._unread and not self._closed:
                         raise TimeoutError(f"no event within {self._timeout:g} s")
         except GesturedError:
             self._closed = True

@@ -2,6 +2,7 @@
 
 import logging
 import math
+import operator
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -86,7 +87,7 @@ def open(  # the name by which users call it: gestured.open
     ladder = ladder_for(model, report=logging.getLogger("gestured").warning)
     used = gestures_in_use(ladder, gestures)
     try:
-        rows, columns = (ladder.rows, ladder.columns) if grid is None else grid
+        rows, columns = map(operator.index, (ladder.rows, ladder.columns) if grid is None else grid)
         if not (FEWEST <= rows <= MOST and FEWEST <= columns <= MOST):
             raise ValueError
     except (TypeError, ValueError):
