@@ -14,7 +14,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Self
 
-from gestured.client.lines import Lines, Refused, Unreachable, parsed
+from gestured.client.lines import Forbidden, Lines, Refused, Unreachable, parsed
 from gestured.client.stream import PATIENCE_S, SILENT, check_hello
 from gestured.core.errors import GesturedError
 
@@ -45,8 +45,8 @@ class Subscriber:
 
         Iterating raises TimeoutError after `timeout` seconds without an event, and may then go on. It raises Refused
         where a daemon refuses the subscription or is none, Stranger where the socket is served by an account that is
-        not believed, and without `reconnect` Unreachable where no daemon is (any more): all are GesturedError, and
-        close it.
+        not believed, Forbidden where it is not for us, and without `reconnect` Unreachable where no daemon is (any
+        more): all are GesturedError, and close it.
         """
         if not paths:
             raise TypeError("Subscriber: expected the path of at least one event socket")
@@ -129,7 +129,7 @@ class Subscriber:
             if source.due <= now and source.lines is None:
                 self._call(source, now)
             elif source.due <= now:
-                self._gone(source, f"the daemon on {source.path} {SILENT}")
+                self._gone(source, Unreachable(f"the daemon on {source.path} {SILENT}"))
         until = min(end, *(source.due for source in self._sources))
         for key, _ in self._selector.select(None if until == math.inf else max(until - now, 0.0)):
             if key.data is not None:
@@ -138,8 +138,10 @@ class Subscriber:
     def _call(self, source: "_Source", now: float) -> None:
         try:
             source.lines = Lines(source.path, "--socket")
+        except Forbidden:  # waiting changes nothing
+            raise
         except Unreachable as error:
-            self._gone(source, str(error))
+            self._gone(source, error)
             return
         with suppress(ConnectionError):  # it hung up; what it said before that is read
             source.lines.socket.sendall(self._request)
@@ -154,7 +156,7 @@ class Subscriber:
         except ConnectionError:
             data = b""
         if not data:
-            self._gone(source, f"the daemon on {source.path} closed the connection")
+            self._gone(source, Unreachable(f"the daemon on {source.path} closed the connection"))
             return
         *lines, source.begun = (source.begun + data).split(b"\n")
         self._unread.extend((source, line) for line in lines)
@@ -167,7 +169,7 @@ class Subscriber:
             refusal = f"the daemon on {source.path} refused the request: {message.get('reason')}"
             if source.hello:
                 raise Refused(refusal)
-            self._gone(source, refusal)
+            self._gone(source, Unreachable(refusal))
             return None
         if not source.hello:
             check_hello(text, message, source.path)
@@ -175,10 +177,10 @@ class Subscriber:
         self.hello, self.path = source.hello, source.path
         return text, message
 
-    def _gone(self, source: "_Source", reason: str) -> None:
-        """There is no daemon (any more): call it again in a while. Without `reconnect` raises Unreachable."""
+    def _gone(self, source: "_Source", error: Unreachable) -> None:
+        """There is no daemon (any more): call it again in a while. Without `reconnect` raises the error."""
         if not self._reconnect:
-            raise Unreachable(reason)
+            raise error
         if source.lines is not None:
             self._selector.unregister(source.lines.socket)
             source.lines.close()

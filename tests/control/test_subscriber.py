@@ -3,6 +3,7 @@
 import json
 import queue
 import signal
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,7 +14,7 @@ from typing import Any
 import pytest
 
 from gestured.client.control import Control
-from gestured.client.lines import Refused, Unreachable
+from gestured.client.lines import Forbidden, Refused, Unreachable
 from gestured.client.subscriber import LONGEST_S, Subscriber
 from gestured.core.errors import GesturedError
 from tests.control.conftest import HELLO, FakeDaemon
@@ -205,6 +206,15 @@ def test_without_reconnect_a_daemon_that_is_gone_is_an_error(fake: FakeDaemon, t
     fake.close()
     with pytest.raises(Unreachable, match="closed the connection"):
         next(subscriber)
+
+
+def test_a_socket_that_is_not_for_us_is_not_waited_for(fake: FakeDaemon, monkeypatch: pytest.MonkeyPatch):
+    def connect(self: socket.socket, path: str) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(socket.socket, "connect", connect)
+    with pytest.raises(Forbidden, match="for members of its group"):
+        next(Subscriber(fake.path))
 
 
 def test_no_path_is_a_mistake():
