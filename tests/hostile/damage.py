@@ -1,10 +1,10 @@
 """How often a damaged gesture is wrong, for each fault: `python -m tests.hostile.damage`.
 
 Simulated people (the project's own simulator, nominal sensor, people whom the models have not seen) perform
-gestures; a fault damages what the sensor sends; the daemon's own hub takes it at times that are written down,
-so that the same seed gives the same numbers at any speed. "Damaged" are the
-gestures during which a packet or frame was not what it should have been. An untouched sensor has the same fault
-for as long: any gesture there is one too many.
+gestures; a fault damages what the sensor sends, or when it is served; the daemon's own backlog and hub take it at
+times that are written down, so that the same seed gives the same numbers at any speed. "Damaged" are the gestures
+during which a packet or frame was not what it should have been, or waited while the daemon stood still. An untouched
+sensor has the same fault for as long: any gesture there is one too many.
 """
 
 import argparse
@@ -14,7 +14,7 @@ import json
 import math
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -27,12 +27,13 @@ from gestured.core.events import Event
 from gestured.core.frames import Frame
 from gestured.core.hub import Hub
 from gestured.daemon import log
+from gestured.daemon.backlog import Backlog, Datagram
 from gestured.daemon.health import TICK_S
 from gestured.daemon.merge import load
 from gestured.daemon.scene import scene_of
 from gestured.model.ladder import ladder_for
 from gestured.simulator import Participant, Sensor, Take, generator, session
-from tests.hostile.faults import FAULTS, Fault
+from tests.hostile.faults import FAULTS, Fault, Stall
 from tests.hostile.grammar import violations
 from tests.hostile.line import Line
 
@@ -80,24 +81,36 @@ def take(participant: int, seconds: float = SESSION_S, touched: bool = True) -> 
 
 
 class Bench:
-    """The daemon's hub, at times that are written down."""
+    """The daemon's backlog and hub, at times that are written down."""
 
     def __init__(self, model: str) -> None:
         # Nothing here may depend on how fast this machine is: no rung is ever too slow.
         self._ladder = ladder_for(model, [], slow_s=math.inf)
         self._scene = scene_of(load({"model": model}, {})[0], self._ladder)
 
-    def events(self, arrivals: list[tuple[float, bytes]]) -> list[dict[str, Any]]:
-        """What the daemon says to (time in s, packet), in order of arrival, as a client's lines."""
+    def events(self, arrivals: list[tuple[float, bytes]], stalls: Sequence[Stall] = ()) -> list[dict[str, Any]]:
+        """What the daemon says to (time in s, packet), in order of arrival, as a client's lines.
+
+        In a stall it neither reads nor looks at a clock. After each group of packets that waited, it looks whether a
+        sensor has fallen silent: its loop may do so after any of them.
+        """
+        def awake(t: float) -> float:
+            return next((until for since, until in stalls if since <= t < until), t)
+
         now, facts = 0.0, []
         hub = Hub(self._scene, self._ladder)
+        backlog = Backlog(lambda source: source in hub.owners)
         tick = arrivals[0][0]
-        for t, together in itertools.groupby(arrivals, key=lambda arrival: arrival[0]):
-            while tick < t:
-                facts += hub.tick(tick)
+        for now, found in itertools.groupby(arrivals, key=lambda arrival: awake(arrival[0])):
+            while tick < now:
+                if awake(tick) == tick:
+                    facts += hub.tick(tick)
                 tick += TICK_S
-            now = t
-            facts += hub.receive([(packet, SOURCE) for _, packet in together], now)
+            backlog.add([Datagram(t, packet, SOURCE) for t, packet in found], now)
+            while backlog:
+                group = backlog.group()
+                facts += hub.receive([(datagram.packet, datagram.source) for datagram in group], group[-1].arrival)
+                facts += hub.tick(now - backlog.age(now))
         facts += hub.flush(now)
         return [json.loads(messages.to_json(fact, 0.0)) for fact in facts if isinstance(fact, Event)]
 
@@ -107,7 +120,8 @@ class Damaged:
     """What arrives of a take."""
 
     arrivals: list[tuple[float, bytes]]  # (time in s, packet) in order
-    struck: np.ndarray  # times of the frames that are not what they should have been
+    stalls: list[Stall]  # of the daemon
+    struck: np.ndarray  # times of the frames that are not what, or not served when, they should have been
     felt: Callable[[float], float]  # when what happened at a time of the take happens now
 
 
@@ -121,17 +135,20 @@ def damage(fault: Fault, healthy: Take, seed: int) -> Damaged:
     waiting: list[tuple[float, int, bytes]] = []
     order = itertools.count()
     stream = fault.apply((healthy.frames, healthy.sensor_times, healthy.counter), rng)
+    stalls = fault.stalls(healthy.sensor_times, rng)
     for frame, t, count in zip(*stream, strict=True):
         packet = form.packet(Frame(float(t), frame), int(count), 1.7e9 + t)
         arrivals = line.push(float(t), packet)
         for arrival, what in arrivals:
             heapq.heappush(waiting, (arrival, next(order), what))
-        if arrivals == [(t, packet)] and np.array_equal(whole.get(float(t), ()), frame):
+        stalled = any(since <= t < until for since, until in stalls)
+        if not stalled and arrivals == [(t, packet)] and np.array_equal(whole.get(float(t), ()), frame):
             sound.add(float(t))
     ordered = [heapq.heappop(waiting) for _ in range(len(waiting))]
     moved = stream[1] if len(stream[1]) == len(whole) else healthy.sensor_times
     return Damaged(
         [(t, packet) for t, _, packet in ordered],
+        stalls,
         np.array(sorted(whole.keys() - sound)),
         lambda t: float(np.interp(t, healthy.sensor_times, moved)) + fault.line.delay_s,
     )
@@ -142,7 +159,7 @@ def measure(name: str, takes: list[Take], idle: list[Take], bench: Bench) -> Row
     row, fault = Row(name), FAULTS[name]
     for seed, healthy in enumerate(takes):
         damaged = damage(fault, healthy, seed)
-        lines = bench.events(damaged.arrivals)
+        lines = bench.events(damaged.arrivals, damaged.stalls)
         row.unended += len(violations(lines))
         tally, hit, struck, felt = Tally(), {}, damaged.struck, damaged.felt
         for event in healthy.events:
@@ -159,7 +176,8 @@ def measure(name: str, takes: list[Take], idle: list[Take], bench: Bench) -> Row
             row.gestures += 1
             (row.damaged if hit[outcome.performed] else row.others)[outcome.verdict] += 1
     for seed, healthy in enumerate(idle):
-        lines = bench.events(damage(fault, healthy, seed).arrivals)
+        damaged = damage(fault, healthy, seed)
+        lines = bench.events(damaged.arrivals, damaged.stalls)
         row.unended += len(violations(lines))
         row.untouched += sum(line["type"] == "gesture" for line in lines)
         row.untouched_minutes += float(healthy.sensor_times[-1] - healthy.sensor_times[0]) / 60

@@ -1,4 +1,4 @@
-"""The faults of a sensor and of the way from it, each as a change of what it sends; seeded."""
+"""The faults of a sensor, of the way from it, and of the machine that listens; seeded."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ Frames = NDArray[np.generic]  # (N, R, C) raw counts
 Times = NDArray[np.float64]  # (N,) s
 Counts = NDArray[np.int64]  # (N,) the sensor's frame counter
 Stream = tuple[Frames, Times, Counts]
+Stall = tuple[float, float]  # s, from and until
 Change = Callable[[Frames, Times, Counts, np.random.Generator], Stream]
 LEAD_S = 2.0  # untouched, and without a fault: what the daemon learns the sensor from
 EVERY_S = 10.0  # the faults that come and go come so often
@@ -19,16 +20,28 @@ EVERY_S = 10.0  # the faults that come and go come so often
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong: with the way, or with the sensor. `counted`: frames carry the sensor's counter."""
+    """What is wrong: with the way, with the sensor, or with the daemon's machine.
+
+    `counted`: frames carry the sensor's counter. `stall_s`: every ten seconds the daemon's loop stands still for so
+    long; what arrives meanwhile waits in the kernel's buffer.
+    """
 
     line: Impairment = Impairment()
     sensor: Change | None = None
     counted: bool = True
+    stall_s: float = 0.0
 
     def apply(self, stream: Stream, rng: np.random.Generator) -> Stream:
         """What the sensor sends instead."""
         frames, times, counts = stream[0].copy(), stream[1].copy(), stream[2].copy()
         return self.sensor(frames, times, counts, rng) if self.sensor else (frames, times, counts)
+
+    def stalls(self, times: Times, rng: np.random.Generator) -> list[Stall]:
+        """When the daemon stands still, in order."""
+        if not self.stall_s:
+            return []
+        starts = (begin + rng.uniform(0, 8) for begin in np.arange(times[0] + LEAD_S, times[-1], EVERY_S))
+        return [(start, start + self.stall_s) for start in starts]
 
 
 def _taxels(frames: Frames, rng: np.random.Generator, count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -150,6 +163,7 @@ FAULTS: dict[str, Fault] = {
     "delay of 0.5 s, jitter of 0.05 s": Fault(Impairment(delay_s=0.5, jitter_s=0.05)),
     "jitter of 0.2 s": Fault(Impairment(jitter_s=0.2)),
     "the way stalls for 0.8 s": Fault(Impairment(stall_s=0.8)),
+    "the daemon stalls for 1 s": Fault(stall_s=1.0),
     "5 % corrupted": Fault(Impairment(corrupt=0.05)),
     "5 % cut short": Fault(Impairment(cut=0.05)),
     "silence of 1.5 s": Fault(sensor=_silence),

@@ -32,14 +32,16 @@ def nobody() -> damage.Take:
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_nobody_makes_no_gesture(bench: damage.Bench, nobody: damage.Take, name: str) -> None:
-    lines = bench.events(damage.damage(FAULTS[name], nobody, 1).arrivals)
+    damaged = damage.damage(FAULTS[name], nobody, 1)
+    lines = bench.events(damaged.arrivals, damaged.stalls)
     assert [line for line in lines if line["type"] == "gesture"] == []
     assert violations(lines) == []
 
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_every_onset_of_somebody_ends(bench: damage.Bench, somebody: damage.Take, name: str) -> None:
-    lines = bench.events(damage.damage(FAULTS[name], somebody, 1).arrivals)
+    damaged = damage.damage(FAULTS[name], somebody, 1)
+    lines = bench.events(damaged.arrivals, damaged.stalls)
     assert any(line["type"] == "onset" for line in lines)
     assert violations(lines) == []
 
@@ -50,10 +52,21 @@ def gestures(lines: list[dict], after: float) -> list[tuple[str, float]]:
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_what_comes_after_the_fault_counts(bench: damage.Bench, somebody: damage.Take, name: str) -> None:
-    bad = [arrival for arrival in damage.damage(FAULTS[name], somebody, 1).arrivals if arrival[0] < HEALED_S]
+    damaged = damage.damage(FAULTS[name], somebody, 1)
+    bad = [arrival for arrival in damaged.arrivals if arrival[0] < HEALED_S]
     good = damage.damage(Fault(), somebody, 1).arrivals
-    healed = bench.events(bad + [arrival for arrival in good if arrival[0] >= HEALED_S])
+    stalls = [stall for stall in damaged.stalls if stall[1] < HEALED_S]
+    healed = bench.events(bad + [arrival for arrival in good if arrival[0] >= HEALED_S], stalls)
     expected = gestures(bench.events(good), AGAIN_S)
     assert len(expected) >= 4
     assert [label for label, _ in gestures(healed, AGAIN_S)] == [label for label, _ in expected]
     assert violations(healed) == []
+
+
+def test_a_stall_of_the_daemon_changes_no_event(bench: damage.Bench, somebody: damage.Take) -> None:
+    """Whenever it stands still: what the kernel's buffer held counts as if it had been read at once."""
+    healthy = bench.events(damage.damage(Fault(), somebody, 1).arrivals)
+    for seed in range(5):
+        damaged = damage.damage(FAULTS["the daemon stalls for 1 s"], somebody, seed)
+        assert len(damaged.struck) > 40
+        assert bench.events(damaged.arrivals, damaged.stalls) == healthy
