@@ -3,7 +3,9 @@
 One test, because each step stands on the one before; it prints what it measured. The limits are the project's own.
 """
 
+import json
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -18,8 +20,10 @@ from types import SimpleNamespace
 import pytest
 
 from gestured.client.stream import Stream
+from tests.daemon import tiny_model
 from tests.daemon.harness import Sensor
 from tests.documents.blocks import blocks
+from tests.hostile import bad_models
 from tests.systemd.container import DEADLINE_S, Container, missing, wait
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -220,6 +224,51 @@ def test_a_model_where_the_service_sees_nothing_is_told_so(box: Container):
     box.run("cp", "/usr/lib/gestured/gestured_models/lstm.onnx", "/tmp/candidate.onnx")
     done = box.run("gesturectl", "shadow", "/tmp/candidate.onnx", check=False)
     assert done.returncode == 1 and "put it into /etc/gestured" in done.stderr
+
+
+def test_a_foreign_model_is_opened_apart_inside_the_units_sandbox(box: Container, tmp_path: Path):
+    """The unit's filter and limits leave room for the process that tries it, also where that has to be ended."""
+    vehicle = Vehicle(box)
+    good = tiny_model.make(tmp_path / "tiny.onnx")
+    models = {"tiny": good, "endless": bad_models.endless(good, tmp_path / "endless.onnx")}
+    models["verbose"] = bad_models.verbose(good, tmp_path / "verbose.onnx")
+    for name, path in models.items():
+        shutil.copy(path, box.path(f"/etc/gestured/{name}.onnx"))
+    box.path(CONFIGURATION).write_text("")
+    box.run("systemctl", "restart", "gestured.service")
+    instance = vehicle.instance()
+
+    box.run("gesturectl", "shadow", "/etc/gestured/tiny.onnx")
+    simulate = "gesturectl simulate --to 127.0.0.1:9000 --sensor tried --kinds swipe_left --seconds 10"
+    box.run(*simulate.split())
+    said = json.loads(box.run("gesturectl", "shadow", "--json").stdout)
+    assert said["ended"] is None and said["segments"] > 0 and said["failed"] == 0, said
+    for name, why in (("endless", "could not be opened within"), ("verbose", "")):
+        begin = time.monotonic()
+        done = box.run("gesturectl", "shadow", f"/etc/gestured/{name}.onnx", check=False)
+        assert done.returncode == 1 and f"{name}.onnx" in done.stderr and why in done.stderr
+        vehicle.configure(f'model = "/etc/gestured/{name}.onnx"\n')
+        assert box.run("systemctl", "reload", "gestured", check=False).returncode != 0
+        report(f"a model that is refused, twice: {name}", time.monotonic() - begin)
+    vehicle.configure('model = "/etc/gestured/tiny.onnx"\n')
+    box.run("systemctl", "reload", "gestured")
+    assert vehicle.instance() == instance
+    box.run("systemctl", "restart", "gestured")
+    with closing(vehicle.stream()) as stream:
+        assert stream.hello["model"] == "tiny"
+    box.path(CONFIGURATION).write_text("")
+    box.run("systemctl", "restart", "gestured.service")
+
+
+def test_a_flood_is_muted_inside_the_units_sandbox_and_the_watchdog_is_fed(box: Container):
+    vehicle = Vehicle(box)
+    instance = vehicle.instance()
+    flood = f"{sys.executable} -m tests.hostile.flood 127.0.0.1:9000 full --rate 600 --ports 58 --seconds 10"
+    network = ["nsenter", f"--net=/proc/{box.leader}/ns/net", f"--wd={ROOT}"]
+    subprocess.run([*network, *flood.split()], check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
+    assert vehicle.instance() == instance
+    said = vehicle.log()
+    assert "senders of a flood are not heard" in said and "cannot be muted" not in said
 
 
 def bound(port: int) -> socket.socket:
