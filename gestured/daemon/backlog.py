@@ -45,7 +45,8 @@ class Backlog:
         self._oldest = 0.0  # s, when what waited longest then had arrived
         self._until = 0.0  # s, when the flood is over unless something is dropped before
         self._cost: dict[Sender, float] = {}  # s of work a byte
-        self._credit: dict[Sender, float] = {}  # s of work
+        self._credit: dict[Sender, tuple[float, float]] = {}  # s of work, and `_equal` then
+        self._equal = 0.0  # s of work that each owner could have had in all turns, were they shared out equally
 
     def __bool__(self) -> bool:
         return bool(self._waiting)
@@ -108,10 +109,12 @@ class Backlog:
         shares = fair(owners, OWNERS_SHARE * seconds)
         spent = sum(min(shares[key], need) for key, need in owners.items())
         shares |= fair({key: need for key, need in needs.items() if key not in owners}, seconds - spent)
+        before = self._equal
+        self._equal += min((shares[key] for key in owners), default=OWNERS_SHARE * seconds)
         served: list[Datagram] = []
         dropped: dict[Sender, int] = {}
         for key in sorted(by_sender, key=needs.__getitem__):
-            kept = self._newest(key, by_sender[key], shares[key])
+            kept = self._newest(key, by_sender[key], shares[key], before)
             served += kept
             if len(kept) < len(by_sender[key]):
                 dropped[key] = len(by_sender[key]) - len(kept)
@@ -135,8 +138,11 @@ class Backlog:
         guess = len(datagram.packet) * self._cost.get(self.sender(datagram.source), FIRST_GUESS)
         return min(guess, CREDIT_S)  # so that anybody is served in the end
 
-    def _newest(self, key: Sender, datagrams: list[Datagram], share: float) -> list[Datagram]:
-        credit = min(self._credit.get(key, CREDIT_S) + share, max(share, CREDIT_S))
+    def _newest(self, key: Sender, datagrams: list[Datagram], share: float, before: float) -> list[Datagram]:
+        credit, equal = self._credit.get(key, (CREDIT_S, before))
+        if isinstance(key, tuple):
+            credit += before - equal  # turns in which it sent nothing; a stranger that pauses has earned nothing
+        credit = min(credit + share, max(share, CREDIT_S))
         kept: list[Datagram] = []
         for datagram in reversed(datagrams):
             cost = self._guess(datagram)
@@ -145,7 +151,7 @@ class Backlog:
             credit -= cost
             kept.append(datagram)
         if len(self._credit) < SENDERS or key in self._credit:
-            self._credit[key] = credit
+            self._credit[key] = credit, self._equal
         return kept[::-1]
 
 

@@ -99,6 +99,23 @@ def test_an_owner_that_floods_does_not_starve_another() -> None:
     assert served[ARM] == 100 and served[SEAT] * 3e-5 > 0.5 * 100 * 0.001
 
 
+def test_who_sends_now_and_then_has_saved_up_for_it_where_many_owners_flood() -> None:
+    """What a frame costs is more than a turn's share of 78, but less than that of the ten turns between two frames."""
+    crowd = [("10.0.0.9", port) for port in range(58)]
+    good = [("10.0.0.1", port) for port in range(20)]
+    waiting, sent, served = Backlog({*crowd, *good}.__contains__), 0, 0
+    for turn in range(3000):
+        now = 0.006 * turn
+        waiting.add([Datagram(now, bytes(60_000), crowd[turn % len(crowd)])], now)
+        if turn % 10 == 0:
+            waiting.add([Datagram(now, FRAME, source) for source in good], now)
+            sent += len(good)
+        for datagram in waiting.share(0.001, now)[0]:
+            waiting.took(datagram, 3.75e-7 * len(datagram.packet))
+            served += datagram.source in good
+    assert served == sent
+
+
 def test_a_stranger_is_heard_beside_owners_that_flood() -> None:
     assert flood({ARM: 500, SEAT: 500, STRANGER: 1})[STRANGER] == 100
 

@@ -11,6 +11,8 @@ import numpy as np
 from tests import encoding
 
 BURST = 50  # packets at a time; fifty microseconds of work
+OWNERS = 58  # names, and so sensors, of kind "owners"
+CALM_S = 1.0  # for which they are sensors like any other, so that they own their names
 
 
 def packets(kind: str) -> list[bytes]:
@@ -22,15 +24,16 @@ def packets(kind: str) -> list[bytes]:
         return [encoding.message("/flood/pressure", "f" * 81, (values,))]
     if kind == "sensors":  # of a new sensor each time
         return [encoding.message(f"/flood{i}/pressure", "f" * 81, (values,)) for i in range(1000)]
-    frame = encoding.message("/flood/pressure", "b", (bytes(81),))
-    return [encoding.bundle([frame] * 500)]  # "full": as many frames as a packet can hold
+    names = [f"/flood{i}" for i in range(OWNERS)] if kind == "owners" else ["/flood"]
+    frames = [encoding.message(f"{name}/pressure", "b", (bytes(81),)) for name in names]
+    return [encoding.bundle([frame] * 500) for frame in frames]  # as many frames as a packet can hold
 
 
 def main() -> int:
     """Send at the rate, or as fast as it goes; print how many packets a second went out."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("to")
-    parser.add_argument("kind", choices=("rubbish", "frames", "sensors", "full"))
+    parser.add_argument("kind", choices=("rubbish", "frames", "sensors", "full", "owners"))
     parser.add_argument("--rate", type=float, default=50_000.0, help="packets a second")
     parser.add_argument("--ports", type=int, default=1, help="sent from so many ports in turn (default: 1)")
     parser.add_argument("--seconds", type=float, default=5.0)
@@ -41,6 +44,10 @@ def main() -> int:
         socks = [stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(args.ports)]
         for sock in socks:
             sock.connect((host, int(port)))
+        for _ in range(round(10 * CALM_S) if args.kind == "owners" else 0):
+            for n, sock in enumerate(socks):
+                sock.send(osc.encode_message(f"/flood{n % OWNERS}/pressure", "b", (bytes(81),)))
+            time.sleep(0.1)
         start = time.monotonic()
         while (passed := time.monotonic() - start) < args.seconds:
             if sent > passed * args.rate:

@@ -49,10 +49,11 @@ def test_a_flood_from_one_source_while_another_sensor_works(start, kind: str, ra
 
 @pytest.mark.hostile
 @pytest.mark.parametrize(
-    ("kind", "rate", "ports"), [("full", 500, 1), ("full", 600, 58), ("full", 50_000, 1), ("frames", 100_000, 58)]
+    ("kind", "rate", "ports"),
+    [("full", 500, 1), ("full", 600, 58), ("owners", 600, 58), ("full", 50_000, 1), ("frames", 100_000, 58)],
 )
 def test_while_a_flood_lasts_the_gestures_of_others_are_right(start, kind: str, rate: int, ports: int) -> None:
-    daemon = start("--metrics", "127.0.0.1:0", model="cnn_lstm")
+    daemon = start("--metrics", "127.0.0.1:0", "--max-sensors", "100", model="cnn_lstm")
     flood = [sys.executable, "-m", "tests.hostile.flood", daemon.ready["listen"], kind, "--seconds", "13"]
     flood += ["--rate", str(rate), "--ports", str(ports)]
     with subprocess.Popen(flood, stdout=subprocess.DEVNULL):
