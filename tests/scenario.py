@@ -27,7 +27,7 @@ One statement a line, in order; `#` begins a comment. A taxel is `ROW,COLUMN` fr
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Contact, Cut, FrontEnd
+from gestured.core.front_end import Contact, Cut, Draft, Found, FrontEnd
 
 Finger = tuple[float, float, float]  # row, column, amplitude
 Fingers = Callable[[float], list[Finger]]  # by the share of a step's time that has passed
@@ -269,7 +269,8 @@ class Player:
             for frame in self.frames(step):
                 self._note(front_end.push(frame))
 
-    def _note(self, events: list[Contact]) -> None:
+    def _note(self, found: Sequence[Found]) -> None:
+        events = [event for event in found if not isinstance(event, Draft)]
         self.events += events
         for event in events:
             if isinstance(event, Cut):

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gestured.core.conditioning import Mounting
+from gestured.core.mounting import Mounting
 from gestured.core.wire import Addresses, Decoder
 from gestured.lab.stability.metamorphic import (
     Property,

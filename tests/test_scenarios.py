@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gestured.core.activity import hardly_ever
+from gestured.core.contact import AfterEffect
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Frame
 from gestured.core.front_end import Contact, Cut
@@ -109,14 +111,15 @@ def test_activity_below_the_threshold_yields_nothing(patterns: list[list[float]]
     player = Player(parse("idle", "sensor grid 3x3\nquiet for 2s"), seed)
     assert player.play() == []
     front_end = player.front_end
+    untouched = AfterEffect(hardly_ever(9))
     idle = np.full((3, 3), player.scenario.sensor.baseline)
     for n, pattern in enumerate(patterns):
         values = idle + 50 * np.reshape(pattern, (3, 3))
         while True:  # all of it just below
-            d, activity, lowest = front_end.conditioner.deviation(values.reshape(-1))
-            if max(activity, -lowest) < front_end.segmenter.on:
+            look = front_end.conditioner.look(10 + n / 15, values.reshape(-1), untouched)
+            if look.activity < hardly_ever(9) and not look.sunken:
                 break
-            values = values - 0.05 * d.reshape(3, 3)
+            values = values - 0.05 * look.above.reshape(3, 3)
         assert front_end.push(Frame(10 + n / 15, values)) == []
         assert not front_end.touched
 

@@ -146,7 +146,7 @@ class Feed:
             sequence=self._recognizer.sequence,
             segments=front_end.segments,
             first=self._vitals.first,
-            baseline=front_end.conditioner.baseline if front_end.ready else None,
+            baseline=front_end.baseline if front_end.ready else None,
         )
 
     def _run(self, act: Callable[[float], list[Event | Decided]], now: float, facts: list[Fact]) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.settling import median
+from gestured.core.quantiles import median
 
 STATES = ("ok", "starting", "degraded", "stale", "no_data", "faulty")  # from good to bad
 SILENT = ("no_data", "stale")  # states of sensors that are not there now

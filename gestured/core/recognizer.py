@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Unknown
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Contact, Cut, FrontEnd
+from gestured.core.front_end import Cut, Draft, Found, FrontEnd
 
 HOLE_S = 0.25  # longer without a frame, nobody knows what the finger did meanwhile;
 HOLE_FRAMES = 2.5  # a slow sensor may take so many of its own intervals
@@ -92,8 +92,6 @@ class Recognizer:
     def push(self, frame: Frame) -> list[Event | Decided]:
         """Take one frame, give what it decides; see `FrontEnd.push`."""
         found = self.front_end.push(frame)
-        if self.front_end.draft is not None:
-            self._ask(self.front_end.draft)
         return self._name(found) if found else []
 
     def give_up(self, t: float) -> list[Event | Decided]:
@@ -108,13 +106,15 @@ class Recognizer:
         """The sensor restarted: cancel what is open, learn the idle sensor anew."""
         return self._name(self.front_end.reset())
 
-    def _name(self, found: list[Contact]) -> list[Event | Decided]:
+    def _name(self, found: Sequence[Found]) -> list[Event | Decided]:
         out: list[Event | Decided] = []
-        for contact in found:
-            if isinstance(contact, Cut):
-                out += self._decide(contact)
+        for one in found:
+            if isinstance(one, Draft):
+                self._ask(one.segment)
+            elif isinstance(one, Cut):
+                out += self._decide(one)
             else:
-                out.append(contact)
+                out.append(one)
         return out
 
     def _ask(self, segment: Segment) -> Scores | None:

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from gestured.core.conditioning import Mounting
-from gestured.core.segmentation import Timing
+from gestured.core.mounting import Mounting
+from gestured.core.timing import Timing
 from gestured.core.wire import Addresses
 
 DOUBLE_TAP = "double_tap"

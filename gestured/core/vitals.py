@@ -26,7 +26,7 @@ class Vitals:
     def review(self, front_end: FrontEnd) -> None:
         """Keep the first baseline that was learned. Beside the way of a frame, now and then."""
         if self.first is None and front_end.ready:
-            self.first = front_end.conditioner.baseline
+            self.first = front_end.baseline
 
     def silent(self) -> None:
         """The sensor has fallen silent: the next interval says nothing of its jitter."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.frames import Segment
-from gestured.core.settling import median
+from gestured.core.quantiles import median
 
 SAME_RATE = 0.12  # a rate this near to the model's is taken as it is: interpolating jittered times blurs taps
 

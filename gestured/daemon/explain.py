@@ -6,7 +6,7 @@ from typing import Any
 
 from gestured import __version__
 from gestured.core.scene import DOUBLE_TAP
-from gestured.core.segmentation import Timing
+from gestured.core.timing import Timing
 from gestured.daemon import clients
 from gestured.daemon.ladder import open_ladder
 from gestured.daemon.settings import Settings, control_beside, default_socket

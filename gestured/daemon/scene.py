@@ -1,6 +1,6 @@
 """The scene that the settings ask for."""
 
-from gestured.core.conditioning import Mounting
+from gestured.core.mounting import Mounting
 from gestured.core.scene import Scene, Setup
 from gestured.core.wire import Addresses
 from gestured.daemon.settings import Settings

@@ -12,12 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gestured.core.conditioning import BLOB, BLOB_GAIN, COMMON, Conditioner, Mounting
+from gestured.core.activity import BLOB, BLOB_GAIN, COMMON, Activity
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment, Touch
-from gestured.core.front_end import Contact, Cut, FrontEnd
-from gestured.core.settling import _quantile, median
+from gestured.core.front_end import Contact, Cut, Draft, FrontEnd
+from gestured.core.mounting import Mounting
+from gestured.core.quantiles import median, quantile
 from gestured.core.window import Window
 
 Array = NDArray[np.float64]
@@ -74,8 +75,13 @@ def stream(
     return times, frames
 
 
+def contacts(front_end: FrontEnd, frame: Frame) -> list[Contact]:
+    return [found for found in front_end.push(frame) if not isinstance(found, Draft)]
+
+
 def play(front_end: FrontEnd, times: Array, frames: NDArray[np.generic]) -> list[Contact]:
-    return [event for t, frame in zip(times, frames, strict=True) for event in front_end.push(Frame(float(t), frame))]
+    taken = [Frame(float(t), frame) for t, frame in zip(times, frames, strict=True)]
+    return [event for frame in taken for event in contacts(front_end, frame)]
 
 
 def heard(times: Array, frames: NDArray[np.generic]) -> tuple[FrontEnd, list[Contact]]:
@@ -168,7 +174,7 @@ def test_a_mounted_sensor_gives_segments_as_a_person_sees_them(
     events = []
     for t, frame in zip(times, frames, strict=True):
         pressed = frame.max() > 600
-        events += front_end.push(Frame(float(t), frame, (touch,) if pressed else ()))
+        events += contacts(front_end, Frame(float(t), frame, (touch,) if pressed else ()))
     (segment,) = segments(events)
     frame = segment.frames[segment.first]
     assert frame.shape == mounting.shape(rows, columns) == (front_end.rows, front_end.columns)
@@ -270,7 +276,7 @@ def test_activity_is_the_strongest_spot_beyond_what_all_taxels_share(
     spots = rows @ scaled @ columns / sum(b * b for b in BLOB)
     common = np.clip(np.sort(scaled, axis=None)[scaled.size // 2], -COMMON, COMMON)
     expected = max(scaled.max() - common, spots.max() - common * BLOB_GAIN)
-    activity, lowest = Conditioner(*shape).activity(scaled.ravel())
+    activity, lowest = Activity(*shape).measure(scaled.ravel())
     assert activity == pytest.approx(expected, rel=1e-9, abs=1e-9 * abs(scaled).max())
     assert lowest == scaled.min()
 
@@ -281,7 +287,7 @@ def test_the_median_is_numpys(rows: int, columns: int, seed: int) -> None:
     assert median(values).tolist() == np.median(values, axis=0).tolist()
     assert float(median(values[0])) == np.median(values[0])
     for share in (0.5, 0.75):
-        assert _quantile(values[0], share) == np.quantile(values[0], share)
+        assert quantile(values[0], share) == np.quantile(values[0], share)
 
 
 def test_the_noise_follows_a_sensor_that_becomes_noisier() -> None:

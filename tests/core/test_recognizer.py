@@ -7,6 +7,7 @@ import math
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,9 +17,9 @@ from hypothesis import strategies as st
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Contact, Cut, FrontEnd
+from gestured.core.front_end import Contact, Cut, Draft, FrontEnd
 from gestured.core.recognizer import Decided, Recognizer, Scores, events_of
-from gestured.core.segmentation import Timing
+from gestured.core.timing import Timing
 from gestured.core.window import Window
 from tests.scenario import Player, parse
 
@@ -114,13 +115,49 @@ def test_what_is_asked_ahead_is_what_is_cut() -> None:
 
 
 def cut_late(stream: Sequence[Frame]) -> list[Segment]:
-    """Segments with all frames up to their cut."""
+    """Segments with all frames up to their cut: nothing is drafted before."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("gestured.core.front_end.DRAFT_S", math.inf)
+        return [x.segment for x in cut_out(stream) if isinstance(x, Cut)]
+
+
+@pytest.mark.parametrize("lines", [(SWIPE,), (TAP,), (TAP, "quiet for 150ms", TAP), (TAP, "quiet for 150ms", SWIPE)])
+def test_a_draft_comes_before_its_cut_and_is_the_same_segment(lines: tuple[str, ...]) -> None:
     front_end = FrontEnd("armrest", 9, 9)
-    found = []
-    for frame in stream:
-        front_end._made = None
-        found += [x.segment for x in front_end.push(frame) if isinstance(x, Cut)]
-    return found
+    drafts: list[Segment] = []
+    cuts = 0
+    for frame in frames("quiet for 1500ms", *lines, "quiet for 900ms", *lines, "quiet for 900ms"):
+        for found in front_end.push(frame):
+            if isinstance(found, Draft):
+                drafts.append(found.segment)
+            elif isinstance(found, Cut):
+                cuts += 1
+                assert any(draft is found.segment for draft in drafts)
+    assert cuts == 2 * (2 if lines[-1] == SWIPE and len(lines) > 1 else 1)
+    assert all(one.offset < other.offset for one, other in pairwise(drafts))  # each was told once
+
+
+@pytest.mark.parametrize("lines", [(SWIPE,), (TAP,), (TAP, "quiet for 150ms", TAP)])
+def test_no_frame_changes_what_the_time_has_decided(lines: tuple[str, ...]) -> None:
+    """A finger that comes back in the very frame that is due comes too late, and begins anew."""
+    stream = frames("quiet for 1500ms", *lines, "quiet for 900ms")
+    decided = next(n for n in range(len(stream)) if any(isinstance(x, Cut) for x in cut_out(stream[: n + 1])))
+    pressed = next(frame for frame in stream if frame.t >= touch_of(stream))
+    late = [*stream[:decided], replace(stream[decided], values=pressed.values)]
+    one, other = cut_out(stream[: decided + 1]), cut_out(late)
+    assert kinds(one) == ["Onset", "Cut", "Release"]
+    assert kinds(other) == ["Onset", "Cut", "Release", "Onset"]
+    for expected, found in zip(one, other[:3], strict=True):
+        if isinstance(expected, Cut) and isinstance(found, Cut):
+            assert np.array_equal(expected.segment.frames, found.segment.frames)
+            assert expected.decided == found.decided
+        else:
+            assert expected == found
+
+
+def touch_of(stream: Sequence[Frame]) -> float:
+    """When the last contact of a stream was touched last, in s."""
+    return max(x.segment.offset for x in cut_out(stream) if isinstance(x, Cut))
 
 
 def test_what_was_decided_follows_its_event() -> None:
@@ -157,7 +194,11 @@ def touched(stream: Sequence[Frame]) -> tuple[int, int]:
 
 def cut_out(stream: Sequence[Frame]) -> list[Contact]:
     front_end = FrontEnd("armrest", 9, 9)
-    return [x for frame in stream for x in front_end.push(frame)]
+    return [x for frame in stream for x in contacts(front_end, frame)]
+
+
+def contacts(front_end: FrontEnd, frame: Frame) -> list[Contact]:
+    return [found for found in front_end.push(frame) if not isinstance(found, Draft)]
 
 
 @pytest.mark.parametrize("where", [-4, 0, 3, 9, 11])  # frames from the onset; the last touched one is the eleventh
@@ -450,7 +491,7 @@ def test_the_times_are_settings() -> None:
     assert 0.3 <= waited < 0.44
     held = frames("quiet for 1500ms", "press 4,4 0.8 for 2s", "quiet for 1s")
     front_end = FrontEnd("s", 9, 9, timing=Timing(limit_s=1.0))
-    events = [event for frame in held for event in front_end.push(frame)]
+    events = [event for frame in held for event in contacts(front_end, frame)]
     assert [type(event) for event in events] == [Onset, Cancelled, Release]
     assert events[1].reason == "held"  # type: ignore[union-attr]
 
@@ -477,7 +518,7 @@ def test_a_silence_means_the_same_however_long_it_was(what: str, answer: str, si
     front_end = FrontEnd("s", 9, 9)
     for frame in stream:
         front_end.push(frame)
-    assert kinds(front_end.push(Frame(stream[-1].t + silence, idle))) == [answer, "Release"]
+    assert kinds(contacts(front_end, Frame(stream[-1].t + silence, idle))) == [answer, "Release"]
 
 
 def fast(rate: float) -> list[Frame]:
@@ -506,7 +547,7 @@ def fast(rate: float) -> list[Frame]:
 @pytest.mark.parametrize("rate", [15.0, 30.0, 200.0, 1000.0])
 def test_a_tap_before_a_swipe_is_a_segment_of_its_own(rate: float) -> None:
     front_end = FrontEnd("s", 9, 9)
-    events = [event for frame in fast(rate) for event in front_end.push(frame)]
+    events = [event for frame in fast(rate) for event in contacts(front_end, frame)]
     assert kinds(events) == ["Onset", "Cut", "Release"] * 2
     tap, swipe = (event.segment for event in events if isinstance(event, Cut))
     assert 1.5 <= tap.onset <= tap.offset < 1.63 and 1.83 <= swipe.onset <= swipe.offset < 2.145

@@ -8,8 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.core import segmentation
-from gestured.core.segmentation import TRANSITIONS, Action, Phase, Segmenter, Signal
+from gestured.core.phases import CONTACT, GAP, IDLE, RELEASING, SPENT, TRANSITIONS, Action, Phase, Row, Signal
+from gestured.core.segmentation import Deed, Segmenter
 
+PHASES = {phase.name: phase for phase in (IDLE, CONTACT, RELEASING, GAP, SPENT)}
 PAGE = Path(__file__).parents[2] / "ARCHITECTURE.md"
 Stream = list[tuple[float, float, tuple[float, float]]]  # s since the frame before, activity in noise, centroid
 
@@ -21,12 +23,12 @@ places = st.sampled_from([(4.0, 4.0), (4.0, 4.5), (0.0, 8.0)])
 def play(stream: Stream, wait: bool = True) -> list[Action]:
     """What a segmenter says of a stream, asked as the front end asks it."""
     segmenter = Segmenter(81, 0.15 * 9, wait_for_double_tap=wait)
-    t, said = 0.0, []
+    t, said = 0.0, list[Deed]()
     for pause, activity, place in stream:
         t += pause
         said += segmenter.flush(t)
         said += segmenter.push(t, activity, place if activity >= segmenter.off else None)
-    return said
+    return [deed.action for deed in said]
 
 
 def table() -> dict[tuple[Phase, Signal], tuple[Phase, Action | None]]:
@@ -40,12 +42,12 @@ def table() -> dict[tuple[Phase, Signal], tuple[Phase, Action | None]]:
         for signal, cell in zip(signals, cells, strict=True):
             if cell != "-":
                 target, _, action = cell.partition(", ")
-                found[Phase[phase], signal] = Phase[target], Action[action.upper()] if action else None
+                found[PHASES[phase], signal] = PHASES[target], Action[action.upper()] if action else None
     return found
 
 
 def test_the_page_shows_the_table() -> None:
-    assert table() == TRANSITIONS
+    assert table() == {key: (row.then, row.action) for key, row in TRANSITIONS.items()}
 
 
 @given(st.lists(st.tuples(waits, activities, places), max_size=60), st.booleans())
@@ -62,10 +64,10 @@ def test_whatever_comes_has_its_row_and_each_onset_its_end(stream: Stream, wait:
 def test_no_row_is_there_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = set()
 
-    class Watched(dict):  # type: ignore[type-arg]
-        def __getitem__(self, key: tuple[Phase, Signal]) -> object:
+    class Watched(dict[tuple[Phase, Signal], Row]):
+        def __getitem__(self, key: tuple[Phase, Signal]) -> Row:
             seen.add(key)
-            return super().__getitem__(key)
+            return TRANSITIONS[key]
 
     monkeypatch.setattr(segmentation, "TRANSITIONS", Watched(TRANSITIONS))
 
@@ -87,6 +89,8 @@ def test_no_row_is_there_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     for n, activity in enumerate([50.0] * 3 + [0.0] * 3):
         waiting.flush(n / 15)
         waiting.push(n / 15, activity, (4.0, 4.0))
-    assert waiting.give_up(0.4) == [Action.HELD]  # a tap whose second one never comes, by a clock that stands still
+    assert [deed.action for deed in waiting.give_up(0.4)] == [
+        Action.HELD
+    ]  # a tap whose second one never comes, by a clock that stands still
     # What lies there after a contact was given up counts as touched down to `off`: it is never weak.
-    assert seen == set(TRANSITIONS) - {(Phase.SPENT, Signal.WEAK)}
+    assert seen == set(TRANSITIONS) - {(SPENT, Signal.WEAK)}

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gestured.core.events import Cancelled, Event, Gesture, Unknown
-from gestured.core.frames import Segment
+from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.measures import MEASURES
 from gestured.core.reading import STATES, Reading
@@ -142,11 +142,15 @@ def test_drift_is_the_way_of_the_baseline_in_units_of_noise(model: Path) -> None
     assert drift(t) == 0.0 and parts.hub.readings(t)["a"].state == "ok"
 
 
-def test_too_many_bad_taxels_make_a_sensor_faulty() -> None:
-    front_end = FrontEnd("a", 9, 9)
-    assert not faulty(front_end)
-    front_end.conditioner.bad[:21] = True
-    assert faulty(front_end)
+@pytest.mark.parametrize(("noisy", "too_many"), [(0, False), (20, False), (21, True)])
+def test_a_sensor_with_more_than_a_quarter_of_bad_taxels_is_faulty(noisy: int, too_many: bool) -> None:
+    front_end, rng = FrontEnd("a", 9, 9), np.random.default_rng(0)
+    for n in range(90):
+        counts = 300 + rng.normal(0, 2, 81)
+        counts[:noisy] += rng.normal(0, 200, noisy)
+        front_end.push(Frame(n / 15, counts.reshape(9, 9)))
+    assert front_end.bad_taxels == noisy
+    assert faulty(front_end) == too_many
 
 
 def contacts(model: Path, *, watched: bool) -> list[str]:

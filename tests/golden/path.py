@@ -12,11 +12,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from gestured.core.events import Cancelled, Event, Onset, Release
+from gestured.core.events import Event
 from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
 from gestured.core.feed import front_end_of
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.front_end import Contact, Draft, FrontEnd
 from gestured.core.hub import Hub
 from gestured.core.reading import Reading
 from gestured.core.recognizer import Decided
@@ -105,10 +105,7 @@ def replay(tape: Tape, model: Ladder) -> list[Line]:
     return [_line(event) for event in player.events()]
 
 
-Found = Onset | Cut | Cancelled | Release
-
-
-def front_ends(tape: Tape) -> Iterator[tuple[FrontEnd, Stamp, list[Found]]]:
+def front_ends(tape: Tape) -> Iterator[tuple[FrontEnd, Stamp, list[Contact]]]:
     """Each sensor's front end after each of its frames, with the frame's stamp, and what the front end found.
 
     Whoever sends may feed every sensor, and touches are kept. A dropped frame is passed over, but its stamp is given.
@@ -128,11 +125,12 @@ def front_ends(tape: Tape) -> Iterator[tuple[FrontEnd, Stamp, list[Found]]]:
                 sensors[name] = Stamper(scene.clock_of(name)), front_end_of(name, scene)
             stamper, front_end = sensors[name]
             for arrival, stamp in zip(arrivals, stamper.stamp(arrivals, now), strict=True):
-                found: list[Found] = []
+                found: list[Contact] = []
                 if not stamp.dropped:
                     if stamp.restarted:
                         found += front_end.reset()
-                    found += front_end.push(Frame(stamp.t, arrival.values, arrival.touches, stamp.lost))
+                    frame = Frame(stamp.t, arrival.values, arrival.touches, stamp.lost)
+                    found += [one for one in front_end.push(frame) if not isinstance(one, Draft)]
                 yield front_end, stamp, found
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gestured.core.front_end import Cut
+from gestured.core.front_end import Contact, Cut
 from gestured.model.ladder import Ladder
 from tests.golden import path
 from tests.golden.path import Line
@@ -56,7 +56,7 @@ def found(tape: Tape, model: Ladder) -> list[Line]:
     return [*lines, *(sensor.line(name) for name, sensor in seen.items() if sensor.stamps)]
 
 
-def _line(sensor: str, contact: path.Found, model: Ladder) -> Line:
+def _line(sensor: str, contact: Contact, model: Ladder) -> Line:
     line: Line = {"type": type(contact).__name__}
     if not isinstance(contact, Cut):
         return line | asdict(contact)

@@ -296,7 +296,7 @@ def month_table(classifier: Classifier, days: float) -> Table:
             heard.update(map(type, events_of(recognizer.push(Frame(float(t), frame)))))
     end = float(times[-1])
     level = LEVEL + swing * float(np.sin(2 * np.pi * end / 86_400.0))
-    off, *_ = front.conditioner.deviation(np.full(81, level))
+    off = level - front.baseline
     after, _ = swipes(1, level=level)
     found: list[Event] = []
     for t, frame in zip(after.times + end + 0.1, after.frames, strict=True):

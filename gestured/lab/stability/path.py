@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.conditioning import Mounting
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.mounting import Mounting
 from gestured.core.recognizer import Classifier, Recognizer, events_of
 from gestured.simulator import GESTURES, Participant, Sensor, generator, gesture_take
 

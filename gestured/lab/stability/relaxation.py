@@ -14,15 +14,10 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.conditioning import (
-    BASELINE_TAU_S,
-    NOISE_TAU_S,
-    RECOVERY_TAU_S,
-    REVIEW_S,
-    UNSEEN_S,
-    Conditioner,
-)
-from gestured.core.segmentation import AFTER_S, ON_SHARE, RECOVERY_S, Segmenter
+from gestured.core.activity import Activity
+from gestured.core.baseline import BASELINE_TAU_S, RECOVERY_TAU_S, Baseline
+from gestured.core.contact import AFTER_S, RECOVERY_S, AfterEffect
+from gestured.core.noise import NOISE_TAU_S, REVIEW_S, SIGMA_PER_DEVIATION, UNSEEN_S, Noise
 from gestured.lab.stability.table import Cell, Table
 from gestured.simulator.textile import REMANENCE_S, relax
 
@@ -48,58 +43,46 @@ class Filter:
     dtypes: tuple[Any, ...] = (np.float64, np.float32)  # that its state can have
 
 
-def _conditioner(dtype: Any) -> Conditioner:
-    """A 3 x 3 sensor whose idle state is known; the state is kept in `dtype`, and begins at 0 s."""
-    made = Conditioner(3, 3)
-    for k in range(16):
-        made.settle(k / 15 - 1.0, np.zeros(9))
-    assert made.ready
-    made.baseline = made.baseline.astype(dtype)
-    made._sigma = np.full(9, 0.75, dtype)
-    made._tracked, made._reviewed, made._usual = 0.0, 0.0, 0.0
-    return made
-
-
 def _baseline(recovering: bool) -> Run:
     def run(times: Array, inputs: Array) -> Array:
-        made, out = _conditioner(inputs.dtype), np.zeros_like(inputs)
-        for k, (t, x) in enumerate(zip(times, inputs, strict=True)):
-            raw = np.full(9, x)
-            d, *_ = made.deviation(raw)
-            made.idle(float(t), raw, d, 0.0, sunken=False, burst=False, recovering=recovering)
-            out[k] = made.baseline[0]
+        made, out, since = Baseline(9), np.zeros_like(inputs), 0.0
+        made.counts = made.counts.astype(inputs.dtype)
+        for k, (t, x) in enumerate(zip(times.tolist(), inputs, strict=True)):
+            made.follow(t, since, x - made.counts, recovering=recovering)
+            out[k], since = made.counts[0], t
         return out
 
     return run
 
 
 def _noise(times: Array, inputs: Array) -> Array:
-    made, out = _conditioner(inputs.dtype), np.zeros_like(inputs)
-    for k, (t, x) in enumerate(zip(times, inputs, strict=True)):
-        d = np.full(9, (0.5 + 0.5 * x) / 1.2533, inputs.dtype)  # never clipped: at most 4 of the least noise
-        made.idle(float(t), d, d, 0.0, sunken=False, burst=True, recovering=False)
-        out[k] = 2.0 * made._sigma[0] - 1.0
+    made, out = Noise(9), np.zeros_like(inputs)
+    made.sigma = np.full(9, 0.75, inputs.dtype)
+    for k, (t, x) in enumerate(zip(times.tolist(), inputs, strict=True)):
+        above = np.full(9, (0.5 + 0.5 * x) / SIGMA_PER_DEVIATION, inputs.dtype)  # never taken for an outlier
+        made.follow(t, above)
+        out[k] = 2.0 * made.sigma[0] - 1.0
     return out
 
 
 def _usual(times: Array, inputs: Array) -> Array:
-    made, out = _conditioner(np.float64), np.zeros(len(inputs))
-    still = np.zeros(9)
-    for k, (t, x) in enumerate(zip(times, inputs, strict=True)):
-        made.idle(float(t), still, still, float(x), sunken=False, burst=True, recovering=False)
-        out[k] = made._usual
+    made, out, since = Activity(3, 3), np.zeros(len(inputs)), 0.0
+    made.unlearn()
+    for k, (t, x) in enumerate(zip(times.tolist(), inputs.tolist(), strict=True)):
+        made.follow(t, since, x)
+        out[k], since = made.usual, t
     return out
 
 
 def _after_effect(times: Array, inputs: Array) -> Array:
     """Decays from 1 whatever comes: `inputs` is 0 for it."""
-    made = Segmenter(9, 1.0, wait_for_double_tap=False)
-    made.push(-0.3, 1.0 / ON_SHARE, (1.0, 1.0))
-    made.push(-0.2, 1.0 / ON_SHARE + made.on, (1.0, 1.0))
-    made.push(-0.1, 0.0, None)
-    made.flush(0.0)
-    scale = made.after_effect(0.0)
-    return np.array([made.after_effect(float(t)) / scale for t in times])
+    made = AfterEffect(on=1.0)
+    made.begin()
+    made.touch(1.0)
+    made.touch(1.0)
+    made.end(0.0)
+    scale = made.level(0.0)
+    return np.array([made.level(float(t)) / scale for t in times])
 
 
 def _branch(times: Array, inputs: Array) -> Array:
@@ -117,12 +100,12 @@ def _remanence(times: Array, inputs: Array) -> Array:
 
 
 FILTERS = (
-    Filter("baseline (core/conditioning)", BASELINE_TAU_S, _baseline(False), 0.0),
-    Filter("baseline after a contact (core/conditioning)", RECOVERY_TAU_S, _baseline(True), 0.0),
-    Filter("noise (core/conditioning)", NOISE_TAU_S, _noise, 0.5, REVIEW_S, UNSEEN_S),
-    Filter("idle activity (core/conditioning)", NOISE_TAU_S, _usual, 0.0, dtypes=(np.float64,)),
+    Filter("baseline (core/baseline)", BASELINE_TAU_S, _baseline(False), 0.0),
+    Filter("baseline after a contact (core/baseline)", RECOVERY_TAU_S, _baseline(True), 0.0),
+    Filter("noise (core/noise)", NOISE_TAU_S, _noise, 0.5, REVIEW_S, UNSEEN_S),
+    Filter("idle activity (core/activity)", NOISE_TAU_S, _usual, 0.0, dtypes=(np.float64,)),
     Filter(
-        "after-effect of a contact (core/segmentation)",
+        "after-effect of a contact (core/contact)",
         RECOVERY_S,
         _after_effect,
         1.0,
@@ -132,7 +115,7 @@ FILTERS = (
     Filter("Prony branch (simulator/textile)", 1.0, _branch, 0.0, even=True),
     Filter("remanence (simulator/textile)", REMANENCE_S, _remanence, 1.0, even=True),
 )
-DECAYS = ("after-effect of a contact (core/segmentation)", "remanence (simulator/textile)")  # take no input
+DECAYS = ("after-effect of a contact (core/contact)", "remanence (simulator/textile)")  # take no input
 
 
 def exact(

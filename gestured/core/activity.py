@@ -1,0 +1,101 @@
+"""How strongly a frame is pressed and where, in units of the sensor's noise.
+
+Nothing here smooths over time: at 15 Hz a tap is one to three frames.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.noise import NOISE_TAU_S
+from gestured.core.quantiles import median
+
+Array = NDArray[np.float64]
+
+COMMON = 4.0  # noise units of what all taxels share that are taken off; a palm must not cancel itself
+BLOB = (0.5, 1.0, 0.5)  # a fingertip over three taxels, in rows and in columns
+BLOB_GAIN = sum(BLOB) ** 2 / sum(b * b for b in BLOB)  # by which a level that all taxels share grows in a spot
+PLACE_SHARE = 0.3  # of the highest taxel: what lies below it says nothing of where the finger is
+PLACE_NOISE = 3.5  # noise units, likewise
+TYPICAL = 0.88  # of sqrt(2 ln N): the median of an idle frame's activity, where noise is normal
+USUAL_AT_MOST = 5.0  # times that: a sensor more restless than this is touched, or out of order
+SURPRISE = 2.0  # times the typical activity: a frame that is stronger counts as so strong, since one must not rule
+
+
+def rarely(taxels: int) -> float:
+    """Noise units that the strongest of so many idle taxels exceeds rarely: extreme values of normal deviates."""
+    return 1.0 + math.sqrt(2 * math.log(taxels))
+
+
+def hardly_ever(taxels: int) -> float:
+    """Noise units that the strongest of so many idle taxels almost never exceeds."""
+    return 3.0 + math.sqrt(2 * math.log(taxels))
+
+
+class Activity:
+    """The activity of a sensor of R x C taxels, and how high it usually is while the sensor is idle.
+
+    Clipping, hum and bursts make idle frames more active than normal noise would. `scale` is by how much: activity is
+    told in what is usual for this sensor.
+    """
+
+    def __init__(self, rows: int, columns: int) -> None:
+        self.rows, self.columns = rows, columns
+        self.scale = 1.0
+        self._down, self._across = _blob(rows), _blob(columns)
+        self._typical = TYPICAL * math.sqrt(2 * math.log(rows * columns))  # median activity where noise is normal
+        self.usual = self._typical  # median activity as it is, before `scale`
+
+    def measure(self, scaled: Array) -> tuple[float, float]:
+        """Strongest spot (a taxel alone, or with its neighbours) and lowest taxel of (N,) deviations in noise units.
+
+        A finger between taxels gives each of them half of what it gives; weighing the neighbours in (the matched
+        filter of a blob, normalised to the same noise) finds it all the same. What all taxels share is no finger.
+        """
+        # Every frame passes here. At this size one sort is cheaper than a minimum, a middle and a maximum, `dot` than
+        # `@`, and `argmax` than `max`.
+        ordered = scaled.copy()
+        ordered.sort()
+        spots = self._down.dot(scaled.reshape(self.rows, self.columns)).dot(self._across)
+        strongest = spots.item(spots.argmax())
+        common = min(max(ordered.item(ordered.size // 2), -COMMON), COMMON)
+        return max(ordered.item(-1) - common, strongest - common * BLOB_GAIN), ordered.item(0)
+
+    def place(self, pressed: Array, noise: float) -> tuple[float, float]:
+        """Centroid (row, column) of what clearly rises above 0 and above `noise`, of (N,) counts."""
+        top = float(pressed.max())
+        share, noise = PLACE_SHARE * top, PLACE_NOISE * noise
+        cut = share if noise >= top else max(share, noise)
+        grid = np.maximum(pressed - cut, 0.0).reshape(self.rows, self.columns)
+        total = float(grid.sum())
+        if not total > 0:
+            return (self.rows - 1) / 2, (self.columns - 1) / 2
+        return (
+            float(grid.sum(axis=1) @ np.arange(self.rows)) / total,
+            float(grid.sum(axis=0) @ np.arange(self.columns)) / total,
+        )
+
+    def unlearn(self) -> None:
+        """Take the sensor's noise for normal, until `learn` knows better."""
+        self.scale, self.usual = 1.0, 0.0
+
+    def learn(self, scaled: Array) -> None:
+        """See (n, N) deviations of idle frames, in noise units as they are with a `scale` of 1."""
+        self.usual = float(median(np.array([self.measure(frame)[0] for frame in scaled])))
+
+    def follow(self, t: float, since: float, activity: float) -> None:
+        """Follow the sensor, idle from `since` until `t` s and then as active as that."""
+        seen = min(activity, SURPRISE * self._typical) * self.scale
+        self.usual += (seen - self.usual) * -math.expm1((since - t) / NOISE_TAU_S)
+
+    def review(self) -> None:
+        """Put what has become usual into `scale`."""
+        self.scale = min(max(self.usual / self._typical, 1.0), USUAL_AT_MOST)
+
+
+def _blob(size: int) -> Array:
+    """(size, size) banded weights of `BLOB`, normalised so that white noise keeps its size."""
+    side, middle, _ = BLOB
+    band = middle * np.eye(size) + side * (np.eye(size, k=1) + np.eye(size, k=-1))
+    return np.asarray(band / math.sqrt(sum(b * b for b in BLOB)))

@@ -1,0 +1,113 @@
+"""What is remembered of a contact: when it was, where its centroid went, and what it leaves behind."""
+
+import math
+from dataclasses import dataclass, field
+
+from gestured.core.timing import Timing
+
+Place = tuple[float, float]  # (row, column) in taxel pitches
+
+ON_SHARE = 0.20  # of the last contact's peak: what a new contact must exceed while the textile recovers
+RECOVERY_S = 1.0  # the time constant of that, and how long what is left on the sensor counts as an after-effect
+AFTER_S = 8.0  # then nothing is left of a contact: a firm finger has faded below the noise
+SPIKE = 4.0  # times the next highest frame: a peak that one frame alone reached counts for so much at most
+FIRM = 8.0  # times the threshold of a contact: what the next highest frame is taken for at least, as a tap may be one
+
+
+class Stretch:
+    """One stretch of activity."""
+
+    __slots__ = ("_box", "began", "touched", "widest")
+
+    def __init__(self, began: float) -> None:
+        self.began = began  # s
+        self.touched = began  # s, the last touched frame
+        self.widest = 0.0  # taxel pitches, the diagonal of the box that holds the way of its centroid
+        self._box: tuple[float, float, float, float] | None = None  # top, left, bottom, right
+
+    def follow(self, place: Place) -> None:
+        """Its centroid is there now."""
+        row, column = place
+        top, left, bottom, right = self._box or (row, column, row, column)
+        top, left, bottom, right = min(top, row), min(left, column), max(bottom, row), max(right, column)
+        self._box = (top, left, bottom, right)
+        self.widest = max(self.widest, math.hypot(bottom - top, right - left))
+
+
+class AfterEffect:
+    """What contacts leave behind: textile comes back slowly, or swings below its baseline.
+
+    `on` is the activity from which there is a contact, in noise units.
+    """
+
+    def __init__(self, on: float) -> None:
+        self.peak = 0.0  # noise units, the highest activity of the contact that goes on, or of the last one
+        self._next = 0.0  # noise units, the next highest: of one frame more
+        self._over = -math.inf  # s, when that contact was over; infinite while it goes on
+        self._on = on
+
+    def begin(self) -> None:
+        """A contact has begun."""
+        self.peak = self._next = 0.0
+        self._over = math.inf
+
+    def touch(self, activity: float) -> None:
+        """A frame of the contact, as active as that in noise units."""
+        self._next = max(self._next, min(self.peak, activity))
+        self.peak = max(self.peak, activity)
+
+    def end(self, t: float) -> None:
+        """The contact is over at `t` s."""
+        self._over = t
+
+    def recovering(self, t: float) -> bool:
+        """Whether a contact has ended just before `t` s, so that what is left on the sensor is its after-effect."""
+        return t - self._over < RECOVERY_S
+
+    def level(self, t: float) -> float:
+        """Activity that a contact may leave behind at `t` s, in noise units.
+
+        One frame that is beyond all others is a fault of the readout, and leaves nothing behind; but the rest of the
+        contact in which it came is no new one.
+        """
+        past = max(t - self._over, 0.0)
+        if past > AFTER_S:
+            return 0.0
+        peak = self.peak
+        if past > RECOVERY_S:
+            peak = min(peak, SPIKE * max(self._next, FIRM * self._on))
+        return ON_SHARE * peak * math.exp(-past / RECOVERY_S)
+
+
+@dataclass(slots=True)
+class Memory:
+    """What the segmenter goes by, and what it remembers."""
+
+    timing: Timing
+    on: float  # noise units: activity from which there is a contact, if the last one has left nothing behind
+    off: float  # noise units: activity below which there is none
+    travel: float  # taxel pitches that a tap may move
+    wait_for_double_tap: bool
+    after: AfterEffect = field(init=False)
+    contact: Stretch = field(init=False)  # the one that goes on, or the last one
+    first: Stretch | None = field(init=False)  # of the segment, if `contact` is its second
+    quiet_since: float | None = field(init=False)  # s, the first quiet frame since the last touched one
+
+    def __post_init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Remember nothing."""
+        self.after = AfterEffect(self.on)
+        self.contact = Stretch(0.0)
+        self.first = self.quiet_since = None
+
+    @property
+    def onset(self) -> float:
+        """When the segment began, in s."""
+        return self.contact.began if self.first is None else self.first.began
+
+    def tap_so_far(self) -> bool:
+        """Whether the contact is short and stayed where it was."""
+        contact = self.contact
+        return contact.touched - contact.began <= self.timing.tap_s and contact.widest <= self.travel

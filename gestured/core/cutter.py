@@ -1,0 +1,122 @@
+"""The latest frames of one sensor, and the segments that are cut out of them."""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.conditioning import Conditioner, Look
+from gestured.core.frames import Segment, Touch
+from gestured.core.taxels import Inspection
+
+LARGEST = float(np.finfo(np.float32).max)  # counts; also what a frame on the wire can hold
+LEAD_S = 0.15  # quiet frames kept before an onset: at 15 Hz two of them
+LEAD_FRAMES = 200  # the same at 1000 Hz, and some: a sensor's own clock may all but stand still
+
+
+class Kept(NamedTuple):
+    """A frame that a segment may need."""
+
+    t: float  # s
+    above: NDArray[np.float64]  # (N,) counts above the baseline
+    touches: tuple[Touch, ...]
+    lost: int  # frames, just before this one
+    new: float  # s, since when the sensor has shown just that: a frame that is repeated tells nothing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Made:
+    """A segment as it was made, perhaps before it was cut."""
+
+    segment: Segment
+    peak: float  # counts
+    bad: NDArray[np.bool_]  # (N,) taxels that are bridged in it
+    inspection: Inspection
+
+
+class Cutter:
+    """Keeps the frames of a contact and shortly before it, and makes segments of them."""
+
+    def __init__(self, conditioner: Conditioner) -> None:
+        self._conditioner = conditioner
+        self._kept: deque[Kept] = deque()
+        self._made: Made | None = None
+        self._settled = -math.inf  # s, the last frame of the quiet second after which the sensor was ready
+        self._shown = b""  # raw counts of the last frame
+        self._new = 0.0  # s, since when it shows that
+
+    def __len__(self) -> int:
+        """How many frames are kept."""
+        return len(self._kept)
+
+    def settled(self, t: float) -> None:
+        """The idle sensor has been watched until `t` s, and is known."""
+        self._settled = t
+
+    def silent(self) -> None:
+        """The stream paused: what follows was not seen to begin."""
+        self._kept.clear()
+        self._settled = -math.inf
+
+    def clear(self) -> None:
+        """The sensor restarted: what was kept is no part of what follows."""
+        self._kept.clear()
+
+    def keep(self, look: Look, touches: tuple[Touch, ...], lost: int) -> None:
+        """Take a frame. Of a sensor that stands still when idle, a repeated one is as good as any."""
+        shown, self._shown = self._shown, look.raw.tobytes()
+        if shown != self._shown or not self._conditioner.noise.lively:
+            self._new = look.t
+        self._kept.append(Kept(look.t, look.above, touches, lost, self._new))
+
+    def trim(self, t: float) -> None:
+        """Nothing is open at `t` s: keep what the next contact may need before its onset."""
+        kept = self._kept
+        while kept[0].t < t - LEAD_S or len(kept) > LEAD_FRAMES:
+            kept.popleft()
+
+    def draft(self, onset: float, offset: float) -> Segment | None:
+        """The segment of a contact that may be over; None where it has been asked for already."""
+        before = self._made
+        made = self._make(onset, offset)
+        return None if made is before else made.segment
+
+    def cut(self, onset: float, offset: float) -> Made:
+        """The segment of a contact that is over, after what it says of the taxels."""
+        self._conditioner.judge(self._make(onset, offset).inspection)
+        made, self._made = self._make(onset, offset), None
+        return made
+
+    def hole(self, onset: float, until: float) -> float:
+        """The longest time in s in which a finger may have moved unseen, from before the onset to `until` s.
+
+        Infinite where nobody saw it come. Of a sensor that says no more nobody knows, and that counts for nothing.
+        """
+        last, longest = self._settled, 0.0
+        for new in (*(kept.new for kept in self._kept), until):
+            if new >= onset:
+                longest = max(longest, new - last)
+            last = new
+        return longest
+
+    def _make(self, onset: float, offset: float) -> Made:
+        """The segment of a contact: made once, unless a taxel has turned out to be bad since."""
+        made, conditioner = self._made, self._conditioner
+        if made is not None and (made.segment.onset, made.segment.offset) == (onset, offset):
+            if np.array_equal(made.bad, conditioner.taxels.bad):
+                return made
+        kept = list(self._kept)
+        times = np.array([frame.t for frame in kept])
+        stack = np.array([frame.above for frame in kept])
+        first = int(np.searchsorted(times, onset))
+        last = int(np.searchsorted(times, offset))
+        frames = np.clip(conditioner.taxels.bridge(stack), -LARGEST, LARGEST).astype(np.float32)
+        touches = tuple(frame.touches for frame in kept) if any(frame.touches for frame in kept) else ()
+        lost = sum(frame.lost for frame in kept[first + 1 : last + 1])
+        segment = Segment(frames, times, first, last, conditioner.noise.level, lost, touches)
+        inspection = conditioner.inspect(stack[first : last + 1])
+        self._made = Made(segment, float(frames.max()), conditioner.taxels.bad, inspection)
+        return self._made

@@ -1,0 +1,49 @@
+"""How a sensor is mounted, so that `swipe_up` is up for the person in front of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.frames import Touch
+
+
+@dataclass(frozen=True, slots=True)
+class Mounting:
+    """How a sensor is mounted: first mirrored left to right, then turned clockwise. Applied to frames and touches."""
+
+    rotate: int = 0  # degrees clockwise: 0, 90, 180, 270
+    mirror: bool = False
+
+    def __post_init__(self) -> None:
+        if self.rotate not in (0, 90, 180, 270):
+            raise ValueError(f"rotate: expected 0, 90, 180 or 270, found {self.rotate!r}")
+
+    def shape(self, rows: int, columns: int) -> tuple[int, int]:
+        """The grid (R, C) after mounting."""
+        return (columns, rows) if self.rotate in (90, 270) else (rows, columns)
+
+    def frame(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
+        """(R, C) as sent -> (R', C') as a person in front of the sensor sees it."""
+        if self.mirror:
+            values = values[:, ::-1]
+        return np.rot90(values, -(self.rotate // 90)) if self.rotate else values
+
+    def point(self, x: float, y: float, rows: int, columns: int) -> tuple[float, float]:
+        """A position on a sensor that sends R x C taxels, as sent -> as a person in front of it sees it.
+
+        Both in taxel pitches: x to the right, y upward, the origin at the bottom left.
+        """
+        if self.mirror:
+            x = columns - 1 - x
+        if self.rotate == 90:
+            return y, columns - 1 - x
+        if self.rotate == 180:
+            return columns - 1 - x, rows - 1 - y
+        if self.rotate == 270:
+            return rows - 1 - y, x
+        return x, y
+
+    def touches(self, sent: tuple[Touch, ...], rows: int, columns: int) -> tuple[Touch, ...]:
+        """The touches of a frame of R x C taxels, as a person in front of the sensor sees them."""
+        return tuple(Touch(touch.id, *self.point(touch.x, touch.y, rows, columns)) for touch in sent)

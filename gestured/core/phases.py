@@ -1,0 +1,205 @@
+"""The segmenter's table: what is true of the sensor, what can be said then, and what follows.
+
+A row stands for a phase and a signal: the phase that follows, what the front end does, and what is remembered.
+ARCHITECTURE.md shows the same table; a test compares them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum, auto  # its hash is an integer's; Enum's is a function in Python
+from typing import NamedTuple
+
+from gestured.core.contact import ON_SHARE, Stretch, Memory, Place
+
+OFF_SHARE = 0.12  # of the contact's peak: below it the finger is off (textile recovers slowly)
+
+
+class Signal(IntEnum):
+    """What a frame, or the time that passed, says."""
+
+    QUIET = auto()
+    WEAK = auto()
+    STRONG = auto()
+    MOVED = auto()  # the second contact is no tap, so it does not belong to the first
+    RELEASED = auto()  # quiet for `release_s`
+    TAPPED = auto()  # the same, and the segment is one tap so far
+    GAP_OVER = auto()  # quiet for `tap_gap_s`
+    LIMIT = auto()  # `limit_s` after the onset
+
+
+class Action(IntEnum):
+    """What the owner of the frames has to do."""
+
+    OPEN = auto()
+    CLOSE = auto()
+    SPLIT = auto()  # the first contact is a segment, the second one begins another
+    HELD = auto()  # give the segment up
+    LEFT = auto()  # a given-up contact was let go
+
+
+# --- what a frame says: which activity is quiet, weak or strong
+
+
+def _untouched(memory: Memory, t: float, activity: float) -> Signal:
+    """A contact has to exceed what the last one has left behind."""
+    if activity < memory.on:  # the common case first
+        return Signal.QUIET if activity < memory.off else Signal.WEAK
+    return Signal.STRONG if activity >= memory.on + memory.after.level(t) else Signal.WEAK
+
+
+def _touched(memory: Memory, t: float, activity: float) -> Signal:
+    """A finger is off below a share of its own peak, and back above a larger one: hysteresis."""
+    peak = memory.after.peak
+    if activity < max(memory.off, OFF_SHARE * peak):
+        return Signal.QUIET
+    return Signal.STRONG if activity >= max(memory.on, ON_SHARE * peak) else Signal.WEAK
+
+
+def _given_up(memory: Memory, t: float, activity: float) -> Signal:
+    """What lies there counts as touched down to `off`: it is never weak."""
+    return Signal.QUIET if activity < memory.off else Signal.STRONG
+
+
+# --- what a wait says, after so many seconds of quiet
+
+
+def _no_wait(memory: Memory, quiet_s: float) -> Signal | None:
+    return None
+
+
+def _released(memory: Memory, quiet_s: float) -> Signal | None:
+    """The finger is off. After a single tap a second one may come."""
+    if quiet_s < memory.timing.release_s:
+        return None
+    waits = memory.wait_for_double_tap and memory.first is None and memory.tap_so_far()
+    return Signal.TAPPED if waits else Signal.RELEASED
+
+
+def _gap_over(memory: Memory, quiet_s: float) -> Signal | None:
+    return Signal.GAP_OVER if quiet_s >= memory.timing.tap_gap_s else None
+
+
+def _left(memory: Memory, quiet_s: float) -> Signal | None:
+    return Signal.RELEASED if quiet_s >= memory.timing.release_s else None
+
+
+# --- what is remembered; what that shows is a signal in turn
+
+
+def _begin(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
+    """The first contact of a segment begins."""
+    memory.after.begin()
+    memory.first, memory.contact = None, Stretch(t)
+    return _press(memory, t, activity, place)
+
+
+def _again(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
+    """The second one begins."""
+    memory.first, memory.contact = memory.contact, Stretch(t)
+    return _press(memory, t, activity, place)
+
+
+def _press(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
+    """A frame that is pressed strongly: it also tells where."""
+    _touch(memory, t, activity)
+    if place is not None:
+        memory.contact.follow(place)
+    return _moved(memory)
+
+
+def _graze(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
+    """A frame that is pressed weakly."""
+    _touch(memory, t, activity)
+    return _moved(memory)
+
+
+def _touch(memory: Memory, t: float, activity: float) -> None:
+    if memory.first is None and memory.after.peak < OFF_SHARE * activity:
+        memory.contact = Stretch(t)  # what came before was too faint to belong to it: a hover, or noise
+    memory.after.touch(activity)
+    memory.contact.touched = t
+    memory.quiet_since = None
+
+
+def _moved(memory: Memory) -> Signal | None:
+    return Signal.MOVED if memory.first is not None and not memory.tap_so_far() else None
+
+
+def _quiet(memory: Memory, t: float, activity: float, place: Place | None) -> None:
+    """The first quiet frame is the one from which the waits count."""
+    if memory.quiet_since is None:
+        memory.quiet_since = t
+
+
+def _lie(memory: Memory, t: float, activity: float, place: Place | None) -> None:
+    """What was given up still lies there."""
+    memory.quiet_since = None
+    memory.contact.touched = t
+
+
+def _part(memory: Memory, t: float, activity: float, place: Place | None) -> None:
+    """The second contact is a segment of its own."""
+    memory.first = None
+
+
+def _end(memory: Memory, t: float, activity: float, place: Place | None) -> None:
+    """The contact is over; its after-effect begins to fade."""
+    memory.after.end(t)
+
+
+# --- the phases and the table
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Phase:
+    """What is true of the sensor, and how frames and waits are read while it is."""
+
+    name: str
+    reads: Callable[[Memory, float, float], Signal]  # s and activity of a frame -> what it says
+    waits: Callable[[Memory, float], Signal | None] = _no_wait  # s of quiet -> what they say, if anything
+    touched: bool = True  # a contact goes on, given up or not
+    pending: bool = True  # it is not given up, and what becomes of it is open
+    let_go: bool = False  # the finger is off: if the stream ends, what is open may be decided
+
+
+IDLE = Phase("IDLE", _untouched, touched=False, pending=False)
+CONTACT = Phase("CONTACT", _touched)
+RELEASING = Phase("RELEASING", _touched, _released, let_go=True)
+GAP = Phase("GAP", _touched, _gap_over, let_go=True)
+SPENT = Phase("SPENT", _given_up, _left, pending=False)
+
+
+class Row(NamedTuple):
+    """What follows when a signal comes in a phase."""
+
+    then: Phase
+    action: Action | None = None
+    remember: Callable[[Memory, float, float, Place | None], Signal | None] | None = None
+
+
+S, A = Signal, Action
+TRANSITIONS: dict[tuple[Phase, Signal], Row] = {
+    (IDLE, S.QUIET): Row(IDLE),
+    (IDLE, S.WEAK): Row(IDLE),
+    (IDLE, S.STRONG): Row(CONTACT, A.OPEN, _begin),
+    (CONTACT, S.QUIET): Row(RELEASING, None, _quiet),
+    (CONTACT, S.WEAK): Row(CONTACT, None, _graze),
+    (CONTACT, S.STRONG): Row(CONTACT, None, _press),
+    (CONTACT, S.MOVED): Row(CONTACT, A.SPLIT, _part),
+    (CONTACT, S.LIMIT): Row(SPENT, A.HELD),
+    (RELEASING, S.QUIET): Row(RELEASING),
+    (RELEASING, S.WEAK): Row(RELEASING),
+    (RELEASING, S.STRONG): Row(CONTACT, None, _press),
+    (RELEASING, S.RELEASED): Row(IDLE, A.CLOSE, _end),
+    (RELEASING, S.TAPPED): Row(GAP),
+    (RELEASING, S.LIMIT): Row(SPENT, A.HELD),
+    (GAP, S.QUIET): Row(GAP),
+    (GAP, S.WEAK): Row(GAP),
+    (GAP, S.STRONG): Row(CONTACT, None, _again),
+    (GAP, S.GAP_OVER): Row(IDLE, A.CLOSE, _end),
+    (GAP, S.LIMIT): Row(SPENT, A.HELD),
+    (SPENT, S.QUIET): Row(SPENT, None, _quiet),
+    (SPENT, S.WEAK): Row(SPENT, None, _lie),
+    (SPENT, S.STRONG): Row(SPENT, None, _lie),
+    (SPENT, S.RELEASED): Row(IDLE, A.LEFT, _end),
+}

@@ -1,0 +1,122 @@
+"""Which taxels are bad: those that are stuck, those that froze under a finger, and the noisy ones."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.bridging import bridged, neighbour_mean
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+NOISY = 8.0  # a taxel with more than this many times the sensor's noise is bad
+FROZEN_S = 0.4  # a pressed taxel that does not change by its noise for so long is no finger
+FROZEN_NOISE = 3.0  # of its noise units: above this a taxel that froze is pressed
+STRIKES = 2  # gestures in which a taxel stood still while its neighbours were pressed, and it is stuck
+STRUCK_SHARE = 0.4  # of the contact's peak that the neighbours of such a taxel have to reach
+STRUCK_NOISE = 8.0  # times the sensor's noise, likewise
+
+
+class Inspection(NamedTuple):
+    """What the frames of one contact say of its taxels."""
+
+    still: Mask  # (N,) taxels that did not change
+    suspect: Mask  # (N,) those of them whose neighbours were pressed
+    any_suspect: bool
+
+
+class Stuck:
+    """The taxels that show the same whatever presses them."""
+
+    def __init__(self, taxels: int) -> None:
+        self.mask: Mask = np.zeros(taxels, dtype=bool)
+        self._strikes = np.zeros(taxels, dtype=np.int64)
+        self._blameless = False  # whether no taxel has strikes or is stuck
+
+    def learn(self, constant: Mask) -> None:
+        """Take the (N,) taxels that never changed while the idle sensor's others did."""
+        self.mask = constant
+        self._blameless = False
+
+    def judge(self, seen: Inspection) -> bool:
+        """A contact is over: a taxel that stood still under pressure, twice, is stuck. Whether others are, now."""
+        if self._blameless and not seen.any_suspect:
+            return False
+        self._strikes[seen.suspect] += 1
+        self._strikes[~seen.still] = 0
+        stuck = (self.mask & seen.still) | (self._strikes >= STRIKES)
+        self._blameless = not (stuck.any() or self._strikes.any())
+        changed = bool((stuck != self.mask).any())
+        self.mask = stuck
+        return changed
+
+
+class Frozen:
+    """The taxels that stay pressed to the last digit, below the sensor's limit: a finger trembles."""
+
+    def __init__(self, taxels: int) -> None:
+        self.mask: Mask = np.zeros(taxels, dtype=bool)
+        self.any = False
+        self._tells = False  # whether a finger's tremble shows in this sensor's last digit
+        self._still_since = np.full(taxels, math.inf)  # s
+        self._previous: Array = np.zeros(taxels)  # raw counts
+        self._limit = -math.inf  # the largest raw count seen under a touch; there a taxel stands still without fault
+
+    def learn(self, *, fine: bool) -> None:
+        """The sensor was learned anew: nothing is frozen. `fine`: a finger's tremble shows in its last digit."""
+        self._tells = fine
+        self._set(np.zeros_like(self.mask))
+
+    def watch(self, t: float, raw: Array, above: Array, sigma: Array) -> bool:
+        """See (N,) counts and what they are above the baseline, `sigma` being the taxels' noise; whether others froze.
+
+        Asked while the sensor is touched, and later as long as a taxel is frozen.
+        """
+        changed = raw != self._previous
+        self._previous = raw
+        self._still_since = np.where(changed, t, np.minimum(self._still_since, t))
+        if not self._tells:
+            return False
+        self._limit = max(self._limit, float(raw.max()))
+        still = t - self._still_since >= FROZEN_S
+        frozen = still & (above > FROZEN_NOISE * sigma) & (raw < self._limit)
+        if not (frozen != self.mask).any():
+            return False
+        self._set(frozen)
+        return True
+
+    def _set(self, mask: Mask) -> None:
+        self.mask = mask
+        self.any = bool(mask.any())
+
+
+class Taxels:
+    """The bad taxels of a sensor of R x C taxels. They are flat here: (N,) with N = R * C."""
+
+    def __init__(self, rows: int, columns: int) -> None:
+        self.rows, self.columns = rows, columns
+        self.stuck = Stuck(rows * columns)
+        self.frozen = Frozen(rows * columns)
+        self.bad: Mask = np.zeros(rows * columns, dtype=bool)  # replaced, never changed in place
+
+    def review(self, sigma: Array, noise: float) -> None:
+        """Say which are bad, by each taxel's noise (N,) and the sensor's. Were it all of them, none would be left."""
+        self.bad = self.stuck.mask | self.frozen.mask | (sigma > NOISY * noise)
+        if self.bad.all():
+            self.bad = np.zeros_like(self.bad)
+
+    def inspect(self, frames: Array, noise: float) -> Inspection:
+        """Look at the frames of a contact, (T, N) counts above the baseline, not yet bridged."""
+        if len(frames) < 2:
+            return Inspection(np.ones(frames.shape[1], dtype=bool), np.zeros(frames.shape[1], dtype=bool), False)
+        peaks = frames.max(axis=0)
+        around = neighbour_mean(peaks.reshape(self.rows, self.columns), np.ones((self.rows, self.columns), dtype=bool))
+        still = np.ptp(frames, axis=0) == 0
+        suspect = still & (around.ravel() > max(STRUCK_SHARE * float(peaks.max()), STRUCK_NOISE * noise))
+        return Inspection(still, suspect, bool(suspect.any()))
+
+    def bridge(self, frames: Array) -> Array:
+        """(T, N) -> (T, R, C) with the bad taxels replaced by what their good neighbours show."""
+        return bridged(frames.reshape(-1, self.rows, self.columns), self.bad.reshape(self.rows, self.columns))
