@@ -54,13 +54,15 @@ class Activity:
         filter of a blob, normalised to the same noise) finds it all the same. What all taxels share is no finger.
         """
         # Every frame passes here. At this size one sort is cheaper than a minimum, a middle and a maximum, `dot` than
-        # `@`, and `argmax` than `max`.
+        # `@`, `argmax` than `max`, and a comparison than a call.
         ordered = scaled.copy()
         ordered.sort()
         spots = self._down.dot(scaled.reshape(self.rows, self.columns)).dot(self._across)
         strongest = spots.item(spots.argmax())
-        common = min(max(ordered.item(ordered.size // 2), -COMMON), COMMON)
-        return max(ordered.item(-1) - common, strongest - common * BLOB_GAIN), ordered.item(0)
+        common = ordered.item(ordered.size // 2)
+        common = COMMON if common > COMMON else -COMMON if common < -COMMON else common
+        alone, spot = ordered.item(-1) - common, strongest - common * BLOB_GAIN
+        return spot if spot > alone else alone, ordered.item(0)
 
     def place(self, pressed: Array, noise: float) -> tuple[float, float]:
         """Centroid (row, column) of what clearly rises above 0 and above `noise`, of (N,) counts."""

@@ -41,10 +41,14 @@ class AfterEffect:
     """
 
     def __init__(self, on: float) -> None:
+        self._on = on
+        self.clear()
+
+    def clear(self) -> None:
+        """There was no contact."""
         self.peak = 0.0  # noise units, the highest activity of the contact that goes on, or of the last one
         self._next = 0.0  # noise units, the next highest: of one frame more
         self._over = -math.inf  # s, when that contact was over; infinite while it goes on
-        self._on = on
 
     def begin(self) -> None:
         """A contact has begun."""
@@ -88,17 +92,18 @@ class Memory:
     off: float  # noise units: activity below which there is none
     travel: float  # taxel pitches that a tap may move
     wait_for_double_tap: bool
-    after: AfterEffect = field(init=False)
+    after: AfterEffect = field(init=False)  # of the contact that goes on, or of the last one
     contact: Stretch = field(init=False)  # the one that goes on, or the last one
     first: Stretch | None = field(init=False)  # of the segment, if `contact` is its second
     quiet_since: float | None = field(init=False)  # s, the first quiet frame since the last touched one
 
     def __post_init__(self) -> None:
+        self.after = AfterEffect(self.on)
         self.clear()
 
     def clear(self) -> None:
         """Remember nothing."""
-        self.after = AfterEffect(self.on)
+        self.after.clear()
         self.contact = Stretch(0.0)
         self.first = self.quiet_since = None
 

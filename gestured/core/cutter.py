@@ -67,10 +67,11 @@ class Cutter:
 
     def keep(self, look: Look, touches: tuple[Touch, ...], lost: int) -> None:
         """Take a frame. Of a sensor that stands still when idle, a repeated one is as good as any."""
-        shown, self._shown = self._shown, look.raw.tobytes()
+        t, shown = look.t, look.raw.tobytes()
         if shown != self._shown or not self._conditioner.noise.lively:
-            self._new = look.t
-        self._kept.append(Kept(look.t, look.above, touches, lost, self._new))
+            self._new = t
+        self._shown = shown
+        self._kept.append(Kept(t, look.above, touches, lost, self._new))
 
     def trim(self, t: float) -> None:
         """Nothing is open at `t` s: keep what the next contact may need before its onset."""

@@ -138,8 +138,10 @@ class FrontEnd:
         touches = self.mounting.touches(frame.touches, *self.sent) if frame.touches else ()
         cutter.keep(look, touches, frame.lost)
         place = conditioner.place(look) if look.activity >= segmenter.off else None
-        found += self._done(segmenter.push(t, look.activity, place), t, t)
-        if len(cutter) > self.timing.limit_frames:
+        deeds = segmenter.push(t, look.activity, place)
+        if deeds:
+            found += self._done(deeds, t, t)
+        if segmenter.phase.pending and len(cutter) > self.timing.limit_frames:
             found += self.give_up(t)
         if segmenter.phase.pending:
             conditioner.busy(look)

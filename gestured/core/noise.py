@@ -103,11 +103,11 @@ class Noise:
 
     def follow(self, t: float, above: Array) -> bool:
         """Follow the idle sensor, (N,) counts off its baseline at `t` s; whether it was time to look at the noise."""
-        self._reviewed = max(self._reviewed, t - UNSEEN_S)
         if t - self._reviewed < REVIEW_S:
             return False
+        since = max(self._reviewed, t - UNSEEN_S)
         seen = np.minimum(np.abs(above), OUTLIER * self.sigma) * SIGMA_PER_DEVIATION
-        sigma = self.sigma + (seen - self.sigma) * -math.expm1((self._reviewed - t) / NOISE_TAU_S)
+        sigma = self.sigma + (seen - self.sigma) * -math.expm1((since - t) / NOISE_TAU_S)
         self._set(np.maximum(sigma, self.step / 2))  # what shows no noise may have some all the same
         self._reviewed = t
         return True

@@ -18,7 +18,7 @@ Not handled: two people on one sensor, and a tap that begins while another finge
 from typing import NamedTuple
 
 from gestured.core.activity import hardly_ever, rarely
-from gestured.core.contact import AfterEffect, Memory, Place
+from gestured.core.contact import Memory, Place
 from gestured.core.phases import IDLE, TRANSITIONS, Action, Phase, Signal
 from gestured.core.timing import Timing
 
@@ -36,23 +36,16 @@ class Segmenter:
 
     def __init__(self, taxels: int, travel: float, *, wait_for_double_tap: bool = True, timing: Timing | None = None):
         """`travel`: taxel pitches that a tap may move."""
-        self._memory = Memory(timing or Timing(), hardly_ever(taxels), rarely(taxels), travel, wait_for_double_tap)
+        self.on = hardly_ever(taxels)  # noise units: activity from which there is a contact
+        self.off = rarely(taxels)  # noise units: activity below which there is none
+        self._memory = Memory(timing or Timing(), self.on, self.off, travel, wait_for_double_tap)
+        self.after = self._memory.after  # what the last contact has left behind
         self.phase: Phase = IDLE
 
     def reset(self) -> None:
         """Start clean, in IDLE."""
         self.phase = IDLE
         self._memory.clear()
-
-    @property
-    def on(self) -> float:
-        """Activity from which there is a contact, in noise units."""
-        return self._memory.on
-
-    @property
-    def off(self) -> float:
-        """Activity below which there is none, in noise units."""
-        return self._memory.off
 
     @property
     def onset(self) -> float:
@@ -63,11 +56,6 @@ class Segmenter:
     def last_touched(self) -> float:
         """When it was touched last, in s."""
         return self._memory.contact.touched
-
-    @property
-    def after(self) -> AfterEffect:
-        """What the last contact has left behind."""
-        return self._memory.after
 
     def push(self, t: float, activity: float, place: Place | None) -> list[Deed]:
         """One frame at `t` s, after `flush(t)`; `place`: the centroid (row, column), if activity is at least `off`."""
