@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import IntEnum, auto  # its hash is an integer's; Enum's is a function in Python
 from typing import NamedTuple
 
-from gestured.core.contact import ON_SHARE, Stretch, Memory, Place
+from gestured.core.contact import ON_SHARE, Memory, Place, Stretch
 
 OFF_SHARE = 0.12  # of the contact's peak: below it the finger is off (textile recovers slowly)
 

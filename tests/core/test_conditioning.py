@@ -666,3 +666,16 @@ def test_a_frame_that_is_no_number_is_a_lost_frame(value: float, moment: float, 
     with np.errstate(all="raise"):
         _, events = heard(times, frames)
     assert told(events) == told(expected)
+
+
+@pytest.mark.parametrize("left", [0.05, -0.05])
+@pytest.mark.parametrize("seed", range(3))
+def test_what_a_contact_leaves_behind_is_no_touch(left: float, seed: int) -> None:
+    """Textile comes back slowly, or swings below its baseline: here within half a second, from a share of the peak."""
+    times, frames = stream(SHAPE, [quiet(2), swipe(SHAPE, column=4), quiet(6), tap(SHAPE), quiet(1)], seed=seed)
+    after = np.maximum(times - 2.8, 0.0)
+    pressed = sum(finger(row, 4, SHAPE) for row in range(9))
+    frames += (left * np.exp(-after / 0.5) * (after > 0))[:, None, None] * pressed
+    front_end, events = heard(times, frames)
+    assert kinds(events) == 2 * ONE and not front_end.touched
+    assert segments(events)[0].offset < 3.3 and 8.8 <= segments(events)[1].onset
