@@ -170,7 +170,7 @@ def error(filter_: Filter, decade: float | None, dtype: Any, count: int) -> tupl
 
 
 def _seconds(filter_: Filter, count: int) -> float:
-    """Seconds a step, the best of five runs; with everything else that the code does in that step."""
+    """Seconds a step, the best of five runs, the code that holds the filter alone."""
     times = steps(count, 7, -1, filter_.tau_s, even=filter_.even)
     inputs = np.zeros(count + 1)
     best = math.inf
@@ -206,7 +206,7 @@ def filters_table(quick: bool) -> Table:
         (
             "Errors are shares of the largest exact output. `mixed`: steps of 1e-9 to 1e9 tau in disorder,",
             "repeated times and gaps of a day. `in range`: finite, never below nor above what came in. `us a",
-            "step`: with all else that the code does with that frame. The noise is looked at every 0.5 s:",
+            "step`: of the code that holds the filter. The noise is looked at every 0.5 s:",
             f"smaller steps add up. The after-effect ends after {AFTER_S:g} s; remanence below 1e-5 is taken for",
             "nothing, which is its error at 1 tau.",
         ),

@@ -1,0 +1,50 @@
+"""Mounting: a frame and its touches are turned together, clockwise, after the mirror."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gestured.core.mounting import Mounting
+
+Shape = tuple[int, int]
+
+grids = st.tuples(st.integers(2, 64), st.integers(2, 64))
+turns = st.sampled_from([0, 90, 180, 270])
+mountings = st.builds(Mounting, turns, st.booleans())
+
+
+@given(grids, mountings, st.data())
+def test_a_touch_stays_at_the_taxel_it_presses(grid: Shape, mounting: Mounting, data: st.DataObject) -> None:
+    rows, columns = grid
+    row, column = data.draw(st.integers(0, rows - 1)), data.draw(st.integers(0, columns - 1))
+    sent = np.zeros(grid)
+    sent[row, column] = 1
+    seen = mounting.frame(sent)
+    assert seen.shape == mounting.shape(rows, columns) and seen.sum() == 1
+    (seen_row,), (seen_column,) = np.nonzero(seen)
+    x, y = mounting.point(column, rows - 1 - row, rows, columns)
+    assert (x, y) == (seen_column, seen.shape[0] - 1 - seen_row)
+
+
+@given(grids, turns, turns, st.booleans())
+def test_turns_add_up_and_the_mirror_comes_first(grid: Shape, one: int, two: int, mirror: bool) -> None:
+    sent = np.arange(grid[0] * grid[1]).reshape(grid)
+    apart = Mounting(two).frame(Mounting(one, mirror).frame(sent))
+    assert np.array_equal(apart, Mounting((one + two) % 360, mirror).frame(sent))
+    assert np.array_equal(Mounting(one).frame(Mounting(0, True).frame(sent)), Mounting(one, True).frame(sent))
+    assert np.array_equal(Mounting(0, True).frame(Mounting(0, True).frame(sent)), sent)
+
+
+def test_turns_are_clockwise_and_the_mirror_swaps_left_and_right() -> None:
+    sent = np.array([[1, 2], [3, 4], [5, 6]])
+    assert Mounting(90).frame(sent).tolist() == [[5, 3, 1], [6, 4, 2]]
+    assert Mounting(270).frame(sent).tolist() == [[2, 4, 6], [1, 3, 5]]
+    assert Mounting(180).frame(sent).tolist() == [[6, 5], [4, 3], [2, 1]]
+    assert Mounting(0, True).frame(sent).tolist() == [[2, 1], [4, 3], [6, 5]]
+
+
+@pytest.mark.parametrize("rotate", [45, -90, 360, 1])
+def test_another_angle_is_refused(rotate: int) -> None:
+    with pytest.raises(ValueError, match=f"rotate.*270.*{rotate}"):
+        Mounting(rotate)
