@@ -29,7 +29,7 @@ def rarely(taxels: int) -> float:
 
 
 def hardly_ever(taxels: int) -> float:
-    """Noise units that the strongest of so many idle taxels almost never exceeds."""
+    """Noise units that the strongest of so many idle taxels almost never exceeds; two more than `rarely`."""
     return 3.0 + math.sqrt(2 * math.log(taxels))
 
 

@@ -17,11 +17,9 @@ from gestured.core.taxels import Inspection, Taxels
 
 Array = NDArray[np.float64]
 
-LEAST_SIGMA = 0.2  # of the sensor's noise: a taxel that hardly moves must not count for more than five others
-# A taxel that lies lower than this share of the highest one's height may be a finger's doing.
-BELOW_SHARE = 0.3
-# Three taxels of twenty, as integers so that the comparison is exact, that lie far below the baseline are no touch.
-SHIFTED, SHIFTED_OF = 3, 20
+LEAST_SIGMA = 0.2  # of the sensor's noise: a taxel that hardly moves counts for at most five times a usual one
+BELOW_SHARE = 0.3  # of the highest taxel's height: what lies less deep than that may come with a firm finger
+SHIFTED, SHIFTED_OF = 3, 20  # taxels: where so many of so many lie far below the baseline, no touch does that
 
 
 class Look(NamedTuple):

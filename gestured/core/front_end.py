@@ -226,10 +226,12 @@ class FrontEnd:
         return found
 
     def _open(self, onset: float) -> list[Contact]:
+        """A segment begins, with the next id."""
         self.segments += 1
         return [Onset(self.sensor, self.segments, onset)]
 
     def _close(self, onset: float, offset: float, t: float, seen: float) -> list[Contact]:
+        """A segment is over, as decided at `t` s: it is cut, unless it was no finger's."""
         release = Release(self.sensor, self.segments, offset)
         if self._glitch(onset, offset):
             return [Cancelled(self.sensor, self.segments, "glitch"), release]
@@ -239,6 +241,7 @@ class FrontEnd:
         return [Cut(self.segments, made.segment, t, self._cutter.hole(onset, seen)), release]
 
     def _cancel(self, reason: str) -> list[Contact]:
+        """The contact that goes on has no answer, and ends."""
         release = Release(self.sensor, self.segments, self._segmenter.last_touched)
         if not self._segmenter.phase.pending:  # it has been cancelled already
             return [release]

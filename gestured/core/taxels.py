@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 NOISY = 8.0  # a taxel with more than this many times the sensor's noise is bad
-FROZEN_S = 0.4  # a pressed taxel that does not change by its noise for so long is no finger
+FROZEN_S = 0.4  # a pressed taxel that stays the same to the last digit for so long is no finger
 FROZEN_NOISE = 3.0  # of its noise units: above this a taxel that froze is pressed
 STRIKES = 2  # gestures in which a taxel stood still while its neighbours were pressed, and it is stuck
 STRUCK_SHARE = 0.4  # of the contact's peak that the neighbours of such a taxel have to reach
