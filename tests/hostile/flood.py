@@ -46,7 +46,7 @@ def main() -> int:
             sock.connect((host, int(port)))
         for _ in range(round(10 * CALM_S) if args.kind == "owners" else 0):
             for n, sock in enumerate(socks):
-                sock.send(osc.encode_message(f"/flood{n % OWNERS}/pressure", "b", (bytes(81),)))
+                sock.send(encoding.message(f"/flood{n % OWNERS}/pressure", "b", (bytes(81),)))
             time.sleep(0.1)
         start = time.monotonic()
         while (passed := time.monotonic() - start) < args.seconds:
