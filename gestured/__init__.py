@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from gestured.core.errors import GesturedError
     from gestured.core.events import Cancelled, Gesture, Onset, Release, Status, Unknown
     from gestured.core.frames import Frame, Touch
-    from gestured.core.hub import Hub  # type: ignore[import-not-found, unused-ignore]
+    from gestured.core.hub import Hub
     from gestured.core.recognizer import Recognizer
-    from gestured.core.scene import Scene  # type: ignore[import-not-found, unused-ignore]
+    from gestured.core.scene import Scene
     from gestured.model.embedded import open
 
 __all__ = [

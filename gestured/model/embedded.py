@@ -12,14 +12,12 @@ from numpy.typing import ArrayLike
 from gestured.core.conditioning import Mounting
 from gestured.core.errors import SettingsError
 from gestured.core.events import Event
+from gestured.core.feed import front_end_of
 from gestured.core.frames import Frame, Touch
-from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Recognizer
+from gestured.core.recognizer import Recognizer, events_of
+from gestured.core.scene import Scene, Setup
 from gestured.core.wire import is_sensor
 from gestured.model.ladder import gestures_in_use, ladder_for
-
-FEWEST, MOST = 2, 64  # rows, and columns, as in the daemon's settings
-DOUBLE_TAP = "double_tap"
 
 
 class Embedded:
@@ -49,7 +47,7 @@ class Embedded:
         if frame.shape != self._shape:
             raise ValueError(f"values: expected the grid {self._shape} of this sensor, found the shape {frame.shape}")
         self._last = t
-        return self._recognizer.push(Frame(t, frame, tuple(touches), lost))
+        return events_of(self._recognizer.push(Frame(t, frame, tuple(touches), lost)))
 
     def flush(self, t: float) -> list[Event]:
         """The stream paused or ended at `t` s: decide what can be decided, cancel the rest.
@@ -59,11 +57,11 @@ class Embedded:
         """
         if not self._last <= t < math.inf:
             raise ValueError(f"t: expected a time not before the last frame's, {self._last} s, found {t}")
-        return self._recognizer.flush(t)
+        return events_of(self._recognizer.flush(t))
 
     def reset(self) -> list[Event]:
         """The sensor restarted: cancel what is open, learn the idle sensor anew."""
-        return self._recognizer.reset()
+        return events_of(self._recognizer.reset())
 
 
 def open(  # the name by which users call it: gestured.open
@@ -88,18 +86,13 @@ def open(  # the name by which users call it: gestured.open
     used = gestures_in_use(ladder, gestures)
     try:
         rows, columns = map(operator.index, (ladder.rows, ladder.columns) if grid is None else grid)
-        if not (FEWEST <= rows <= MOST and FEWEST <= columns <= MOST):
-            raise ValueError
     except (TypeError, ValueError):
-        raise SettingsError(
-            f"grid: expected rows and columns, each from {FEWEST} to {MOST}, such as (9, 9), found {grid!r}"
-        ) from None
+        raise SettingsError(f"grid: expected rows and columns, such as (9, 9), found {grid!r}") from None
     try:
-        mounting = Mounting(rotate, mirror)
+        scene = Scene(gestures=used, grid=(rows, columns), sensors={sensor: Setup(mounting=Mounting(rotate, mirror))})
     except ValueError as error:
         raise SettingsError(str(error)) from None
-    front_end = FrontEnd(sensor, rows, columns, mounting=mounting, wait_for_double_tap=DOUBLE_TAP in used)
-    return Embedded(Recognizer(front_end, ladder, gestures=used), used)
+    return Embedded(Recognizer(front_end_of(sensor, scene), ladder, gestures=used), used)
 
 
 def _counts(values: ArrayLike) -> np.ndarray[tuple[int, ...], np.dtype[np.generic]]:

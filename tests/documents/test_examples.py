@@ -1,6 +1,5 @@
 """The examples marked `run: here`: run against a real daemon, but for the addresses."""
 
-import importlib.util
 import os
 import shutil
 import socket
@@ -169,7 +168,6 @@ def test_one_sensor_in_a_process_of_ones_own(place: Place):
     assert [line.split()[0] for line in done.stdout.splitlines()] == ["swipe_left", "swipe_up"]
 
 
-@pytest.mark.skipif(importlib.util.find_spec("gestured.core.hub") is None, reason="gestured.core.hub is not there yet")
 def test_many_sensors_in_a_process_of_ones_own(place: Place):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
