@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-import gestured.core
-import gestured.simulator
 from gestured.core.errors import RecordingError
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
 from gestured.core.window import Window
+from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import (
@@ -196,12 +195,7 @@ STREAMS = {"wide": _wide, "cohort": _cohort, "others": _others}
 
 def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
     """The first `count` takes of one of `STREAMS`, from `cache` where they were made before."""
-    code = hashlib.sha256()
-    for package in (gestured.core, gestured.simulator):
-        for path in sorted(Path(str(package.__file__)).parent.glob("*.py")):
-            code.update(path.read_bytes())
-    code.update(Path(__file__).read_bytes())
-    path = cache / f"{stream}-{seed}-{count}-{code.hexdigest()[:12]}.npz"
+    path = cache / f"{stream}-{seed}-{count}-{code_digest(__name__)[:12]}.npz"
     if path.exists():
         with np.load(path, allow_pickle=False) as stored:
             return Samples(*(stored[name] for name in Samples.__slots__))

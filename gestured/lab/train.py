@@ -23,6 +23,7 @@ from gestured.core.features import feature_names
 from gestured.core.measures import MEASURES, measures
 from gestured.lab.dataset import OTHERS, TRIALS, WINDOW, Samples, join, recorded, simulated
 from gestured.lab.decide import fit_decision, threshold
+from gestured.lab.digest import code_digest
 from gestured.lab.export import export_forest, export_net, write_manifest
 from gestured.lab.fit import CLASSES, FitConfig, finetune, load_nets, logits, pretrain, save_nets, targets
 from gestured.lab.forest_graph import forest_outputs
@@ -116,9 +117,8 @@ class Trained:
 
 def learn(plan: Plan, data: Data, cache: Path) -> Trained:
     """Both stages and the folds; what is done already is read from the cache."""
-    key = hashlib.sha256(json.dumps([asdict(plan.fit), data.teach.digest(), CLASSES, _code()]).encode()).hexdigest()[
-        :12
-    ]
+    told = json.dumps([code_digest("gestured.lab.fit"), asdict(plan.fit), data.teach.digest()])
+    key = hashlib.sha256(told.encode()).hexdigest()[:12]
     first = cache / f"simulated-{key}.npz"
     if not first.exists():
         save_nets(first, pretrain(data.teach, plan.fit, cache / f"checkpoint-{key}.npz"))
@@ -138,14 +138,6 @@ def _kept(path: Path, start: nn.ModuleDict, data: Data, real: Samples, plan: Pla
     if not path.exists():
         save_nets(path, finetune(start, data.teach, real, plan.fit, title))
     return load_nets(path)
-
-
-def _code() -> str:
-    """A digest of what shapes training besides the data and the plan."""
-    here = Path(__file__).parent
-    return hashlib.sha256(
-        b"".join((here / f"{n}.py").read_bytes() for n in ("fit", "nets", "trajectory", "augment"))
-    ).hexdigest()
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ Everything is drawn from PCG64 on SeedSequences and ends in integer counts: the 
 takes.
 """
 
-from .cohort import (
+from gestured.simulator.cohort import (
     GESTURES,
     NON_GESTURES,
     NONE,
@@ -23,8 +23,8 @@ from .cohort import (
     session,
     wide,
 )
-from .people import INCLINATIONS, SPEEDS, Artefact, Contact, Participant, Performance, generator
-from .sensor import Event, Sensor, Take
+from gestured.simulator.people import INCLINATIONS, SPEEDS, Artefact, Contact, Participant, Performance, generator
+from gestured.simulator.sensor import Event, Sensor, Take
 
 __all__ = [
     "GESTURES",

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .gestures import TEN
-from .others import OTHERS
-from .people import INCLINATIONS, SPEEDS, Artefact, Contact, Participant, Performance, generator
-from .sensor import Sensor, Take
-from .strokes import Scene
+from gestured.simulator.gestures import TEN
+from gestured.simulator.others import OTHERS
+from gestured.simulator.people import INCLINATIONS, SPEEDS, Artefact, Contact, Participant, Performance, generator
+from gestured.simulator.sensor import Sensor, Take
+from gestured.simulator.strokes import Scene
 
 GESTURES: tuple[str, ...] = tuple(TEN)
 # Gestures one right after the other: read as such, not as none.

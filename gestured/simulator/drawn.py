@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from .gestures import DOWN, LEFT, RIGHT, UP
-from .kinematics import Array, arc, ellipse, grid, polyline, progress, turning, wander
-from .people import Contact
-from .strokes import Scene
+from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP
+from gestured.simulator.kinematics import Array, arc, ellipse, grid, polyline, progress, turning, wander
+from gestured.simulator.people import Contact
+from gestured.simulator.strokes import Scene
 
 
 def drawn(scene: Scene, t: Array, x: Array, y: Array) -> list[Contact]:

@@ -5,10 +5,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .kinematics import ellipse, grid, turning, wander
-from .people import Contact
-from .strokes import Scene, fingers_on, stroke, swipe_length, touch_down
-from .things import resting_hand
+from gestured.simulator.kinematics import ellipse, grid, turning, wander
+from gestured.simulator.people import Contact
+from gestured.simulator.strokes import Scene, fingers_on, stroke, swipe_length, touch_down
+from gestured.simulator.things import resting_hand
 
 RIGHT, UP, LEFT, DOWN = 0.0, math.pi / 2, math.pi, -math.pi / 2
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from .drawn import (
+from gestured.simulator.drawn import (
     arc_stroke,
     back_and_forth,
     check_mark,
@@ -17,12 +17,12 @@ from .drawn import (
     wave,
     zigzag,
 )
-from .gestures import DOWN, LEFT, RIGHT, UP, swipe
-from .kinematics import arc, grid, progress
-from .people import Artefact, Contact
-from .several import drumming, knuckles, pinch, rotation, spread, three_finger_swipe, two_finger_tap
-from .strokes import Scene, fingers_on, stroke, swipe_length, touch_down
-from .things import (
+from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP, swipe
+from gestured.simulator.kinematics import arc, grid, progress
+from gestured.simulator.people import Artefact, Contact
+from gestured.simulator.several import drumming, knuckles, pinch, rotation, spread, three_finger_swipe, two_finger_tap
+from gestured.simulator.strokes import Scene, fingers_on, stroke, swipe_length, touch_down
+from gestured.simulator.things import (
     electrical_burst,
     forearm,
     heel_rest,

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .kinematics import Array, wander
+from gestured.simulator.kinematics import Array, wander
 
 SPEEDS = {"slow": 0.55, "normal": 1.0, "fast": 1.8}
 INCLINATIONS = (0, 1, 2)

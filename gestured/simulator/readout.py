@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .kinematics import Array, wander
-from .people import Artefact, generator
+from gestured.simulator.kinematics import Array, wander
+from gestured.simulator.people import Artefact, generator
 
 if TYPE_CHECKING:
-    from .sensor import Sensor
+    from gestured.simulator.sensor import Sensor
 
 
 def amplify(sensor: "Sensor", field: Array, times: Array, inclination: int, rng: np.random.Generator) -> Array:

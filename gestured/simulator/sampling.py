@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .kinematics import Array
-from .people import Contact
-from .textile import tail_kernel
+from gestured.simulator.kinematics import Array
+from gestured.simulator.people import Contact
+from gestured.simulator.textile import tail_kernel
 
 if TYPE_CHECKING:
-    from .people import Performance
-    from .sensor import Sensor
+    from gestured.simulator.people import Performance
+    from gestured.simulator.sensor import Sensor
 
 FINGER_MM = 3.7  # the finger that a sensor's `gain` refers to
 INSTANTS = 3  # per row and frame

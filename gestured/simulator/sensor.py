@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .kinematics import Array
-from .people import Performance, generator
-from .readout import amplify, digitise, disturb, transmit
-from .sampling import sample
-from .textile import compress, leak, relax
+from gestured.simulator.kinematics import Array
+from gestured.simulator.people import Performance, generator
+from gestured.simulator.readout import amplify, digitise, disturb, transmit
+from gestured.simulator.sampling import sample
+from gestured.simulator.textile import compress, leak, relax
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +133,7 @@ class Sensor:
     @staticmethod
     def wide(rng: np.random.Generator, hardness: float = 0.6) -> "Sensor":
         """Any sensor at all; `hardness` 0 (clean) .. 1 (as bad as it may get) scales all that disturbs."""
-        from .variety import any_sensor  # which builds Sensors itself
+        from gestured.simulator.variety import any_sensor  # which builds Sensors itself
 
         return any_sensor(rng, hardness)
 

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from .gestures import DOWN, LEFT, RIGHT, UP, swipe
-from .kinematics import grid, progress
-from .people import Contact
-from .strokes import Scene, touch_down
+from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP, swipe
+from gestured.simulator.kinematics import grid, progress
+from gestured.simulator.people import Contact
+from gestured.simulator.strokes import Scene, touch_down
 
 
 def knuckles(scene: Scene) -> list[Contact]:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .kinematics import Array, arc, grid, progress, wander
-from .people import SPEEDS, Contact, Participant, fingertip
+from gestured.simulator.kinematics import Array, arc, grid, progress, wander
+from gestured.simulator.people import SPEEDS, Contact, Participant, fingertip
 
 
 @dataclass(frozen=True, slots=True)

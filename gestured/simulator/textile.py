@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .kinematics import Array
+from gestured.simulator.kinematics import Array
 
 REMANENCE_S = 1.5  # after a touch, what hysteresis has left behind fades that fast
 

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from .kinematics import Array, grid, progress, wander
-from .people import Artefact, Contact
-from .strokes import Scene
+from gestured.simulator.kinematics import Array, grid, progress, wander
+from gestured.simulator.people import Artefact, Contact
+from gestured.simulator.strokes import Scene
 
 Pair = tuple[float, float]
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from .sensor import Sensor
+from gestured.simulator.sensor import Sensor
 
 
 def _log(rng: np.random.Generator, low: float, high: float) -> float:

@@ -12,7 +12,8 @@ import numpy as np
 
 from gestured.client.say import say, say_drawn, say_json
 from gestured.core.errors import GesturedError, RecordingError
-from gestured.lab.recordings.origin import digest, said
+from gestured.lab.digest import file_digest
+from gestured.lab.recordings.origin import said
 from gestured.record.arrays import Recordings, read, write
 
 FIELDS = {f"{field.name}.npy" for field in fields(Recordings)}
@@ -71,7 +72,7 @@ def find(participant: str, paths: Sequence[Path]) -> tuple[list[Part], list[str]
             unread.append(str(error))
             continue
         if own:
-            parts.append(Part(file, digest(file), own, len(subjects)))
+            parts.append(Part(file, file_digest(file), own, len(subjects)))
     return parts, unread
 
 

@@ -1,12 +1,12 @@
 """Whose recordings a model learned from: written into the model's metadata, and read again when somebody asks."""
 
-import hashlib
 import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from gestured.lab.digest import file_digest
 from gestured.model.file import inspect, read_bytes
 from gestured.record.arrays import read
 
@@ -22,15 +22,11 @@ class Origin:
     subjects: list[str]
 
 
-def digest(path: Path) -> str:
-    """SHA-256 of a file."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def origins(paths: Iterable[Path]) -> list[dict[str, Any]]:
     """What a model that learns from these files says of them; RecordingError for what is no recording."""
-    return [asdict(Origin(path.name, digest(path), sorted(set(read(path).subjects.astype(str))))) for path in paths]
+    return [
+        asdict(Origin(path.name, file_digest(path), sorted(set(read(path).subjects.astype(str))))) for path in paths
+    ]
 
 
 def said(model: Path) -> list[Origin] | None:

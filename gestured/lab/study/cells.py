@@ -9,37 +9,17 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 from joblib import Parallel, delayed, parallel_config
 
-import gestured.core
-import gestured.lab
 from gestured.core.errors import GesturedError
+from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.lab.study.material import Data
 from gestured.lab.study.protocols import Result, Task, run
 from gestured.record.files import PUBLIC, atomic_write
-
-SHAPING = (  # the rooms whose code decides what a cell's numbers are
-    "dataset", "fit", "nets", "trajectory", "study/shifting", "study/wavelets", "study/touch_patterns",
-    "study/motion_history", "study/trajectory_boosting", "study/nets", "study/training", "study/methods",
-    "study/views", "study/material", "study/protocols", "study/elapsed", "study/run_time", "study/onnx_form",
-    "study/sessions",
-)  # fmt: skip
-
-
-@cache
-def code_digest() -> str:
-    """Of everything that shapes a cell, besides its data and its task."""
-    lab = Path(str(gestured.lab.__file__)).parent
-    core = sorted(Path(str(gestured.core.__file__)).parent.glob("*.py"))
-    total = hashlib.sha256()
-    for path in [*core, *(lab / f"{room}.py" for room in SHAPING)]:
-        total.update(path.read_bytes())
-    return total.hexdigest()
 
 
 @dataclass(frozen=True)
@@ -52,20 +32,23 @@ class Schedule:
 
     def path(self, task: Task, data: Data) -> Path:
         """A cell's file."""
-        return self._file(task.method, [data.key, asdict(task)])
+        return self._path(task.method, run.__module__, [data.key, asdict(task)])
 
-    def _file(self, name: str, key: Sequence[Any]) -> Path:
-        text = json.dumps([code_digest(), *key], sort_keys=True, default=str)
-        return self.cache / "cells" / f"{name}-{hashlib.sha256(text.encode()).hexdigest()[:20]}.json"
+    def once(self, name: str, module: str, key: Sequence[Any], make: Callable[[], Any]) -> Any:
+        """What `make` gives, from its file where it was made before.
 
-    def once(self, name: str, key: Sequence[Any], make: Callable[[], Any]) -> Any:
-        """What `make` gives, from its file where it was made before; `key` is what it depends on besides the code."""
-        path = self._file(name, key)
+        It depends on the code of `module` and of all that this uses, and on `key`.
+        """
+        path = self._path(name, module, key)
         found = _read(path) if path.exists() else None
         if found is None:
             found = json.loads(json.dumps(make()))
             keep(path, found)
         return found
+
+    def _path(self, name: str, module: str, key: Sequence[Any]) -> Path:
+        told = json.dumps([code_digest(module), *key], sort_keys=True, default=str)
+        return self.cache / "cells" / f"{name}-{hashlib.sha256(told.encode()).hexdigest()[:20]}.json"
 
     def results(self, tasks: Sequence[Task], sets: Mapping[str, Data], title: str) -> dict[Task, Result]:
         """Every task's result, from its file where it was computed before."""

@@ -14,12 +14,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-import gestured.core
-import gestured.lab.dataset
-import gestured.simulator
 from gestured.core.frames import Segment
 from gestured.core.window import Window
 from gestured.lab.dataset import TRIALS, WINDOW, Performed, Samples, collect, cuts, matched
+from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import Trial, cohort_take
@@ -85,13 +83,8 @@ def _cut(seed: int, index: int) -> Segment | None:
 
 def load(cache: Path, trials: NDArray[np.int64], jobs: int) -> Cohort:
     """The cohort's gestures of these trials, from `cache` where they were made before."""
-    code = hashlib.sha256(trials.tobytes())
-    for package in (gestured.core, gestured.simulator):
-        for path in sorted(Path(str(package.__file__)).parent.glob("*.py")):
-            code.update(path.read_bytes())
-    for room in (gestured.lab.dataset.__file__, __file__):
-        code.update(Path(room).read_bytes())
-    path = cache / f"study-cohort-{len(trials)}-{code.hexdigest()[:12]}.npz"
+    key = hashlib.sha256(code_digest(__name__).encode() + trials.tobytes()).hexdigest()
+    path = cache / f"study-cohort-{len(trials)}-{key[:12]}.npz"
     if not path.exists():
         with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
             made = pool.imap(partial(_cut, SEED), trials.tolist(), chunksize=30)

@@ -15,6 +15,7 @@ import gestured
 from gestured.core.errors import GesturedError
 from gestured.lab.cli import REAL
 from gestured.lab.dataset import NONE, Samples, simulated
+from gestured.lab.digest import file_digest
 from gestured.lab.study import cohort, elapsed, failures, own, signals, tables
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.choices import choices
@@ -29,6 +30,7 @@ from gestured.lab.study.run_time import measure
 from gestured.lab.study.sessions import online
 from gestured.lab.study.tuning import tune
 from gestured.lab.study.views import Values
+from gestured.model.model import shipped
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES
 
@@ -99,12 +101,21 @@ def compute(plan: Plan, schedule: Schedule, folder: Path, recordings: Sequence[P
     # What is timed comes last and alone: nothing else of ours runs beside it.
     simulated_data = sets["simulated"]
     key = [simulated_data.key, asdict(plan), tuned]
-    study["run_time"] = schedule.once("run-time", key, lambda: measure(plan, tuned, people, simulated_data))
-    models = schedule.cache / "models"
-    played = schedule.once("online", key, lambda: online(plan, tuned, simulated_data, models))
-    study["online"], study["online_shipped"] = played
+    study["run_time"] = schedule.once(
+        "run-time", measure.__module__, key, lambda: measure(plan, tuned, people, simulated_data)
+    )
+    study["online"], study["online_shipped"] = played(plan, tuned, simulated_data, schedule)
     study["machine"]["minutes"] = round((time.monotonic() - start) / 60, 1)
     return study
+
+
+def played(plan: Plan, tuned: dict[str, Values], data: Data, schedule: Schedule) -> list[list[dict[str, Any]]]:
+    """The online protocol's rows: of the study's models, and of the shipped ones."""
+    key = [data.key, asdict(plan), tuned, [file_digest(path) for path in shipped().values()]]
+    made: list[list[dict[str, Any]]] = schedule.once(
+        "online", online.__module__, key, lambda: online(plan, tuned, data, schedule.cache / "models")
+    )
+    return made
 
 
 def _failures(found: Mapping[tables.Cell, Result], people: cohort.Cohort) -> list[dict[str, Any]]:

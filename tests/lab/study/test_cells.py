@@ -11,14 +11,15 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("pywt")
 
-from joblib import Parallel
-
 from gestured.core.errors import GesturedError
-from gestured.lab.study import cells
+from gestured.lab.study import cells, study
 from gestured.lab.study.cells import Schedule
+from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import CLEAN, PARTICIPANTS
 from tests.lab.study.material_made import data
 from tests.lab.study.test_protocols import task
+from joblib import Parallel
+
 
 TASKS = [task(CLEAN), task(PARTICIPANTS), task(PARTICIPANTS, "none")]
 
@@ -73,6 +74,20 @@ def test_a_damaged_checkpoint_is_made_again(tmp_path: Path, here: None) -> None:
 def test_other_data_are_other_checkpoints(tmp_path: Path) -> None:
     schedule = Schedule(tmp_path, 1)
     assert schedule.path(TASKS[0], data(4)) != schedule.path(TASKS[0], data(5))
+
+
+def test_other_shipped_models_are_played_again(tmp_path: Path, shelf: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plays = iter(range(9))
+    monkeypatch.setattr(study, "online", lambda *_: ([], [{"play": next(plays)}]))
+
+    def play() -> int:
+        _, ((row,)) = study.played(Plan.small(0), {}, data(), Schedule(tmp_path, 1))
+        return int(row["play"])
+
+    assert play() == play() == 0
+    with (shelf / "lstm.onnx").open("ab") as file:
+        file.write(b"\0")
+    assert play() == 1
 
 
 @pytest.fixture

@@ -1,0 +1,72 @@
+"""Digests of code and of files: the keys under which the lab keeps what takes long to compute.
+
+That of code sees what runs and nothing else: a changed comment, docstring or line break leaves it as it is.
+"""
+
+import ast
+import hashlib
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import gestured
+
+PACKAGE = Path(gestured.__file__).parent
+
+
+@cache
+def code_digest(module: str) -> str:
+    """SHA-256 of a module of gestured, such as `gestured.lab.fit`, and of all of gestured's that it uses.
+
+    A module is used that an import or a text names, anywhere in the code: programs are started by their name.
+    """
+    found: dict[Path, ast.Module] = {}
+    todo = list(_files(module))
+    while todo:
+        path = todo.pop()
+        if path not in found:
+            found[path] = tree = _WithoutTexts().visit(ast.parse(path.read_bytes()))
+            todo += [other for name in _named(tree, path) for other in _files(name)]
+    total = hashlib.sha256()
+    for path in sorted(found):
+        total.update(f"{path.relative_to(PACKAGE)}\n{ast.dump(found[path])}\n".encode())
+    return total.hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+class _WithoutTexts(ast.NodeTransformer):
+    """Takes docstrings away, and whatever else is a text that nothing is done with."""
+
+    def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
+        return None if isinstance(node.value, ast.Constant) else self.generic_visit(node)
+
+
+def _named(tree: ast.Module, path: Path) -> Iterator[str]:
+    """Every name in a file's code that may be a module's."""
+    package = path.relative_to(PACKAGE.parent).parts[:-1]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else ()
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value
+
+
+def _files(name: str) -> Iterator[Path]:
+    """Where a module's code is: one file, a package's own, or none where gestured has no module of this name."""
+    first, *parts = name.split(".")
+    if first != PACKAGE.name or not all(part.isidentifier() for part in parts):
+        return
+    place = PACKAGE.joinpath(*parts)
+    for path in (place.with_suffix(".py"), place / "__init__.py", place / "__main__.py"):
+        if path.is_file():
+            yield path

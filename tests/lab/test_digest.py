@@ -1,0 +1,57 @@
+"""The digest of code by which the lab knows what it has computed before: what changes it, and what does not."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import gestured
+from gestured.lab.digest import code_digest
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """A copy of the package that can be changed."""
+    shutil.copytree(Path(gestured.__file__).parent, tmp_path / "gestured", ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path / "gestured"
+
+
+def digest(package: Path, module: str) -> str:
+    code = f"from gestured.lab.digest import code_digest; print(code_digest({module!r}))"
+    environ = {**os.environ, "PYTHONPATH": str(package.parent)}  # before the installed one
+    command = [sys.executable, "-P", "-c", code]
+    return subprocess.run(command, env=environ, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def test_comments_docstrings_and_line_breaks_are_no_code(copy: Path) -> None:
+    before = digest(copy, "gestured.lab.dataset")
+    assert before == code_digest("gestured.lab.dataset")
+    for path in copy.rglob("*.py"):
+        path.write_text("# Said about it.\n\n" + path.read_text().replace('"""', '"""Said about it. ', 1))
+    assert digest(copy, "gestured.lab.dataset") == before
+
+
+@pytest.mark.parametrize(
+    ("module", "room"),
+    [
+        ("gestured.lab.dataset", "lab/dataset.py"),  # its own code
+        ("gestured.lab.dataset", "core/segmentation.py"),  # what it imports imports it
+        ("gestured.lab.dataset", "simulator/people.py"),  # through a package
+        ("gestured.lab.study.sessions", "daemon/pipeline.py"),  # a program that it starts
+        ("gestured.lab.study.report", "lab/study/report/markup.py"),  # imported by the name that its folder has
+    ],
+)
+def test_every_change_of_code_that_is_used_changes_it(copy: Path, module: str, room: str) -> None:
+    before = digest(copy, module)
+    with (copy / room).open("a") as file:
+        file.write("\nOTHER_CODE = 1\n")
+    assert digest(copy, module) != before
+
+
+def test_code_that_is_not_used_does_not_count(copy: Path) -> None:
+    before = digest(copy, "gestured.lab.dataset")
+    (copy / "control" / "cli.py").write_text("")
+    assert digest(copy, "gestured.lab.dataset") == before
