@@ -75,6 +75,12 @@ def events(path: Path, *lines: object) -> Path:
     return write(path, CHANNELS, *(message(2, 10**9, line) for line in data))
 
 
+@pytest.mark.parametrize("written", ["[fd00::7]:5", "fd00::7:5"])
+def test_a_sender_is_known_with_brackets_and_without(tmp_path: Path, written: str) -> None:
+    path = write(tmp_path / "a.mcap", channel(1, "/gestured/packets", source=written), message(1, 10**9, b""))
+    assert tape.read(path).packets[0].source == ("fd00::7", 5)
+
+
 @pytest.mark.parametrize("number", [1, 3], ids=["packets", "pictures"])
 def test_the_sum_of_all_chunks_is_bounded(tmp_path: Path, number: int) -> None:
     inside = CHANNELS + channel(3, "/arm/pressure") + message(number, 10**9, bytes(1 << 16)) * 60  # 4 MiB

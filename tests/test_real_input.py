@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 
 from gestured.client.stream import Stream
+from gestured.core.address import Address
+from gestured.core.osc import encode_bundle, encode_message
 from gestured.model.model import shipped
 from tests import encoding
 
@@ -50,7 +52,7 @@ class Daemon:
         assert self.process.stdout is not None
         self.ready: dict[str, Any] = json.loads(self.process.stdout.readline())
         self.ending = False
-        self.port = int(self.ready["listen"].rsplit(":", 1)[1])
+        self.port = Address.parse(self.ready["listen"]).port
 
     def stream(self, *types: str) -> Stream:
         return Stream(Path(self.ready["socket"]), {"types": types})

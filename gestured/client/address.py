@@ -1,12 +1,16 @@
 """HOST:PORT on the command line."""
 
 import argparse
-import re
+
+from gestured.core.address import Address
 
 
-def host_port(text: str) -> tuple[str, int]:
-    """HOST:PORT or [HOST]:PORT as (host, port); for argparse."""
-    match = re.fullmatch(r"(?:\[([^\[\]\s]+)\]|([^\[\]:/\s]+)):(\d{1,5})", text)
-    if match is None or not 0 < int(match[3]) < 65536:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected HOST:PORT, such as 127.0.0.1:9000")
-    return match[1] or match[2], int(match[3])
+def host_port(text: str) -> Address:
+    """The address of a peer, whose port is known; for argparse."""
+    try:
+        address = Address.parse(text)
+        if address.port:
+            return address
+    except ValueError:
+        pass  # said below, with an example
+    raise argparse.ArgumentTypeError(f"{text!r}: expected HOST:PORT, such as 127.0.0.1:9000")

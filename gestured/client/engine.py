@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import gestured
+from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
 STOP_S = 5.0
@@ -55,10 +56,9 @@ class Engine:
         return ready
 
     @property
-    def listen(self) -> tuple[str, int]:
+    def listen(self) -> Address:
         """Where it takes frames."""
-        host, port = self.ready["listen"].rsplit(":", 1)
-        return host.strip("[]"), int(port)
+        return Address.parse(self.ready["listen"])
 
     @property
     def socket(self) -> Path:

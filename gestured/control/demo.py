@@ -62,9 +62,8 @@ def run(args: argparse.Namespace) -> int:
                 closing(Stream(engine.socket, {"types": ["gesture", "unknown"]})) as stream,
                 closing(Sensor(engine.listen, Form(SENSOR))) as sensor,
             ):
-                host, port = engine.listen
                 show.say(
-                    f"The daemon listens on {host}:{port} with the model {engine.ready['model']}.",
+                    f"The daemon listens on {engine.listen} with the model {engine.ready['model']}.",
                     f"A simulated sensor of {play.rows} x {play.columns} taxels sends OSC to it "
                     f"at {play.rate_hz:g} Hz.",
                     "For two seconds nobody touches it. Ctrl-C ends.",

@@ -17,6 +17,7 @@ from gestured.client.lines import JOIN, Forbidden, Refused, Unreachable
 from gestured.client.peer import Stranger
 from gestured.client.say import say, say_json
 from gestured.control.address import add_control, default_control
+from gestured.core.address import Address
 from gestured.core.errors import ModelError
 from gestured.model.model import check
 
@@ -92,7 +93,7 @@ def examine(path: Path) -> Iterator[Finding]:
         if isinstance(error, Stranger):
             remedy = f"ls -ld {path.parent} shows whose folder it is"
         yield Finding("bad", str(error), remedy)
-        yield _port(("127.0.0.1", 9000))
+        yield _port(Address("127.0.0.1", 9000))
         yield _model("cnn_lstm", None)
         return
     yield _permissions(path)
@@ -132,15 +133,15 @@ def _buffer(path: Path) -> Finding:
     return Finding("ok", f"the kernel grants receive buffers of {most >> 10} KiB")
 
 
-def _port(address: tuple[str, int]) -> Finding:
+def _port(address: Address) -> Finding:
     """Whether the daemon could have its usual port."""
-    where = f"udp {address[0]}:{address[1]}"
+    where = f"udp {address}"
     with socket.socket(type=socket.SOCK_DGRAM) as probe:
         try:
             probe.bind(address)
         except OSError as error:
             remedy = (
-                f"sudo ss -ulpn 'sport = :{address[1]}' shows whose it is. systemd holds it for the service: good; "
+                f"sudo ss -ulpn 'sport = :{address.port}' shows whose it is. systemd holds it for the service: good; "
                 "else end that program, or choose another --listen"
             )
             return Finding("warn", f"{where}: {error.strerror}", remedy)

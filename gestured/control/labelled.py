@@ -8,6 +8,7 @@ import numpy as np
 from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form
 from gestured.control.diff import STOPWATCH_S, Answer, Difference, Knew, Line, Verdict
+from gestured.core.address import Address
 from gestured.core.errors import RecordingError
 from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
@@ -16,7 +17,7 @@ from gestured.record.tape import Packet, Tape
 
 PAUSE_S = 3.0  # between two recordings: whatever is open is answered
 SESSION = "session"
-SOURCE = ("127.0.0.1", 9)  # of all its packets
+SOURCE = Address("127.0.0.1", 9)  # of all its packets
 DIFFERENT = ("wrong", "missed", "false")
 
 

@@ -16,6 +16,7 @@ from gestured.client.control import Control
 from gestured.client.lines import Refused, Unreachable
 from gestured.client.say import say, say_json
 from gestured.control.address import add_control, connect, finish_on_signals
+from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.facts import Taken
 from gestured.core.hub import Hub
@@ -93,10 +94,10 @@ class Keeper:
         """One line."""
         if line["type"] == "packet":
             self._t_ns = line["t_ns"] + self._epoch_ns
-            host, port = line["source"]
             packet = base64.b64decode(line["data"])
-            self._tape.packet(self._t_ns, f"{host}:{port}", packet)
-            for fact in self._hub.receive([(packet, (host, port))], line["t_ns"] / 1e9):
+            source = Address(*line["source"])
+            self._tape.packet(self._t_ns, str(source), packet)
+            for fact in self._hub.receive([(packet, source)], line["t_ns"] / 1e9):
                 if isinstance(fact, Taken):
                     self._tape.picture(self._t_ns, fact.sensor, fact.frame.values)
             self.packets += 1

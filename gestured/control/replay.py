@@ -151,7 +151,7 @@ def _there(args: argparse.Namespace, source: Source) -> int:
 def _send(args: argparse.Namespace, source: Source) -> list[float]:
     """When each packet was sent. Raises GesturedError where nobody listens."""
     sent, unheard = send(source.tape, args.to, args.speed)
-    where = f"{args.to[0]}:{args.to[1]}"
+    where = str(args.to)
     if unheard:
         raise GesturedError(f"nobody listened on {where} for {unheard} of {len(sent)} packets")
     say(f"sent {len(sent)} packets to {where}", to=sys.stderr)

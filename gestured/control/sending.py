@@ -16,6 +16,8 @@ from gestured.client.lines import Unreachable
 from gestured.client.sensor import sent_after_refusal
 from gestured.client.stream import Stream
 from gestured.control.diff import ONSET_S, Line
+from gestured.core import osc
+from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.stamping import Stamper
 from gestured.record.replay import Replay
@@ -32,7 +34,7 @@ TYPES = ("onset", "gesture", "unknown", "cancelled", "release", "status")
 TIMES = ("onset", "offset", "decided")
 
 
-def send(found: Tape, to: tuple[str, int], speed: float) -> tuple[list[float], int]:
+def send(found: Tape, to: Address, speed: float) -> tuple[list[float], int]:
     """When each packet was sent (s since the epoch), and how many were refused by a closed port.
 
     Each sender of the tape gets a socket of its own: a sensor belongs to its source.
@@ -40,7 +42,7 @@ def send(found: Tape, to: tuple[str, int], speed: float) -> tuple[list[float], i
     try:
         family, kind, _, _, where = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
     except OSError as error:
-        raise GesturedError(f"cannot send to {to[0]}:{to[1]}: {error.strerror or error}") from None
+        raise GesturedError(f"cannot send to {to}: {error.strerror or error}") from None
     senders: dict[tuple[str, int], socket.socket] = {}
     sent: list[float] = []
     unheard = 0

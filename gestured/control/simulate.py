@@ -10,6 +10,7 @@ from gestured.client.address import host_port
 from gestured.client.say import say, tell
 from gestured.client.sensor import BLOBS, Form, Sensor
 from gestured.control.play import add_arguments, frames, play_from
+from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
 from gestured.simulator import Event
@@ -29,7 +30,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         epilog="examples:\n  gesturectl simulate --to 127.0.0.1:9000 --sensor armrest\n"
         "  gesturectl simulate --kinds swipe_left,double_tap --seconds 30 --blob",
     )
-    parser.add_argument("--to", type=host_port, default=("127.0.0.1", 9000), metavar="HOST:PORT",
+    parser.add_argument("--to", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT",
                         help="where the daemon listens (default: 127.0.0.1:9000)")  # fmt: skip
     parser.add_argument(
         "--sensor", type=_sensor, default="simulated", metavar="NAME", help="its name (default: simulated)"
@@ -53,10 +54,9 @@ def run(args: argparse.Namespace) -> int:
     try:
         sensor = Sensor(args.to, form)
     except OSError as error:
-        raise GesturedError(f"cannot send to {args.to[0]}:{args.to[1]}: {error.strerror or error}") from None
-    host, port = args.to
+        raise GesturedError(f"cannot send to {args.to}: {error.strerror or error}") from None
     what = f"{play.rows} x {play.columns} taxels at {play.rate_hz:g} Hz"
-    say(f"sending {what} to {host}:{port} as {args.sensor}; Ctrl-C ends", to=sys.stderr)
+    say(f"sending {what} to {args.to} as {args.sensor}; Ctrl-C ends", to=sys.stderr)
     try:
         for start, take in play.takes(args.seconds):
             sensor.send(_telling(frames(start, take), start, take.events, sensor, args.json))
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         sensor.close()
         if sensor.unheard:
             lost = f"{sensor.unheard} of {sensor.sent} packets"
-            say(f"nobody listened on {host}:{port} for {lost}", to=sys.stderr)
+            say(f"nobody listened on {args.to} for {lost}", to=sys.stderr)
     return 0
 
 

@@ -17,6 +17,7 @@ from gestured.client.lines import Unreachable
 from gestured.client.say import say, shown, tell
 from gestured.control.address import add_control, connect, finish_on_signals
 from gestured.core import osc
+from gestured.core.address import Address
 from gestured.core.errors import GesturedError, ProtocolError
 from gestured.core.wire import is_sensor
 
@@ -216,27 +217,26 @@ def _tap(args: argparse.Namespace) -> Iterator[tuple[float, str, bytes]]:
         timer.start()
         for line in control.lines():
             if line["type"] == "packet":
-                host, port = line["source"]
-                yield line["t_ns"] / 1e9, f"{host}:{port}", base64.b64decode(line["data"])
+                yield line["t_ns"] / 1e9, str(Address(*line["source"])), base64.b64decode(line["data"])
         if not control.finished:
             raise Unreachable("the daemon closed the connection")
 
 
-def _listen(address: tuple[str, int], seconds: float) -> Iterator[tuple[float, str, bytes]]:
+def _listen(address: Address, seconds: float) -> Iterator[tuple[float, str, bytes]]:
     try:
         family, kind, _, _, where = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0]
         receiver = socket.socket(family, kind)
         receiver.bind(where)
     except OSError as error:
         hint = "; without --listen I ask the daemon that has it" if error.errno == 98 else ""
-        raise GesturedError(f"cannot listen on {address[0]}:{address[1]}: {error.strerror}{hint}") from None
+        raise GesturedError(f"cannot listen on {address}: {error.strerror}{hint}") from None
     with receiver:
         end = time.monotonic() + seconds
-        say(f"listening on {address[0]}:{address[1]}", to=sys.stderr)
+        say(f"listening on {address}", to=sys.stderr)
         while (left := end - time.monotonic()) > 0:
             receiver.settimeout(left)
             try:
                 packet, source = receiver.recvfrom(65_536)
             except TimeoutError:
                 return
-            yield time.monotonic(), f"{source[0]}:{source[1]}", packet
+            yield time.monotonic(), str(Address(*source[:2])), packet

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from gestured.core.address import Address
 from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
 from gestured.core.recognizer import Decided
 from gestured.daemon.log import Throttle, log
@@ -46,7 +47,7 @@ class Desk:
 
     def muted(self, senders: Sequence[tuple[str, int] | str]) -> None:
         """Say at a bounded rate that these senders of a flood are not heard for a while."""
-        names = [sender if isinstance(sender, str) else f"{sender[0]}:{sender[1]}" for sender in senders]
+        names = [sender if isinstance(sender, str) else str(Address(*sender[:2])) for sender in senders]
         self._throttle.warn("senders of a flood are not heard for some seconds", "muted", senders=names)
 
     def bug(self, what: str, error: BaseException | None = None, **fields: object) -> None:
@@ -69,6 +70,6 @@ class Desk:
 
     def _changed(self, change: Changed) -> None:
         if change.what == "new":
-            log.info("new sensor", sensor=change.sensor, source=f"{change.source[0]}:{change.source[1]}")
+            log.info("new sensor", sensor=change.sensor, source=str(Address(*change.source[:2])))
         else:
             self._throttle.warn(CHANGES[change.what], change.what, sensor=change.sensor)

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from gestured.core.address import Address
 from gestured.core.wire import Addresses
 from gestured.daemon.values import (
-    Address,
     AddressField,
     DestinationField,
     GridField,

@@ -3,12 +3,13 @@
 import socket
 from typing import Protocol
 
+from gestured.core import messages, osc
+from gestured.core.address import Address
 from gestured.core.events import Event, Gesture, Status
 from gestured.core.reading import SILENT
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.sockets import resolve
-from gestured.daemon.values import Address
 
 
 class Sink(Protocol):

@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from gestured.core.address import Address
 from gestured.core.errors import GesturedError
-from gestured.daemon.values import Address
 
 RECEIVE_BYTES = 4 << 20  # the default holds 166 frames of 9 x 9 floats, this 6,500
 BACKLOG = 1024  # a thousand clients may come back at once after a restart

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gestured import __version__
+from gestured.core.address import Address
 from gestured.core.reading import Reading
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.snapshot import Snapshot
@@ -94,7 +95,7 @@ def _sensor(reading: Reading, now: float) -> dict[str, Any]:
     if reading.source is None:
         return shown
     return shown | {
-        "source": f"{reading.source[0]}:{reading.source[1]}",
+        "source": str(Address(*reading.source[:2])),
         "heard_s_ago": round(now - reading.heard, 3),
         "lost": reading.lost,
         "noise": round(reading.noise, 4),

@@ -8,17 +8,9 @@ from typing import Annotated, NamedTuple
 
 from pydantic import BeforeValidator
 
+from gestured.core.address import Address
+
 SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
-
-
-class Address(NamedTuple):
-    """A host (name or literal) and a port; port 0 means any free one."""
-
-    host: str
-    port: int
-
-    def __str__(self) -> str:
-        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
 
 
 class Grid(NamedTuple):
@@ -32,17 +24,14 @@ class Grid(NamedTuple):
 
 
 def _address(value: object) -> Address:
-    match = re.fullmatch(r"(?:\[([0-9A-Fa-f:.%\w]+)\]|([^\[\]:/\s]+)):(\d{1,5})", str(value))
-    if not isinstance(value, str) or match is None or int(match[3]) > 65535:
-        raise ValueError("HOST:PORT with a port from 0 to 65535, such as 127.0.0.1:9000 or [::1]:9000")
-    return Address(match[1] or match[2], int(match[3]))
+    return Address.parse(value if isinstance(value, str) else "")
 
 
 def _destination(value: object) -> Address:
     try:
         if not isinstance(value, str) or not value.startswith("osc://"):
             raise ValueError
-        address = _address(value.removeprefix("osc://").rstrip("/"))
+        address = Address.parse(value.removeprefix("osc://").rstrip("/"))
         if address.port == 0:
             raise ValueError
     except ValueError:

@@ -23,6 +23,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from gestured.core.address import Address
 from gestured.core.errors import RecordingError
 from gestured.record.files import create, open_regular
 from gestured.record.mcap import CHANNEL, MESSAGE, METADATA, Budget, CutOff, Damaged, Fields, TooLarge, records
@@ -31,7 +32,7 @@ PACKETS, EVENTS, SCENE = "/gestured/packets", "/gestured/events", "scene"
 TEXT_BYTES = 1 << 20  # of one channel or metadata record that is read; settings have some kilobytes
 ITEM_COSTS = 250  # bytes of memory for a packet or an event, besides what it holds
 EVENT_COSTS = 24  # bytes of memory for a byte of JSON, where it is all empty lists
-NOBODY = "", 0  # the source of a channel that holds no packets
+NOBODY = Address("", 0)  # the source of a channel that holds no packets
 HOST_CHARACTERS = 255  # of a sender's name; the DNS allows no more
 LARGEST = 1e11  # of any number in an event that is read; as seconds since 1970 it is a date that Python can print
 CHUNK_BYTES = 1 << 20
@@ -83,7 +84,7 @@ class Packet:
     """A datagram."""
 
     t_ns: int  # when the daemon read it, since the epoch
-    source: tuple[str, int]
+    source: Address
     data: bytes
 
 
@@ -240,7 +241,7 @@ class _Reading:
         self.scene: Mapping[str, Any] | None = None
         self.packets: list[Packet] = []
         self.events: list[Mapping[str, Any]] = []
-        self._channels: dict[int, tuple[str, tuple[str, int]]] = {}  # topic, "" where we do not know it; source
+        self._channels: dict[int, tuple[str, Address]] = {}  # topic, "" where we do not know it; source
 
     def take(self, opcode: int, content: bytes, budget: Budget) -> None:
         """One record; what we do not know is passed over."""
@@ -259,7 +260,8 @@ class _Reading:
         number, _ = fields.take("<HH")
         topic, _ = fields.text(), fields.text()
         topic = topic if topic in (PACKETS, EVENTS) else ""
-        self._channels[number] = topic, _source(fields.pairs().get("source", ":0")) if topic == PACKETS else NOBODY
+        source = fields.pairs().get("source") if topic == PACKETS else None
+        self._channels[number] = topic, NOBODY if source is None else _source(source)
 
     def _message(self, content: bytes, budget: Budget) -> None:
         fields = Fields(content)
@@ -313,8 +315,13 @@ def _brief(value: object) -> str:
     return repr(value)[:40]
 
 
-def _source(text: str) -> tuple[str, int]:
+def _source(text: str) -> Address:
     host, _, port = text.rpartition(":")
-    if not port.isdecimal() or len(port) > 5 or len(host) > HOST_CHARACTERS:
-        raise Damaged(f"a source {text[:40]!r}, expected HOST:PORT")
-    return host, int(port)
+    if ":" in host and not host.startswith("["):  # as it stands in tapes of before 0.1.0
+        text = f"[{host}]:{port}"
+    try:
+        if len(host) <= HOST_CHARACTERS:
+            return Address.parse(text)
+    except ValueError:
+        pass
+    raise Damaged(f"a source {text[:40]!r}, expected HOST:PORT")

@@ -11,6 +11,8 @@ from gestured.control.cli import main
 from gestured.control.doctor import BUFFER_BYTES, _buffer, _clock, _permissions, _port
 from gestured.control.sniff import Sight, lines, propose
 from gestured.control.status import screen
+from gestured.core import osc
+from gestured.core.address import Address
 from tests import encoding
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Hand, Sensor, blob, counted, floats, ints
@@ -239,5 +241,5 @@ def test_doctor_looks_at_the_machine(tmp_path: Path) -> None:
         assert _permissions(limit).level == level
     with socket.socket(type=socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
-        found = _port(taken.getsockname())
+        found = _port(Address(*taken.getsockname()))
     assert found.level == "warn" and "in use" in found.what and "--listen" in found.remedy

@@ -51,6 +51,15 @@ def test_a_bundle_of_pressure_and_trajectory(start, udp):
     assert all(len(message.params) % 3 == 0 for message in trajectories)
 
 
+def test_an_ipv6_address_is_said_as_it_is_given(start):
+    with socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as udp:
+        udp.bind(("::1", 0))
+        where = f"[::1]:{udp.getsockname()[1]}"
+        process = start("simulate", "--to", where, "--seconds", 1)
+        _, err = process.communicate(timeout=30)
+    assert process.returncode == 0 and f" to {where} as ".encode() in err
+
+
 @pytest.mark.parametrize(
     ("flags", "dtype"),
     [

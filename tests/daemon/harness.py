@@ -21,6 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core import osc
+from gestured.core.address import Address
 from tests import encoding
 
 DEADLINE_S = 20.0
@@ -126,10 +128,9 @@ class Daemon:
         return daemon
 
     @property
-    def address(self) -> tuple[str, int]:
+    def address(self) -> Address:
         """Where it listens for OSC."""
-        host, port = self.ready["listen"].rsplit(":", 1)
-        return host, int(port)
+        return Address.parse(self.ready["listen"])
 
     @property
     def socket(self) -> Path:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from gestured.core.address import Address
 from gestured.core.errors import SettingsError
 from gestured.core.front_end import FrontEnd
 from gestured.core.scene import Scene
@@ -23,7 +24,6 @@ from gestured.daemon.merge import load
 from gestured.daemon.settings import FLAGS, Settings
 from gestured.daemon.sockets import AddressError, bind_udp
 from gestured.daemon.udp import Receiver
-from gestured.daemon.values import Address
 from tests.daemon import harness
 from tests.daemon.harness import DEADLINE_S, Hand
 from tests.daemon.parts import SNAPSHOT, SOURCE, Parts

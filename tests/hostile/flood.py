@@ -8,6 +8,8 @@ from contextlib import ExitStack
 
 import numpy as np
 
+from gestured.core import osc
+from gestured.core.address import Address
 from tests import encoding
 
 BURST = 50  # packets at a time; fifty microseconds of work
@@ -32,18 +34,17 @@ def packets(kind: str) -> list[bytes]:
 def main() -> int:
     """Send at the rate, or as fast as it goes; print how many packets a second went out."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("to")
+    parser.add_argument("to", type=Address.parse)
     parser.add_argument("kind", choices=("rubbish", "frames", "sensors", "full", "owners"))
     parser.add_argument("--rate", type=float, default=50_000.0, help="packets a second")
     parser.add_argument("--ports", type=int, default=1, help="sent from so many ports in turn (default: 1)")
     parser.add_argument("--seconds", type=float, default=5.0)
     args = parser.parse_args()
-    host, port = args.to.rsplit(":", 1)
     what, sent = packets(args.kind), 0
     with ExitStack() as stack:
         socks = [stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(args.ports)]
         for sock in socks:
-            sock.connect((host, int(port)))
+            sock.connect(args.to)
         for _ in range(round(10 * CALM_S) if args.kind == "owners" else 0):
             for n, sock in enumerate(socks):
                 sock.send(encoding.message(f"/flood{n % OWNERS}/pressure", "b", (bytes(81),)))

@@ -6,6 +6,7 @@ from datetime import date
 from pathlib import Path
 
 from gestured.client.address import host_port
+from gestured.core.address import Address
 from gestured.core.wire import is_sensor
 from gestured.lab.recordings.protocol import pseudonym
 from gestured.lab.recordings.sources import SESSION
@@ -36,7 +37,7 @@ def add(command: Add) -> None:
     collect.add_argument("--participant", type=pseudonym, required=True, metavar="NAME",
                          help="pseudonym: 1 to 32 of A-Z a-z 0-9 _ -")  # fmt: skip
     collect.add_argument("--out", type=Path, default=FOLDER, help=f"folder for NAME.npz ({FOLDER})")
-    collect.add_argument("--listen", type=host_port, default=("127.0.0.1", 9000), metavar="HOST:PORT",
+    collect.add_argument("--listen", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT",
                          help="where the sensor sends to (127.0.0.1:9000)")  # fmt: skip
     collect.add_argument("--sensor", type=_sensor, metavar="NAME", help="which sensor (the first that sends)")
     collect.add_argument("--rows", type=_side, default=9, metavar="N", help="rows of its grid (9)")

@@ -8,6 +8,7 @@ from collections import deque
 import numpy as np
 
 from gestured.client.say import shown
+from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled, Event, Onset, Release, Status
 from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
@@ -49,8 +50,8 @@ class LiveSensor:
     `pump` reads; what the hub found of it since `begin` is `found`.
     """
 
-    def __init__(self, address: tuple[str, int], rows: int, columns: int, name: str | None) -> None:
-        self.where = f"{address[0]}:{address[1]}"
+    def __init__(self, address: Address, rows: int, columns: int, name: str | None) -> None:
+        self.where = str(address)
         self.name = name
         self.grid = (rows, columns)
         self.ready = False  # the idle sensor is known

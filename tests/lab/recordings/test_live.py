@@ -8,6 +8,7 @@ import pytest
 
 from gestured.client.sensor import Form
 from gestured.control.play import frames
+from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.lab.recordings.live import LiveSensor
 from gestured.simulator import Participant, Sensor, Take, generator, gesture_take, session
@@ -20,7 +21,7 @@ def live() -> Iterator[LiveSensor]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         address = probe.getsockname()
-    sensor = LiveSensor(address, 9, 9, None)
+    sensor = LiveSensor(Address(*address), 9, 9, None)
     yield sensor
     sensor.close()
 
@@ -112,4 +113,4 @@ def test_an_address_that_is_taken_is_named() -> None:
         taken.bind(("127.0.0.1", 0))
         host, port = taken.getsockname()
         with pytest.raises(GesturedError, match=f"cannot listen on {host}:{port}: Address already in use"):
-            LiveSensor((host, port), 9, 9, None)
+            LiveSensor(Address(host, port), 9, 9, None)

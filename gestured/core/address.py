@@ -1,0 +1,28 @@
+"""HOST:PORT: how an address is written and read."""
+
+from typing import NamedTuple
+
+
+class Address(NamedTuple):
+    """A host (name or literal) and a port; port 0 means any free one. As a text an IPv6 literal stands in brackets."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+
+    @classmethod
+    def parse(cls, text: str) -> "Address":
+        """HOST:PORT or [HOST]:PORT. ValueError, which says what was expected, for anything else."""
+        host, _, port = text.rpartition(":")
+        bracketed = host.startswith("[") and host.endswith("]")
+        name = host[1:-1] if bracketed else host
+        wrong = set("[]/" if bracketed else "[]/:")
+        if not name or any(c in wrong or c.isspace() for c in name) or not _is_port(port):
+            raise ValueError("HOST:PORT with a port from 0 to 65535, such as 127.0.0.1:9000 or [::1]:9000")
+        return cls(name, int(port))
+
+
+def _is_port(text: str) -> bool:
+    return text.isascii() and text.isdecimal() and len(text) <= 5 and int(text) < 65536
