@@ -185,8 +185,7 @@ def _daemon(status: dict[str, Any]) -> Iterator[Finding]:
 def _ports(status: dict[str, Any]) -> Iterator[Finding]:
     where = {key: value for key, value in status["addresses"].items() if value}
     yield Finding("ok", ", ".join(f"{key} {value}" for key, value in where.items()))
-    host = where["listen"].rsplit(":", 1)[0]
-    if not (host.startswith("127.") or host == "[::1]"):
+    if not where["listen"].startswith(("127.", "[::1]:")):
         what = f"frames are taken from the network ({where['listen']}); OSC has no authentication"
         yield Finding("warn", what, "name the senders with --allow, and keep the network private")
 
