@@ -16,7 +16,6 @@ import pytest
 
 from gestured.client.stream import Stream
 from gestured.core.address import Address
-from gestured.core.osc import encode_bundle, encode_message
 from gestured.model.model import shipped
 from tests import encoding
 

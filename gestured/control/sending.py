@@ -16,7 +16,6 @@ from gestured.client.lines import Unreachable
 from gestured.client.sensor import sent_after_refusal
 from gestured.client.stream import Stream
 from gestured.control.diff import ONSET_S, Line
-from gestured.core import osc
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.stamping import Stamper

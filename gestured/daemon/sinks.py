@@ -3,7 +3,6 @@
 import socket
 from typing import Protocol
 
-from gestured.core import messages, osc
 from gestured.core.address import Address
 from gestured.core.events import Event, Gesture, Status
 from gestured.core.reading import SILENT

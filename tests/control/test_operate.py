@@ -11,7 +11,6 @@ from gestured.control.cli import main
 from gestured.control.doctor import BUFFER_BYTES, _buffer, _clock, _permissions, _port
 from gestured.control.sniff import Sight, lines, propose
 from gestured.control.status import screen
-from gestured.core import osc
 from gestured.core.address import Address
 from tests import encoding
 from tests.daemon import tiny_model

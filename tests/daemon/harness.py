@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core import osc
 from gestured.core.address import Address
 from tests import encoding
 

@@ -94,6 +94,7 @@ class Bench:
         In a stall it neither reads nor looks at a clock. After each group of packets that waited, it looks whether a
         sensor has fallen silent: its loop may do so after any of them.
         """
+
         def awake(t: float) -> float:
             return next((until for since, until in stalls if since <= t < until), t)
 

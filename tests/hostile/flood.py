@@ -8,7 +8,6 @@ from contextlib import ExitStack
 
 import numpy as np
 
-from gestured.core import osc
 from gestured.core.address import Address
 from tests import encoding
 

@@ -11,6 +11,8 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("pywt")
 
+from joblib import Parallel
+
 from gestured.core.errors import GesturedError
 from gestured.lab.study import cells, study
 from gestured.lab.study.cells import Schedule
@@ -18,8 +20,6 @@ from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import CLEAN, PARTICIPANTS
 from tests.lab.study.material_made import data
 from tests.lab.study.test_protocols import task
-from joblib import Parallel
-
 
 TASKS = [task(CLEAN), task(PARTICIPANTS), task(PARTICIPANTS, "none")]
 
