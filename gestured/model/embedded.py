@@ -64,7 +64,7 @@ class Embedded:
         return events_of(self._recognizer.reset())
 
 
-def open(  # the name by which users call it: gestured.open
+def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     model: str | Path = "cnn_lstm",
     *,
     sensor: str = "sensor",
