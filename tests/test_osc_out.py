@@ -13,11 +13,11 @@ from pythonosc.osc_message import OscMessage
 from gestured.client import osc_out
 from gestured.client.sensor import Form
 from gestured.core import osc
+from gestured.core.address import Address
 from gestured.core.events import Event, Gesture, Status
 from gestured.core.frames import Frame, Touch
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.sinks import OscSink
-from gestured.daemon.values import Address
 from tests import encoding
 
 names = st.text("abcXYZ019_-", min_size=1, max_size=20)

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gestured.core.conditioning import Mounting
 from gestured.core.errors import SettingsError
 from gestured.core.events import Event
 from gestured.core.feed import front_end_of
 from gestured.core.frames import Frame, Touch
+from gestured.core.mounting import Mounting
 from gestured.core.recognizer import Recognizer, events_of
 from gestured.core.scene import Scene, Setup
 from gestured.core.wire import is_sensor
