@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from gestured.core.errors import RecordingError
-from gestured.record.arrays import Recordings, read
+from gestured.record.arrays import read
+from gestured.record.recordings import Recordings
 
 FIELDS = [field.name for field in fields(Recordings)]
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from gestured.core.frames import Touch
-from gestured.record.arrays import Recordings, read, write
+from gestured.record.arrays import read, write
+from gestured.record.recordings import Recordings
 from tests.small_recording import example, same, session
 
 DATA = Path(__file__).parent.parent.parent / "shared" / "data"

@@ -13,6 +13,7 @@ from gestured.core.facts import Taken
 from gestured.core.frames import Frame
 from gestured.core.scene import Scene
 from gestured.record import arrays as recording
+from gestured.record.recordings import Recordings
 from gestured.record.replay import Mute, Replay, opened
 from gestured.record.tape import Tape
 
@@ -46,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def sessions_of(path: Path, sensor: str | None = None) -> tuple[list[str], recording.Recordings]:
+def sessions_of(path: Path, sensor: str | None = None) -> tuple[list[str], Recordings]:
     """The sensors of a tape, or the one, and a session of each. Raises RecordingError."""
     found, known = opened(path)
     sessions = {name: used for name, used in _used(found, known.scene).items() if sensor in (None, name)}
@@ -73,7 +74,7 @@ def _used(found: Tape, scene: Scene) -> dict[str, list[Frame]]:
     return used
 
 
-def _recordings(sessions: dict[str, list[Frame]], found: Tape) -> recording.Recordings:
+def _recordings(sessions: dict[str, list[Frame]], found: Tape) -> Recordings:
     frames = [frame for each in sessions.values() for frame in each]
     touches = np.full((len(frames), FINGERS, 2), np.nan, np.float32)
     ids = np.full((len(frames), FINGERS), -1, np.int32)
@@ -89,7 +90,7 @@ def _recordings(sessions: dict[str, list[Frame]], found: Tape) -> recording.Reco
         and spans[e["sensor"]][0] <= e["onset"] <= e["offset"] <= spans[e["sensor"]][1]
     ]
     labels = np.array([label for _, label, _, _ in events], dtype="U64")
-    return recording.Recordings(
+    return Recordings(
         frames=np.stack([frame.values for frame in frames]),
         times=np.array([frame.t for frame in frames]),
         offsets=np.cumsum([0, *map(len, sessions.values())], dtype=np.int64),

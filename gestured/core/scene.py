@@ -48,7 +48,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         if not self.gestures:
-            raise ValueError("gestures: expected at least one")
+            raise ValueError("gestures: expected at least one, found none")
         for name in ("", *self.sensors):
             rows, columns = self.grid_of(name)
             if not (SIDE[0] <= rows <= SIDE[1] and SIDE[0] <= columns <= SIDE[1]):

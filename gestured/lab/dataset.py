@@ -38,7 +38,7 @@ from gestured.simulator import (
 )  # fmt: skip
 
 if TYPE_CHECKING:
-    from gestured.record.arrays import Recordings
+    from gestured.record.recordings import Recordings
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 NONE = "none"

@@ -1,13 +1,12 @@
 """What the contract says of a recording's fields, held against them."""
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from gestured.record.arrays import Recordings
+from gestured.record.recordings import Recordings
 
 FINGERS = 3
 FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; checking their times takes a multiple of their size
@@ -33,19 +32,19 @@ class Wrong(Exception):
         self.field = field
 
 
-def check(r: "Recordings") -> None:
+def check(r: Recordings) -> None:
     """Everything the contract says of the fields; raises Wrong."""
     check_all_but_frames(r)
     check_frames(r)
 
 
-def check_all_but_frames(r: "Recordings") -> None:
+def check_all_but_frames(r: Recordings) -> None:
     """Everything but what the frames hold; raises Wrong."""
     structure(r)
     _values(r)
 
 
-def check_frames(r: "Recordings") -> None:
+def check_frames(r: Recordings) -> None:
     """What the frames hold; raises Wrong."""
     if r.frames.dtype.kind == "f" and r.frames.size:
         low, high = r.frames.min(axis=(1, 2)), r.frames.max(axis=(1, 2))  # NaN is both
@@ -53,7 +52,7 @@ def check_frames(r: "Recordings") -> None:
         _first("frames", np.isfinite(low) & np.isfinite(high), "finite values", owner)
 
 
-def structure(r: "Recordings") -> None:
+def structure(r: Recordings) -> None:
     """What must hold for the fields to be told apart, recording by recording: types, shapes, who owns what.
 
     Raises Wrong with the field.
@@ -69,7 +68,7 @@ def structure(r: "Recordings") -> None:
         _first("event_recording", (r.event_recording >= 0) & (r.event_recording < g), f"0 to {g - 1}", of="event")
 
 
-def shapes(r: "Recordings") -> None:
+def shapes(r: Recordings) -> None:
     """Types, shapes and numbers: what can be told before anything is unpacked. Raises Wrong with the field."""
     _shape("frames", r.frames, "iuf", (None, None, None))
     n, rows, columns = r.frames.shape
@@ -109,7 +108,7 @@ def shapes(r: "Recordings") -> None:
                 raise Wrong(f"{field}: expected float64, found {getattr(r, field).dtype}", field)
 
 
-def _values(r: "Recordings") -> None:
+def _values(r: Recordings) -> None:
     """What the fields hold, once their structure is known to be right."""
     ends = r.offsets
     lengths = np.diff(ends)
@@ -136,7 +135,7 @@ def _values(r: "Recordings") -> None:
     _events(r)
 
 
-def _touches(r: "Recordings", owner: NDArray[np.int64]) -> None:
+def _touches(r: Recordings, owner: NDArray[np.int64]) -> None:
     if r.touches is None or r.touch_ids is None:
         return
     absent = r.touch_ids == -1
@@ -151,7 +150,7 @@ def _touches(r: "Recordings", owner: NDArray[np.int64]) -> None:
     )
 
 
-def _events(r: "Recordings") -> None:
+def _events(r: Recordings) -> None:
     if r.event_recording is None:
         return
     assert r.event_labels is not None and r.event_kinds is not None

@@ -2,19 +2,16 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gestured.simulator.kinematics import Array, wander
+from gestured.simulator.nature import Nature
 from gestured.simulator.people import Artefact, generator
 
-if TYPE_CHECKING:
-    from gestured.simulator.sensor import Sensor
 
-
-def amplify(sensor: "Sensor", field: Array, times: Array, inclination: int, rng: np.random.Generator) -> Array:
+def amplify(sensor: Nature, field: Array, times: Array, inclination: int, rng: np.random.Generator) -> Array:
     """Signal (N, R, C) in touches: this sensor's own gains and offsets, drift and noise put on the field."""
     own = generator(sensor.seed, 0x5E5)
     rows, columns, n = sensor.rows, sensor.columns, times.size
@@ -49,7 +46,7 @@ def amplify(sensor: "Sensor", field: Array, times: Array, inclination: int, rng:
 
 
 def disturb(
-    sensor: "Sensor",
+    sensor: Nature,
     signal: Array,
     times: Array,
     artefacts: Sequence[tuple[float, Artefact]],
@@ -91,7 +88,7 @@ def _mask(form: str, signal: Array, rng: np.random.Generator) -> Array:
     return mask
 
 
-def digitise(sensor: "Sensor", signal: Array) -> NDArray[np.generic]:
+def digitise(sensor: Nature, signal: Array) -> NDArray[np.generic]:
     """Integer frames (N, R, C): scaled, bad taxels put in, rounded, clipped."""
     own = generator(sensor.seed, 0xBAD)
     cells = own.permutation(sensor.rows * sensor.columns)
@@ -109,7 +106,7 @@ def digitise(sensor: "Sensor", signal: Array) -> NDArray[np.generic]:
     return np.clip(out, low, min(sensor.saturation, info.max)).astype(sensor.dtype)
 
 
-def transmit(sensor: "Sensor", times: Array, rng: np.random.Generator) -> tuple[NDArray[np.int64], Array]:
+def transmit(sensor: Nature, times: Array, rng: np.random.Generator) -> tuple[NDArray[np.int64], Array]:
     """Which frames arrive (a repeat is a duplicate) and when: in order, strictly one after the other."""
     n = times.size
     keep = rng.random(n) >= sensor.loss

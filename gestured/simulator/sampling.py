@@ -1,18 +1,14 @@
 """From contacts in continuous time to a pressure field at the sensor's instants, and to finger reports."""
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gestured.simulator.kinematics import Array
-from gestured.simulator.people import Contact
+from gestured.simulator.nature import Nature
+from gestured.simulator.people import Contact, Performance
 from gestured.simulator.textile import tail_kernel
-
-if TYPE_CHECKING:
-    from gestured.simulator.people import Performance
-    from gestured.simulator.sensor import Sensor
 
 FINGER_MM = 3.7  # the finger that a sensor's `gain` refers to
 INSTANTS = 3  # per row and frame
@@ -27,7 +23,7 @@ class Fingers:
         self.ids: NDArray[np.int32] = np.full((frames, 3), -1, dtype=np.int32)
         self._number = 0
 
-    def track(self, contact: Contact, at: Array, first: int, sensor: "Sensor", rng: np.random.Generator) -> None:
+    def track(self, contact: Contact, at: Array, first: int, sensor: Nature, rng: np.random.Generator) -> None:
         """Reports one finger at times `at` (its own clock) in the frames from `first` on."""
         force = np.interp(at, contact.t, contact.force, left=0.0, right=0.0)
         error = rng.normal(0.0, sensor.touch_noise, (2, at.size))
@@ -42,7 +38,7 @@ class Fingers:
 
 
 def sample(
-    sensor: "Sensor", performances: "list[tuple[float, Performance]]", times: Array, rng: np.random.Generator
+    sensor: Nature, performances: list[tuple[float, Performance]], times: Array, rng: np.random.Generator
 ) -> tuple[Array, Fingers]:
     """Pressure (N, R, C) in normal touches, of frames that end at `times` (N,), and the finger reports.
 
@@ -72,7 +68,7 @@ def sample(
     return field, fingers
 
 
-def footprint(sensor: "Sensor", contact: Contact, at: Array, taxel_x: Array, taxel_y: Array) -> Array:
+def footprint(sensor: Nature, contact: Contact, at: Array, taxel_x: Array, taxel_y: Array) -> Array:
     """Mean pressure (F, R, C) of one contact over the instants `at` (F, S, R): a turned super-Gaussian."""
     force = np.interp(at, contact.t, contact.force, left=0.0, right=0.0)
     x, y = np.interp(at, contact.t, contact.x), np.interp(at, contact.t, contact.y)

@@ -10,7 +10,7 @@ import pytest
 
 from gestured.control.cli import main
 from gestured.record import arrays as recording
-from gestured.record.arrays import Recordings
+from gestured.record.recordings import Recordings
 from tests.control.conftest import gestures
 from tests.daemon import tiny_model
 from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor

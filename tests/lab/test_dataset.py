@@ -27,7 +27,7 @@ from gestured.lab.dataset import (
     simulated,
     with_idle,
 )
-from gestured.record.arrays import Recordings
+from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES, NON_GESTURES, Participant, Sensor, Take, generator, gesture_take, session
 
 

@@ -11,7 +11,8 @@ from gestured.lab.recordings.live import LiveSensor
 from gestured.lab.recordings.protocol import order
 from gestured.lab.recordings.session import Session
 from gestured.lab.recordings.terminal import Terminal
-from gestured.record.arrays import Recordings, read
+from gestured.record.arrays import read
+from gestured.record.recordings import Recordings
 
 
 def run(args: argparse.Namespace) -> int:

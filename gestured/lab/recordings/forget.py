@@ -14,7 +14,8 @@ from gestured.client.say import say, say_drawn, say_json
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.digest import file_digest
 from gestured.lab.recordings.origin import said
-from gestured.record.arrays import Recordings, read, write
+from gestured.record.arrays import read, write
+from gestured.record.recordings import Recordings
 
 FIELDS = {f"{field.name}.npy" for field in fields(Recordings)}
 

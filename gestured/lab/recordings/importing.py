@@ -11,7 +11,8 @@ from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.recordings.safe import LeftOut
 from gestured.lab.recordings.sources import SESSION, Csv, read_capfingerid, read_csv
 from gestured.lab.recordings.store import join
-from gestured.record.arrays import Recordings, write
+from gestured.record.arrays import write
+from gestured.record.recordings import Recordings
 
 SHOWN = 10  # of what was left out; the rest is counted
 CSV_ALONE = ("rows", "columns", "time_unit", "label", "participant", "consent")

@@ -15,7 +15,7 @@ from gestured.core.errors import GesturedError
 from gestured.lab.recordings.protocol import INCLINATIONS
 from gestured.lab.recordings.quality import gaps
 from gestured.lab.recordings.safe import LeftOut, read_what_is_good
-from gestured.record.arrays import Recordings
+from gestured.record.recordings import Recordings
 
 SHOWN = 10  # of what was left out; the rest is counted
 BAR = 30  # characters

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gestured.record.arrays import Recordings
+from gestured.record.recordings import Recordings
 from gestured.simulator import SPEEDS
 
 INCLINATIONS = ("flat", "tilted", "upright")  # of the sensor; recordings hold their numbers 0, 1, 2

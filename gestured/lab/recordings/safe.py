@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gestured.core.errors import RecordingError
-from gestured.record.arrays import Recordings, load
+from gestured.record.arrays import load
 from gestured.record.check import Wrong, check, structure
+from gestured.record.recordings import Recordings
 
 # Fields that may be left out, each with those that mean nothing without it.
 OPTIONAL = {field: {field} for field in ("speeds", "inclinations", "kinds", "consents")} | {

@@ -18,8 +18,9 @@ from gestured.lab.recordings.protocol import INCLINATIONS, Trial, left
 from gestured.lab.recordings.quality import Take, faults
 from gestured.lab.recordings.store import compact, join
 from gestured.lab.recordings.terminal import Ended, Terminal
-from gestured.record.arrays import Recordings, write
+from gestured.record.arrays import write
 from gestured.record.check import FINGERS
+from gestured.record.recordings import Recordings
 
 PATIENCE_S = 10.0  # for a gesture to begin, and for it to end
 APART_S = 0.4  # a second contact within so long belongs to the take (and spoils it)

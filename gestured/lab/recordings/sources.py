@@ -19,8 +19,8 @@ from gestured.core.errors import RecordingError
 from gestured.lab.recordings.protocol import PSEUDONYM
 from gestured.lab.recordings.safe import LeftOut
 from gestured.lab.recordings.store import compact, touched
-from gestured.record.arrays import Recordings
 from gestured.record.files import open_regular
+from gestured.record.recordings import Recordings
 
 SESSION = "session"
 OTHER = "other"  # something was performed, and nobody knows exactly what

@@ -11,8 +11,8 @@ from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
 from gestured.lab.dataset import with_idle
-from gestured.record.arrays import Recordings
 from gestured.record.check import EVENTS, FINGERS
+from gestured.record.recordings import Recordings
 
 UNKNOWN = {"speeds": "", "inclinations": "", "kinds": "", "consents": ""}  # where one set has the field and one has not
 TOGETHER = ("onsets", "releases")  # are left out where one set does not know them

@@ -14,7 +14,8 @@ import numpy as np
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.dataset import NONE, Samples, join, recorded
 from gestured.lab.recordings.safe import read_what_is_good
-from gestured.record.arrays import Recordings, read
+from gestured.record.arrays import read
+from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES
 
 REAL_FILE = "capfingerid_gestures_dev.npz"

@@ -25,7 +25,7 @@ from gestured.lab.study.material import SHIFT, Data
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import PARTICIPANTS, Result
-from gestured.lab.study.report import write_report
+from gestured.lab.study.report.page import write_report
 from gestured.lab.study.run_time import measure
 from gestured.lab.study.sessions import online
 from gestured.lab.study.tuning import tune

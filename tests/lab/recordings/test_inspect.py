@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from gestured.lab.cli import main
-from gestured.record.arrays import Recordings, write
+from gestured.record.arrays import write
+from gestured.record.recordings import Recordings
 from tests.small_recording import example, save, session
 
 

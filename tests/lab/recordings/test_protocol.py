@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.lab.recordings.protocol import INCLINATIONS, Trial, left, order, pseudonym
-from gestured.record.arrays import Recordings
+from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES, SPEEDS
 
 

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from gestured.core.errors import RecordingError
 from gestured.lab.recordings.safe import read_what_is_good
-from gestured.record.arrays import Recordings, read
+from gestured.record.arrays import read
+from gestured.record.recordings import Recordings
 from tests.small_recording import FIELDS, example, same, save, session
 from tests.test_recording import any_recordings
 

@@ -11,7 +11,8 @@ pytest.importorskip("pywt")
 
 from gestured.core.errors import GesturedError
 from gestured.lab.study.own import own
-from gestured.record.arrays import Recordings, write
+from gestured.record.arrays import write
+from gestured.record.recordings import Recordings
 from gestured.simulator import Participant, Sensor, generator, gesture_take
 
 

@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("matplotlib", reason="needs the extra [lab]")
 pytest.importorskip("jinja2", reason="needs the extra [lab]")
 
-from gestured.lab.study.report import write_report
+from gestured.lab.study.report.page import write_report
 from tests.lab.study.made_study import NAMES, empty_study, made_study, small_study
 
 Study = dict[str, Any]

@@ -1,0 +1,88 @@
+"""Recordings in memory: the fields of the contract, and what can be asked of them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.frames import Frame, Touch
+
+EVENT = "event_"  # begins the name of each field that is about what was performed in a session
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings:
+    """G recordings of one grid, N frames in all; `len` is G. Fields as in the contract; None is not known."""
+
+    frames: NDArray[Any]  # (N, R, C) raw counts
+    times: NDArray[np.float64]  # (N,) s, strictly increasing within a recording
+    offsets: NDArray[np.int64]  # (G+1,) recording g is frames[offsets[g]:offsets[g+1]]
+    labels: NDArray[np.str_]  # (G,) a gesture, "none" or "session"
+    subjects: NDArray[Any]  # (G,) numbers or names
+    speeds: NDArray[Any] | None = None  # (G,) numbers or names
+    inclinations: NDArray[Any] | None = None  # (G,) numbers or names
+    kinds: NDArray[np.str_] | None = None  # (G,) the finer name
+    onsets: NDArray[np.integer[Any]] | None = None  # (G,) frame within the recording: first touched
+    releases: NDArray[np.integer[Any]] | None = None  # (G,) last touched
+    touches: NDArray[np.float32] | None = None  # (N, 3, 2) x, y; NaN for no finger
+    touch_ids: NDArray[np.int32] | None = None  # (N, 3), -1 for no finger
+    event_recording: NDArray[np.integer[Any]] | None = None  # (E,) what was performed, in which recording
+    event_labels: NDArray[np.str_] | None = None  # (E,)
+    event_kinds: NDArray[np.str_] | None = None  # (E,)
+    event_onsets: NDArray[np.float64] | None = None  # (E,) s on the recording's times
+    event_offsets: NDArray[np.float64] | None = None  # (E,) s
+    consents: NDArray[np.str_] | None = None  # (G,) day of the participant's consent, YYYY-MM-DD; "" is not known
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def frames_of(self, i: int) -> NDArray[Any]:
+        """(T, R, C) raw counts of recording i; IndexError where there is none."""
+        return self.frames[self._span(i)]
+
+    def times_of(self, i: int) -> NDArray[np.float64]:
+        """(T,) seconds of recording i; IndexError where there is none."""
+        return self.times[self._span(i)]
+
+    def stream(self, i: int) -> Iterator[Frame]:
+        """Recording i as the front end takes it, with its touches."""
+        span = self._span(i)
+        for n in range(span.start, span.stop):
+            touches: tuple[Touch, ...] = ()
+            if self.touches is not None and self.touch_ids is not None:
+                touches = tuple(
+                    Touch(int(k), float(x), float(y))
+                    for k, (x, y) in zip(self.touch_ids[n], self.touches[n], strict=True)
+                    if k >= 0
+                )
+            yield Frame(float(self.times[n]), self.frames[n], touches)
+
+    def take(self, chosen: Sequence[int] | NDArray[np.integer[Any]]) -> "Recordings":
+        """The chosen recordings, each at most once, in that order, with their frames and events."""
+        index = np.asarray(chosen, np.int64)
+        lengths = np.diff(self.offsets)[index]
+        spans = [np.arange(self.offsets[i], self.offsets[i + 1]) for i in index]
+        of_frames = np.concatenate(spans) if spans else index
+        place = np.full(len(self), -1, np.int64)
+        place[index] = np.arange(len(index))
+        events = slice(0) if self.event_recording is None else place[self.event_recording] >= 0
+        rows = {"frames": of_frames, "times": of_frames, "touches": of_frames, "touch_ids": of_frames}
+        taken = {
+            field: value[events if field.startswith(EVENT) else rows.get(field, index)]
+            for field, value in self.present()
+        }
+        taken["offsets"] = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+        if self.event_recording is not None:
+            taken["event_recording"] = place[taken["event_recording"]]
+        return Recordings(**taken)
+
+    def present(self) -> Iterator[tuple[str, NDArray[Any]]]:
+        """Fields that are known, by name."""
+        return ((f.name, value) for f in fields(self) if (value := getattr(self, f.name)) is not None)
+
+    def _span(self, i: int) -> slice:
+        if not -len(self) <= i < len(self):
+            raise IndexError(f"recording {i} of {len(self)}")
+        return slice(int(self.offsets[i % len(self)]), int(self.offsets[i % len(self) + 1]))
