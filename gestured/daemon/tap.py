@@ -1,6 +1,6 @@
 """Packets as they arrived, with the events they led to: for recordings, and for the flight recorder.
 
-A packet is kept as the bytes that came, before anything looked at them, with the time that the pipeline gave it: so
+A packet is kept as the bytes that came, before anything looked at them, with the time that the hub gave it: so
 a recording replays through the same code to the same events. Nothing is kept and nothing is copied as long as nobody
 taps and no flight recorder is set.
 """
