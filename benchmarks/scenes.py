@@ -15,7 +15,7 @@ from gestured.client.stream import Stream
 from gestured.core.frames import Frame, Touch
 from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.values import Grid
-from gestured.simulator import Participant, Sensor, generator, gesture_take
+from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
 
 SCENES: dict[str, tuple[str, ...]] = {
     "minimal": (),
@@ -95,7 +95,9 @@ def _wait(model: str, flags: tuple[str, ...]) -> float:
     with Engine(model, 9, 9, "--clock", "sensor", *flags) as engine:
         stream = Stream(engine.socket, {"types": ["gesture", "unknown"]})
         for n in range(10):
-            take = gesture_take("one_tap", Participant(960 + n), Sensor.nominal(day=n), generator(960, n), "normal", 0)
+            take = gesture_take(
+                "one_tap", Participant(960 + n), SimulatedSensor.nominal(day=n), generator(960, n), "normal", 0
+            )
             form, epoch = Form(f"tap{n}"), time.time()
             packets = [form.packet(Frame(0.0, f), k, epoch + k / 15) for k, f in enumerate(take.frames)]
             play(engine.listen[1], packets)

@@ -19,7 +19,7 @@ from gestured.client.engine import Engine
 from gestured.client.sensor import Form
 from gestured.client.stream import Stream
 from gestured.core.frames import Frame
-from gestured.simulator import Participant, Sensor, Take, generator, session
+from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 
 RATE_HZ = 15.0
 SECONDS = 60.0
@@ -30,7 +30,9 @@ ROOM = 256 << 10  # bytes that may wait in the kernel: more, and the sender wait
 
 def touched(number: int, seconds: float) -> Take:
     """A session of one person on the nominal sensor."""
-    return session(Participant(950 + number), Sensor.nominal(day=950 + number), generator(950, number), seconds, 0.2)
+    return session(
+        Participant(950 + number), SimulatedSensor.nominal(day=950 + number), generator(950, number), seconds, 0.2
+    )
 
 
 def idle(number: int, frames: int) -> NDArray[np.float64]:

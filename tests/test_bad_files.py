@@ -185,7 +185,7 @@ def test_nothing_is_written_that_could_not_be_read_again(tmp_path: Path, monkeyp
     from gestured.core.errors import RecordingError
     from gestured.record import arrays as recording
 
-    monkeypatch.setattr(recording, "MAX_BYTES", 500)
+    monkeypatch.setattr(recording, "MAX_RECORDING_BYTES", 500)
     with pytest.raises(RecordingError, match="not written: unpacks to"):
         recording.write(tmp_path / "r.npz", example())
     assert os.listdir(tmp_path) == []

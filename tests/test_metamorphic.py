@@ -24,7 +24,7 @@ from gestured.lab.stability.metamorphic import (
     shifted,
     turned,
 )
-from gestured.lab.stability.path import Stream, events, labels, segments, simulated
+from gestured.lab.stability.path import Series, events, labels, segments, simulated
 from gestured.model.model import LADDER, Model, open_model, shipped
 
 COUNT = 40
@@ -40,7 +40,7 @@ changes = st.one_of(
 
 
 @cache
-def streams() -> list[Stream]:
+def streams() -> list[Series]:
     return [on_grid(stream) for _, stream in simulated(COUNT)]
 
 
@@ -77,7 +77,7 @@ def test_a_sensor_that_is_mounted_otherwise_and_says_so_gives_the_same_events(
 ) -> None:
     stream = streams()[number]
     sent = np.rot90(stream.frames, rotate // 90, axes=(1, 2))  # counter-clockwise: the mounting turns it back
-    turned_back = Stream(stream.times, sent[:, :, ::-1] if mirror else sent)
+    turned_back = Series(stream.times, sent[:, :, ::-1] if mirror else sent)
     net = model(LADDER[0])
     assert events(turned_back, net, Mounting(rotate, mirror)) == events(stream, net)
 

@@ -308,7 +308,7 @@ def test_what_is_no_model_file(tmp_path: Path, kind: str) -> None:
         path.touch()
     elif kind == "huge":
         with path.open("wb") as file:
-            file.truncate(model_file.MAX_BYTES + 1)
+            file.truncate(model_file.MAX_MODEL_BYTES + 1)
     elif kind == "text":
         path.write_text("this is not a model\n" * 1000)
     elif kind == "nul":

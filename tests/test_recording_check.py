@@ -141,7 +141,7 @@ def test_objects_are_never_unpickled(tmp_path: Path, name: str) -> None:
 
 
 def test_archive_that_unpacks_to_too_much(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recording, "MAX_BYTES", 10_000)
+    monkeypatch.setattr(recording, "MAX_RECORDING_BYTES", 10_000)
     path = tmp_path / "r.npz"
     big = replace(example(), frames=np.zeros((10, 40, 40), np.uint8))
     np.savez_compressed(path, **{k: getattr(big, k) for k in FIELDS if getattr(big, k) is not None})

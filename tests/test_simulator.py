@@ -16,7 +16,7 @@ from gestured.simulator import (
     NON_GESTURES,
     Participant,
     Performance,
-    Sensor,
+    SimulatedSensor,
     Take,
     cohort,
     cohort_plan,
@@ -27,7 +27,7 @@ from gestured.simulator import (
     session,
     wide,
 )
-from gestured.simulator.kinematics import progress
+from gestured.simulator.kinematics import stroke_progress
 from gestured.simulator.textile import relax
 
 # Integer frames and counters of 51 cohort trials and 40 wide takes. It changes when the simulated data do;
@@ -142,7 +142,7 @@ def test_fingers_of_a_swipe_go_where_it_says(kind: str) -> None:
 def test_pressure_and_reported_fingers_go_where_the_swipe_says(kind: str) -> None:
     dx, dy = DIRECTIONS[kind]
     for seed in PEOPLE:
-        take = gesture_take(kind, Participant(seed), Sensor.nominal(), generator(seed, 5), "slow", seed % 3)
+        take = gesture_take(kind, Participant(seed), SimulatedSensor.nominal(), generator(seed, 5), "slow", seed % 3)
         columns, rows = touched(take)
         # Row 0 is on top: up is towards smaller rows.
         assert (columns[-1] - columns[0]) * dx - (rows[-1] - rows[0]) * dy > 0.7
@@ -156,7 +156,7 @@ def test_circles_turn_as_a_person_sees_them(kind: str, sense: int) -> None:
     for seed in PEOPLE:
         finger = performed(kind, seed).contacts[0]
         assert 220.0 < sense * turned(finger.x, finger.y) < 500.0
-        take = gesture_take(kind, Participant(seed), Sensor.nominal(), generator(seed, 5), "slow", seed % 3)
+        take = gesture_take(kind, Participant(seed), SimulatedSensor.nominal(), generator(seed, 5), "slow", seed % 3)
         columns, rows = touched(take)
         assert sense * turned(columns, -rows) > 180.0
 
@@ -168,7 +168,7 @@ def test_two_finger_swipes_have_two_fingers_at_once(kind: str) -> None:
         first, second = (contact for contact in performance.contacts if contact.finger)
         together = min(first.t[-1], second.t[-1]) - max(first.t[0], second.t[0])
         assert together > 0.4 * performance.duration_s
-        take = gesture_take(kind, Participant(seed), Sensor.nominal(), generator(seed, 5), "slow")
+        take = gesture_take(kind, Participant(seed), SimulatedSensor.nominal(), generator(seed, 5), "slow")
         assert ((take.touch_ids >= 0).sum(axis=1) == 2).sum() >= 2
 
 
@@ -198,7 +198,7 @@ def _ends(performance: Performance) -> list[tuple[tuple[float, float], tuple[flo
 
 def test_nothing_is_touched_before_the_onset() -> None:
     for kind in GESTURES + NON_GESTURES:
-        take = gesture_take(kind, Participant(4), Sensor.nominal(), generator(8), "normal", 1)
+        take = gesture_take(kind, Participant(4), SimulatedSensor.nominal(), generator(8), "normal", 1)
         idle = take.frames[still(take)].astype(float)
         assert len(idle) > 15
         assert np.abs(idle - np.median(idle, axis=0)).max() < 8.0 * 0.014 * take.sensor.gain
@@ -209,14 +209,14 @@ def test_nothing_is_touched_before_the_onset() -> None:
 def test_every_kind_leaves_a_mark() -> None:
     for kind in GESTURES + NON_GESTURES:
         for seed in range(4):
-            take = gesture_take(kind, Participant(seed), Sensor.nominal(), generator(seed, 2), "normal", 1)
+            take = gesture_take(kind, Participant(seed), SimulatedSensor.nominal(), generator(seed, 2), "normal", 1)
             idle = np.median(take.frames[still(take)], axis=0)
             assert np.abs(take.frames - idle).max() > 0.08 * take.sensor.gain, kind
             assert take.label == (kind if kind in GESTURES else "none")
 
 
 def test_a_finger_shows_where_it_is() -> None:
-    sensor = replace(Sensor.nominal(), noise=0.0, gain_spread=0.0, touch_noise=0.0)
+    sensor = replace(SimulatedSensor.nominal(), noise=0.0, gain_spread=0.0, touch_noise=0.0)
     for seed in range(20):
         take = gesture_take("long_press", Participant(seed), sensor, generator(seed, 9))
         middle = int(np.searchsorted(take.sensor_times, take.events[0].onset_s + 0.5))
@@ -230,7 +230,7 @@ def test_a_finger_shows_where_it_is() -> None:
 @given(st.integers(0, 2**32), st.floats(0.0, 1.0))
 @settings(max_examples=60, deadline=None)
 def test_progress_runs_from_0_to_1_and_never_back(seed: int, moving_ends: float) -> None:
-    s = progress(np.linspace(-0.2, 1.2, 300), generator(seed), moving_ends)
+    s = stroke_progress(np.linspace(-0.2, 1.2, 300), generator(seed), moving_ends)
     assert s[0] == pytest.approx(0.0, abs=1e-9)
     assert s[-1] == pytest.approx(1.0, abs=1e-9)
     assert (np.diff(s) >= -1e-9).all()
@@ -273,7 +273,7 @@ def test_any_sensor_sends_whole_frames_in_order(seed: int) -> None:
 
 
 def test_lost_and_doubled_frames_show_in_the_counter() -> None:
-    sensor = replace(Sensor.nominal(), loss=0.1, duplicates=0.1, late=0.1)
+    sensor = replace(SimulatedSensor.nominal(), loss=0.1, duplicates=0.1, late=0.1)
     take = session(Participant(0), sensor, generator(0), 40.0)
     steps = np.diff(take.counter)
     assert (steps == 0).any()
@@ -284,7 +284,7 @@ def test_lost_and_doubled_frames_show_in_the_counter() -> None:
 
 
 def test_bad_taxels_never_change() -> None:
-    sensor = replace(Sensor.nominal(), dead=2, stuck=3)
+    sensor = replace(SimulatedSensor.nominal(), dead=2, stuck=3)
     take = session(Participant(0), sensor, generator(1), 30.0)
     constant = (take.frames == take.frames[0]).all(axis=0)
     assert constant.sum() == 5
@@ -292,7 +292,7 @@ def test_bad_taxels_never_change() -> None:
 
 def test_a_clipped_sensor_without_noise_is_silent_in_idle() -> None:
     sensor = replace(
-        Sensor.nominal(),
+        SimulatedSensor.nominal(),
         clipped=True,
         noise=0.0,
         row_noise=0.0,
@@ -306,7 +306,7 @@ def test_a_clipped_sensor_without_noise_is_silent_in_idle() -> None:
 
 
 def test_a_session_s_events_are_apart_and_inside() -> None:
-    take = session(Participant(3), Sensor.nominal(), generator(3), 60.0, non_gesture_share=0.5)
+    take = session(Participant(3), SimulatedSensor.nominal(), generator(3), 60.0, non_gesture_share=0.5)
     onsets = np.array([event.onset_s for event in take.events])
     offsets = np.array([event.offset_s for event in take.events])
     assert len(take.events) > 8
@@ -319,12 +319,12 @@ def test_a_session_s_events_are_apart_and_inside() -> None:
 
 def test_a_session_can_be_told_what_to_perform() -> None:
     kinds = ["one_tap", "palm", "swipe_left"]
-    take = session(Participant(3), Sensor.nominal(), generator(3), 30.0, kinds=kinds)
+    take = session(Participant(3), SimulatedSensor.nominal(), generator(3), 30.0, kinds=kinds)
     assert [event.kind for event in take.events] == kinds
 
 
 def test_an_idle_session_holds_noise_alone() -> None:
-    take = session(Participant(3), replace(Sensor.nominal(), drift=0.0), generator(3), 20.0, kinds=[])
+    take = session(Participant(3), replace(SimulatedSensor.nominal(), drift=0.0), generator(3), 20.0, kinds=[])
     assert take.events == ()
     assert len(take.frames) == 300
     frames = take.frames.astype(float)
@@ -333,7 +333,7 @@ def test_an_idle_session_holds_noise_alone() -> None:
 
 def test_a_hand_may_rest_on_the_pad_from_the_start() -> None:
     palm = perform("palm", Participant(0), generator(1))
-    take = Sensor.nominal().record([(-0.5 * palm.duration_s, palm)], 4.0, generator(1))
+    take = SimulatedSensor.nominal().record([(-0.5 * palm.duration_s, palm)], 4.0, generator(1))
     first, last = take.frames[0].astype(float), take.frames[-1].astype(float)
     assert (first - last).max() > 0.3 * take.sensor.gain
 

@@ -7,13 +7,13 @@ from typing import Any
 
 from gestured.client.lines import Lines, Refused, Unreachable
 
-PATIENCE_S = 20.0  # a reload opens and tests a model; everything else takes milliseconds
+ANSWER_TIMEOUT_S = 20.0  # a reload opens and tests a model; everything else takes milliseconds
 
 
 class Control(Lines):
     """One connection. Raises Unreachable where no daemon answers."""
 
-    def __init__(self, path: Path, patience_s: float = PATIENCE_S) -> None:
+    def __init__(self, path: Path, patience_s: float = ANSWER_TIMEOUT_S) -> None:
         """`patience_s` is how long an answer may take."""
         super().__init__(path, "--control")
         self._patience_s = patience_s

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 SIZE = 9  # columns, and rows: two of them share a line of text
 SHADES = " ░▒▓█"
 BLOCKS = {(False, False): " ", (True, False): "▀", (False, True): "▄", (True, True): "█"}
-SEEN = 0.15  # what is fainter is left dark
-BACKGROUND, FAINT, STEPS = 233, 238, 17  # on the grey ramp of 256-colour terminals
+FAINTEST = 0.15  # what is fainter is left dark
+BACKGROUND, FAINT, GREYS = 233, 238, 17  # on the grey ramp of 256-colour terminals
 
 
 def trace(frames: NDArray[np.generic]) -> NDArray[np.float32]:
@@ -41,7 +41,7 @@ def draw(picture: NDArray[np.float32], colour: bool) -> list[str]:
 
 def _coloured(cells: list[tuple[float, float]]) -> str:
     # The form says where, the grey says when: so it is readable as plain text too.
-    drawn = (f"\x1b[38;5;{FAINT + round(STEPS * max(c))}m{BLOCKS[c[0] > SEEN, c[1] > SEEN]}" for c in cells)
+    drawn = (f"\x1b[38;5;{FAINT + round(GREYS * max(c))}m{BLOCKS[c[0] > FAINTEST, c[1] > FAINTEST]}" for c in cells)
     return f"\x1b[48;5;{BACKGROUND}m" + "".join(drawn) + "\x1b[0m"
 
 

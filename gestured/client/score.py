@@ -7,7 +7,7 @@ from typing import Any
 
 NONE = "none"  # the label of whatever is no gesture
 TOLERANCE_S = 0.3  # clocks, filters and thresholds shift an onset by some frames
-PATIENCE_S = 1.5  # after the end of what was performed; longer than any wait for a second tap
+MISSED_AFTER_S = 1.5  # after the end of what was performed; longer than any wait for a second tap
 
 
 @dataclass(eq=False)
@@ -69,7 +69,7 @@ class Tally:
 
     def settle(self, now: float) -> list[Outcome]:
         """What nothing can come for any more."""
-        over = [performed for performed in self.waiting if performed.offset + PATIENCE_S <= now]
+        over = [performed for performed in self.waiting if performed.offset + MISSED_AFTER_S <= now]
         self.waiting = [performed for performed in self.waiting if performed not in over]
         silent = [performed for performed in over if not performed.answered]
         return [self._count(Outcome("rejected" if p.label == NONE else "missed", p)) for p in silent]

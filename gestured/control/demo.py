@@ -22,9 +22,9 @@ from gestured.control.show import as_dict, block, summary
 from gestured.core.errors import GesturedError
 from gestured.simulator import Take
 
-SENSOR = "demo"
+DEMO_SENSOR = "demo"
 SLACK_S = 0.3  # idle frames shown before what was performed, and waited for at the end
-TAIL_S = 0.1
+DRAWN_AFTER_S = 0.1
 POLL_S = 0.05
 
 
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         try:
             with (
                 closing(Stream(engine.socket, {"types": ["gesture", "unknown"]})) as stream,
-                closing(Sensor(engine.listen, Form(SENSOR))) as sensor,
+                closing(Sensor(engine.listen, Form(DEMO_SENSOR))) as sensor,
             ):
                 show.say(
                     f"The daemon listens on {engine.listen} with the model {engine.ready['model']}.",
@@ -142,5 +142,5 @@ class Show:
         of = outcome.performed
         onset, offset = (of.onset, of.offset) if of else (outcome.event["onset"], outcome.event["offset"])  # type: ignore[index]
         times = self.take.times + sensor.epoch
-        shown = (times >= onset - SLACK_S) & (times <= offset + TAIL_S)
+        shown = (times >= onset - SLACK_S) & (times <= offset + DRAWN_AFTER_S)
         say_drawn(block(outcome, trace(self.take.frames[shown]), self.colour))

@@ -10,7 +10,7 @@ from gestured.client.say import shown
 from gestured.record.replay import opened
 
 ONSET_S = 0.25  # answers whose onsets lie closer are about the same contact
-CONFIDENCE = 0.05  # what a baseline learned at another moment may change
+CONFIDENCE_TOLERANCE = 0.05  # what a baseline learned at another moment may change
 STOPWATCH_S = 1e6  # times below are no dates
 
 Line = Mapping[str, Any]  # of the event stream; its times are the recording's
@@ -105,4 +105,6 @@ def differences(before: Iterable[Answer], after: Iterable[Answer]) -> list[Diffe
 def _alike(old: Answer, new: Answer) -> bool:
     if old.name != new.name:
         return False
-    return old.confidence is None or new.confidence is None or abs(old.confidence - new.confidence) <= CONFIDENCE
+    return (
+        old.confidence is None or new.confidence is None or abs(old.confidence - new.confidence) <= CONFIDENCE_TOLERANCE
+    )

@@ -15,7 +15,7 @@ from gestured.core.stamping import Stamper
 from gestured.record import arrays as recording
 from gestured.record.tape import Packet, Tape
 
-PAUSE_S = 3.0  # between two recordings: whatever is open is answered
+BETWEEN_RECORDINGS_S = 3.0  # between two recordings: whatever is open is answered
 SESSION = "session"
 SOURCE = Address("127.0.0.1", 9)  # of all its packets
 DIFFERENT = ("wrong", "missed", "false")
@@ -31,7 +31,7 @@ class Labelled:
         self._path, self._sensor = path, sensor
         self._found = found = recording.read(path)
         spans = [found.times_of(g) for g in range(len(found))]
-        lengths = [float(times[-1] - times[0]) + PAUSE_S for times in spans]
+        lengths = [float(times[-1] - times[0]) + BETWEEN_RECORDINGS_S for times in spans]
         self._first = np.array([times[0] for times in spans])  # (G,) s, as in the file
         begin = float(self._first[0]) if spans and self._first[0] >= STOPWATCH_S else 0.0
         self._start = begin + np.cumsum([0.0, *lengths])[:-1]  # (G,) s, as it is played

@@ -15,7 +15,7 @@ from gestured.simulator import (
     SPEEDS,
     Participant,
     Performance,
-    Sensor,
+    SimulatedSensor,
     Take,
     generator,
     perform,
@@ -23,9 +23,9 @@ from gestured.simulator import (
 
 PART_S = 600.0  # what is simulated at a time; between two parts the sensor is off
 OFF_S = 3.0
-LEAD_S = 2.0  # untouched at first: the daemon learns the baseline
-TAIL_S = 1.0
-IDLE_S = (1.0, 2.0)  # between performances
+UNTOUCHED_S = 2.0  # untouched at first: the daemon learns the baseline
+LAST_PAUSE_S = 1.0
+BETWEEN_S = (1.0, 2.0)  # between performances
 
 
 @dataclass(frozen=True)
@@ -51,21 +51,21 @@ class Play:
 
     def _take(self, part: int, seconds: float) -> Take:
         rng = generator(self.seed, 0xC7, self.participant, part)
-        nominal = Sensor.nominal(day=self.participant)
+        nominal = SimulatedSensor.nominal(day=self.participant)
         pitch = min(nominal.extent) / min(self.rows, self.columns)
         sensor = replace(nominal, rows=self.rows, columns=self.columns, pitch_mm=pitch, rate_hz=self.rate_hz)
         person = Participant(self.participant)
         inclination = int(rng.integers(3))
         performances: list[tuple[float, Performance]] = []
-        now = LEAD_S
+        now = UNTOUCHED_S
         while True:
             kind = self._kind(len(performances), rng)
             speed = self.speed or tuple(SPEEDS)[int(rng.integers(len(SPEEDS)))]
             performance = perform(kind, person, rng, speed, inclination, sensor.extent)
-            if now + performance.duration_s + TAIL_S > seconds:
+            if now + performance.duration_s + LAST_PAUSE_S > seconds:
                 return sensor.record(performances, seconds, rng)
             performances.append((now, performance))
-            now += performance.duration_s + float(rng.uniform(*IDLE_S))
+            now += performance.duration_s + float(rng.uniform(*BETWEEN_S))
 
     def _kind(self, number: int, rng: np.random.Generator) -> str:
         if self.kinds:

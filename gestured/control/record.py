@@ -24,7 +24,7 @@ from gestured.record.replay import Mute, maker
 from gestured.record.tape import Writer, library
 
 FLUSH_S = 1.0  # what a crash or a power cut costs
-WAITING = 50_000  # lines; the daemon counts what finds no room
+WAITING_LINES = 50_000  # lines; the daemon counts what finds no room
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -125,7 +125,7 @@ class Keeper:
 
 def _waiting(control: Control) -> Iterator[dict[str, Any] | None]:
     """The daemon's lines; None now and then where none come."""
-    lines: queue.Queue[dict[str, Any] | None] = queue.Queue(WAITING)
+    lines: queue.Queue[dict[str, Any] | None] = queue.Queue(WAITING_LINES)
 
     def read() -> None:
         with suppress(Refused):  # half a line, where one of us closed the connection

@@ -24,8 +24,8 @@ from gestured.model.ladder import Ladder, ladder_for
 from gestured.model.model import shipped
 from gestured.record.replay import Maker, Mute, Replay
 
-MODEL = "cnn_lstm"  # for a file that names none
-Source = Recorded | Labelled
+DEFAULT_MODEL = "cnn_lstm"  # for a file that names none
+Playable = Recorded | Labelled
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -67,7 +67,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
 def run(args: argparse.Namespace) -> int:
     """Send it, or play it here; 1 where a comparison finds differences."""
     _check(args)
-    source: Source = Labelled(args.file, args.sensor) if args.file.suffix == ".npz" else Recorded(args.file)
+    source: Playable = Labelled(args.file, args.sensor) if args.file.suffix == ".npz" else Recorded(args.file)
     if not source.tape.whole:
         say(f"{args.file}: writing was cut off; what is there is played", to=sys.stderr)
     if not source.tape.packets:
@@ -91,7 +91,7 @@ def _check(args: argparse.Namespace) -> None:
         raise GesturedError("--model is for a replay here; the daemon of --to has its own")
 
 
-def _here(args: argparse.Namespace, source: Source) -> int:
+def _here(args: argparse.Namespace, source: Playable) -> int:
     """Without a daemon."""
     scene, ladder = _opened(source, args.model)
     try:
@@ -106,9 +106,9 @@ def _here(args: argparse.Namespace, source: Source) -> int:
     return 0
 
 
-def _opened(source: Source, model: str | None) -> tuple[Scene, Ladder]:
+def _opened(source: Playable, model: str | None) -> tuple[Scene, Ladder]:
     if isinstance(source, Labelled):
-        ladder = ladder_for(model or MODEL, None)
+        ladder = ladder_for(model or DEFAULT_MODEL, None)
         return source.scene(ladder.gestures), ladder
     maker = source.maker
     if model is None:
@@ -132,7 +132,7 @@ def _recorded_models(path: Path, maker: Maker) -> list[Path]:
     return [shipped()[name] for name in names]
 
 
-def _there(args: argparse.Namespace, source: Source) -> int:
+def _there(args: argparse.Namespace, source: Playable) -> int:
     """To a daemon, whose events are compared."""
     # Which gestures there are is the daemon's business.
     scene = source.scene(("none",)) if isinstance(source, Labelled) else source.maker.scene
@@ -148,7 +148,7 @@ def _there(args: argparse.Namespace, source: Source) -> int:
     return status
 
 
-def _send(args: argparse.Namespace, source: Source) -> list[float]:
+def _send(args: argparse.Namespace, source: Playable) -> list[float]:
     """When each packet was sent. Raises GesturedError where nobody listens."""
     sent, unheard = send(source.tape, args.to, args.speed)
     where = str(args.to)
@@ -162,7 +162,7 @@ def _knew(replay: Replay) -> Knew:
     return lambda sensor, t: sensor in replay.played and replay.played[sensor].knew(t - replay.epoch)
 
 
-def _compare(args: argparse.Namespace, source: Source, lines: Iterable[Line], knew: Knew) -> int:
+def _compare(args: argparse.Namespace, source: Playable, lines: Iterable[Line], knew: Knew) -> int:
     compared, skipped, differences = source.compare(lines, knew)
     for difference in differences:
         if args.json:

@@ -25,7 +25,7 @@ from gestured.record.tape import Packet, Tape
 Times = NDArray[np.float64]
 
 BUNDLE = b"#bundle\0"
-PATIENCE_S = 10.0  # a daemon says something once a second
+STATUS_TIMEOUT_S = 10.0  # a daemon says something once a second
 BACKLOG_S = 0.5  # what a daemon needs for a receive buffer that is full
 SILENT = ("stale", "no_data")  # states of a sensor that nobody feeds
 CONTACTS = 1000  # enough to tell
@@ -110,7 +110,7 @@ class Hearing:
         self._stream = Stream(path, {"types": TYPES})
         self._heard: queue.Queue[dict[str, Any] | None] = queue.Queue()
         threading.Thread(target=self._read, daemon=True).start()
-        end = time.monotonic() + PATIENCE_S
+        end = time.monotonic() + STATUS_TIMEOUT_S
         while sensors & set(self._stream.hello["sensors"]) and (live := self._live()):
             if time.monotonic() > end:
                 self.close()
@@ -165,9 +165,9 @@ class Hearing:
 
     def _next(self) -> dict[str, Any]:
         try:
-            line = self._heard.get(timeout=PATIENCE_S)
+            line = self._heard.get(timeout=STATUS_TIMEOUT_S)
         except queue.Empty:
-            raise Unreachable(f"the daemon on {self._stream.path} says nothing for {PATIENCE_S:g} s") from None
+            raise Unreachable(f"the daemon on {self._stream.path} says nothing for {STATUS_TIMEOUT_S:g} s") from None
         if line is None:
             raise Unreachable(f"the daemon on {self._stream.path} closed the connection")
         return line

@@ -10,7 +10,7 @@ from gestured.client.picture import draw
 from gestured.client.say import shown
 from gestured.client.score import NONE, Outcome, Performed
 
-COLOURS = {"right": 32, "rejected": 32, "wrong": 31, "false": 31, "missed": 33}
+VERDICT_COLOURS = {"right": 32, "rejected": 32, "wrong": 31, "false": 31, "missed": 33}
 BOLD, DIM = 1, 2
 
 
@@ -35,7 +35,7 @@ def block(outcome: Outcome, picture: NDArray[np.float32], colour: bool) -> str:
     else:
         answer = "unknown" if performed and performed.unknown else "-"
     when = f"{1000 * outcome.latency_s:.0f} ms after its end" if outcome.latency_s is not None else ""
-    verdict = paint(outcome.verdict.upper(), COLOURS[outcome.verdict], colour)
+    verdict = paint(outcome.verdict.upper(), VERDICT_COLOURS[outcome.verdict], colour)
     words = [
         "",
         f"performed   {name(performed)}",

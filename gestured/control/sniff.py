@@ -23,9 +23,9 @@ from gestured.core.wire import is_sensor
 
 USUAL = "/{sensor}/pressure"
 LEAST_TAXELS = 4  # 2 x 2
-SEEN = 256  # addresses; what comes after that is counted together
-SHOWN = 80  # characters of an address or of type tags
-LONGEST = 255  # characters of an address that is proposed
+MOST_ADDRESSES = 256  # addresses; what comes after that is counted together
+SHOWN_CHARACTERS = 80  # characters of an address or of type tags
+LONGEST_ADDRESS = 255  # characters of an address that is proposed
 TRAJECTORY = "/trajectory"
 
 
@@ -92,17 +92,17 @@ def lines(sight: "Sight") -> Iterator[str]:
     rows = sight.rows()
     for s in rows:
         senders = ", ".join(sorted(s.sources))
-        address, types = shown(s.address, SHOWN), shown(s.types, SHOWN)
+        address, types = shown(s.address, SHOWN_CHARACTERS), shown(s.types, SHOWN_CHARACTERS)
         yield f"  {address:<32} ,{types:<16} {s.count:6d}  {s.rate_hz:7.1f} Hz  from {senders}"
     for reason, count in sight.errors.items():
         yield f"  {count} packets are no OSC: {reason}"
     for s in rows:
         if _taxels(s.types) and len(s.sources) > 1:
             several = "has several senders: the daemon takes the first; give each sensor a name of its own"
-            yield f"  {shown(s.address, SHOWN)} {several}"
+            yield f"  {shown(s.address, SHOWN_CHARACTERS)} {several}"
         if _taxels(s.types) and _sensor(s.address) is None and not s.address.endswith(TRAJECTORY):
-            unsafe = f"is not proposed: expected parts of A-Z a-z 0-9 _ - . and at most {LONGEST} characters"
-            yield f"  {shown(s.address, SHOWN)} {unsafe}"
+            unsafe = f"is not proposed: expected parts of A-Z a-z 0-9 _ - . and at most {LONGEST_ADDRESS} characters"
+            yield f"  {shown(s.address, SHOWN_CHARACTERS)} {unsafe}"
     yield ""
     yield from propose(rows) or ["nothing that looks like a pressure frame"]
 
@@ -130,7 +130,7 @@ class Sight:
         self.errors.update(error.reason for error in errors)
         for message in messages:
             key = message.address, short_types(message)
-            if key not in self.seen and len(self.seen) >= SEEN:
+            if key not in self.seen and len(self.seen) >= MOST_ADDRESSES:
                 key = "(others)", ""
             seen = self.seen.setdefault(key, Seen(*key, first=t))
             seen.count += 1
@@ -197,7 +197,11 @@ def _sensor(address: str) -> tuple[str, str] | None:
 
     None where there is none, or where a part could be more than a name.
     """
-    if address.endswith(TRAJECTORY) or len(address) > LONGEST or not re.fullmatch(r"(/[A-Za-z0-9_.-]+)+", address):
+    if (
+        address.endswith(TRAJECTORY)
+        or len(address) > LONGEST_ADDRESS
+        or not re.fullmatch(r"(/[A-Za-z0-9_.-]+)+", address)
+    ):
         return None
     parts = address.split("/")[1:]
     places = [i for i, part in enumerate(parts) if is_sensor(part)]

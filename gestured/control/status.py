@@ -12,9 +12,9 @@ from gestured.control.address import add_control, connect
 from gestured.control.shadow import words as shadow_words
 
 CLEAR = "\x1b[2J\x1b[H"
-PERIOD_S = 1.0
-NAMES = {"duration_s": "duration", "unknown": "answered by unknown"}
-SENSORS = 12  # lines; what is more is counted
+REFRESH_S = 1.0
+SHIFT_NAMES = {"duration_s": "duration", "unknown": "answered by unknown"}
+SENSOR_LINES = 12  # lines; what is more is counted
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
                 say(*screen(status))
             if not args.watch:
                 return 0 if status["ready"]["ready"] else 1
-            time.sleep(PERIOD_S)
+            time.sleep(REFRESH_S)
 
 
 def screen(status: dict[str, Any]) -> Iterator[str]:
@@ -85,13 +85,13 @@ def _sensors(sensors: dict[str, dict[str, Any]]) -> Iterator[str]:
         yield "no sensor was heard so far (gesturectl sniff shows what arrives)"
         return
     yield "sensor           state         Hz  jitter   lost  bad  drift gestures  grid"
-    for name, s in list(sensors.items())[:SENSORS]:
+    for name, s in list(sensors.items())[:SENSOR_LINES]:
         numbers = f"{s['rate_hz']:6.1f} {1000 * s['jitter_s']:4.0f} ms {s.get('lost', 0):6d} {s['bad_taxels']:4d}"
         touched = "  touched" if s.get("touched") else ""
         tail = f"{s['drift']:6.1f} {s.get('gestures', 0):8d}  {s['grid']}{touched}"
         yield f"{name[:16]:<16} {s['state']:<9} {numbers} {tail}"
-    if len(sensors) > SENSORS:
-        yield f"and {len(sensors) - SENSORS} more"
+    if len(sensors) > SENSOR_LINES:
+        yield f"and {len(sensors) - SENSOR_LINES} more"
 
 
 def _recent(recent: list[dict[str, Any]]) -> Iterator[str]:
@@ -105,7 +105,7 @@ def _recent(recent: list[dict[str, Any]]) -> Iterator[str]:
 def _shift(shift: dict[str, Any]) -> str:
     if not shift["outside"]:
         return f"nothing to say yet ({shift['gestures']} gestures)"
-    shares = ", ".join(f"{NAMES.get(name, name)} {100 * share:.0f} %" for name, share in shift["outside"].items())
+    shares = ", ".join(f"{SHIFT_NAMES.get(name, name)} {100 * share:.0f} %" for name, share in shift["outside"].items())
     verdict = "unlike the training data" if shift["unlike"] else "as in training"
     return f"{verdict}; outside its range (2 % or less expected) in the last {shift['gestures']} gestures: {shares}"
 

@@ -16,7 +16,7 @@ OWNERS_SHARE = 0.75  # of the time, in a flood, for those who own a sensor; stra
 CREDIT_S = 0.02  # of work that a sender may save up, and begins with: what the largest packet of frames costs
 FIRST_GUESS = 3e-7  # s of work a byte, until a sender's packets have been served
 NEWEST = 0.2  # weight of the newest measurement of that
-SENDERS = 4096  # whose credit is remembered
+REMEMBERED_SENDERS = 4096  # whose credit is remembered
 
 
 class Datagram(NamedTuple):
@@ -126,7 +126,7 @@ class Backlog:
         """A packet of a flood was served, and cost so much."""
         key = self.sender(datagram.source)
         cost = seconds / len(datagram.packet) if datagram.packet else 0.0
-        if len(self._cost) < SENDERS or key in self._cost:
+        if len(self._cost) < REMEMBERED_SENDERS or key in self._cost:
             before = self._cost.get(key, cost)
             self._cost[key] = before + NEWEST * (cost - before)
 
@@ -150,7 +150,7 @@ class Backlog:
                 break
             credit -= cost
             kept.append(datagram)
-        if len(self._credit) < SENDERS or key in self._credit:
+        if len(self._credit) < REMEMBERED_SENDERS or key in self._credit:
             self._credit[key] = credit, self._equal
         return kept[::-1]
 

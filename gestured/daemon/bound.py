@@ -19,7 +19,7 @@ from gestured.daemon.sockets import (
 
 INTERNET = (socket.AF_INET, socket.AF_INET6)
 # FileDescriptorName= -> what such a socket must be, in systemd's words
-NAMES = {
+SOCKET_NAMES = {
     "osc": (INTERNET, socket.SOCK_DGRAM, "ListenDatagram=HOST:PORT"),
     "events": ((socket.AF_UNIX,), socket.SOCK_STREAM, "ListenStream=/PATH"),
     "control": ((socket.AF_UNIX,), socket.SOCK_STREAM, "ListenStream=/PATH"),
@@ -95,11 +95,11 @@ def _where(sock: socket.socket) -> str:
 def _by_name(passed: Sequence[tuple[str, socket.socket]]) -> dict[str, socket.socket]:
     found: dict[str, socket.socket] = {}
     for name, sock in passed:
-        if name not in NAMES:
+        if name not in SOCKET_NAMES:
             raise AddressError(
-                f"systemd passed a socket named {name!r}, expected FileDescriptorName= one of {', '.join(NAMES)}"
+                f"systemd passed a socket named {name!r}, expected FileDescriptorName= one of {', '.join(SOCKET_NAMES)}"
             )
-        families, kind, words = NAMES[name]
+        families, kind, words = SOCKET_NAMES[name]
         if sock.family not in families or sock.type != kind or name in found:
             raise AddressError(
                 f"systemd's socket {name!r}: expected one, of {words}, found {sock.family.name} {sock.type.name}"

@@ -8,7 +8,7 @@ from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.daemon.desk import Desk
 
-SIDE = 4  # taxels
+CANARY_TAXELS = 4  # taxels
 
 
 class Canary:
@@ -19,7 +19,7 @@ class Canary:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._front_end = FrontEnd("canary", SIDE, SIDE)
+        self._front_end = FrontEnd("canary", CANARY_TAXELS, CANARY_TAXELS)
         self._random = Random(0)
         self._t = 0.0
 
@@ -27,8 +27,8 @@ class Canary:
         """Whether a frame came through. A failure is logged and counted; systemd restarts us if it lasts."""
         self._t += 0.1
         try:
-            values = np.array([self._random.gauss(100.0, 1.0) for _ in range(SIDE * SIDE)])
-            self._front_end.push(Frame(self._t, values.reshape(SIDE, SIDE)))
+            values = np.array([self._random.gauss(100.0, 1.0) for _ in range(CANARY_TAXELS * CANARY_TAXELS)])
+            self._front_end.push(Frame(self._t, values.reshape(CANARY_TAXELS, CANARY_TAXELS)))
         except Exception:
             self._desk.bug("in the way of the watchdog's frame")
             return False

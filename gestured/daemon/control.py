@@ -19,16 +19,16 @@ from typing import Any
 
 from gestured.core.errors import GesturedError
 from gestured.daemon.log import Throttle
-from gestured.daemon.request import MAX_LINE, Answer, Refusal, Stream, Verb, parse_request
+from gestured.daemon.request import MAX_REQUEST_BYTES, Refusal, Reply, ReplyStream, Verb, parse_request
 
-CONNECTIONS = 16
-KEPT = 4  # more connections for root and our own user: no member of the group can lock them out
+OPERATORS = 16
+OPERATORS_KEPT = 4  # more connections for root and our own user: no member of the group can lock them out
 IDLE_S = 60.0  # who asks nothing for so long, and is no tap, gives its place to others
-STALLED_S = 10.0  # the same for who does not read an answer
+UNREAD_S = 10.0  # the same for who does not read an answer
 LOGGED = 8  # lines of one verb and user in a log.PERIOD_S; what is more is counted
-PIECE_BYTES = 16 << 10  # of a stream that are made in one turn: less than a millisecond's work
-PAUSE_S = 0.1  # the longest pause after a turn
-BACKLOG_BYTES = 8 << 20  # of a connection that packets are streamed to; what is above is lost, and counted
+TURN_BYTES = 16 << 10  # of a stream that are made in one turn: less than a millisecond's work
+TURN_PAUSE_S = 0.1  # the longest pause after a turn
+TAP_BACKLOG_BYTES = 8 << 20  # of a connection that packets are streamed to; what is above is lost, and counted
 SO_PEERGROUPS = 59  # Linux 4.13; not in Python's socket module
 
 
@@ -45,7 +45,7 @@ class Connection:
         """Send a line, or count it as lost where too much waits already; never blocks."""
         if self.closed:
             return False
-        if self._writer.transport.get_write_buffer_size() > BACKLOG_BYTES:
+        if self._writer.transport.get_write_buffer_size() > TAP_BACKLOG_BYTES:
             self.lost += 1
             return False
         self._writer.write(line)
@@ -74,7 +74,7 @@ class ControlServer:
 
     async def start(self) -> None:
         """Take connections from now on."""
-        self._server = await asyncio.start_unix_server(self._serve, sock=self._sock, limit=MAX_LINE)
+        self._server = await asyncio.start_unix_server(self._serve, sock=self._sock, limit=MAX_REQUEST_BYTES)
 
     def close(self) -> None:
         """Take no more, and hang up."""
@@ -86,7 +86,7 @@ class ControlServer:
         self._open.add(writer)
         try:
             who = _peer(writer.get_extra_info("socket"))
-            places = CONNECTIONS + (KEPT if who.ours else 0)
+            places = OPERATORS + (OPERATORS_KEPT if who.ours else 0)
             if not who.may:
                 self._throttle.warn("control refused", "peer", uid=who.uid, pid=who.pid)
                 writer.write(_refusal("only root, the daemon's user and its group may control it"))
@@ -117,7 +117,7 @@ class ControlServer:
                 writer.write(_refusal(f"nothing was asked for {IDLE_S:g} s; connect again"))
                 return
             except ValueError:  # what is longer cannot be told from what follows it
-                writer.write(_refusal(f"a request has at most {MAX_LINE} bytes"))
+                writer.write(_refusal(f"a request has at most {MAX_REQUEST_BYTES} bytes"))
                 return
             if not line:
                 connection.end()
@@ -140,22 +140,22 @@ class ControlServer:
         async with self._turn(self._slow if verb.slow else self._quick):
             found = await self._run(connection, verb, parameters)
             # On its way before what the verb streams after it.
-            writer.write(_line(found.answer if isinstance(found, Stream) else found))
-        if isinstance(found, Stream):
+            writer.write(_line(found.answer if isinstance(found, ReplyStream) else found))
+        if isinstance(found, ReplyStream):
             self._streaming = True
             try:
                 await self._stream(connection, writer, found.lines)
             finally:
                 self._streaming = False
 
-    async def _run(self, connection: Connection, verb: Verb, parameters: Mapping[str, Any]) -> Answer | Stream:
+    async def _run(self, connection: Connection, verb: Verb, parameters: Mapping[str, Any]) -> Reply | ReplyStream:
         try:
             found = await verb.run(connection, **parameters)
-            if not isinstance(found, Stream):
+            if not isinstance(found, ReplyStream):
                 return {"ok": True, **found}
             if self._streaming:
                 raise Refusal("it is being sent to somebody else; ask again when that is over")
-            return Stream({"ok": True, **found.answer}, found.lines)
+            return ReplyStream({"ok": True, **found.answer}, found.lines)
         except GesturedError as error:
             return {"ok": False, "reason": str(error)}
         except Exception:  # a bug in a verb is this answer's end, not the daemon's
@@ -169,9 +169,9 @@ class ControlServer:
                 for line in lines:
                     writer.write(line)
                     size += len(line)
-                    if size >= PIECE_BYTES:
+                    if size >= TURN_BYTES:
                         break
-            if size < PIECE_BYTES:
+            if size < TURN_BYTES:
                 return
             await _drain(writer)
 
@@ -181,13 +181,13 @@ class ControlServer:
         async with lock:
             began = time.perf_counter()
             yield
-            await asyncio.sleep(min(time.perf_counter() - began, PAUSE_S))
+            await asyncio.sleep(min(time.perf_counter() - began, TURN_PAUSE_S))
 
 
 async def _drain(writer: asyncio.StreamWriter) -> None:
     """Wait until it is read, but for what the kernel keeps; raises TimeoutError where nobody reads."""
     try:
-        async with asyncio.timeout(STALLED_S):
+        async with asyncio.timeout(UNREAD_S):
             await writer.drain()
     except TimeoutError:
         writer.transport.abort()

@@ -17,9 +17,9 @@ from gestured.daemon.sockets import AddressError
 
 DEADLINE_S = 5.0
 REQUEST_BYTES = 8192
-CONNECTIONS = 64
+HTTP_CONNECTIONS = 64
 
-Answer = tuple[int, str, bytes]  # status, content type, body
+Response = tuple[int, str, bytes]  # status, content type, body
 _REASONS = {
     200: "OK",
     400: "Bad Request",
@@ -30,7 +30,7 @@ _REASONS = {
 }
 
 
-def as_json(status: int, body: Mapping[str, object]) -> Answer:
+def as_json(status: int, body: Mapping[str, object]) -> Response:
     """An answer of one JSON object."""
     return status, "application/json", json.dumps(body).encode() + b"\n"
 
@@ -38,7 +38,7 @@ def as_json(status: int, body: Mapping[str, object]) -> Answer:
 def serve_pages(sock: socket.socket, snapshot: Callable[[], Snapshot], metrics: Metrics) -> "HttpThread":
     """Serve the daemon's pages on a listening socket; each request takes a snapshot of its own."""
 
-    def exposition() -> Answer:
+    def exposition() -> Response:
         return 200, "text/plain; version=0.0.4; charset=utf-8", metrics.exposition(snapshot())
 
     return HttpThread(
@@ -57,7 +57,7 @@ class HttpThread:
     Raises AddressError where it cannot, because there are too few descriptors for one.
     """
 
-    def __init__(self, sock: socket.socket, routes: dict[str, Callable[[], Answer]]) -> None:
+    def __init__(self, sock: socket.socket, routes: dict[str, Callable[[], Response]]) -> None:
         self._sock, self._routes = sock, routes
         self._open: dict[asyncio.StreamWriter, None] = {}  # oldest first
         self._started = threading.Event()
@@ -91,7 +91,7 @@ class HttpThread:
         server.close()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if len(self._open) >= CONNECTIONS:
+        if len(self._open) >= HTTP_CONNECTIONS:
             oldest = next(iter(self._open))
             del self._open[oldest]
             oldest.transport.abort()

@@ -16,7 +16,7 @@ from typing import Any
 
 import structlog
 
-LEVELS = {"debug": 10, "info": 20, "warning": 30, "error": 40}
+LOG_LEVELS = {"debug": 10, "info": 20, "warning": 30, "error": 40}
 PERIOD_S = 10.0  # the time in which lines of one reason are bounded
 REASONS = 64  # more reasons than there are; a bound in case one slips in that a peer can choose
 WAITING_BYTES = 256 << 10  # of lines that nobody has read so far; what comes after them is thrown away, and counted
@@ -34,13 +34,13 @@ def configure(level: str) -> None:
             *([] if tty else [structlog.processors.format_exc_info]),
             structlog.dev.ConsoleRenderer() if tty else structlog.processors.JSONRenderer(),
         ],
-        wrapper_class=structlog.make_filtering_bound_logger(LEVELS[level]),
+        wrapper_class=structlog.make_filtering_bound_logger(LOG_LEVELS[level]),
         logger_factory=lambda *_: _Printer(),
         cache_logger_on_first_use=False,
     )
 
 
-class Writer:
+class LineWriter:
     """Writes lines to a descriptor, in their order, without making anybody wait.
 
     A thread, because the descriptor is shared: one that we made non-blocking would be so for the shell that started us.
@@ -101,21 +101,21 @@ class Writer:
                 return  # the other end is gone, or the disk full: thrown away
 
 
-_errors: Writer | None = None
+_errors: LineWriter | None = None
 
 
 def say(line: str) -> None:
     """Have a line written to standard error, where there is one."""
     global _errors
     if sys.stderr is not None:
-        _errors = _errors or Writer(STDERR)
+        _errors = _errors or LineWriter(STDERR)
         _errors.put(line)
 
 
 def answer(line: str) -> None:
     """Write one line to standard output, where there is one; waits LAST_S for a reader, not longer."""
     if sys.stdout is not None:
-        writer = Writer(STDOUT)
+        writer = LineWriter(STDOUT)
         writer.put(line)
         writer.close()
 

@@ -16,14 +16,17 @@ from gestured.core.errors import SettingsError
 from gestured.daemon.settings import FLAGS, AddressSettings, GestureSettings, Part, SensorSettings, Settings
 
 ENVIRONMENT = "GESTURED_"
-MAX_BYTES = 1 << 20  # of a configuration: many times what the largest number of sensors takes
+MAX_CONFIG_BYTES = 1 << 20  # of a configuration: many times what the largest number of sensors takes
 
 
 def _read(path: str) -> str:
     # A FIFO or a device would make a plain open, or the read after it, wait for ever.
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY)) as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode) or len(data := file.read(MAX_BYTES + 1)) > MAX_BYTES:
-            raise SettingsError(f"config: {path}: expected a regular file of at most {MAX_BYTES >> 20} MiB")
+        if (
+            not stat.S_ISREG(os.fstat(file.fileno()).st_mode)
+            or len(data := file.read(MAX_CONFIG_BYTES + 1)) > MAX_CONFIG_BYTES
+        ):
+            raise SettingsError(f"config: {path}: expected a regular file of at most {MAX_CONFIG_BYTES >> 20} MiB")
     return data.decode()
 
 

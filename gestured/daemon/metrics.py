@@ -23,7 +23,7 @@ NAMED_GESTURES = 12
 OTHER = "other"
 INFERENCE_S = (0.0005, 0.001, 0.005, 0.025, 0.1)
 LATENCY_S = (0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0)
-CONFIDENCE = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
+CONFIDENCE_BUCKETS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 
 
 class Counter:
@@ -87,7 +87,7 @@ class Metrics:
             most=NAMED_MODELS,
         )
         self.latency = Histogram("gestured_latency_seconds", "From the last touched frame to the event", LATENCY_S)
-        self.confidence = Histogram("gestured_confidence", "Confidence of the published gestures", CONFIDENCE)
+        self.confidence = Histogram("gestured_confidence", "Confidence of the published gestures", CONFIDENCE_BUCKETS)
         self._named: set[str] = set()
 
     def event(self, event: Event) -> None:

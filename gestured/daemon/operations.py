@@ -13,7 +13,7 @@ from gestured.daemon.control import Connection
 from gestured.daemon.desk import Desk
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.publisher import Publisher
-from gestured.daemon.request import Answer, Parameter, Refusal, Stream, Verb
+from gestured.daemon.request import Parameter, Refusal, Reply, ReplyStream, Verb
 from gestured.daemon.snapshot import Snapshot
 from gestured.daemon.status import scene, status
 from gestured.daemon.tap import Taps, as_lines
@@ -57,18 +57,18 @@ class Operations:
             "flight": Verb(self.flight),
         }
 
-    async def status(self, connection: Connection) -> Answer:
+    async def status(self, connection: Connection) -> Reply:
         """How the daemon is."""
         return status(self.snapshot(), self.metrics)
 
-    async def reload(self, connection: Connection) -> Answer:
+    async def reload(self, connection: Connection) -> Reply:
         """Read configuration and model anew; the old ones stay where the new ones are bad."""
         reason = await self.reload_all()
         if reason is not None:
             raise Refusal(f"{reason}; nothing has changed")
         return {"model": self.snapshot().models.active}
 
-    async def recalibrate(self, connection: Connection, sensor: str | None = None) -> Answer:
+    async def recalibrate(self, connection: Connection, sensor: str | None = None) -> Reply:
         """Learn the idle sensor anew: one, or all. Refused while one of them is touched: a hand is no baseline."""
         heard = {name: one for name, one in self.snapshot().sensors.items() if one.source is not None}
         if sensor is not None and sensor not in heard:
@@ -82,7 +82,7 @@ class Operations:
         self.desk.take(self.hub.restart(chosen, time.monotonic()))
         return {"sensors": chosen}
 
-    async def emit(self, connection: Connection, gesture: str, sensor: str | None = None) -> Answer:
+    async def emit(self, connection: Connection, gesture: str, sensor: str | None = None) -> Reply:
         """A made-up gesture through every output, marked as a test; it takes the sensor's next numbers."""
         snapshot, sensor = self.snapshot(), sensor or "test"
         if gesture not in snapshot.gestures:
@@ -106,7 +106,7 @@ class Operations:
             self.publisher.publish(event, test=True)
         return {"sensor": sensor, "gesture": gesture, "sequence": sequence}
 
-    async def shadow(self, connection: Connection, model: str | None) -> Answer:
+    async def shadow(self, connection: Connection, model: str | None) -> Reply:
         """Run a candidate beside the active model; null ends it. Gives what the last one was worth."""
         if model is None:
             last, self.watch.shadow = self.watch.shadow, None
@@ -114,19 +114,19 @@ class Operations:
         candidate = await asyncio.to_thread(open_apart, model)
         return {"shadow": self.watch.compare(candidate).report()}
 
-    async def tap(self, connection: Connection) -> Answer:
+    async def tap(self, connection: Connection) -> Reply:
         """Stream packets and events over this connection from now on."""
         if connection.tap:
             raise Refusal("this connection is a tap already")
         self.taps.join(connection)
         return self._scene()
 
-    async def flight(self, connection: Connection) -> Stream:
+    async def flight(self, connection: Connection) -> ReplyStream:
         """Stream what the flight recorder holds, then `{"type":"end"}`."""
         if not self.taps.ring_bytes:
             raise Refusal("the flight recorder is off; set flight_recorder = MiB (or --flight-recorder) and restart")
         held = self.taps.flight()
-        return Stream(self._scene() | {"lines": len(held)}, chain(as_lines(held), (b'{"type":"end"}\n',)))
+        return ReplyStream(self._scene() | {"lines": len(held)}, chain(as_lines(held), (b'{"type":"end"}\n',)))
 
-    def _scene(self) -> Answer:
+    def _scene(self) -> Reply:
         return scene(self.snapshot(), time.time_ns() - time.monotonic_ns())

@@ -7,16 +7,16 @@ from typing import Any
 
 from gestured.core.errors import GesturedError
 
-MAX_LINE = 4096  # bytes of a request
+MAX_REQUEST_BYTES = 4096  # bytes of a request
 
-Answer = dict[str, Any]
+Reply = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Stream:
+class ReplyStream:
     """An answer that lines follow. They are made as they are read."""
 
-    answer: Answer
+    answer: Reply
     lines: Iterator[bytes]
 
 
@@ -38,7 +38,7 @@ class Parameter:
 class Verb:
     """What `run(connection, **parameters)` does; it gives the answer or raises Refusal."""
 
-    run: Callable[..., Awaitable[Answer | Stream]]
+    run: Callable[..., Awaitable[Reply | ReplyStream]]
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     changes: bool = True  # and so is logged
     slow: bool = False  # it waits for another thread; what is quick need not wait for it

@@ -14,7 +14,7 @@ from gestured.core.recognizer import Classifier, Scores
 from gestured.model.process import ModelProcess
 
 PAIRS = 10  # disagreements that a report names
-WAITING = 8  # segments; each may be some seconds of frames
+WAITING_SEGMENTS = 8  # segments; each may be some seconds of frames
 FINISH_S = 2.0  # for what a candidate was given before it was to end
 UNKNOWN = "unknown"
 
@@ -61,7 +61,7 @@ class Shadow:
         self.ended: str | None = None  # why, where it ended by itself
         self._comparison = Comparison()
         self._lock = threading.Lock()  # of what is counted
-        self._waiting: queue.Queue[tuple[Segment, Scores] | None] = queue.Queue(WAITING)  # None: no more
+        self._waiting: queue.Queue[tuple[Segment, Scores] | None] = queue.Queue(WAITING_SEGMENTS)  # None: no more
         self._thread = threading.Thread(target=self._work, name="shadow", daemon=True)
         self._thread.start()
 

@@ -22,7 +22,7 @@ from gestured.core.recognizer import Scores
 from gestured.core.window import Window
 
 LAST = 100  # gestures
-LEAST = 20  # before which nothing is said
+LEAST_GESTURES = 20  # before which nothing is said
 UNLIKELY = 0.2  # share outside; with 2 % expected, 4 of 20 come by chance once in 1700 times (binomial)
 MANY = 0.5  # share of segments that are unknown
 UNKNOWN = "unknown"
@@ -58,9 +58,11 @@ class Shift:
         return max((len(self._outside[name]) for name in self.ranges), default=0)
 
     def shares(self) -> dict[str, float]:
-        """Share outside the training range for each quantity, share of `unknown`; empty before there were LEAST."""
+        """Share outside the training range for each quantity, share of `unknown`; empty for fewer gestures."""
         return {
-            name: sum(tuple(outside)) / len(outside) for name, outside in self._outside.items() if len(outside) >= LEAST
+            name: sum(tuple(outside)) / len(outside)
+            for name, outside in self._outside.items()
+            if len(outside) >= LEAST_GESTURES
         }
 
     def unlike(self) -> list[str]:

@@ -18,7 +18,7 @@ from gestured.daemon.control import Connection
 
 KEPT_S = 30.0  # of the flight recorder
 OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps
-Kept = tuple[int, Source, bytes] | bytes  # a packet with its time in ns (monotonic), or an event's line
+Remembered = tuple[int, Source, bytes] | bytes  # a packet with its time in ns (monotonic), or an event's line
 
 
 class Taps:
@@ -28,7 +28,7 @@ class Taps:
         """Remember the last KEPT_S seconds, but never more than `ring_bytes` (0: nothing)."""
         self.ring_bytes = ring_bytes
         self._live: list[Connection] = []
-        self._ring: deque[tuple[int, int, Kept]] = deque()  # ns, bytes, what
+        self._ring: deque[tuple[int, int, Remembered]] = deque()  # ns, bytes, what
         self._size = 0
 
     @property
@@ -63,7 +63,7 @@ class Taps:
             if self.ring_bytes:
                 self._keep(time.monotonic_ns(), len(line) + OVERHEAD_BYTES, line)
 
-    def flight(self) -> deque[Kept]:
+    def flight(self) -> deque[Remembered]:
         """What the ring holds now, oldest first: the packets themselves, not copies of them."""
         self._forget(time.monotonic_ns())
         return deque(what for _, _, what in self._ring)
@@ -86,7 +86,7 @@ class Taps:
         for connection in self._live:
             connection.send(line)
 
-    def _keep(self, t_ns: int, size: int, what: Kept) -> None:
+    def _keep(self, t_ns: int, size: int, what: Remembered) -> None:
         self._ring.append((t_ns, size, what))
         self._size += size
         self._forget(t_ns)
@@ -103,7 +103,7 @@ def packet_line(t_ns: int, source: Source, packet: bytes) -> bytes:
     return json.dumps(line, separators=(",", ":")).encode() + b"\n"
 
 
-def as_lines(flight: deque[Kept]) -> Iterator[bytes]:
+def as_lines(flight: deque[Remembered]) -> Iterator[bytes]:
     """The ring's content as a tap would have streamed it. It is taken out of `flight`: what was sent is let go."""
     while flight:
         what = flight.popleft()

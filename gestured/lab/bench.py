@@ -21,7 +21,7 @@ from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Recognizer
 from gestured.lab.online import play
 from gestured.model.model import open_model
-from gestured.simulator import Participant, Sensor, Take, generator, session
+from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 
 SECONDS = 300.0
 REPEATS = 5
@@ -29,7 +29,7 @@ CHECKOUT = Path(gestured.__file__).parent.parent / "benchmarks"
 
 
 def _take() -> Take:
-    return session(Participant(901), Sensor.nominal(day=901), generator(901, 0xBE), SECONDS, 0.2)
+    return session(Participant(901), SimulatedSensor.nominal(day=901), generator(901, 0xBE), SECONDS, 0.2)
 
 
 def replay_speed(model: str, take: Take) -> list[float]:

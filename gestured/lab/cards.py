@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from gestured.lab.train import Plan
+from gestured.lab.train import TrainingPlan
 from gestured.model.model import open_model
 
 WHAT = {
@@ -22,20 +22,20 @@ LIMITS = """\
 - Gestures that follow each other without the finger leaving for two frames are one segment, and unknown."""
 
 
-def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: Plan) -> None:
+def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: TrainingPlan) -> None:
     """One Markdown file beside each model."""
     for name, found in figures.items():
         (folder / f"{name}.md").write_text(_card(folder / f"{name}.onnx", name, found, plan))
 
 
-BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
+FIGURES_BEGIN, FIGURES_END = "<!-- figures: begin -->", "<!-- figures: end -->"
 
 
 def write_block(readme: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
     """Renew the table of figures between the marks in a README; ValueError where they are missing."""
     text = readme.read_text()
-    if text.count(BEGIN) != 1 or text.count(END) != 1:
-        raise ValueError(f"{readme}: expected the marks {BEGIN} and {END} once each")
+    if text.count(FIGURES_BEGIN) != 1 or text.count(FIGURES_END) != 1:
+        raise ValueError(f"{readme}: expected the marks {FIGURES_BEGIN} and {FIGURES_END} once each")
     rows = [
         _row(f"`{name}`, {title}", values)
         for name, found in figures.items()
@@ -44,8 +44,8 @@ def write_block(readme: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
             *((f"real, {k}", v) for k, v in found.get("real", {}).items() if k != "kinds"),
         ]
     ]
-    block = "\n".join([BEGIN, *HEAD, *rows, END])
-    readme.write_text(text[: text.index(BEGIN)] + block + text[text.index(END) + len(END) :])
+    block = "\n".join([FIGURES_BEGIN, *HEAD, *rows, FIGURES_END])
+    readme.write_text(text[: text.index(FIGURES_BEGIN)] + block + text[text.index(FIGURES_END) + len(FIGURES_END) :])
 
 
 HEAD = (
@@ -54,7 +54,7 @@ HEAD = (
 )
 
 
-def _card(path: Path, name: str, found: Mapping[str, Any], plan: Plan) -> str:
+def _card(path: Path, name: str, found: Mapping[str, Any], plan: TrainingPlan) -> str:
     model = open_model(path)
     real = "real" in found
     rows = [(f"simulated, {test} ", values) for test, values in found["simulated"].items()]

@@ -12,8 +12,8 @@ from gestured.lab.recordings import commands as recordings
 
 CACHE = Path(".cache/lab")
 MODELS = Path("models")
-REAL = Path("../shared/data")
-NEEDED = ("torch", "sklearn", "onnx", "mpmath", "pywt", "jinja2", "matplotlib")
+REAL_FOLDER = Path("../shared/data")
+LAB_PACKAGES = ("torch", "sklearn", "onnx", "mpmath", "pywt", "jinja2", "matplotlib")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -34,7 +34,10 @@ def parser() -> argparse.ArgumentParser:
     def add_data(command: argparse.ArgumentParser) -> None:
         command.add_argument("--cache", type=Path, default=CACHE, help=f"where finished steps are kept ({CACHE})")
         command.add_argument(
-            "--real", type=Path, default=REAL, help=f"folder of the real recordings; left out where it is not ({REAL})"
+            "--real",
+            type=Path,
+            default=REAL_FOLDER,
+            help=f"folder of the real recordings; left out where it is not ({REAL_FOLDER})",
         )
         command.add_argument("--jobs", type=int, default=2, help="processes and threads (2)")
         command.add_argument("--quick", action="store_true", help="a small run to try it; its models are worth nothing")
@@ -93,7 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from gestured.lab.study import study
         except ModuleNotFoundError as error:
             package = (error.name or "").split(".")[0]
-            if package not in NEEDED:
+            if package not in LAB_PACKAGES:
                 raise
             raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from None
         if args.command == "stability":

@@ -10,21 +10,21 @@ import torch
 
 from gestured.core.errors import GesturedError
 from gestured.lab.cards import write_block, write_cards
-from gestured.lab.cli import REAL
-from gestured.lab.evaluate import Outcome, held_out_kinds, real_figures, simulated_figures
+from gestured.lab.cli import REAL_FOLDER
+from gestured.lab.evaluate import Evaluation, held_out_kinds, real_figures, simulated_figures
 from gestured.lab.export import write_manifest
-from gestured.lab.train import Plan, calibration_set, learn, load, train
+from gestured.lab.train import TrainingPlan, calibration_set, learn, load, train
 from gestured.model.model import LADDER, open_model
 
 
-def _plan(args: argparse.Namespace) -> tuple[Plan, Path | None]:
+def _plan(args: argparse.Namespace) -> tuple[TrainingPlan, Path | None]:
     if args.jobs < 1:
         raise GesturedError(f"--jobs: expected 1 or more, found {args.jobs}")
     torch.set_num_threads(args.jobs)
     real = args.real if args.real.is_dir() else None
-    if real is None and args.real != REAL:
+    if real is None and args.real != REAL_FOLDER:
         raise GesturedError(f"--real: {args.real} is no folder")
-    return (Plan.quick() if args.quick else Plan()), real
+    return (TrainingPlan.quick() if args.quick else TrainingPlan()), real
 
 
 def train_models(args: argparse.Namespace) -> int:
@@ -47,7 +47,7 @@ def evaluate_models(args: argparse.Namespace) -> int:
     for path in paths.values():
         open_model(path)  # says what is wrong before anything is simulated
     data = load(plan, args.cache, real, args.jobs)
-    print(Outcome.HEAD, flush=True)
+    print(Evaluation.HEAD, flush=True)
     figures: dict[str, dict[str, Any]] = {
         name: {"simulated": found} for name, found in simulated_figures(paths, data).items()
     }

@@ -28,7 +28,7 @@ from gestured.simulator import (
     NON_GESTURES,
     SPEEDS,
     Participant,
-    Sensor,
+    SimulatedSensor,
     Take,
     cohort_plan,
     cohort_take,
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 NONE = "none"
-COVERED = 0.5  # of a performed gesture must lie in a segment for it to carry its label
+OVERLAP = 0.5  # of a performed gesture must lie in a segment for it to carry its label
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +158,7 @@ def matched(segments: Iterable[Segment], performed: Sequence[Performed]) -> Iter
             covered = common / max(event.offset - event.onset, 1e-3)
             if covered > share:
                 best, share = event, covered
-        if best is None or (best.label != NONE and share < COVERED):
+        if best is None or (best.label != NONE and share < OVERLAP):
             continue
         strength = float(segment.frames[segment.first : segment.last + 1].max()) / max(segment.noise, 1e-30)
         yield WINDOW.apply(segment).astype(np.float16), best.label, best.kind, best.person, strength
@@ -171,7 +171,9 @@ def from_take(take: Take) -> list[Sample]:
 
 
 TRIALS = tuple(cohort_plan())  # 34 participants x 10 gestures x 3 speeds x 3 inclinations = 3060
-OTHERS = tuple((p, k, s) for p in range(34) for k in NON_GESTURES for s in SPEEDS)  # the same people do something else
+OTHER_TRIALS = tuple(
+    (p, k, s) for p in range(34) for k in NON_GESTURES for s in SPEEDS
+)  # the same people do something else
 
 
 def _wide(seed: int, index: int) -> list[Sample]:
@@ -179,10 +181,12 @@ def _wide(seed: int, index: int) -> list[Sample]:
 
 
 def _others(seed: int, index: int) -> list[Sample]:
-    number, kind, speed = OTHERS[index]
+    number, kind, speed = OTHER_TRIALS[index]
     person = seed * 1000 + number
     rng = generator(seed, 0x07, index)
-    take = gesture_take(kind, Participant(person), Sensor.nominal(day=person), rng, speed, int(rng.integers(3)))
+    take = gesture_take(
+        kind, Participant(person), SimulatedSensor.nominal(day=person), rng, speed, int(rng.integers(3))
+    )
     return from_take(take)
 
 

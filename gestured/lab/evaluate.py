@@ -19,7 +19,7 @@ from gestured.lab.dataset import NONE, Samples
 from gestured.lab.decide import fit_decision, threshold
 from gestured.lab.fit import CLASSES, padded, targets
 from gestured.lab.nets import Perceptron, Recurrent
-from gestured.lab.train import Calibrated, Data, Plan, Trained, folds, judged
+from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan, folds, judged
 from gestured.lab.trajectory import trajectory_features
 from gestured.model.model import Model, open_model
 from gestured.simulator import GESTURES
@@ -28,7 +28,7 @@ GROUPS = 3  # of kinds of non-gestures held out
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class Evaluation:
     """What answers are worth on a set: shares of the gestures that were performed, and of the non-gestures."""
 
     gestures: int
@@ -52,7 +52,7 @@ class Outcome:
 Answers = tuple[NDArray[np.float32], NDArray[np.float32]]  # scores (N, G), unknown (N,)
 
 
-def outcome(answers: Answers, labels: NDArray[np.int64], least: float, performed: int | None = None) -> Outcome:
+def outcome(answers: Answers, labels: NDArray[np.int64], least: float, performed: int | None = None) -> Evaluation:
     """Judge answers against classes (N,), published from a confidence of `least` on.
 
     `performed`: how many gestures were performed, where some were never cut out.
@@ -67,7 +67,7 @@ def outcome(answers: Answers, labels: NDArray[np.int64], least: float, performed
         return float(chosen.sum() / of) if of else float("nan")
 
     hits, misses = share(right & published & known, total), share(~right & published & known, total)
-    return Outcome(
+    return Evaluation(
         total, int((~known).sum()), share(right & known, total), hits, misses, 1 - hits - misses,
         share(~published & ~known, int((~known).sum())),
     )  # fmt: skip
@@ -83,7 +83,7 @@ def answers(model: Model, samples: Samples) -> Answers:
     return np.concatenate([p[0] for p in parts])[back], np.concatenate([p[1] for p in parts])[back]
 
 
-def simulated_figures(models: Mapping[str, Path], data: Data) -> dict[str, dict[str, Any]]:
+def simulated_figures(models: Mapping[str, Path], data: TrainingData) -> dict[str, dict[str, Any]]:
     """Of each model and test set; with the share of each kind that was answered rightly."""
     found: dict[str, dict[str, Any]] = {}
     for name, path in models.items():
@@ -105,7 +105,7 @@ def by_kind(given: Answers, samples: Samples, least: float) -> dict[str, float]:
     return {str(kind): round(float(good[samples.kinds == kind].mean()), 3) for kind in np.unique(samples.kinds)}
 
 
-def real_figures(trained: Trained, calibrated: Calibrated, data: Data) -> dict[str, Any]:
+def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -> dict[str, Any]:
     """Real subjects, each by the networks that have not seen them, calibrated without them."""
     real = data.real
     if real is None or trained.held_out is None:
@@ -140,7 +140,7 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: Data) -> dict[s
     return found
 
 
-def held_out_kinds(trained: Trained, data: Data, plan: Plan, name: str = "cnn_lstm") -> dict[str, Any]:
+def held_out_kinds(trained: Trained, data: TrainingData, plan: TrainingPlan, name: str = "cnn_lstm") -> dict[str, Any]:
     """Non-gestures of kinds that the heads and the calibration have not seen: three groups of kinds, in turn."""
     net = trained.nets[name]
     assert isinstance(net, Recurrent)
@@ -175,7 +175,7 @@ def held_out_kinds(trained: Trained, data: Data, plan: Plan, name: str = "cnn_ls
 Cues = tuple[Tensor, Tensor, NDArray[np.int64]]  # embedding (N, 32), trajectory features (N, F), class (N,)
 
 
-def _cues(net: Recurrent, samples: Samples, plan: Plan, *, vary: bool = False) -> Cues:
+def _cues(net: Recurrent, samples: Samples, plan: TrainingPlan, *, vary: bool = False) -> Cues:
     """What the heads see. With `vary` a random part of the samples, as they are and varied."""
     labels = targets(samples)
     index = np.flatnonzero(labels >= 0)
@@ -196,7 +196,7 @@ def _cues(net: Recurrent, samples: Samples, plan: Plan, *, vary: bool = False) -
     return torch.cat(embedded), torch.cat(features), np.concatenate(found)
 
 
-def _refit(cues: Cues, which: int, hidden: list[int], plan: Plan) -> nn.Module:
+def _refit(cues: Cues, which: int, hidden: list[int], plan: TrainingPlan) -> nn.Module:
     """A fresh head (0: on the embedding, linear; 1: on the trajectory features) that never saw the hidden kinds."""
     torch.manual_seed(plan.fit.seed)
     seen = torch.from_numpy(~np.isin(cues[2], hidden))

@@ -30,7 +30,7 @@ from gestured.record.files import PUBLIC, atomic_write
 
 PARITY = 1e-4
 BATCHES = (1, 2, 7)
-LENGTHS = (1, 2, 15, 60, 500)  # frames
+CHECKED_LENGTHS = (1, 2, 15, 60, 500)  # frames
 
 
 def export_net(
@@ -79,7 +79,7 @@ def export_net(
         proto = onnx.load(traced)
     example = np.round(_windows(2, 12, rows, columns), 3)
     metadata = _metadata(kind, version, gestures, window, calibration, training_data, quantiles, learned_from)
-    inputs = [_windows(b, t, rows, columns) for b in BATCHES for t in LENGTHS]
+    inputs = [_windows(b, t, rows, columns) for b in BATCHES for t in CHECKED_LENGTHS]
     return _finish(proto, Path(path), metadata, example, truth, inputs)
 
 

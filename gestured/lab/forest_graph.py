@@ -17,7 +17,7 @@ from sklearn.ensemble import RandomForestClassifier
 from gestured.core.errors import ModelError
 
 OPSET = 17
-LEAST = 1e-3  # a forest's probabilities are not trusted below this, nor above 1 - this
+LEAST_CHANCE = 1e-3  # a forest's probabilities are not trusted below this, nor above 1 - this
 
 Outputs = tuple[NDArray[np.float32], NDArray[np.float32]]  # scores (B, G), unknown (B,)
 
@@ -30,9 +30,9 @@ def forest_outputs(probabilities: NDArray[Any], gestures: int, calibration: Mapp
     """
     temperature, scale, offset = _calibration(calibration)
     named = np.asarray(probabilities, np.float64)[:, :gestures]
-    logits = np.log(np.maximum(named, LEAST)) / temperature
+    logits = np.log(np.maximum(named, LEAST_CHANCE)) / temperature
     powers = np.exp(logits - logits.max(axis=1, keepdims=True))
-    none = np.clip(1.0 - named.sum(axis=1), LEAST, 1.0 - LEAST)
+    none = np.clip(1.0 - named.sum(axis=1), LEAST_CHANCE, 1.0 - LEAST_CHANCE)
     unknown = 1.0 / (1.0 + np.exp(-(scale * np.log(none / (1.0 - none)) + offset)))
     scores = powers / powers.sum(axis=1, keepdims=True)
     return scores.astype(np.float32), unknown.astype(np.float32)
@@ -52,8 +52,8 @@ def forest_graph(forest: RandomForestClassifier, gestures: int, calibration: Map
         "gesture_end": np.array([gestures], np.int64),
         "axis_one": np.array([1], np.int64),
         "zero": np.array([0], np.int64),
-        "least": np.float32(LEAST),
-        "most": np.float32(1.0 - LEAST),
+        "least": np.float32(LEAST_CHANCE),
+        "most": np.float32(1.0 - LEAST_CHANCE),
         "one": np.float32(1.0),
         "temperature": np.float32(temperature),
         "scale": np.float32(scale),

@@ -19,11 +19,10 @@ from gestured.client.stream import Stream
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
 from gestured.lab.progress import progress
-from gestured.simulator import Participant, Take, generator, session
-from gestured.simulator import Sensor as Textile
+from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 
 SESSION_S = 120.0
-NON_GESTURES = 0.2  # share of what is performed
+NON_GESTURE_SHARE = 0.2  # share of what is performed
 TAIL_S = 2.0
 
 
@@ -32,10 +31,13 @@ def takes(minutes: float, idle_minutes: float, seed: int) -> Iterator[tuple[str,
     for n in range(round(minutes * 60 / SESSION_S)):
         person = seed + n
         rng = generator(person, 0x0E)
-        yield "session", session(Participant(person), Textile.nominal(day=person), rng, SESSION_S, NON_GESTURES)
+        yield (
+            "session",
+            session(Participant(person), SimulatedSensor.nominal(day=person), rng, SESSION_S, NON_GESTURE_SHARE),
+        )
     if idle_minutes > 0:
         rng = generator(seed, 0x1D)
-        yield "idle", session(Participant(seed), Textile.nominal(day=seed), rng, idle_minutes * 60, kinds=[])
+        yield "idle", session(Participant(seed), SimulatedSensor.nominal(day=seed), rng, idle_minutes * 60, kinds=[])
 
 
 def play(model: str, take: Take, speed: float) -> tuple[list[dict[str, Any]], float, float]:

@@ -21,7 +21,7 @@ from torch import Tensor, nn
 import gestured
 from gestured.core.features import feature_names
 from gestured.core.measures import MEASURES, measures
-from gestured.lab.dataset import OTHERS, TRIALS, WINDOW, Samples, join, recorded, simulated
+from gestured.lab.dataset import OTHER_TRIALS, TRIALS, WINDOW, Samples, join, recorded, simulated
 from gestured.lab.decide import fit_decision, threshold
 from gestured.lab.digest import code_digest
 from gestured.lab.export import export_forest, export_net, write_manifest
@@ -32,29 +32,31 @@ from gestured.lab.recordings.origin import origins
 from gestured.record.arrays import read
 from gestured.simulator import GESTURES, NONE, wide
 
-REAL = ("capfingerid_gestures_dev.npz", "capfingerid_sessions_dev.npz")
+REAL_FILES = ("capfingerid_gestures_dev.npz", "capfingerid_sessions_dev.npz")
 FOLDS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class TrainingPlan:
     """How much is simulated; the numbers behind the shipped models are the defaults."""
 
     wide: int = 60_000
     wide_check: int = 4_000  # takes to calibrate, and as many to test
     cohort: int = len(TRIALS)
-    others: int = len(OTHERS)
+    others: int = len(OTHER_TRIALS)
     forest: int = 20_000  # simulated samples for the forest
     fit: FitConfig = field(default_factory=FitConfig)
 
     @classmethod
-    def quick(cls) -> "Plan":
+    def quick(cls) -> "TrainingPlan":
         """A run of some minutes, to try the pipeline; its models are worth nothing."""
-        return cls(1_500, 400, len(TRIALS), len(OTHERS), 2_000, FitConfig(epochs=3, real_epochs=1, real_samples=1_000))
+        return cls(
+            1_500, 400, len(TRIALS), len(OTHER_TRIALS), 2_000, FitConfig(epochs=3, real_epochs=1, real_samples=1_000)
+        )
 
 
 @dataclass(frozen=True, slots=True)
-class Data:
+class TrainingData:
     """Everything that is learned from or judged on, split by participant."""
 
     teach: Samples  # the wide stream, then the cohort
@@ -65,7 +67,7 @@ class Data:
     real: Samples | None
 
 
-def load(plan: Plan, cache: Path, real: Path | None, jobs: int) -> Data:
+def load(plan: TrainingPlan, cache: Path, real: Path | None, jobs: int) -> TrainingData:
     """Simulate, or take from the cache, and read the real recordings where they are."""
     teach, check, test = (
         simulated(cache, "wide", seed, count, jobs)
@@ -77,7 +79,7 @@ def load(plan: Plan, cache: Path, real: Path | None, jobs: int) -> Data:
     person = both.people % 1000
     plans = np.array([trial.participant for trial in TRIALS[: plan.cohort]])
     own = both.take(person < 24)
-    return Data(
+    return TrainingData(
         join([teach, own]),
         len(own),
         join([check, both.take((person >= 24) & (person < 28))]),
@@ -97,7 +99,7 @@ def _real(cache: Path, folder: Path | None) -> Samples | None:
 
 def _real_files(folder: Path | None) -> list[Path]:
     """The real recordings, all of them or none."""
-    paths = [folder / name for name in REAL] if folder else []
+    paths = [folder / name for name in REAL_FILES] if folder else []
     return paths if all(path.exists() for path in paths) else []
 
 
@@ -115,7 +117,7 @@ class Trained:
     held_out: dict[str, Tensor] | None  # (G, K) logits of each net over the real samples, None without any
 
 
-def learn(plan: Plan, data: Data, cache: Path) -> Trained:
+def learn(plan: TrainingPlan, data: TrainingData, cache: Path) -> Trained:
     """Both stages and the folds; what is done already is read from the cache."""
     told = json.dumps([code_digest("gestured.lab.fit"), asdict(plan.fit), data.teach.digest()])
     key = hashlib.sha256(told.encode()).hexdigest()[:12]
@@ -134,7 +136,9 @@ def learn(plan: Plan, data: Data, cache: Path) -> Trained:
     return Trained(_kept(cache / f"final-{key}.npz", start, data, data.real, plan, "final"), held_out)
 
 
-def _kept(path: Path, start: nn.ModuleDict, data: Data, real: Samples, plan: Plan, title: str) -> nn.ModuleDict:
+def _kept(
+    path: Path, start: nn.ModuleDict, data: TrainingData, real: Samples, plan: TrainingPlan, title: str
+) -> nn.ModuleDict:
     if not path.exists():
         save_nets(path, finetune(start, data.teach, real, plan.fit, title))
     return load_nets(path)
@@ -148,7 +152,7 @@ class Calibrated:
     labels: NDArray[np.int64]
 
 
-def calibration_set(trained: Trained, data: Data, plan: Plan) -> Calibrated:
+def calibration_set(trained: Trained, data: TrainingData, plan: TrainingPlan) -> Calibrated:
     """People that no network has seen: simulated ones, and each real subject by the fold that left it out."""
     found, labels = logits(trained.nets, data.calibrate, plan.fit), targets(data.calibrate)
     if data.real is not None and trained.held_out is not None:
@@ -176,7 +180,9 @@ def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged,
     return module, calibration, answers(scores.numpy().max(axis=1) * (1 - unknown.numpy()), known, least)
 
 
-def grow_forest(data: Data, plan: Plan, jobs: int) -> tuple[RandomForestClassifier, dict[str, Any], dict[str, Any]]:
+def grow_forest(
+    data: TrainingData, plan: TrainingPlan, jobs: int
+) -> tuple[RandomForestClassifier, dict[str, Any], dict[str, Any]]:
     """The touch-pattern forest of the paper's Table IV (200 trees, depth 9), with a class for what is no gesture.
 
     Gives what `judged` gives.
@@ -250,7 +256,7 @@ def answers(confidence: NDArray[np.floating], known: NDArray[np.bool_], least: f
     return {"confidence": _at(given[given >= least]), "unknown": round(float((given < least).mean()), 4)}
 
 
-def train(plan: Plan, out: Path, cache: Path, real: Path | None, jobs: int) -> Data:
+def train(plan: TrainingPlan, out: Path, cache: Path, real: Path | None, jobs: int) -> TrainingData:
     """Make the three models in `out`, with an empty manifest; the figures come from `evaluate`."""
     torch.set_num_threads(max(jobs, 1))
     data = load(plan, cache, real, jobs)

@@ -12,8 +12,8 @@ from torch import Tensor, nn
 
 from gestured.lab.nets import Perceptron, active_frames, last_active
 
-POINTS = 8  # of the path
-BLOB = 7  # taxels across the mean contact
+PATH_POINTS = 8  # of the path
+PATCH = 7  # taxels across the mean contact
 FLOOR = 0.12  # of the peak: below it a taxel counts for nothing
 EPS = 1e-6
 MAXIMUM = 0.2  # of the peak: lower local maxima are no fingers
@@ -63,12 +63,12 @@ def per_frame(x: Tensor) -> dict[str, Tensor]:
 
 
 def mean_blob(x: Tensor, s: dict[str, Tensor], weight: Tensor) -> Tensor:
-    """(B, T, R, C) -> (B, BLOB * BLOB): the contact, each frame moved to its centroid, averaged: finger, two, palm."""
+    """(B, T, R, C) -> (B, PATCH * PATCH): the contact, its frames centred and averaged: finger, two, palm."""
     rows, columns = x.shape[2], x.shape[3]
-    offset = torch.arange(BLOB, dtype=x.dtype) - BLOB // 2
+    offset = torch.arange(PATCH, dtype=x.dtype) - PATCH // 2
     row = (1 - s["y"]) / 2 * (rows - 1)
     column = (s["x"] + 1) / 2 * (columns - 1)
-    at_row = row[:, :, None, None] + offset[:, None] - torch.arange(rows, dtype=x.dtype)  # (B, T, BLOB, R)
+    at_row = row[:, :, None, None] + offset[:, None] - torch.arange(rows, dtype=x.dtype)  # (B, T, PATCH, R)
     at_column = column[:, :, None, None] + offset[:, None] - torch.arange(columns, dtype=x.dtype)
     moved = F.relu(1 - at_row.abs()) @ x @ F.relu(1 - at_column.abs()).transpose(2, 3)
     blob = (moved * weight[:, :, None, None]).sum(1) / (weight.sum(1)[:, None, None] + EPS)
@@ -131,7 +131,7 @@ def trajectory_features(x: Tensor) -> Tensor:
     # The path at equal distances, from its middle, and how its parts lie in time.
     share = step / (length[:, None] + EPS)
     reached = share.cumsum(1)
-    marks = torch.arange(POINTS, dtype=x.dtype) / (POINTS - 1)
+    marks = torch.arange(PATH_POINTS, dtype=x.dtype) / (PATH_POINTS - 1)
     done = ((marks - (reached - share)[:, :, None]) / (share[:, :, None] + 1e-4)).clamp(0, 1)
     path_x = torch.einsum("btk,bt->bk", done, dx) + (s["x"][:, :1] - mx[:, None])
     path_y = torch.einsum("btk,bt->bk", done, dy) + (s["y"][:, :1] - my[:, None])

@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 
 from gestured.core.window import Window
 
-MAX_BYTES = 64 * 1024 * 1024
+MAX_MODEL_BYTES = 64 * 1024 * 1024
 MAX_FIELDS = 500_000  # protobuf fields that are looked at; a shipped model has some thousands
-MAX_DEPTH = 16  # messages inside messages
+MAX_MESSAGE_DEPTH = 16  # messages inside messages
 MAX_PROPERTIES = 64  # metadata; a shipped model has a dozen
 MAX_TEXT = 2 << 20  # bytes of one of them; the largest is the self-test, some kilobytes
 MAX_METADATA = 4 << 20  # bytes of all of them
@@ -64,7 +64,7 @@ _ITEM_BYTES = {
 
 
 def read_bytes(path: Path) -> bytes:
-    """The file's bytes, read once; a regular file of at most `MAX_BYTES`."""
+    """The file's bytes, read once; a regular file of at most `MAX_MODEL_BYTES`."""
     try:
         # Non-blocking: opening a FIFO must not wait for a writer.
         file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
@@ -74,16 +74,16 @@ def read_bytes(path: Path) -> bytes:
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):
             raise ValueError("is not a regular file")
-        if status.st_size > MAX_BYTES:
-            raise ValueError(f"has {status.st_size} bytes, expected at most {MAX_BYTES}")
+        if status.st_size > MAX_MODEL_BYTES:
+            raise ValueError(f"has {status.st_size} bytes, expected at most {MAX_MODEL_BYTES}")
         try:
-            data = file.read(MAX_BYTES + 1)
+            data = file.read(MAX_MODEL_BYTES + 1)
         except OSError as error:
             raise ValueError(f"cannot be read: {error.strerror or error}") from None
     if not data:
         raise ValueError("is empty, expected an ONNX model")
-    if len(data) > MAX_BYTES:
-        raise ValueError(f"grew while it was read, expected at most {MAX_BYTES} bytes")
+    if len(data) > MAX_MODEL_BYTES:
+        raise ValueError(f"grew while it was read, expected at most {MAX_MODEL_BYTES} bytes")
     return data
 
 
@@ -95,8 +95,8 @@ def inspect(data: bytes) -> dict[str, str]:
     stack = [("model", 0, len(data), 0)]
     while stack:
         kind, start, end, depth = stack.pop()
-        if depth > MAX_DEPTH:
-            raise ValueError(f"nests deeper than {MAX_DEPTH} messages")
+        if depth > MAX_MESSAGE_DEPTH:
+            raise ValueError(f"nests deeper than {MAX_MESSAGE_DEPTH} messages")
         fields = []
         for field in _fields(data, start, end):
             steps += 1

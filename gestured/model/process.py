@@ -31,7 +31,7 @@ RUN_S = 5  # s for a segment, after which the child ends; what can be ended othe
 MAX_ANSWER = 16 << 20  # bytes of a line; a report holds some of the metadata, which are bounded
 # The folders of our own interpreter, wherever we were started, and nothing from the environment or the current folder.
 START = "import sys; sys.path[:] = sys.argv[1:]; from gestured.model.worker import main; main()"
-KEPT = ("LD_LIBRARY_PATH",)  # of the environment: some systems find the C++ library by it
+ENVIRONMENT_KEPT = ("LD_LIBRARY_PATH",)  # of the environment: some systems find the C++ library by it
 
 _turn = threading.Lock()  # one file is opened at a time: each child may take memory of the same service
 _children: "weakref.WeakSet[subprocess.Popen[bytes]]" = weakref.WeakSet()  # one that nobody holds ends by itself
@@ -139,7 +139,7 @@ def _start() -> "subprocess.Popen[bytes]":
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             cwd="/",
-            env={name: os.environ[name] for name in KEPT if name in os.environ}
+            env={name: os.environ[name] for name in ENVIRONMENT_KEPT if name in os.environ}
             | {"ORT_DISABLE_TELEMETRY": "1", "OPENBLAS_NUM_THREADS": "1"},
             start_new_session=True,  # Ctrl-C is for us
         )

@@ -10,7 +10,7 @@ from typing import Any
 BASE_BYTES = 192 << 20  # of memory for Python, numpy, onnxruntime (some 80 MiB) and a small model
 BYTES_PER_BYTE = 4  # more for each of the file's: as read, as parsed, and its weights as onnxruntime arranges them
 START_S = 8  # s until the model is here
-HEADER_BYTES = 9  # a length, and the seconds that the answer may take
+REQUEST_HEADER_BYTES = 9  # a length, and the seconds that the answer may take
 
 
 def main() -> None:
@@ -59,8 +59,8 @@ def _scores(model: Any, content: bytes) -> dict[str, Any]:
 
 
 def _message() -> bytes | None:
-    header = sys.stdin.buffer.read(HEADER_BYTES)
-    if len(header) < HEADER_BYTES:
+    header = sys.stdin.buffer.read(REQUEST_HEADER_BYTES)
+    if len(header) < REQUEST_HEADER_BYTES:
         return None
     signal.alarm(header[8])
     size = int.from_bytes(header[:8], "big")

@@ -19,7 +19,7 @@ from gestured.record.files import PRIVATE, atomic_write, open_regular
 from gestured.record.npz import Archive, brief
 from gestured.record.recordings import Recordings
 
-MAX_BYTES = 2 << 30  # unpacked
+MAX_RECORDING_BYTES = 2 << 30  # unpacked
 
 
 _FIELDS = tuple(field.name for field in fields(Recordings))
@@ -43,8 +43,8 @@ def write(path: str | Path, recordings: Recordings) -> None:
     try:
         check(recordings)
         total = sum(value.nbytes for _, value in recordings.present())
-        if total > MAX_BYTES:
-            raise Wrong(f"unpacks to {total} bytes, expected at most {MAX_BYTES}")
+        if total > MAX_RECORDING_BYTES:
+            raise Wrong(f"unpacks to {total} bytes, expected at most {MAX_RECORDING_BYTES}")
         with atomic_write(path) as file:
             _pack(file, recordings)
     except Wrong as error:
@@ -60,7 +60,7 @@ def load(path: str | Path, without: Collection[str] = (), look: Callable[[Record
     """
     try:
         with open_regular(path) as file:
-            archive = Archive(file, _KNOWN.difference(without), MAX_BYTES)
+            archive = Archive(file, _KNOWN.difference(without), MAX_RECORDING_BYTES)
             forms = {field: header.stand_in() for field, header in archive.headers.items()}
             missing = [field for field in _REQUIRED if field not in forms]
             if missing:

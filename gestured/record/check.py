@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from gestured.record.recordings import Recordings
 
 FINGERS = 3
-FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; checking their times takes a multiple of their size
+MAX_FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; checking their times takes a multiple of their size
 RECORDINGS = 1 << 20  # of a file, and as many events; each of their texts is checked alone
 CHARACTERS = 1024  # of one text
 LABEL = re.compile(r"[a-z0-9_]{1,64}")
@@ -19,7 +19,7 @@ PER_RECORDING = {
     "labels": "U", "subjects": "iufU", "speeds": "iufU", "inclinations": "iufU", "kinds": "U", "consents": "U",
     "onsets": "iu", "releases": "iu",
 }  # fmt: skip
-EVENTS = {
+EVENT_FIELDS = {
     "event_recording": "iu", "event_labels": "U", "event_kinds": "U", "event_onsets": "f", "event_offsets": "f",
 }  # fmt: skip
 
@@ -74,7 +74,7 @@ def shapes(r: Recordings) -> None:
     n, rows, columns = r.frames.shape
     if not (rows and columns):
         raise Wrong(f"frames: expected (N, R, C), found {r.frames.shape}", "frames")
-    _at_most("frames", n, FRAMES)
+    _at_most("frames", n, MAX_FRAMES)
     _shape("offsets", r.offsets, "i", (None,))
     g = len(r.offsets) - 1
     if r.offsets.dtype != np.int64 or g < 0:
@@ -95,14 +95,14 @@ def shapes(r: Recordings) -> None:
         _shape("touch_ids", r.touch_ids, "i", (n, FINGERS))
         if r.touches.dtype != np.float32 or r.touch_ids.dtype != np.int32:
             raise Wrong("touches: expected float32, and int32 for touch_ids", "touches")
-    present = [field for field in EVENTS if getattr(r, field) is not None]
+    present = [field for field in EVENT_FIELDS if getattr(r, field) is not None]
     if present:
-        if len(present) < len(EVENTS):
-            raise Wrong(f"{present[0]}: expected together with all of {', '.join(EVENTS)}", present[0])
+        if len(present) < len(EVENT_FIELDS):
+            raise Wrong(f"{present[0]}: expected together with all of {', '.join(EVENT_FIELDS)}", present[0])
         assert r.event_recording is not None
         e = len(r.event_recording)
         _at_most("event_recording", e, RECORDINGS)
-        for field, kinds in EVENTS.items():
+        for field, kinds in EVENT_FIELDS.items():
             _shape(field, getattr(r, field), kinds, (e,))
             if kinds == "f" and getattr(r, field).dtype != np.float64:
                 raise Wrong(f"{field}: expected float64, found {getattr(r, field).dtype}", field)

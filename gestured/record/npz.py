@@ -22,7 +22,7 @@ from gestured.record.check import CHARACTERS, Wrong
 DIRECTORY_BYTES = 64 << 10  # of the list of members; a recording's has less than two thousand
 HEADER_BYTES = 16 << 10  # of an array's header; NumPy itself takes no more than 10,000
 ITEM_BYTES = 4 * CHARACTERS  # of one number or text
-PIECE_BYTES = 1 << 20  # that are unpacked at once
+UNPACK_BYTES = 1 << 20  # that are unpacked at once
 # The end of an archive's directory, and what stands before it where there is another, larger one.
 _END, _END_BYTES, _LOCATOR, _LOCATOR_BYTES = b"PK\x05\x06", 22, b"PK\x06\x07", 20
 
@@ -66,7 +66,7 @@ class Archive:
         with self._opened(field) as member:
             member.read(header.begin)
             done = 0
-            while done < len(values) and (piece := member.read(min(PIECE_BYTES, len(values) - done))):
+            while done < len(values) and (piece := member.read(min(UNPACK_BYTES, len(values) - done))):
                 values[done : done + len(piece)] = np.frombuffer(piece, np.uint8)
                 done += len(piece)
             if done < len(values) or member.read(1):

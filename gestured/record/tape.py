@@ -34,9 +34,9 @@ ITEM_COSTS = 250  # bytes of memory for a packet or an event, besides what it ho
 EVENT_COSTS = 24  # bytes of memory for a byte of JSON, where it is all empty lists
 NOBODY = Address("", 0)  # the source of a channel that holds no packets
 HOST_CHARACTERS = 255  # of a sender's name; the DNS allows no more
-LARGEST = 1e11  # of any number in an event that is read; as seconds since 1970 it is a date that Python can print
+LARGEST_NUMBER = 1e11  # of any number in an event; as seconds since 1970 it is a date that Python can print
 CHUNK_BYTES = 1 << 20
-SENDERS = 256  # channels; whoever comes after that shares one
+SENDER_CHANNELS = 256  # channels; whoever comes after that shares one
 EVENT_SCHEMA: dict[str, Any] = {
     "title": "gestured.Event",
     "type": "object",
@@ -138,7 +138,7 @@ class Writer:
     def packet(self, t_ns: int, source: str, data: bytes) -> None:
         """Keep a datagram of `source` (HOST:PORT)."""
         if source not in self._senders:
-            source = source if len(self._senders) < SENDERS else "other:0"
+            source = source if len(self._senders) < SENDER_CHANNELS else "other:0"
             if source not in self._senders:
                 self._senders[source] = self._mcap.register_channel(PACKETS, "osc", 0, {"source": source})
         self._add(self._senders[source], t_ns, data)
@@ -146,7 +146,7 @@ class Writer:
     def picture(self, t_ns: int, sensor: str, values: NDArray[Any]) -> None:
         """Keep a frame, (R, C) counts, for viewers; of the first SENDERS sensors."""
         if sensor not in self._pictures:
-            if len(self._pictures) >= SENDERS:
+            if len(self._pictures) >= SENDER_CHANNELS:
                 return
             self._pictures[sensor] = self._mcap.register_channel(f"/{sensor}/pressure", "json", self._image)
         rows, columns = values.shape
@@ -308,7 +308,7 @@ def _right(form: str, value: object) -> bool:
         return isinstance(value, str)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
-    return abs(value) <= LARGEST and (form == "number" or isinstance(value, int))  # so NaN is none
+    return abs(value) <= LARGEST_NUMBER and (form == "number" or isinstance(value, int))  # so NaN is none
 
 
 def _brief(value: object) -> str:

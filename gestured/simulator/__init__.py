@@ -1,7 +1,7 @@
 """A simulator of people, fingers, a textile and its sensor, in plain numpy.
 
 What it is: human strokes in continuous time (`perform`), a soft matrix sensor that samples, blurs, leaks,
-lags and quantises them (`Sensor.record`), and seeded collections of both (`cohort`, `wide`, `session`).
+lags and quantises them (`SimulatedSensor.record`), and seeded collections of both (`cohort`, `wide`, `session`).
 What it is not: a finite-element model of a fabric, nor fitted to textile recordings (none were at hand). Its
 distributions are invented within plausible bounds; blob sizes, durations and speeds were compared with real
 fingers on a touchscreen only. A figure measured on it is a figure about it.
@@ -23,8 +23,8 @@ from gestured.simulator.cohort import (
     session,
     wide,
 )
-from gestured.simulator.people import INCLINATIONS, SPEEDS, Artefact, Contact, Participant, Performance, generator
-from gestured.simulator.sensor import Event, Sensor, Take
+from gestured.simulator.people import INCLINATIONS, SPEEDS, Artefact, Participant, Performance, Press, generator
+from gestured.simulator.sensor import Event, SimulatedSensor, Take
 
 __all__ = [
     "GESTURES",
@@ -34,11 +34,11 @@ __all__ = [
     "SEQUENCES",
     "SPEEDS",
     "Artefact",
-    "Contact",
+    "Press",
     "Event",
     "Participant",
     "Performance",
-    "Sensor",
+    "SimulatedSensor",
     "Take",
     "Trial",
     "cohort",

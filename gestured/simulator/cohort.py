@@ -11,9 +11,9 @@ import numpy as np
 
 from gestured.simulator.gestures import TEN
 from gestured.simulator.others import OTHERS
-from gestured.simulator.people import INCLINATIONS, SPEEDS, Artefact, Contact, Participant, Performance, generator
-from gestured.simulator.sensor import Sensor, Take
-from gestured.simulator.strokes import Scene
+from gestured.simulator.people import INCLINATIONS, SPEEDS, Artefact, Participant, Performance, Press, generator
+from gestured.simulator.sensor import SimulatedSensor, Take
+from gestured.simulator.strokes import Occasion
 
 GESTURES: tuple[str, ...] = tuple(TEN)
 # Gestures one right after the other: read as such, not as none.
@@ -41,7 +41,7 @@ def perform(
     if inclination not in INCLINATIONS:
         raise ValueError(f"inclination: {inclination!r} is none of 0, 1, 2")
     turn, grow, press = participant.pose(inclination)
-    scene = Scene(
+    occasion = Occasion(
         rng,
         participant,
         extent[0],
@@ -52,8 +52,8 @@ def perform(
         grow,
         press,
     )
-    made = TEN[kind](scene) if kind in TEN else OTHERS[kind](scene)
-    contacts = tuple(m for m in made if isinstance(m, Contact))
+    made = TEN[kind](occasion) if kind in TEN else OTHERS[kind](occasion)
+    contacts = tuple(m for m in made if isinstance(m, Press))
     artefacts = tuple(m for m in made if isinstance(m, Artefact))
     stops = [float(c.t[-1]) for c in contacts] + [a.stop for a in artefacts]
     label = kind if kind in TEN else NONE
@@ -63,7 +63,7 @@ def perform(
 def gesture_take(
     kind: str,
     participant: Participant,
-    sensor: Sensor,
+    sensor: SimulatedSensor,
     rng: np.random.Generator,
     speed: str = "normal",
     inclination: int = 1,
@@ -78,7 +78,7 @@ def gesture_take(
 
 def session(
     participant: Participant,
-    sensor: Sensor,
+    sensor: SimulatedSensor,
     rng: np.random.Generator,
     seconds: float = 60.0,
     non_gesture_share: float = 0.25,
@@ -135,7 +135,7 @@ def cohort_take(trial: Trial, seed: int = 0) -> Take:
     """One trial of the cohort, on the nominal sensor on that participant's day; needs no other trial."""
     rng = generator(seed, 0xC0, trial.index)
     person = Participant(_person(seed, trial.participant))
-    sensor = Sensor.nominal(day=_person(seed, trial.participant))
+    sensor = SimulatedSensor.nominal(day=_person(seed, trial.participant))
     return gesture_take(trial.gesture, person, sensor, rng, trial.speed, trial.inclination)
 
 
@@ -159,7 +159,7 @@ def wide(
     rng = generator(seed, 0x71DE, index)
     hard = float(rng.random()) if hardness is None else hardness
     person = Participant(int(rng.integers(1 << 40)) + 1_000_000)
-    sensor = Sensor.wide(rng, hard)
+    sensor = SimulatedSensor.wide(rng, hard)
     pool = kinds if kinds is not None else NON_GESTURES if rng.random() < non_gesture_share else GESTURES
     kind = pool[int(rng.integers(len(pool)))]
     speed = ("slow", "normal", "fast")[int(rng.integers(3))]

@@ -1,4 +1,4 @@
-"""The ten gestures: a function for each, from a scene to the contacts a person makes."""
+"""The ten gestures: a function for each, from a occasion to the contacts a person makes."""
 
 import math
 from collections.abc import Callable
@@ -6,54 +6,54 @@ from collections.abc import Callable
 import numpy as np
 
 from gestured.simulator.kinematics import ellipse, grid, turning, wander
-from gestured.simulator.people import Contact
-from gestured.simulator.strokes import Scene, fingers_on, stroke, swipe_length, touch_down
+from gestured.simulator.people import Press
+from gestured.simulator.strokes import Occasion, fingers_on, stroke, swipe_length, touch_down
 from gestured.simulator.things import resting_hand
 
 RIGHT, UP, LEFT, DOWN = 0.0, math.pi / 2, math.pi, -math.pi / 2
 
 
-def one_tap(scene: Scene) -> list[Contact]:
+def one_tap(occasion: Occasion) -> list[Press]:
     """One finger for 40 to 350 ms, anywhere."""
-    x, y = scene.spot(3.0, 3.0)
-    return [touch_down(scene, x, y, scene.tap_s())]
+    x, y = occasion.spot(3.0, 3.0)
+    return [touch_down(occasion, x, y, occasion.tap_s())]
 
 
-def double_tap(scene: Scene) -> list[Contact]:
+def double_tap(occasion: Occasion) -> list[Press]:
     """Two taps 80 to 400 ms apart at about one place, unequal in force and duration."""
-    rng = scene.rng
-    x, y = scene.spot(3.0, 3.0)
-    first, gap = scene.tap_s(), scene.gap_s()
-    dx, dy = np.clip(rng.normal(0.0, 0.03, 2), -0.09, 0.09) * scene.small
+    rng = occasion.rng
+    x, y = occasion.spot(3.0, 3.0)
+    first, gap = occasion.tap_s(), occasion.gap_s()
+    dx, dy = np.clip(rng.normal(0.0, 0.03, 2), -0.09, 0.09) * occasion.small
     return [
-        touch_down(scene, x, y, first, force=rng.uniform(0.7, 1.2)),
-        touch_down(scene, x + dx, y + dy, scene.tap_s(), first + gap, force=rng.uniform(0.7, 1.2)),
+        touch_down(occasion, x, y, first, force=rng.uniform(0.7, 1.2)),
+        touch_down(occasion, x + dx, y + dy, occasion.tap_s(), first + gap, force=rng.uniform(0.7, 1.2)),
     ]
 
 
-def swipe(heading: float, count: int = 1) -> Callable[[Scene], list[Contact]]:
+def swipe(heading: float, count: int = 1) -> Callable[[Occasion], list[Press]]:
     """A stroke towards `heading` with `count` fingers side by side."""
 
-    def performed(scene: Scene) -> list[Contact]:
+    def performed(occasion: Occasion) -> list[Press]:
         # Several fingers side by side keep their direction better than one.
-        path = stroke(scene, heading, swipe_length(scene, heading), limit=0.36 if count == 1 else 0.3)
-        contacts = fingers_on(scene, path, count, heading)
-        if count == 1 and scene.rng.random() < 0.25 * scene.person.clumsy:
-            contacts.append(resting_hand(scene, float(path.t[-1])))
+        path = stroke(occasion, heading, swipe_length(occasion, heading), limit=0.36 if count == 1 else 0.3)
+        contacts = fingers_on(occasion, path, count, heading)
+        if count == 1 and occasion.rng.random() < 0.25 * occasion.person.clumsy:
+            contacts.append(resting_hand(occasion, float(path.t[-1])))
         return contacts
 
     return performed
 
 
-def circle(sense: float) -> Callable[[Scene], list[Contact]]:
+def circle(sense: float) -> Callable[[Occasion], list[Press]]:
     """A circle of 270 to 450 degrees; `sense` +1 counter-clockwise, -1 clockwise as the person sees it."""
 
-    def performed(scene: Scene) -> list[Contact]:
-        rng, person = scene.rng, scene.person
-        radius = float(np.clip(scene.small * (0.1 + 0.31 * scene.reach()) * scene.grow, 6.0, 60.0))
+    def performed(occasion: Occasion) -> list[Press]:
+        rng, person = occasion.rng, occasion.person
+        radius = float(np.clip(occasion.small * (0.1 + 0.31 * occasion.reach()) * occasion.grow, 6.0, 60.0))
         total = math.radians(rng.uniform(300.0, 400.0) if rng.random() < 0.75 else rng.uniform(270.0, 450.0))
-        move = float(np.clip(0.95 * (radius / 18.0) ** 0.3 / scene.rate * rng.lognormal(0.0, 0.2), 0.45, 3.2))
-        before, after = (0.6 * rest for rest in scene.rests())
+        move = float(np.clip(0.95 * (radius / 18.0) ** 0.3 / occasion.rate * rng.lognormal(0.0, 0.2), 0.45, 3.2))
+        before, after = (0.6 * rest for rest in occasion.rests())
         t = grid(before + move + after)
         tau = np.clip((t - before) / move, 0.0, 1.0)
         first = rng.normal(math.pi / 2, 0.9) if rng.random() < 0.55 else rng.uniform(-math.pi, math.pi)
@@ -66,18 +66,18 @@ def circle(sense: float) -> Callable[[Scene], list[Contact]]:
         sway = 0.6 * person.wobble_mm * min(1.0, radius / 15.0)
         x = x + drift[0] * tau + sway * wander(t, rng, 0.4, 3.0, 3)
         y = y + drift[1] * tau + sway * wander(t, rng, 0.4, 3.0, 3)
-        x, y = scene.settle(x, y)
+        x, y = occasion.settle(x, y)
         glides = before == 0.0 and rng.random() < person.glide
         fade = rng.uniform(0.03, 0.12) * move if glides else None
-        contacts = [scene.finger(t, x, y, fade_in_s=fade, fade_out_s=fade)]
+        contacts = [occasion.finger(t, x, y, fade_in_s=fade, fade_out_s=fade)]
         if rng.random() < 0.2 * person.clumsy:
-            contacts.append(resting_hand(scene, float(t[-1])))
+            contacts.append(resting_hand(occasion, float(t[-1])))
         return contacts
 
     return performed
 
 
-TEN: dict[str, Callable[[Scene], list[Contact]]] = {
+TEN: dict[str, Callable[[Occasion], list[Press]]] = {
     "one_tap": one_tap,
     "double_tap": double_tap,
     "swipe_down": swipe(DOWN),

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-STEP_S = 0.004  # fine time grid: 250 Hz, ten steps within the fastest rise of a tap
+PATH_STEP_S = 0.004  # fine time grid: 250 Hz, ten steps within the fastest rise of a tap
 
 
 def grid(duration_s: float) -> Array:
-    """Times 0 .. duration (n,), about STEP_S apart; both ends are included and n >= 5."""
-    return np.linspace(0.0, duration_s, max(5, math.ceil(duration_s / STEP_S) + 1))
+    """Times 0 .. duration (n,), about PATH_STEP_S apart; both ends are included and n >= 5."""
+    return np.linspace(0.0, duration_s, max(5, math.ceil(duration_s / PATH_STEP_S) + 1))
 
 
 def minimum_jerk(tau: Array) -> Array:
@@ -46,7 +46,7 @@ def lognormal(tau: Array, sigma: float, mirrored: bool = False) -> Array:
     return np.where(u <= 0.0, 0.0, np.minimum(normal_cdf(z) / 0.995, 1.0))
 
 
-def progress(tau: Array, rng: np.random.Generator, moving_ends: float = 0.0) -> Array:
+def stroke_progress(tau: Array, rng: np.random.Generator, moving_ends: float = 0.0) -> Array:
     """Progress 0..1 of one stroke with a random human speed profile.
 
     `moving_ends` (0..1) is how much of the speed is left at landing and leaving: the finger touches only the

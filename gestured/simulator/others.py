@@ -18,10 +18,10 @@ from gestured.simulator.drawn import (
     zigzag,
 )
 from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP, swipe
-from gestured.simulator.kinematics import arc, grid, progress
-from gestured.simulator.people import Artefact, Contact
+from gestured.simulator.kinematics import arc, grid, stroke_progress
+from gestured.simulator.people import Artefact, Press
 from gestured.simulator.several import drumming, knuckles, pinch, rotation, spread, three_finger_swipe, two_finger_tap
-from gestured.simulator.strokes import Scene, fingers_on, stroke, swipe_length, touch_down
+from gestured.simulator.strokes import Occasion, fingers_on, stroke, swipe_length, touch_down
 from gestured.simulator.things import (
     electrical_burst,
     forearm,
@@ -35,21 +35,21 @@ from gestured.simulator.things import (
 )
 
 
-def long_press(scene: Scene) -> list[Contact]:
+def long_press(occasion: Occasion) -> list[Press]:
     """A finger that stays for 0.9 s or longer."""
-    x, y = scene.spot(3.0, 3.0)
-    return [touch_down(scene, x, y, scene.rng.uniform(0.9, 3.0))]
+    x, y = occasion.spot(3.0, 3.0)
+    return [touch_down(occasion, x, y, occasion.rng.uniform(0.9, 3.0))]
 
 
-def slow_touch(scene: Scene) -> list[Contact]:
+def slow_touch(occasion: Occasion) -> list[Press]:
     """A light touch that comes and goes slowly and drifts a little: somebody leans or feels."""
-    rng = scene.rng
-    x, y = scene.spot(3.0, 3.0)
+    rng = occasion.rng
+    x, y = occasion.spot(3.0, 3.0)
     t = grid(rng.uniform(0.9, 2.6))
     drift = rng.normal(0.0, 2.0, 2)
     half = 0.48 * float(t[-1])
     return [
-        scene.finger(
+        occasion.finger(
             t,
             x + drift[0] * t,
             y + drift[1] * t,
@@ -60,80 +60,80 @@ def slow_touch(scene: Scene) -> list[Contact]:
     ]
 
 
-def diagonal_swipe(scene: Scene) -> list[Contact]:
+def diagonal_swipe(occasion: Occasion) -> list[Press]:
     """A swipe 31 to 59 degrees off the axes."""
-    rng = scene.rng
+    rng = occasion.rng
     heading = float(rng.choice([1, 3, 5, 7])) * math.pi / 4
-    path = stroke(scene, heading, swipe_length(scene, heading) * 0.8, limit=math.radians(14.0))
-    return fingers_on(scene, path, int(rng.choice([1, 2], p=[0.85, 0.15])), heading)
+    path = stroke(occasion, heading, swipe_length(occasion, heading) * 0.8, limit=math.radians(14.0))
+    return fingers_on(occasion, path, int(rng.choice([1, 2], p=[0.85, 0.15])), heading)
 
 
-def tap_then_swipe(scene: Scene) -> list[Contact]:
+def tap_then_swipe(occasion: Occasion) -> list[Press]:
     """A tap, and then a swipe from about there."""
-    rng = scene.rng
+    rng = occasion.rng
     heading = float(rng.choice([RIGHT, UP, LEFT, DOWN]))
-    path = stroke(scene, heading, swipe_length(scene, heading))
-    made = fingers_on(scene, path, 1, heading)
-    tap, gap = scene.tap_s(), scene.gap_s()
+    path = stroke(occasion, heading, swipe_length(occasion, heading))
+    made = fingers_on(occasion, path, 1, heading)
+    tap, gap = occasion.tap_s(), occasion.gap_s()
     moved = made[0]
     shifted = replace(moved, t=moved.t + tap + gap)
-    near = rng.normal(0.0, 0.03, 2) * scene.small
-    return [touch_down(scene, float(moved.x[0]) + near[0], float(moved.y[0]) + near[1], tap), shifted]
+    near = rng.normal(0.0, 0.03, 2) * occasion.small
+    return [touch_down(occasion, float(moved.x[0]) + near[0], float(moved.y[0]) + near[1], tap), shifted]
 
 
-def press_and_slide(scene: Scene) -> list[Contact]:
+def press_and_slide(occasion: Occasion) -> list[Press]:
     """A finger that holds for 0.9 s or longer and then drags."""
-    rng = scene.rng
+    rng = occasion.rng
     heading = rng.uniform(-math.pi, math.pi)
-    length = swipe_length(scene, heading) * rng.uniform(0.5, 1.0)
-    hold, move, after = rng.uniform(0.9, 2.0), rng.uniform(0.3, 1.2) / scene.rate, rng.uniform(0.0, 0.4)
+    length = swipe_length(occasion, heading) * rng.uniform(0.5, 1.0)
+    hold, move, after = rng.uniform(0.9, 2.0), rng.uniform(0.3, 1.2) / occasion.rate, rng.uniform(0.0, 0.4)
     t = grid(hold + move + after)
-    x, y = arc(progress((t - hold) / move, rng), length, heading, rng.normal(0.0, 0.2))
-    return drawn(scene, t, x, y)
+    x, y = arc(stroke_progress((t - hold) / move, rng), length, heading, rng.normal(0.0, 0.2))
+    return drawn(occasion, t, x, y)
 
 
-def triple_tap(scene: Scene) -> list[Contact]:
+def triple_tap(occasion: Occasion) -> list[Press]:
     """Three or four taps in a row at about one place."""
-    rng = scene.rng
-    x, y = scene.spot(4.0, 4.0)
+    rng = occasion.rng
+    x, y = occasion.spot(4.0, 4.0)
     made, start = [], 0.0
     for _ in range(int(rng.choice([3, 4], p=[0.75, 0.25]))):
-        duration = scene.tap_s()
-        dx, dy = rng.normal(0.0, 0.025, 2) * scene.small
-        made.append(touch_down(scene, x + dx, y + dy, duration, start))
-        start += duration + max(scene.gap_s(), 0.11)
+        duration = occasion.tap_s()
+        dx, dy = rng.normal(0.0, 0.025, 2) * occasion.small
+        made.append(touch_down(occasion, x + dx, y + dy, duration, start))
+        start += duration + max(occasion.gap_s(), 0.11)
     return made
 
 
-def taps_apart(scene: Scene) -> list[Contact]:
+def taps_apart(occasion: Occasion) -> list[Press]:
     """Two taps as close in time as a double tap, but at places a third of the pad or more apart."""
-    rng = scene.rng
-    apart = scene.small * rng.uniform(0.38, 0.7)
+    rng = occasion.rng
+    apart = occasion.small * rng.uniform(0.38, 0.7)
     angle = rng.uniform(-math.pi, math.pi)
     dx, dy = 0.5 * apart * math.cos(angle), 0.5 * apart * math.sin(angle)
-    x, y = scene.spot(abs(dx), abs(dy))
-    first = scene.tap_s()
+    x, y = occasion.spot(abs(dx), abs(dy))
+    first = occasion.tap_s()
     return [
-        touch_down(scene, x - dx, y - dy, first),
-        touch_down(scene, x + dx, y + dy, scene.tap_s(), first + scene.gap_s()),
+        touch_down(occasion, x - dx, y - dy, first),
+        touch_down(occasion, x + dx, y + dy, occasion.tap_s(), first + occasion.gap_s()),
     ]
 
 
-def tap_then_hold(scene: Scene) -> list[Contact]:
+def tap_then_hold(occasion: Occasion) -> list[Press]:
     """A tap, and then a press of 0.9 s or longer at the same place."""
-    rng = scene.rng
-    x, y = scene.spot(3.0, 3.0)
-    first = scene.tap_s()
-    dx, dy = rng.normal(0.0, 0.03, 2) * scene.small
+    rng = occasion.rng
+    x, y = occasion.spot(3.0, 3.0)
+    first = occasion.tap_s()
+    dx, dy = rng.normal(0.0, 0.03, 2) * occasion.small
     return [
-        touch_down(scene, x, y, first),
-        touch_down(scene, x + dx, y + dy, rng.uniform(0.9, 2.0), first + scene.gap_s()),
+        touch_down(occasion, x, y, first),
+        touch_down(occasion, x + dx, y + dy, rng.uniform(0.9, 2.0), first + occasion.gap_s()),
     ]
 
 
-Made = list[Contact] | list[Artefact]
+Made = list[Press] | list[Artefact]
 
-OTHERS: dict[str, Callable[[Scene], Made]] = {
+OTHERS: dict[str, Callable[[Occasion], Made]] = {
     "long_press": long_press,
     "slow_touch": slow_touch,
     "triple_tap": triple_tap,

@@ -23,7 +23,7 @@ def generator(*key: int) -> np.random.Generator:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Contact:
+class Press:
     """One finger (or palm, or thing) on the pad; arrays are (n,) on a fine grid of increasing times.
 
     Before the first and after the last time there is no contact. Positions are millimetres from the pad's
@@ -59,7 +59,7 @@ class Performance:
 
     kind: str
     label: str
-    contacts: tuple[Contact, ...]
+    contacts: tuple[Press, ...]
     duration_s: float
     speed: str
     inclination: int
@@ -186,7 +186,7 @@ def fingertip(
     fade_out_s: float | None = None,
     size: float = 1.0,
     start: float = 0.0,
-) -> Contact:
+) -> Press:
     """A finger of this person on the path x, y (n,) at times t (n,) from 0, with a hand's unsteadiness."""
     level = force * person.force * float(np.clip(rng.lognormal(0.0, person.force_spread), 0.35, 2.5))
     fade_in = rng.uniform(0.02, 0.08) if fade_in_s is None else fade_in_s
@@ -196,7 +196,7 @@ def fingertip(
     broad = float(rng.uniform(1.2, 1.6)) if rng.random() < 0.08 else 1.0
     width = min(person.finger_mm * size * broad * float(rng.uniform(0.88, 1.14)), 8.0)
     oblong = float(np.clip(person.oblong * rng.uniform(0.85, 1.2), 1.0, 2.2))
-    return Contact(
+    return Press(
         t=t + start,
         x=x + shake * wander(t, rng, 8.0, 12.0, 3),
         y=y + shake * wander(t, rng, 8.0, 12.0, 3),

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gestured.simulator.kinematics import Array
 from gestured.simulator.nature import Nature
-from gestured.simulator.people import Contact, Performance
+from gestured.simulator.people import Performance, Press
 from gestured.simulator.textile import tail_kernel
 
 FINGER_MM = 3.7  # the finger that a sensor's `gain` refers to
@@ -23,7 +23,7 @@ class Fingers:
         self.ids: NDArray[np.int32] = np.full((frames, 3), -1, dtype=np.int32)
         self._number = 0
 
-    def track(self, contact: Contact, at: Array, first: int, sensor: Nature, rng: np.random.Generator) -> None:
+    def track(self, contact: Press, at: Array, first: int, sensor: Nature, rng: np.random.Generator) -> None:
         """Reports one finger at times `at` (its own clock) in the frames from `first` on."""
         force = np.interp(at, contact.t, contact.force, left=0.0, right=0.0)
         error = rng.normal(0.0, sensor.touch_noise, (2, at.size))
@@ -68,7 +68,7 @@ def sample(
     return field, fingers
 
 
-def footprint(sensor: Nature, contact: Contact, at: Array, taxel_x: Array, taxel_y: Array) -> Array:
+def footprint(sensor: Nature, contact: Press, at: Array, taxel_x: Array, taxel_y: Array) -> Array:
     """Mean pressure (F, R, C) of one contact over the instants `at` (F, S, R): a turned super-Gaussian."""
     force = np.interp(at, contact.t, contact.force, left=0.0, right=0.0)
     x, y = np.interp(at, contact.t, contact.x), np.interp(at, contact.t, contact.y)

@@ -44,7 +44,7 @@ class Take:
     touches: NDArray[np.float32]  # (N, 3, 2) x right, y upward from the bottom-left taxel, in pitches; NaN
     touch_ids: NDArray[np.int32]  # (N, 3), -1 for none
     events: tuple[Event, ...]
-    sensor: "Sensor"
+    sensor: "SimulatedSensor"
 
     @property
     def label(self) -> str:
@@ -58,13 +58,13 @@ class Take:
 
 
 @dataclass(frozen=True)
-class Sensor(Nature):
+class SimulatedSensor(Nature):
     """One sensor: its nature, and what it sends."""
 
     @staticmethod
-    def nominal(day: int | None = None) -> "Sensor":
+    def nominal(day: int | None = None) -> "SimulatedSensor":
         """The 9 x 9 textile at 15 Hz; with a day, the same sensor as it is on another day."""
-        sensor = Sensor(seed=1)
+        sensor = SimulatedSensor(seed=1)
         if day is None:
             return sensor
         rng = generator(day, 0xDA7)
@@ -83,7 +83,7 @@ class Sensor(Nature):
         )
 
     @staticmethod
-    def wide(rng: np.random.Generator, hardness: float = 0.6) -> "Sensor":
+    def wide(rng: np.random.Generator, hardness: float = 0.6) -> "SimulatedSensor":
         """Any sensor at all; `hardness` 0 (clean) .. 1 (as bad as it may get) scales all that disturbs."""
         from gestured.simulator.variety import any_sensor  # which builds Sensors itself
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gestured.simulator.kinematics import Array, arc, grid, progress, wander
-from gestured.simulator.people import SPEEDS, Contact, Participant, fingertip
+from gestured.simulator.kinematics import Array, arc, grid, stroke_progress, wander
+from gestured.simulator.people import SPEEDS, Participant, Press, fingertip
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class Occasion:
     """One person about to do one thing on a pad of `width` x `height` millimetres."""
 
     rng: np.random.Generator
@@ -68,7 +68,7 @@ class Scene:
         start: float = 0.0,
         fade_in_s: float | None = None,
         fade_out_s: float | None = None,
-    ) -> Contact:
+    ) -> Press:
         """This person's finger on a path, pressed as the pose has it."""
         return fingertip(
             self.rng,
@@ -109,23 +109,23 @@ class Scene:
 
 
 def touch_down(
-    scene: Scene,
+    occasion: Occasion,
     x: float,
     y: float,
     duration_s: float,
     start: float = 0.0,
     force: float = 1.0,
     size: float = 1.0,
-) -> Contact:
+) -> Press:
     """A finger that stays where it lands for that long, rolling a little."""
-    rng = scene.rng
+    rng = occasion.rng
     t = grid(duration_s)
     # A fingertip rolls on and off and its centre moves with the load: some millimetres on a real panel.
     u = t / duration_s
     roll = np.multiply.outer(u - 0.5, np.clip(rng.normal(0.0, 1.9, 2), -4.5, 4.5))
     roll += np.multiply.outer(np.sin(math.pi * u), rng.normal(0.0, 0.8, 2))
     edge = 0.5 * duration_s
-    return scene.finger(
+    return occasion.finger(
         t,
         x + roll[:, 0],
         y + roll[:, 1],
@@ -148,21 +148,21 @@ class Stroke:
     fade_out_s: float
 
 
-def stroke(scene: Scene, heading: float, length: float, *, limit: float = 0.36) -> Stroke:
+def stroke(occasion: Occasion, heading: float, length: float, *, limit: float = 0.36) -> Stroke:
     """One stroke of `length` millimetres towards `heading` (radians), within `limit` radians of it.
 
     Bent about wrist or elbow, unsteady, sometimes with a hook at the end, with rests or gliding on and off.
     Duration grows with length^0.4, as it does in free reaching.
     """
-    rng, person = scene.rng, scene.person
-    error = float(np.clip(scene.turn + rng.normal(0.0, person.aim), -limit, limit))
+    rng, person = occasion.rng, occasion.person
+    error = float(np.clip(occasion.turn + rng.normal(0.0, person.aim), -limit, limit))
     bend = float(np.clip(person.bend * length * rng.uniform(0.3, 1.6) + rng.normal(0.0, 0.06), -0.85, 0.85))
-    move = float(np.clip(0.42 * (length / 50.0) ** 0.4 / scene.rate * rng.lognormal(0.0, 0.15), 0.13, 1.6))
-    before, after = scene.rests()
+    move = float(np.clip(0.42 * (length / 50.0) ** 0.4 / occasion.rate * rng.lognormal(0.0, 0.15), 0.13, 1.6))
+    before, after = occasion.rests()
     glides = before == 0.0 and after == 0.0 and rng.random() < 0.2 + 0.7 * person.glide
     t = grid(before + move + after)
     tau = (t - before) / move
-    s = progress(tau, rng, moving_ends=float(rng.uniform(0.2, 1.0)) if glides else 0.0)
+    s = stroke_progress(tau, rng, moving_ends=float(rng.uniform(0.2, 1.0)) if glides else 0.0)
     x, y = arc(s, length, heading + error, bend)
     if rng.random() < 0.15:
         # A hook: the finger turns away or springs back as it stops.
@@ -180,26 +180,26 @@ def stroke(scene: Scene, heading: float, length: float, *, limit: float = 0.36) 
     return Stroke(t, x - half * math.cos(heading), y - half * math.sin(heading), float(fade_in), float(fade_out))
 
 
-def swipe_length(scene: Scene, heading: float) -> float:
+def swipe_length(occasion: Occasion, heading: float) -> float:
     """Length of a swipe in millimetres: 0.2 to 0.95 of the pad's extent in that direction, 12 to 150 mm."""
-    across = abs(math.cos(heading)) * scene.width + abs(math.sin(heading)) * scene.height
-    across = min(across, 1.25 * scene.small / max(abs(math.cos(heading)), abs(math.sin(heading)), 0.7) + 60.0)
-    length = across * (0.21 + 0.72 * scene.reach()) * scene.grow
+    across = abs(math.cos(heading)) * occasion.width + abs(math.sin(heading)) * occasion.height
+    across = min(across, 1.25 * occasion.small / max(abs(math.cos(heading)), abs(math.sin(heading)), 0.7) + 60.0)
+    length = across * (0.21 + 0.72 * occasion.reach()) * occasion.grow
     return float(np.clip(length, max(12.0, 0.2 * across), min(150.0, 0.97 * across)))
 
 
-def fingers_on(scene: Scene, path: Stroke, count: int, heading: float, delay_s: float = 0.08) -> list[Contact]:
+def fingers_on(occasion: Occasion, path: Stroke, count: int, heading: float, delay_s: float = 0.08) -> list[Press]:
     """Several fingers side by side on one stroke: uneven in force, size, length, landing and lifting."""
-    rng = scene.rng
+    rng = occasion.rng
     if count == 1:
-        x, y = scene.settle(path.x, path.y)
-        return [scene.finger(path.t, x, y, fade_in_s=path.fade_in_s, fade_out_s=path.fade_out_s)]
-    gap = min(scene.spacing(), 0.8 * scene.small / (count - 1))
+        x, y = occasion.settle(path.x, path.y)
+        return [occasion.finger(path.t, x, y, fade_in_s=path.fade_in_s, fade_out_s=path.fade_out_s)]
+    gap = min(occasion.spacing(), 0.8 * occasion.small / (count - 1))
     side = heading + math.pi / 2 + float(np.clip(rng.normal(0.0, 0.25), -0.6, 0.6))
     offsets = (np.arange(count) - (count - 1) / 2) * gap * rng.uniform(0.9, 1.1, count)
     xs = [path.x * rng.uniform(0.9, 1.08) + o * math.cos(side) for o in offsets]
     ys = [path.y * rng.uniform(0.9, 1.08) + o * math.sin(side) for o in offsets]
-    all_x, all_y = scene.settle(np.concatenate(xs), np.concatenate(ys))
+    all_x, all_y = occasion.settle(np.concatenate(xs), np.concatenate(ys))
     total = float(path.t[-1])
     delay_s = min(delay_s, 0.25 * total)
     forces = rng.uniform(0.35, 1.0, count) if rng.random() < 0.3 else rng.uniform(0.7, 1.0, count)
@@ -213,7 +213,7 @@ def fingers_on(scene: Scene, path: Stroke, count: int, heading: float, delay_s: 
         x = np.interp(t + first, path.t, all_x[k * n : (k + 1) * n])
         y = np.interp(t + first, path.t, all_y[k * n : (k + 1) * n])
         contacts.append(
-            scene.finger(
+            occasion.finger(
                 t,
                 x,
                 y,

@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 
-from gestured.simulator.kinematics import Array, grid, progress, wander
-from gestured.simulator.people import Artefact, Contact
-from gestured.simulator.strokes import Scene
+from gestured.simulator.kinematics import Array, grid, stroke_progress, wander
+from gestured.simulator.people import Artefact, Press
+from gestured.simulator.strokes import Occasion
 
 Pair = tuple[float, float]
 
 
 def blob(
-    scene: Scene,
+    occasion: Occasion,
     t: Array,
     x: float | Array,
     y: float | Array,
@@ -24,108 +24,110 @@ def blob(
     start: float = 0.0,
     unrest: float = 0.08,
     flatness: float = 1.2,
-) -> Contact:
+) -> Press:
     """A contact that is no fingertip.
 
     `size` are its standard deviations in mm, `fades_s` how long it comes and goes.
     """
-    rng, total, ones = scene.rng, float(t[-1]), np.ones_like(t)
+    rng, total, ones = occasion.rng, float(t[-1]), np.ones_like(t)
     level = np.clip(t / min(fades_s[0], 0.45 * total), 0.0, 1.0)
     level = level * np.clip((total - t) / min(fades_s[1], 0.45 * total), 0.0, 1.0)
     level = level * np.clip(1.0 + unrest * wander(t, rng, 0.3, 4.0), 0.0, 3.0)
     turn = rng.uniform(0.0, math.pi) if angle is None else angle
-    return Contact(t + start, x * ones, y * ones, force * level, *size, turn, 0.1, flatness, False)
+    return Press(t + start, x * ones, y * ones, force * level, *size, turn, 0.1, flatness, False)
 
 
-def between(scene: Scene, *ranges: Pair) -> Pair:
+def between(occasion: Occasion, *ranges: Pair) -> Pair:
     """Two numbers from two ranges."""
     (a, b), (c, d) = ranges
-    return float(scene.rng.uniform(a, b)), float(scene.rng.uniform(c, d))
+    return float(occasion.rng.uniform(a, b)), float(occasion.rng.uniform(c, d))
 
 
-def resting_hand(scene: Scene, duration_s: float) -> Contact:
+def resting_hand(occasion: Occasion, duration_s: float) -> Press:
     """The heel of the hand or an idle finger that lies lightly on the pad's edge during a gesture."""
-    rng, t = scene.rng, grid(duration_s)
-    side = 1.0 if scene.person.right_handed else -1.0
-    x = scene.width * (0.5 + side * rng.uniform(0.3, 0.55))
-    y = scene.height * rng.uniform(-0.08, 0.12)
+    rng, t = occasion.rng, grid(duration_s)
+    side = 1.0 if occasion.person.right_handed else -1.0
+    x = occasion.width * (0.5 + side * rng.uniform(0.3, 0.55))
+    y = occasion.height * rng.uniform(-0.08, 0.12)
     if rng.random() < 0.5:
-        return blob(scene, t, x, y, rng.uniform(0.2, 0.6), between(scene, (8.0, 14.0), (5.0, 9.0)), (0.08, 0.1))
-    return blob(scene, t, x, y, rng.uniform(0.1, 0.3), (4.0, 3.5), (0.08, 0.1))
+        return blob(occasion, t, x, y, rng.uniform(0.2, 0.6), between(occasion, (8.0, 14.0), (5.0, 9.0)), (0.08, 0.1))
+    return blob(occasion, t, x, y, rng.uniform(0.1, 0.3), (4.0, 3.5), (0.08, 0.1))
 
 
-def palm(scene: Scene) -> list[Contact]:
+def palm(occasion: Occasion) -> list[Press]:
     """A flat hand: large contacts that land within 0.15 s (balls of the hand, finger roots, often one big patch)."""
-    rng = scene.rng
+    rng = occasion.rng
     total = rng.uniform(0.2, 2.2)
-    cx, cy = scene.spot(0.1 * scene.width, 0.1 * scene.height)
-    spread = rng.uniform(0.1, 0.36) * scene.small
-    sizes = [between(scene, (5.0, 13.0), (4.0, 9.0)) for _ in range(int(rng.integers(3, 8)))]
+    cx, cy = occasion.spot(0.1 * occasion.width, 0.1 * occasion.height)
+    spread = rng.uniform(0.1, 0.36) * occasion.small
+    sizes = [between(occasion, (5.0, 13.0), (4.0, 9.0)) for _ in range(int(rng.integers(3, 8)))]
     if rng.random() < 0.5:
-        sizes[0] = between(scene, (14.0, 26.0), (10.0, 18.0))
+        sizes[0] = between(occasion, (14.0, 26.0), (10.0, 18.0))
     made = []
     for size in sizes:
         first = rng.uniform(0.0, min(0.15, 0.3 * total))
         t = grid(total - first)
         (dx, dy), (vx, vy) = rng.normal(0.0, spread, 2), rng.normal(0.0, 3.0, 2)
-        force = scene.person.force * rng.uniform(0.5, 2.5)
-        fades = between(scene, (0.03, 0.2), (0.03, 0.2))
-        made.append(blob(scene, t, cx + dx + vx * t, cy + dy + vy * t, force, size, fades, start=first))
+        force = occasion.person.force * rng.uniform(0.5, 2.5)
+        fades = between(occasion, (0.03, 0.2), (0.03, 0.2))
+        made.append(blob(occasion, t, cx + dx + vx * t, cy + dy + vy * t, force, size, fades, start=first))
     return made
 
 
-def heel_rest(scene: Scene) -> list[Contact]:
+def heel_rest(occasion: Occasion) -> list[Press]:
     """The heel of the hand lies on an edge for seconds, heavy and large."""
-    rng, t = scene.rng, grid(scene.rng.uniform(1.0, 4.0))
+    rng, t = occasion.rng, grid(occasion.rng.uniform(1.0, 4.0))
     edge = rng.uniform(-0.5, 0.5)
     places = [(edge, -0.42), (edge, 0.42), (-0.42, edge), (0.42, edge)]
     px, py = places[int(rng.choice(4, p=[0.55, 0.1, 0.15, 0.2]))]
     sway = rng.uniform(0.2, 2.0)
-    x = scene.width * (0.5 + px) + sway * wander(t, rng, 0.2, 1.0)
-    y = scene.height * (0.5 + py) + sway * wander(t, rng, 0.2, 1.0)
-    fades = between(scene, (0.05, 0.4), (0.05, 0.4))
-    made = [blob(scene, t, x, y, rng.uniform(1.0, 6.0), between(scene, (9.0, 18.0), (6.0, 11.0)), fades)]
+    x = occasion.width * (0.5 + px) + sway * wander(t, rng, 0.2, 1.0)
+    y = occasion.height * (0.5 + py) + sway * wander(t, rng, 0.2, 1.0)
+    fades = between(occasion, (0.05, 0.4), (0.05, 0.4))
+    made = [blob(occasion, t, x, y, rng.uniform(1.0, 6.0), between(occasion, (9.0, 18.0), (6.0, 11.0)), fades)]
     if rng.random() < 0.4:
         dx, dy = rng.normal(0.0, 22.0), rng.normal(0.0, 12.0)
-        size = between(scene, (6.0, 12.0), (5.0, 9.0))
-        made.append(blob(scene, t, x + dx, y + dy, rng.uniform(0.5, 3.0), size, fades))
+        size = between(occasion, (6.0, 12.0), (5.0, 9.0))
+        made.append(blob(occasion, t, x + dx, y + dy, rng.uniform(0.5, 3.0), size, fades))
     return made
 
 
-def forearm(scene: Scene) -> list[Contact]:
+def forearm(occasion: Occasion) -> list[Press]:
     """An arm laid across the pad: a long band that comes and goes slowly and rolls a little."""
-    rng, t = scene.rng, grid(scene.rng.uniform(0.6, 3.5))
-    x, y = scene.spot(0.1 * scene.width, 0.1 * scene.height)
-    dx, dy = rng.normal(0.0, 0.12, 2) * scene.small
+    rng, t = occasion.rng, grid(occasion.rng.uniform(0.6, 3.5))
+    x, y = occasion.spot(0.1 * occasion.width, 0.1 * occasion.height)
+    dx, dy = rng.normal(0.0, 0.12, 2) * occasion.small
     u = t / t[-1]
-    size = rng.uniform(0.3, 0.7) * scene.small, rng.uniform(7.0, 16.0)
-    fades = between(scene, (0.1, 0.6), (0.1, 0.6))
-    return [blob(scene, t, x + dx * u, y + dy * u, rng.uniform(2.0, 9.0), size, fades)]
+    size = rng.uniform(0.3, 0.7) * occasion.small, rng.uniform(7.0, 16.0)
+    fades = between(occasion, (0.1, 0.6), (0.1, 0.6))
+    return [blob(occasion, t, x + dx * u, y + dy * u, rng.uniform(2.0, 9.0), size, fades)]
 
 
-def wipe(scene: Scene) -> list[Contact]:
+def wipe(occasion: Occasion) -> list[Press]:
     """A flat hand or a cloth wipes over: a large heavy patch crosses the pad, once or to and fro."""
-    rng = scene.rng
-    t = grid(float(np.clip(rng.uniform(0.4, 2.5) / scene.rate, 0.3, 3.5)))
+    rng = occasion.rng
+    t = grid(float(np.clip(rng.uniform(0.4, 2.5) / occasion.rate, 0.3, 3.5)))
     u = t / t[-1]
     once = rng.random() < 0.5
-    way = progress(u, rng) if once else 0.5 - 0.5 * np.cos(math.pi * rng.uniform(2.0, 5.0) * u)
-    along, heading = (way - 0.5) * rng.uniform(0.6, 1.3) * scene.small, rng.uniform(-math.pi, math.pi)
-    cx, cy = scene.spot(0.2 * scene.width, 0.2 * scene.height)
+    way = stroke_progress(u, rng) if once else 0.5 - 0.5 * np.cos(math.pi * rng.uniform(2.0, 5.0) * u)
+    along, heading = (way - 0.5) * rng.uniform(0.6, 1.3) * occasion.small, rng.uniform(-math.pi, math.pi)
+    cx, cy = occasion.spot(0.2 * occasion.width, 0.2 * occasion.height)
     x, y = cx + along * math.cos(heading), cy + along * math.sin(heading)
     made = []
     for _ in range(int(rng.integers(1, 4))):
         dx, dy = rng.normal(0.0, 10.0, 2)
-        size, fades = between(scene, (9.0, 20.0), (6.0, 12.0)), between(scene, (0.03, 0.3), (0.03, 0.3))
-        made.append(blob(scene, t, x + dx, y + dy, rng.uniform(0.8, 4.0), size, fades, unrest=rng.uniform(0.05, 0.3)))
+        size, fades = between(occasion, (9.0, 20.0), (6.0, 12.0)), between(occasion, (0.03, 0.3), (0.03, 0.3))
+        made.append(
+            blob(occasion, t, x + dx, y + dy, rng.uniform(0.8, 4.0), size, fades, unrest=rng.uniform(0.05, 0.3))
+        )
     return made
 
 
-def object_put_down(scene: Scene) -> list[Contact]:
+def object_put_down(occasion: Occasion) -> list[Press]:
     """A thing is put down: a cup's ring, edges, a block, feet. Hard edges, no tremor, stays 0.4 to 5 s."""
-    rng = scene.rng
+    rng = occasion.rng
     t = grid(rng.uniform(0.4, 5.0))
-    x, y = scene.spot(0.1 * scene.width, 0.1 * scene.height, beyond=0.2)
+    x, y = occasion.spot(0.1 * occasion.width, 0.1 * occasion.height, beyond=0.2)
     parts: list[tuple[float, float, Pair]]  # place and size
     form = int(rng.integers(4))
     if form == 0:
@@ -135,51 +137,51 @@ def object_put_down(scene: Scene) -> list[Contact]:
     elif form == 1:
         parts = [(*rng.normal(0.0, 20.0, 2), (rng.uniform(10.0, 25.0), 3.0)) for _ in range(2)]
     elif form == 2:
-        parts = [(0.0, 0.0, between(scene, (8.0, 25.0), (8.0, 20.0)))]
+        parts = [(0.0, 0.0, between(occasion, (8.0, 25.0), (8.0, 20.0)))]
     else:
         feet = int(rng.integers(1, 5))
-        parts = [(*rng.normal(0.0, 12.0, 2), between(scene, (2.0, 6.0), (2.0, 4.0))) for _ in range(feet)]
+        parts = [(*rng.normal(0.0, 12.0, 2), between(occasion, (2.0, 6.0), (2.0, 4.0))) for _ in range(feet)]
     blow = rng.uniform(0.4, 4.0) * (1.0 + rng.uniform(0.0, 1.5) * np.exp(-t / 0.05))
-    fades = between(scene, (0.01, 0.06), (0.03, 0.2))
+    fades = between(occasion, (0.01, 0.06), (0.03, 0.2))
     return [
-        blob(scene, t, x + dx, y + dy, blow * rng.uniform(0.3, 1.2), size, fades, unrest=0.01, flatness=2.5)
+        blob(occasion, t, x + dx, y + dy, blow * rng.uniform(0.3, 1.2), size, fades, unrest=0.01, flatness=2.5)
         for dx, dy, size in parts
     ]
 
 
-def sleeve_brush(scene: Scene) -> list[Contact]:
+def sleeve_brush(occasion: Occasion) -> list[Press]:
     """Cloth brushes over: one to four weak, large, ragged patches wander across in 0.3 to 1.8 s."""
-    rng = scene.rng
+    rng = occasion.rng
     total, heading = rng.uniform(0.3, 1.8), rng.uniform(-math.pi, math.pi)
-    across = rng.uniform(0.5, 1.6) * scene.small
+    across = rng.uniform(0.5, 1.6) * occasion.small
     made = []
     for _ in range(int(rng.integers(1, 5))):
         first = rng.uniform(0.0, 0.3) * total
         t = grid(total - first)
         along = across * (t / t[-1] - 0.5)
-        x = scene.width * rng.uniform(0.25, 0.75) + along * math.cos(heading) + 4.0 * wander(t, rng, 0.5, 3.0)
-        y = scene.height * rng.uniform(0.25, 0.75) + along * math.sin(heading) + 4.0 * wander(t, rng, 0.5, 3.0)
-        size, fades = between(scene, (7.0, 24.0), (3.5, 10.0)), between(scene, (0.05, 0.5), (0.05, 0.5))
+        x = occasion.width * rng.uniform(0.25, 0.75) + along * math.cos(heading) + 4.0 * wander(t, rng, 0.5, 3.0)
+        y = occasion.height * rng.uniform(0.25, 0.75) + along * math.sin(heading) + 4.0 * wander(t, rng, 0.5, 3.0)
+        size, fades = between(occasion, (7.0, 24.0), (3.5, 10.0)), between(occasion, (0.05, 0.5), (0.05, 0.5))
         unrest = rng.uniform(0.2, 0.8)
-        made.append(blob(scene, t, x, y, rng.uniform(0.3, 2.2), size, fades, start=first, unrest=unrest))
+        made.append(blob(occasion, t, x, y, rng.uniform(0.3, 2.2), size, fades, start=first, unrest=unrest))
     return made
 
 
-def wrinkle(scene: Scene) -> list[Contact]:
+def wrinkle(occasion: Occasion) -> list[Press]:
     """The fabric is pulled: a long ridge appears along a fold, shifts, and relaxes."""
-    rng, t = scene.rng, grid(scene.rng.uniform(0.4, 3.0))
-    x, y = scene.spot(0.1 * scene.width, 0.1 * scene.height)
+    rng, t = occasion.rng, grid(occasion.rng.uniform(0.4, 3.0))
+    x, y = occasion.spot(0.1 * occasion.width, 0.1 * occasion.height)
     dx, dy = rng.normal(0.0, 8.0, 2)
     u = t / t[-1]
-    size = rng.uniform(0.25, 0.8) * scene.small, rng.uniform(3.0, 6.0)
-    fades = between(scene, (0.05, 0.8), (0.1, 1.0))
+    size = rng.uniform(0.25, 0.8) * occasion.small, rng.uniform(3.0, 6.0)
+    fades = between(occasion, (0.05, 0.8), (0.1, 1.0))
     unrest = rng.uniform(0.05, 0.4)
-    return [blob(scene, t, x + dx * u, y + dy * u, rng.uniform(0.8, 5.0), size, fades, unrest=unrest)]
+    return [blob(occasion, t, x + dx * u, y + dy * u, rng.uniform(0.8, 5.0), size, fades, unrest=unrest)]
 
 
-def electrical_burst(scene: Scene) -> list[Artefact]:
+def electrical_burst(occasion: Occasion) -> list[Artefact]:
     """Interference for 0.05 to 1.5 s: on everything, on rows, columns, blocks, or scattered."""
-    rng = scene.rng
+    rng = occasion.rng
     made, start = [], 0.0
     for _ in range(int(rng.integers(1, 5))):
         stop = start + rng.uniform(0.04, 0.6)
@@ -190,7 +192,7 @@ def electrical_burst(scene: Scene) -> list[Artefact]:
     return made
 
 
-def spike(scene: Scene) -> list[Artefact]:
+def spike(occasion: Occasion) -> list[Artefact]:
     """One taxel jumps for a frame or two."""
-    rng = scene.rng
+    rng = occasion.rng
     return [Artefact(0.0, rng.uniform(0.01, 0.08), "taxel", rng.uniform(0.4, 4.0), 0.3)]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from gestured.simulator.sensor import Sensor
+from gestured.simulator.sensor import SimulatedSensor
 
 
 def _log(rng: np.random.Generator, low: float, high: float) -> float:
@@ -42,7 +42,7 @@ def _lags(rng: np.random.Generator, hard: float) -> tuple[tuple[float, ...], tup
     return tuple(amplitudes), tuple(taus)
 
 
-def any_sensor(rng: np.random.Generator, hardness: float) -> Sensor:
+def any_sensor(rng: np.random.Generator, hardness: float) -> SimulatedSensor:
     """A random sensor: a fifth like touchscreens (sharp blobs, no offset, 8 bits), the rest textiles."""
     hard = min(max(hardness, 0.0), 1.0)
     screen = rng.random() < 0.22
@@ -62,7 +62,7 @@ def any_sensor(rng: np.random.Generator, hardness: float) -> Sensor:
     offset = 0.0 if screen else float(rng.choice([0.0, 1.0])) * _log(rng, 0.05, 3.0)
     top = 255 if screen or gain < 90.0 else int(max(gain * rng.uniform(1.2, 8.0) * (1.0 + offset), 300.0))
     clipped = screen or bool(rng.random() < 0.15)
-    return Sensor(
+    return SimulatedSensor(
         seed=int(rng.integers(1 << 31)),
         rows=rows,
         columns=columns,

@@ -171,7 +171,7 @@ def test_a_daemon_that_cannot_be_compared_with_is_one_sentence(replay, serve, da
 
 
 def test_a_sensor_that_is_there_already_is_left_alone(replay, daemon: Daemon, wrongly: Path, monkeypatch) -> None:
-    monkeypatch.setattr("gestured.control.sending.PATIENCE_S", 1.5)
+    monkeypatch.setattr("gestured.control.sending.STATUS_TIMEOUT_S", 1.5)
     Sensor(daemon, "live").begin()
     daemon.client().subscribe("status").until(lambda line: line.get("sensors", {}).get("live") == "ok")
     flags = ["--to", daemon.ready["listen"], "--socket", str(daemon.socket), "--diff", "--sensor", "live"]

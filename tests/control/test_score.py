@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.client.score import NONE, PATIENCE_S, Performed, Tally
+from gestured.client.score import MISSED_AFTER_S, NONE, Performed, Tally
 
 
 def gesture(name: str, onset: float, offset: float) -> dict:
@@ -31,8 +31,8 @@ def test_another_gesture_is_wrong():
 def test_a_gesture_is_missed_only_when_nothing_can_come_any_more():
     tally = Tally()
     tally.begin(Performed("one_tap", "one_tap", 10.0, 10.2))
-    assert tally.settle(10.2 + PATIENCE_S - 0.01) == []
-    (outcome,) = tally.settle(10.2 + PATIENCE_S)
+    assert tally.settle(10.2 + MISSED_AFTER_S - 0.01) == []
+    (outcome,) = tally.settle(10.2 + MISSED_AFTER_S)
     assert outcome.verdict == "missed"
     assert tally.settle(math.inf) == []
 

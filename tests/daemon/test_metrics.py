@@ -20,7 +20,7 @@ from gestured.core.vitals import Vitals, faulty
 from gestured.core.window import Window
 from gestured.daemon.metrics import Gauges, Metrics, by_label
 from gestured.daemon.shadow import Comparison, Shadow
-from gestured.daemon.shift import LAST, LEAST, Shift, measured
+from gestured.daemon.shift import LAST, LEAST_GESTURES, Shift, measured
 from gestured.daemon.watch import Watch
 from gestured.model.ladder import ladder_for
 from gestured.model.model import open_apart
@@ -182,7 +182,7 @@ QUANTILES = {
 def test_gestures_as_in_training_are_no_shift_and_others_are() -> None:
     shift = Shift(QUANTILES)
     usual = {"strength": 40.0, "duration_s": 0.4, "area": 0.1, "confidence": 1.0}  # surer than ever is no fault
-    for _ in range(LEAST - 1):
+    for _ in range(LEAST_GESTURES - 1):
         shift.add(usual)
     assert shift.shares() == {} and shift.unlike() == []
     for _ in range(LAST):

@@ -16,7 +16,7 @@ from gestured.client.control import Control
 from gestured.client.lines import Refused
 from gestured.daemon import control, log
 from gestured.daemon.control import Connection, ControlServer
-from gestured.daemon.request import Answer, Stream, Verb
+from gestured.daemon.request import Reply, ReplyStream, Verb
 from tests.daemon.harness import Daemon, Sensor, lines_of
 
 LINE = b"x" * 999 + b"\n"
@@ -32,16 +32,16 @@ class Desk:
         self.made: list[int] = []  # the turn of each line of a stream
         self.verbs = {"ask": Verb(self.ask), "tap": Verb(self.tap), "stream": Verb(self.stream)}
 
-    async def ask(self, connection: Connection) -> Answer:
+    async def ask(self, connection: Connection) -> Reply:
         self.asked.append(self.turn)
         return {}
 
-    async def tap(self, connection: Connection) -> Answer:
+    async def tap(self, connection: Connection) -> Reply:
         connection.tap = True
         return {}
 
-    async def stream(self, connection: Connection) -> Stream:
-        return Stream({}, self.lines())
+    async def stream(self, connection: Connection) -> ReplyStream:
+        return ReplyStream({}, self.lines())
 
     def lines(self) -> Iterator[bytes]:
         for _ in range(LINES):
@@ -105,7 +105,7 @@ def test_a_stream_is_made_as_it_is_read_in_small_pieces_and_one_at_a_time(tmp_pa
                 assert await answer(reader) == {"ok": True}
                 assert await reader.readexactly(LINES * len(LINE)) == LINE * LINES
             assert len(desk.made) == 2 * LINES
-            most = control.PIECE_BYTES // len(LINE) + 1
+            most = control.TURN_BYTES // len(LINE) + 1
             assert max(map(desk.made.count, set(desk.made[:LINES]))) <= most
             for each in (writer, asking):
                 each.close()
@@ -134,7 +134,7 @@ def test_who_asks_nothing_for_long_gives_his_place_to_others_but_a_tap_stays(tmp
 
 
 def test_who_does_not_read_an_answer_is_hung_up_on(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(control, "STALLED_S", 0.01)
+    monkeypatch.setattr(control, "UNREAD_S", 0.01)
 
     async def main() -> None:
         async with open_desk(tmp_path) as (_, path):
@@ -164,7 +164,7 @@ def test_members_of_the_group_cannot_take_all_places(start) -> None:
         path = Path(start("--control", f"{folder}/control").ready["control"])
         os.seteuid(65534)  # the group stays
         try:
-            taken = [open_ones.enter_context(Control(path)) for _ in range(control.CONNECTIONS)]
+            taken = [open_ones.enter_context(Control(path)) for _ in range(control.OPERATORS)]
             assert all(one.ask("status")["ok"] for one in taken)
             with Control(path) as member, pytest.raises(Refused, match="more than 16 connections"):
                 member.ask("status")

@@ -228,11 +228,11 @@ def slow(address: tuple[str, int], count: int) -> list[socket.socket]:
 
 def test_slow_http_clients_hold_nobody_up(web) -> None:
     address, _ = web
-    socks = slow(address, 3 * http.CONNECTIONS)
+    socks = slow(address, 3 * http.HTTP_CONNECTIONS)
     for _ in range(3):
         assert ask(address, b"GET /ok HTTP/1.1\r\n\r\n").startswith(b"HTTP/1.1 200")
-        socks += slow(address, http.CONNECTIONS)
-    for sock in socks[: http.CONNECTIONS]:  # those that came first made place
+        socks += slow(address, http.HTTP_CONNECTIONS)
+    for sock in socks[: http.HTTP_CONNECTIONS]:  # those that came first made place
         with suppress(ConnectionResetError):
             assert sock.recv(1) == b""
     for sock in socks:

@@ -4,7 +4,7 @@ import itertools
 from dataclasses import replace
 
 from gestured.client.sensor import Form
-from gestured.simulator import GESTURES, NON_GESTURES, SEQUENCES, Sensor, Take, generator
+from gestured.simulator import GESTURES, NON_GESTURES, SEQUENCES, SimulatedSensor, Take, generator
 from tests.golden.making import LEG, QUIET, UINT16, hands, held, jammed, sent, struck, tape
 from tests.golden.tape import Tape
 
@@ -52,9 +52,9 @@ def people() -> list[Tape]:
 
 def _wide(number: int) -> Tape:
     """Four sensors as strange as the simulator knows them."""
-    rng, found = generator(number, 0x31DE), list[tuple[int, Sensor]]()
+    rng, found = generator(number, 0x31DE), list[tuple[int, SimulatedSensor]]()
     for seed in itertools.count(100 * number):
-        sensor = Sensor.wide(rng, 0.8)
+        sensor = SimulatedSensor.wide(rng, 0.8)
         if sensor.rows * sensor.columns <= 120 and sensor.gain < 400 and sensor.rate_hz < 40:
             found.append((seed, sensor))
         if len(found) == 4:
@@ -121,7 +121,7 @@ def hand() -> list[Tape]:
             "clipped",
             "whole counts without the baseline; the usual sensor at its usual gain",
             sent(hands(35, 50, clipped), Form("arm", "uint8")),
-            sent(hands(36, 25, Sensor.nominal()), Form("leg", "uint16"), LEG, 0.03),
+            sent(hands(36, 25, SimulatedSensor.nominal()), Form("leg", "uint16"), LEG, 0.03),
         ),
     ]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from gestured.client.sensor import Form
 from gestured.core.frames import Frame, Touch
-from gestured.simulator import Participant, Sensor, Take, generator, session
+from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 from tests.golden.tape import Packet, Source, Tape, ticks
 from tests.hostile.faults import Fault
 from tests.hostile.line import Line
@@ -19,14 +19,14 @@ EPOCH_S = 1.7e9  # of the sensors' time tags
 GRAIN_S = 2.0**-10  # of times and time tags: what has few digits compresses well
 Sent = tuple[float, Source, bytes]  # s, when it arrives, from whom, what
 # Its noise is one or two counts: 8 bits would nearly do, and it compresses.
-QUIET = replace(Sensor.nominal(), gain=120.0)
+QUIET = replace(SimulatedSensor.nominal(), gain=120.0)
 ARM: Source = ("10.0.0.1", 5001)
 LEG: Source = ("10.0.0.2", 5002)
 UINT16 = Form("arm", "uint16")
 
 
 def hands(
-    seed: int, seconds: float, sensor: Sensor = QUIET, kinds: Sequence[str] | None = None, lead_s: float = 2.0
+    seed: int, seconds: float, sensor: SimulatedSensor = QUIET, kinds: Sequence[str] | None = None, lead_s: float = 2.0
 ) -> Take:
     """What somebody, drawn from `seed`, does on a sensor; `kinds` in that order, as far as the time reaches."""
     rng = generator(seed, 0x601D)

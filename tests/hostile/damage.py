@@ -32,7 +32,7 @@ from gestured.daemon.health import TICK_S
 from gestured.daemon.merge import load
 from gestured.daemon.scene import scene_of
 from gestured.model.ladder import ladder_for
-from gestured.simulator import Participant, Sensor, Take, generator, session
+from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 from tests.hostile.faults import FAULTS, Fault, Stall
 from tests.hostile.grammar import violations
 from tests.hostile.line import Line
@@ -75,7 +75,7 @@ def _share(part: int, whole: int) -> float | None:
 
 def take(participant: int, seconds: float = SESSION_S, touched: bool = True) -> Take:
     """What somebody, or nobody, does on a healthy sensor."""
-    sensor = replace(Sensor.nominal(day=participant), loss=0.0)
+    sensor = replace(SimulatedSensor.nominal(day=participant), loss=0.0)
     rng = generator(participant, 0xFA)
     return session(Participant(participant), sensor, rng, seconds, 0.0, kinds=None if touched else [])
 

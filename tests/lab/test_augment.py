@@ -13,7 +13,7 @@ from gestured.lab.augment import symmetry_table, turned, varied
 from gestured.lab.dataset import from_take
 from gestured.lab.fit import CLASSES
 from gestured.lab.nets import ACTIVE
-from gestured.simulator import Participant, Sensor, generator, gesture_take
+from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
 from tests.lab.made import direction, direction_of, gestures
 
 TABLE = symmetry_table(CLASSES)
@@ -40,7 +40,7 @@ def test_a_turned_window_shows_what_the_table_calls_it(label: str, symmetry: int
 def test_simulated_gestures_turn_as_made_ones_do(label: str) -> None:
     seen = 0
     for person in range(50, 56):
-        take = gesture_take(label, Participant(person), Sensor.nominal(day=person), generator(person, 5))
+        take = gesture_take(label, Participant(person), SimulatedSensor.nominal(day=person), generator(person, 5))
         for frames, found, *_ in from_take(take):
             if direction(frames) != direction_of(found):  # a person's hand can be too crooked for this eye
                 continue

@@ -68,7 +68,7 @@ def test_arguments_that_mean_nothing_are_usage_errors(line: str, capsys: pytest.
 
 
 def test_no_jobs_is_a_mistake_that_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for package in cli.NEEDED:
+    for package in cli.LAB_PACKAGES:
         pytest.importorskip(package, reason="needs the extra [lab]")
     assert main(["train", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"), "--jobs", "0"]) == 1
     assert capsys.readouterr().err == "gestured-lab: --jobs: expected 1 or more, found 0\n"
@@ -78,7 +78,7 @@ def test_no_jobs_is_a_mistake_that_is_named(tmp_path: Path, capsys: pytest.Captu
 def test_a_folder_that_cannot_be_made_is_named_before_anything_is_simulated(
     flag: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for package in cli.NEEDED:
+    for package in cli.LAB_PACKAGES:
         pytest.importorskip(package, reason="needs the extra [lab]")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").write_text("a file")
@@ -122,13 +122,13 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Everything that `train` does, with a plan much smaller than --quick, in one process."""
-    for package in cli.NEEDED:
+    for package in cli.LAB_PACKAGES:
         pytest.importorskip(package, reason="needs the extra [lab]")
     from gestured.lab import train
-    from gestured.lab.dataset import OTHERS, STREAMS, TRIALS, Samples, collect
+    from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS, Samples, collect
     from gestured.lab.fit import FitConfig
 
-    spread = {"wide": range(80), "cohort": range(0, len(TRIALS), 9), "others": range(0, len(OTHERS), 9)}
+    spread = {"wide": range(80), "cohort": range(0, len(TRIALS), 9), "others": range(0, len(OTHER_TRIALS), 9)}
     made: dict[tuple[str, int], Samples] = {}
 
     def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
@@ -141,10 +141,10 @@ def test_train_makes_three_models_and_evaluate_their_figures(
         subjects = np.arange(len(taken)) % 6
         return Samples(taken.frames, taken.offsets, taken.labels, taken.kinds, subjects, taken.strength)
 
-    plan = train.Plan(80, 80, len(TRIALS), 300, 200, FitConfig(epochs=2, real_epochs=1, real_samples=64))
+    plan = train.TrainingPlan(80, 80, len(TRIALS), 300, 200, FitConfig(epochs=2, real_epochs=1, real_samples=64))
     monkeypatch.setattr(train, "simulated", simulated)
     monkeypatch.setattr(train, "_real", real)
-    monkeypatch.setattr(train.Plan, "quick", classmethod(lambda cls: plan))
+    monkeypatch.setattr(train.TrainingPlan, "quick", classmethod(lambda cls: plan))
     out, cache = tmp_path / "models", tmp_path / "cache"
     arguments = ["--cache", str(cache), "--jobs", "1", "--quick"]
 

@@ -12,7 +12,7 @@ from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Decided, Recognizer, Scores
 from gestured.lab.dataset import (
-    OTHERS,
+    OTHER_TRIALS,
     STREAMS,
     TRIALS,
     WINDOW,
@@ -28,11 +28,20 @@ from gestured.lab.dataset import (
     with_idle,
 )
 from gestured.record.recordings import Recordings
-from gestured.simulator import GESTURES, NON_GESTURES, Participant, Sensor, Take, generator, gesture_take, session
+from gestured.simulator import (
+    GESTURES,
+    NON_GESTURES,
+    Participant,
+    SimulatedSensor,
+    Take,
+    generator,
+    gesture_take,
+    session,
+)
 
 
 def take_of(kind: str, person: int = 70) -> Take:
-    return gesture_take(kind, Participant(person), Sensor.nominal(day=person), generator(person, 3))
+    return gesture_take(kind, Participant(person), SimulatedSensor.nominal(day=person), generator(person, 3))
 
 
 class Sure:
@@ -49,7 +58,7 @@ def decided(found: list[Event | Decided]) -> list[Segment]:
 
 
 def test_what_is_learned_from_is_what_the_daemon_would_have_classified() -> None:
-    take = session(Participant(71), Sensor.nominal(day=71), generator(71, 4), 40.0)
+    take = session(Participant(71), SimulatedSensor.nominal(day=71), generator(71, 4), 40.0)
     heard: list[Segment] = []
     front_end = FrontEnd("armrest", *take.frames.shape[1:])
     recognizer = Recognizer(front_end, Sure())
@@ -65,7 +74,7 @@ def test_what_is_learned_from_is_what_the_daemon_would_have_classified() -> None
 
 def test_a_session_gives_each_performance_its_own_name() -> None:
     kinds = ["swipe_up", "one_tap", "long_press", "circle_clockwise", "double_tap"]
-    take = session(Participant(72), Sensor.nominal(day=72), generator(72, 4), 40.0, kinds=kinds)
+    take = session(Participant(72), SimulatedSensor.nominal(day=72), generator(72, 4), 40.0, kinds=kinds)
     assert [kind for _, _, kind, *_ in from_take(take)] == kinds
     labels = [label for _, label, *_ in from_take(take)]
     assert labels == ["swipe_up", "one_tap", "none", "circle_clockwise", "double_tap"]
@@ -107,7 +116,7 @@ def test_a_segment_is_named_after_what_it_holds() -> None:
 # --- the streams ---
 
 
-@pytest.mark.parametrize(("stream", "plan"), [("cohort", TRIALS), ("others", OTHERS)])
+@pytest.mark.parametrize(("stream", "plan"), [("cohort", TRIALS), ("others", OTHER_TRIALS)])
 def test_a_sample_carries_the_participant_of_its_plan(stream: str, plan: tuple) -> None:
     for index in range(0, len(plan), 331):
         trial = plan[index]
@@ -120,8 +129,8 @@ def test_a_sample_carries_the_participant_of_its_plan(stream: str, plan: tuple) 
 def test_the_plans_are_complete() -> None:
     assert len(TRIALS) == 34 * 10 * 3 * 3
     assert set(Counter((t.participant, t.gesture) for t in TRIALS).values()) == {9}
-    assert set(Counter((p, k) for p, k, _ in OTHERS).values()) == {3}
-    assert {k for _, k, _ in OTHERS} == set(NON_GESTURES)
+    assert set(Counter((p, k) for p, k, _ in OTHER_TRIALS).values()) == {3}
+    assert {k for _, k, _ in OTHER_TRIALS} == set(NON_GESTURES)
 
 
 def same(a: Samples, b: Samples) -> None:
@@ -255,7 +264,7 @@ def test_a_tap_of_a_single_frame_is_learned_like_any_other() -> None:
 
 def test_recorded_sessions_leave_out_what_nobody_named() -> None:
     kinds = ["swipe_up", "one_tap", "swipe_left", "circle_clockwise"]
-    take = session(Participant(73), Sensor.nominal(day=73), generator(73, 4), 40.0, kinds=kinds)
+    take = session(Participant(73), SimulatedSensor.nominal(day=73), generator(73, 4), 40.0, kinds=kinds)
     labels = ["swipe_up", "other", "swipe_left", "circle_clockwise"]
     found = recorded(Recordings(
         take.frames, take.times, np.array([0, len(take.frames)]), np.array(["session"]), np.array([3]),

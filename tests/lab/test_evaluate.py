@@ -7,7 +7,7 @@ pytest.importorskip("torch", reason="needs the extra [lab]")
 pytest.importorskip("sklearn", reason="needs the extra [lab]")
 pytest.importorskip("onnx", reason="needs the extra [lab]")
 
-from gestured.lab.evaluate import Outcome, outcome
+from gestured.lab.evaluate import Evaluation, outcome
 
 THREE = np.eye(3, dtype=np.float32)
 
@@ -54,4 +54,4 @@ def test_the_shares_of_the_gestures_add_up(least: float) -> None:
 
 def test_a_row_stands_under_its_heading() -> None:
     found = outcome(answer((0, 0.0), (1, 0.0)), np.array([0, 4]), 0.5)
-    assert len(found.row("a set")) == len(Outcome.HEAD)
+    assert len(found.row("a set")) == len(Evaluation.HEAD)

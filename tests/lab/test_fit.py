@@ -14,7 +14,7 @@ pytest.importorskip("onnx", reason="needs the extra [lab]")
 from torch import nn
 
 from gestured.lab import fit, train
-from gestured.lab.dataset import OTHERS, STREAMS, TRIALS, Samples, collect
+from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS, Samples, collect
 from gestured.lab.fit import (
     CLASSES,
     REAL_KINDS,
@@ -178,7 +178,7 @@ def test_rare_classes_are_drawn_more_often_than_they_come() -> None:
 @pytest.fixture(scope="module")
 def everyone() -> dict[str, Samples]:
     """One take of each participant of each stream, and some of the wide one by seed."""
-    people = {person: k for k, (person, *_) in enumerate(OTHERS)}
+    people = {person: k for k, (person, *_) in enumerate(OTHER_TRIALS)}
     trials = {trial.participant: trial.index for trial in TRIALS}
     made = {f"wide{seed}": collect(s for i in range(25) for s in STREAMS["wide"](seed, i)) for seed in (1, 2, 3)}
     made["cohort"] = collect(s for i in trials.values() for s in STREAMS["cohort"](0, i))
@@ -196,7 +196,7 @@ def few(everyone: dict[str, Samples], monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("few")
 def test_nobody_is_on_two_sides_of_the_split(tmp_path: Path, everyone: dict[str, Samples]) -> None:
-    data = train.load(train.Plan(), tmp_path, None, 1)
+    data = train.load(train.TrainingPlan(), tmp_path, None, 1)
     parts = {"teach": data.teach, "calibrate": data.calibrate, **data.tests}
     people = {name: set(samples.people.tolist()) for name, samples in parts.items()}
     for a in people:
@@ -211,7 +211,7 @@ def test_nobody_is_on_two_sides_of_the_split(tmp_path: Path, everyone: dict[str,
 
 @pytest.mark.usefixtures("few")
 def test_the_plan_counts_what_was_performed(tmp_path: Path) -> None:
-    data = train.load(train.Plan(), tmp_path, None, 1)
+    data = train.load(train.TrainingPlan(), tmp_path, None, 1)
     assert data.performed["nominal"] == 6 * 90
 
 
@@ -224,7 +224,7 @@ def test_no_real_subject_is_judged_by_a_net_that_has_seen_it(
     tmp_path: Path, samples: Samples, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     real = named_people(samples, np.arange(len(samples)) % 7)
-    data = replace(train.load(train.Plan(), tmp_path, None, 1), real=real)
+    data = replace(train.load(train.TrainingPlan(), tmp_path, None, 1), real=real)
     taught: list[set[int]] = []
     judged: list[set[int]] = []
 
@@ -239,7 +239,7 @@ def test_no_real_subject_is_judged_by_a_net_that_has_seen_it(
     monkeypatch.setattr(train, "pretrain", lambda *_: build())
     monkeypatch.setattr(train, "finetune", tune)
     monkeypatch.setattr(train, "logits", judge)
-    trained = train.learn(train.Plan(), data, tmp_path)
+    trained = train.learn(train.TrainingPlan(), data, tmp_path)
     assert len(judged) == train.FOLDS
     for seen, asked in zip(taught, judged, strict=False):
         assert asked
@@ -253,7 +253,7 @@ def test_no_real_subject_is_judged_by_a_net_that_has_seen_it(
 
     monkeypatch.setattr(train, "pretrain", lambda *_: pytest.fail("what is done is not done again"))
     monkeypatch.setattr(train, "finetune", lambda *_: pytest.fail("what is done is not done again"))
-    train.learn(train.Plan(), data, tmp_path)
+    train.learn(train.TrainingPlan(), data, tmp_path)
 
 
 def test_stage_two_starts_from_stage_one_and_leaves_it_alone(samples: Samples) -> None:

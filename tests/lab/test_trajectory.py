@@ -7,7 +7,7 @@ torch = pytest.importorskip("torch", reason="needs the extra [lab]")
 
 from torch import Tensor
 
-from gestured.lab.trajectory import BLOB, POINTS, trajectory_features
+from gestured.lab.trajectory import PATCH, PATH_POINTS, trajectory_features
 from tests.lab.made import gestures, line, ring, window
 
 MADE = gestures()
@@ -22,9 +22,9 @@ def features(frames: np.ndarray) -> Tensor:
 
 def parts(values: Tensor) -> dict[str, Tensor]:
     """The blocks by name, as `trajectory_features` puts them in a row."""
-    sizes = {"single": len(values) - 4 * POINTS - 16 - BLOB * BLOB}
-    sizes |= {"shape_x": POINTS, "shape_y": POINTS, "path_x": POINTS, "path_y": POINTS}
-    sizes |= {"peaks": 4, "slot_x": 4, "slot_y": 4, "steps": 4, "blob": BLOB * BLOB}
+    sizes = {"single": len(values) - 4 * PATH_POINTS - 16 - PATCH * PATCH}
+    sizes |= {"shape_x": PATH_POINTS, "shape_y": PATH_POINTS, "path_x": PATH_POINTS, "path_y": PATH_POINTS}
+    sizes |= {"peaks": 4, "slot_x": 4, "slot_y": 4, "steps": 4, "blob": PATCH * PATCH}
     return dict(zip(sizes, torch.split(values, list(sizes.values())), strict=True))
 
 
@@ -38,13 +38,13 @@ def test_when_it_happened_does_not_matter(name: str, wait: int) -> None:
 @pytest.mark.parametrize("name", sorted(MADE))
 def test_a_mirrored_window_has_mirrored_features(name: str) -> None:
     seen, mirrored = features(MADE[name]), features(MADE[name][:, :, ::-1])
-    torch.testing.assert_close(mirrored.abs()[: -BLOB * BLOB], seen.abs()[: -BLOB * BLOB], atol=1e-4, rtol=1e-3)
+    torch.testing.assert_close(mirrored.abs()[: -PATCH * PATCH], seen.abs()[: -PATCH * PATCH], atol=1e-4, rtol=1e-3)
     a, b = parts(seen), parts(mirrored)
     for block in ("shape_x", "path_x", "slot_x"):
         torch.testing.assert_close(b[block], -a[block], atol=1e-4, rtol=1e-3)
     for block in ("shape_y", "path_y", "slot_y", "peaks", "steps"):
         torch.testing.assert_close(b[block], a[block], atol=1e-4, rtol=1e-3)
-    blob = a["blob"].reshape(BLOB, BLOB).flip(1).flatten()
+    blob = a["blob"].reshape(PATCH, PATCH).flip(1).flatten()
     torch.testing.assert_close(b["blob"], blob, atol=1e-4, rtol=1e-3)
     for k in (EX, MX, WINDING, AREA, TURNING):
         assert float(b["single"][k]) == pytest.approx(-float(a["single"][k]), abs=1e-4)

@@ -21,7 +21,7 @@ FIELDS = {f"{field.name}.npy" for field in fields(Recordings)}
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class Holding:
     """What is a participant's in a file."""
 
     path: Path
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     return 1 if unread else 0
 
 
-def find(participant: str, paths: Sequence[Path]) -> tuple[list[Part], list[str]]:
+def find(participant: str, paths: Sequence[Path]) -> tuple[list[Holding], list[str]]:
     """Where a participant's recordings are in these files and folders, and what could not be looked into."""
     parts, unread = [], []
     for path in paths:
@@ -73,7 +73,7 @@ def find(participant: str, paths: Sequence[Path]) -> tuple[list[Part], list[str]
             unread.append(str(error))
             continue
         if own:
-            parts.append(Part(file, file_digest(file), own, len(subjects)))
+            parts.append(Holding(file, file_digest(file), own, len(subjects)))
     return parts, unread
 
 
@@ -100,7 +100,7 @@ def remove(participant: str, path: Path) -> None:
         path.unlink()
 
 
-def told(participant: str, parts: Sequence[Part], folder: Path) -> dict[str, str]:
+def told(participant: str, parts: Sequence[Holding], folder: Path) -> dict[str, str]:
     """What each model in `folder` says of the participant: model -> a sentence."""
     answers = {}
     digests = {part.sha256: part.path for part in parts}
@@ -133,7 +133,7 @@ def _agreed(participant: str) -> bool:
     return sys.stdin.readline().strip().lower() == "yes"
 
 
-def _close(participant: str, parts: Sequence[Part], done: bool, models: dict[str, Any]) -> None:
+def _close(participant: str, parts: Sequence[Holding], done: bool, models: dict[str, Any]) -> None:
     if done:
         say(f"removed: {sum(part.own for part in parts)} recordings of {participant}")
     elif parts:

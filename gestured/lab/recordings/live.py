@@ -18,13 +18,13 @@ from gestured.core.owner import Source
 from gestured.core.reading import Reading
 from gestured.core.recognizer import Decided, Scores
 from gestured.core.scene import DOUBLE_TAP, Scene
-from gestured.lab.recordings.quality import Take
+from gestured.lab.recordings.quality import Captured
 
 PACKET_BYTES = 65_536
 RECEIVE_BYTES = 4 << 20
 HISTORY_S = 30.0  # frames that are kept; longer than any wait for a gesture
-LEAD_S = 1.2  # of idle sensor kept before a gesture: the front end learns from a second of it
-SILENT_S = 2.0
+KEPT_IDLE_S = 1.2  # of idle sensor kept before a gesture: the front end learns from a second of it
+SENSOR_GONE_S = 2.0
 WHY = {
     "glitch": "shorter than any finger's touch",
     "stuck": "only taxels that are out of order changed",
@@ -90,7 +90,7 @@ class LiveSensor:
     @property
     def silent(self) -> bool:
         """Whether no frame has come for a while."""
-        return time.monotonic() - self._heard > SILENT_S
+        return time.monotonic() - self._heard > SENSOR_GONE_S
 
     def trouble(self) -> str:
         """What keeps frames from arriving, in words."""
@@ -158,7 +158,7 @@ class LiveSensor:
         over = any(isinstance(contact, Release) for contact in self.found)
         return over and not self.touched and self.now - self._free >= seconds
 
-    def take(self) -> Take | None:
+    def take(self) -> Captured | None:
         """What was felt since `begin`; None where nothing was."""
         onset = self.onset
         if onset is None:
@@ -173,10 +173,10 @@ class LiveSensor:
             trouble = f"{len(cuts)} gestures were seen, expected one"
         elif not cuts:
             trouble = WHY.get(reasons[0], reasons[0]) if reasons else "not let go"
-        start = min(max(first - LEAD_S, self._before), first)
+        start = min(max(first - KEPT_IDLE_S, self._before), first)
         frames = tuple(frame for frame in self._frames if frame.t >= start)
         marks = np.searchsorted([frame.t for frame in frames], [first, last])
-        return Take(
+        return Captured(
             frames,
             int(marks[0]),
             min(int(marks[1]), len(frames) - 1),

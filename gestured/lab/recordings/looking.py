@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from gestured.client.picture import draw, shrunk
 from gestured.client.say import say, say_drawn, say_json
 from gestured.core.errors import GesturedError
-from gestured.lab.recordings.protocol import INCLINATIONS
+from gestured.lab.recordings.protocol import INCLINATION_NAMES
 from gestured.lab.recordings.quality import gaps
 from gestured.lab.recordings.safe import LeftOut, read_what_is_good
 from gestured.record.recordings import Recordings
 
 SHOWN = 10  # of what was left out; the rest is counted
 BAR = 30  # characters
-WIDTH = 72  # frames of a drawn pressure; longer recordings are drawn in groups of frames
+DRAWN_FRAMES = 72  # frames of a drawn pressure; longer recordings are drawn in groups of frames
 SNAPSHOTS = 6
-LEVELS = "▁▂▃▄▅▆▇█"
+BARS = "▁▂▃▄▅▆▇█"
 
 
 def run(args: argparse.Namespace) -> int:
@@ -97,8 +97,8 @@ def _counts(values: NDArray[Any]) -> dict[str, int]:
 
 def _words(inclinations: NDArray[Any]) -> NDArray[Any]:
     """As the protocol calls them, where they are its numbers; else as they are."""
-    if inclinations.dtype.kind in "iu" and np.isin(inclinations, range(len(INCLINATIONS))).all():
-        return np.take(np.array(INCLINATIONS), inclinations)
+    if inclinations.dtype.kind in "iu" and np.isin(inclinations, range(len(INCLINATION_NAMES))).all():
+        return np.take(np.array(INCLINATION_NAMES), inclinations)
     return inclinations
 
 
@@ -168,10 +168,10 @@ def _gesture(r: Recordings, index: int, colour: bool) -> list[str]:
     """The pressure summed over the taxels against time, and snapshots of it."""
     rise = _rise(r.frames_of(index))
     times = r.times_of(index)
-    groups = np.array_split(np.arange(len(rise)), min(WIDTH, len(rise)))
+    groups = np.array_split(np.arange(len(rise)), min(DRAWN_FRAMES, len(rise)))
     summed = np.array([rise[group].sum(axis=(1, 2)).max() for group in groups])
     levels = _scaled(summed - summed.min())
-    drawn = "".join(LEVELS[round((len(LEVELS) - 1) * float(level))] for level in levels)
+    drawn = "".join(BARS[round((len(BARS) - 1) * float(level))] for level in levels)
     first, last = 0, len(rise) - 1
     lines = ["", f"  {drawn}  {times[-1] - times[0]:.2f} s"]
     if r.onsets is not None and r.releases is not None:

@@ -11,11 +11,11 @@ import numpy as np
 from gestured.record.recordings import Recordings
 from gestured.simulator import SPEEDS
 
-INCLINATIONS = ("flat", "tilted", "upright")  # of the sensor; recordings hold their numbers 0, 1, 2
+INCLINATION_NAMES = ("flat", "tilted", "upright")  # of the sensor; recordings hold their numbers 0, 1, 2
 PSEUDONYM = re.compile(r"[A-Za-z0-9_-]{1,32}")
 
 
-class Trial(NamedTuple):
+class Exercise(NamedTuple):
     """One thing to perform."""
 
     gesture: str
@@ -23,7 +23,7 @@ class Trial(NamedTuple):
     inclination: int
 
     def __str__(self) -> str:
-        return f"{self.gesture}, {self.speed}, sensor {INCLINATIONS[self.inclination]}"
+        return f"{self.gesture}, {self.speed}, sensor {INCLINATION_NAMES[self.inclination]}"
 
 
 def pseudonym(text: str) -> str:
@@ -36,22 +36,22 @@ def pseudonym(text: str) -> str:
     return text
 
 
-def order(participant: str, seed: int, gestures: Sequence[str], repeats: int) -> list[Trial]:
+def order(participant: str, seed: int, gestures: Sequence[str], repeats: int) -> list[Exercise]:
     """All trials in this participant's own order: the same for the same arguments.
 
     Inclinations come in blocks, in random order, since whoever moves the sensor must hold it still for a while before
     it can be used again. Within a block gestures and speeds are shuffled, each once before any comes again.
     """
     rng = np.random.default_rng([seed, *participant.encode()])
-    trials: list[Trial] = []
-    for inclination in rng.permutation(len(INCLINATIONS)).tolist():
-        block = [Trial(gesture, speed, inclination) for gesture in gestures for speed in SPEEDS]
+    trials: list[Exercise] = []
+    for inclination in rng.permutation(len(INCLINATION_NAMES)).tolist():
+        block = [Exercise(gesture, speed, inclination) for gesture in gestures for speed in SPEEDS]
         for _ in range(repeats):
             trials += [block[k] for k in rng.permutation(len(block))]
     return trials
 
 
-def left(trials: Sequence[Trial], kept: Recordings | None) -> list[Trial]:
+def left(trials: Sequence[Exercise], kept: Recordings | None) -> list[Exercise]:
     """What of `trials` is still to do, in order, when `kept` holds what was done before."""
     done = Counter(_performed(kept)) if kept is not None else Counter()
     todo = []
@@ -63,8 +63,8 @@ def left(trials: Sequence[Trial], kept: Recordings | None) -> list[Trial]:
     return todo
 
 
-def _performed(kept: Recordings) -> list[Trial]:
+def _performed(kept: Recordings) -> list[Exercise]:
     if kept.speeds is None or kept.inclinations is None:
         return []
     fields = (kept.labels.tolist(), kept.speeds.tolist(), kept.inclinations.tolist())
-    return [Trial(*found) for found in zip(*fields, strict=True)]
+    return [Exercise(*found) for found in zip(*fields, strict=True)]

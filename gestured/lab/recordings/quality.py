@@ -12,11 +12,11 @@ GAP = 1.6  # times the usual step between frames: one was lost
 RAIL_FRAMES = 3  # so many frames, and this share of the contact, at exactly the largest count: cut off there
 RAIL_SHARE = 0.3  # in 997 touches of CapFingerId, whose counts end before their range does, 5 are so even
 RAIL_TAXELS = 3  # or so many taxels at once
-STEPS = 50  # a coarser sensor repeats its counts anyway
+FINEST = 50  # a coarser sensor repeats its counts anyway
 
 
 @dataclass(frozen=True, slots=True)
-class Take:
+class Captured:
     """One captured gesture with idle frames around it; times in seconds on the sensor's clock."""
 
     frames: tuple[Frame, ...]
@@ -45,7 +45,7 @@ class Take:
         return float((values - _idle(values, self.onset))[self.onset : self.release + 1].max())
 
 
-def faults(take: Take, gesture: str) -> list[str]:
+def faults(take: Captured, gesture: str) -> list[str]:
     """What is wrong with a take of `gesture`; empty where nothing is."""
     found = [take.trouble] if take.trouble else []
     contact = slice(take.onset, take.release + 1)
@@ -60,7 +60,7 @@ def faults(take: Take, gesture: str) -> list[str]:
     return found
 
 
-def lost(take: Take) -> int:
+def lost(take: Captured) -> int:
     """Frames that went missing during the contact: by the sensor's counter, or else by gaps in time."""
     frames = take.frames[take.onset : take.release + 1]
     counted = sum(frame.lost for frame in frames[1:])
@@ -79,11 +79,11 @@ def gaps(times: NDArray[np.float64]) -> NDArray[np.int64]:
 def saturated(contact: NDArray[np.floating]) -> bool:
     """Whether the pressure of a contact (T, R, C) in counts was cut off at the top.
 
-    Under a finger, counts tremble; at the end of their range they stand still. Of a sensor with fewer than `STEPS`
+    Under a finger, counts tremble; at the end of their range they stand still. Of a sensor with fewer than `FINEST`
     steps nothing can be told.
     """
     top = contact.max()
-    if top - contact.min() < STEPS:
+    if top - contact.min() < FINEST:
         return False
     at_top = (contact == top).sum(axis=(1, 2))
     return bool((at_top > 0).sum() >= max(RAIL_FRAMES, RAIL_SHARE * len(contact)) or at_top.max() >= RAIL_TAXELS)

@@ -14,15 +14,15 @@ import numpy as np
 
 from gestured.client.picture import draw, trace
 from gestured.lab.recordings.live import LiveSensor
-from gestured.lab.recordings.protocol import INCLINATIONS, Trial, left
-from gestured.lab.recordings.quality import Take, faults
+from gestured.lab.recordings.protocol import INCLINATION_NAMES, Exercise, left
+from gestured.lab.recordings.quality import Captured, faults
 from gestured.lab.recordings.store import compact, join
 from gestured.lab.recordings.terminal import Ended, Terminal
 from gestured.record.arrays import write
 from gestured.record.check import FINGERS
 from gestured.record.recordings import Recordings
 
-PATIENCE_S = 10.0  # for a gesture to begin, and for it to end
+GESTURE_TIMEOUT_S = 10.0  # for a gesture to begin, and for it to end
 APART_S = 0.4  # a second contact within so long belongs to the take (and spoils it)
 CONSENT = """\
 Consent of participant {participant}
@@ -48,7 +48,7 @@ class Session:
         self._consent = ""
         self._inclination: int | None = None
 
-    def run(self, trials: Sequence[Trial]) -> None:
+    def run(self, trials: Sequence[Exercise]) -> None:
         """Until everything is kept, or somebody quits."""
         say = self._terminal.say
         try:
@@ -94,14 +94,14 @@ class Session:
         rows, columns = self._sensor.grid
         self._terminal.say(f"Sensor {self._sensor.name}: {rows} x {columns} at {self._sensor.rate_hz:.0f} Hz.")
 
-    def _trial(self, trial: Trial, number: int, total: int) -> Take | None:
+    def _trial(self, trial: Exercise, number: int, total: int) -> Captured | None:
         """The take to keep, or None where it was discarded."""
         say = self._terminal.say
         while True:
             try:
                 if trial.inclination != self._inclination:
                     self._inclination = None
-                    say(f"\nThe sensor {INCLINATIONS[trial.inclination]}, please. Enter when it is in place.")
+                    say(f"\nThe sensor {INCLINATION_NAMES[trial.inclination]}, please. Enter when it is in place.")
                     while self._until(None) != "\n":
                         pass
                     self._inclination = trial.inclination
@@ -117,7 +117,7 @@ class Session:
             if answer == "\n" and take is not None:
                 return take
 
-    def _once(self, trial: Trial) -> tuple[str, Take | None]:
+    def _once(self, trial: Exercise) -> tuple[str, Captured | None]:
         """One performance: what was captured, and the key that judges it."""
         terminal, sensor = self._terminal, self._sensor
         for left_s in range(self._wait_s, 0, -1):
@@ -128,9 +128,9 @@ class Session:
             self._until(self._free)
         sensor.begin()
         terminal.say("now!")
-        self._until(lambda: sensor.onset is not None, PATIENCE_S)
+        self._until(lambda: sensor.onset is not None, GESTURE_TIMEOUT_S)
         if sensor.onset is not None:
-            self._until(lambda: sensor.quiet(APART_S), PATIENCE_S)
+            self._until(lambda: sensor.quiet(APART_S), GESTURE_TIMEOUT_S)
         take = sensor.take()
         self._show(trial, take)
         usable = take is not None and not take.trouble
@@ -143,7 +143,7 @@ class Session:
     def _free(self) -> bool:
         return self._sensor.ready and not self._sensor.touched
 
-    def _show(self, trial: Trial, take: Take | None) -> None:
+    def _show(self, trial: Exercise, take: Captured | None) -> None:
         if take is None:
             self._terminal.say("  nothing touched the sensor")
             return
@@ -161,7 +161,7 @@ class Session:
         for row, text in zip(picture, words, strict=True):
             self._terminal.say(f"  {row}   {text}".rstrip())
 
-    def _keep(self, take: Take, trial: Trial) -> None:
+    def _keep(self, take: Captured, trial: Exercise) -> None:
         new = recording(take, trial, self.participant, self._consent)
         together = new if self.kept is None else join([self.kept, new])
         write(self.path, together)
@@ -201,7 +201,7 @@ class Session:
             return "p"
 
 
-def recording(take: Take, trial: Trial, participant: str, consent: str) -> Recordings:
+def recording(take: Captured, trial: Exercise, participant: str, consent: str) -> Recordings:
     """A take in the contract's form, times counted from its first frame."""
     times = take.times()
     n = len(times)

@@ -23,14 +23,14 @@ from gestured.record.files import open_regular
 from gestured.record.recordings import Recordings
 
 SESSION = "session"
-OTHER = "other"  # something was performed, and nobody knows exactly what
+UNNAMED = "other"  # something was performed, and nobody knows exactly what
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 CAPFINGERID = (27, 15)  # electrodes of the Nexus 5's panel
 PAUSE = "PAUSE"
 LINE = 256 << 10  # characters of a line; 64 x 64 numbers with all their digits have half as many
 NUMBERS = 1 << 27  # of all frames of a file: a gibibyte in memory
 BAD_LINES = 10_000
-LARGEST = 1e30  # of any number; sums and differences of such counts still fit into a float32
+LARGEST_COUNT = 1e30  # of any number; sums and differences of such counts still fit into a float32
 WORD = 40  # characters of a hand, a finger or a task
 
 
@@ -50,7 +50,7 @@ class Csv:
     consent: str  # YYYY-MM-DD, or empty
 
 
-Row = tuple[int, float, list[float], str]  # line, time in s, values, what else the row says
+SourceRow = tuple[int, float, list[float], str]  # line, time in s, values, what else the row says
 
 
 class _Refused(Exception):
@@ -61,7 +61,7 @@ def read_csv(path: Path, form: Csv) -> tuple[Recordings, list[LeftOut]]:
     """One recording; RecordingError where the file does not hold one."""
     left: list[LeftOut] = []
 
-    def rows() -> Iterator[Row]:
+    def rows() -> Iterator[SourceRow]:
         for number, text in _lines(path):
             cells = text.split(",")
             if number == 1 and _number(cells[0]) is None:
@@ -102,7 +102,7 @@ def read_capfingerid(path: Path) -> tuple[Recordings, list[LeftOut]]:
     who: list[str] = []
     size = 2 + math.prod(CAPFINGERID)
 
-    def rows() -> Iterator[Row]:
+    def rows() -> Iterator[SourceRow]:
         for number, text in _lines(path):
             try:
                 head = text.split(";")
@@ -132,7 +132,7 @@ def read_capfingerid(path: Path) -> tuple[Recordings, list[LeftOut]]:
         subjects=np.array(who[:1]),
         kinds=np.array([f"{who[2]} finger, {who[1]} hand"]),
         event_recording=np.zeros(len(runs), np.int64),
-        event_labels=np.array([OTHER] * len(runs), dtype="U5"),
+        event_labels=np.array([UNNAMED] * len(runs), dtype="U5"),
         event_kinds=np.array([tasks[first].lower() for first, _ in runs], dtype="U40"),
         event_onsets=np.array([times[first] for first, _ in runs], np.float64),
         event_offsets=np.array([times[last] for _, last in runs], np.float64),
@@ -147,7 +147,7 @@ def _runs(tasks: list[str]) -> list[tuple[int, int]]:
 
 
 def _frames(
-    path: Path, rows: Iterator[Row], grid: tuple[int, int], left: list[LeftOut]
+    path: Path, rows: Iterator[SourceRow], grid: tuple[int, int], left: list[LeftOut]
 ) -> tuple[NDArray[np.generic], NDArray[np.float64], list[str]]:
     """(T, R, C) frames, (T,) seconds from the first one on, and what else each row says."""
     times: list[float] = []
@@ -201,7 +201,7 @@ def _numbers(cells: list[str], count: int) -> list[float]:
         raise _Refused("line", f"expected {count} numbers, found {len(cells)}")
     found = [_number(cell) for cell in cells]
     for k, value in enumerate(found, 1):
-        if value is None or not abs(value) <= LARGEST:
+        if value is None or not abs(value) <= LARGEST_COUNT:
             raise _Refused(f"number {k}", f"expected a finite number, found {cells[k - 1][:20]!r}")
     return [value for value in found if value is not None]
 

@@ -11,10 +11,15 @@ from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
 from gestured.lab.dataset import with_idle
-from gestured.record.check import EVENTS, FINGERS
+from gestured.record.check import EVENT_FIELDS, FINGERS
 from gestured.record.recordings import Recordings
 
-UNKNOWN = {"speeds": "", "inclinations": "", "kinds": "", "consents": ""}  # where one set has the field and one has not
+UNKNOWN_VALUES = {
+    "speeds": "",
+    "inclinations": "",
+    "kinds": "",
+    "consents": "",
+}  # where one set has the field and one has not
 TOGETHER = ("onsets", "releases")  # are left out where one set does not know them
 
 
@@ -33,7 +38,7 @@ def join(parts: Sequence[Recordings]) -> Recordings:
             continue
         if field in TOGETHER and any(value is None for value in known):
             continue
-        if field not in EVENTS:
+        if field not in EVENT_FIELDS:
             known = [
                 _unknown(field, part) if value is None else value for part, value in zip(parts, known, strict=True)
             ]
@@ -57,7 +62,7 @@ def _unknown(field: str, part: Recordings) -> NDArray[Any]:
         return np.full((len(part.frames), FINGERS, 2), np.nan, np.float32)
     if field == "touch_ids":
         return np.full((len(part.frames), FINGERS), -1, np.int32)
-    return np.full(len(part), UNKNOWN[field])
+    return np.full(len(part), UNKNOWN_VALUES[field])
 
 
 def compact(frames: NDArray[Any]) -> NDArray[Any]:

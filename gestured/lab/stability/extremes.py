@@ -18,11 +18,11 @@ from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Classifier, Recognizer, events_of
 from gestured.core.window import Window
 from gestured.lab.dataset import WINDOW
-from gestured.lab.stability.path import Array, Stream, events, fault, labels
-from gestured.lab.stability.table import Cell, Table
+from gestured.lab.stability.path import Array, Series, events, fault, labels
+from gestured.lab.stability.table import Table, Value
 from gestured.model.model import Model
 
-SIGNAL, NOISE, LEVEL = 600.0, 2.0, 300.0  # counts of a firm finger, of noise, of an idle taxel
+SIGNAL, NOISE, IDLE_LEVEL = 600.0, 2.0, 300.0  # counts of a firm finger, of noise, of an idle taxel
 FINITE = (float(np.finfo(np.float32).max), 1e30, 1.0, 1e-40, 1e-45, 0.0, -0.0, -1e-40, -1.0, -1e30)
 WINDOWS = (
     WINDOW,
@@ -39,7 +39,7 @@ class Case:
     """A stream, and the times (s) of the swipes of which each must be found; `alone`: and nothing else."""
 
     family: str
-    stream: Stream
+    stream: Series
     swipes: tuple[float, ...] = ()
     alone: bool = False
 
@@ -51,8 +51,8 @@ def finger(row: float, column: float, rows: int, columns: int, width: float) -> 
 
 
 def swipes(
-    count: int, *, shape: tuple[int, int] = (9, 9), rate: float = 15.0, noise: float = NOISE, level: float = LEVEL
-) -> tuple[Stream, tuple[float, ...]]:
+    count: int, *, shape: tuple[int, int] = (9, 9), rate: float = 15.0, noise: float = NOISE, level: float = IDLE_LEVEL
+) -> tuple[Series, tuple[float, ...]]:
     """So many swipes of 0.7 s to the right, 3.7 s apart, the first at 1.5 s; and when they begin."""
     rng = np.random.default_rng(len(shape) * count)
     times = np.arange(int(count * 3.7 * rate)) / rate
@@ -61,7 +61,7 @@ def swipes(
     size = max(min(shape) / 9, 0.6)
     for k in np.flatnonzero((share >= 0) & (share <= 1)):
         frames[k] += finger((shape[0] - 1) / 2, (0.1 + 0.8 * share[k]) * (shape[1] - 1), *shape, size)
-    return Stream(times, frames), tuple(1.5 + 3.7 * k for k in range(count))
+    return Series(times, frames), tuple(1.5 + 3.7 * k for k in range(count))
 
 
 def segment_cases(quick: bool) -> Iterator[tuple[str, Segment]]:
@@ -116,34 +116,34 @@ def streams(quick: bool) -> Iterator[Case]:
     for power in (*range(-30, 31, 15 if quick else 5), -3, -2, -1, 1, 2, 3):
         for kind in (np.float32, np.float64):
             yield Case(
-                "scale 1e-30 to 1e30", Stream(base.times, (base.frames * 10.0**power).astype(kind)), at, alone=True
+                "scale 1e-30 to 1e30", Series(base.times, (base.frames * 10.0**power).astype(kind)), at, alone=True
             )
-    clipped = Stream(base.times, np.rint(np.maximum(swipes(2, noise=0.0, level=0.0)[0].frames, 0.0)))
+    clipped = Series(base.times, np.rint(np.maximum(swipes(2, noise=0.0, level=0.0)[0].frames, 0.0)))
     for power in range(-6, 7, 3):
-        yield Case("scale of a sensor without noise", Stream(base.times, clipped.frames * 10.0**power), at, alone=True)
+        yield Case("scale of a sensor without noise", Series(base.times, clipped.frames * 10.0**power), at, alone=True)
     for offset in (1.0, 1e2, 1e4):
         for kind in (np.float32, np.float64):
             shifted = (base.frames + offset * SIGNAL).astype(kind)
-            yield Case("offset up to 1e4 times the signal", Stream(base.times, shifted), at, alone=True)
+            yield Case("offset up to 1e4 times the signal", Series(base.times, shifted), at, alone=True)
     for offset in (1e5, 1e6, 1e7):
-        yield Case("offset up to 1e7: finite", Stream(base.times, (base.frames + offset * SIGNAL).astype(np.float32)))
+        yield Case("offset up to 1e7: finite", Series(base.times, (base.frames + offset * SIGNAL).astype(np.float32)))
     for shape in ((2, 2), (9, 9), (64, 64)):
         for value in FINITE:
             yield Case(
-                "constant signals: nothing", Stream(np.arange(60) / 15, np.full((60, *shape), value)), alone=True
+                "constant signals: nothing", Series(np.arange(60) / 15, np.full((60, *shape), value)), alone=True
             )
-    yield Case("one frame: nothing", Stream(base.times[:1], base.frames[:1]), alone=True)
+    yield Case("one frame: nothing", Series(base.times[:1], base.frames[:1]), alone=True)
     touched = (base.times % 3.7 >= 1.5) & (base.times % 3.7 <= 2.0)
     for taxel in range(0, 81, few):
         frames = base.frames.copy().reshape(-1, 81)
         frames[touched, taxel] += SIGNAL
-        yield Case("one active taxel", Stream(base.times, frames.reshape(base.frames.shape)))
+        yield Case("one active taxel", Series(base.times, frames.reshape(base.frames.shape)))
     for value in (4095.0, 65535.0, FINITE[0]):
         yield Case("all saturated, all equal", _with(base, touched, value))
     for value in (1.0, 1e3, 1e30):
         signs = np.where(np.indices(base.frames.shape).sum(axis=0) % 2, value, -value)
-        yield Case("alternating extremes", Stream(base.times, signs))
-        yield Case("alternating extremes", Stream(base.times, np.where(touched[:, None, None], signs, base.frames)))
+        yield Case("alternating extremes", Series(base.times, signs))
+        yield Case("alternating extremes", Series(base.times, np.where(touched[:, None, None], signs, base.frames)))
     for count in (1, 2, 3, 10, 100, 1000, *(() if quick else (10_000,))):
         yield Case("touched for 1 to 10,000 frames at 1000 Hz", _held(count))
     for rate in (5.0, 10.0, 30.0, 100.0, 250.0, *(() if quick else (1000.0,))):
@@ -152,14 +152,14 @@ def streams(quick: bool) -> Iterator[Case]:
         stream, when = swipes(2, shape=shape)
         yield Case("2 x 2 to 64 x 64", stream, when if min(shape) >= LEAST_GRID else ())
     for frames in (base.frames * 1e-310, (base.frames * 1e-40).astype(np.float32)):
-        yield Case("denormals", Stream(base.times, frames))
-    yield Case("-0.0 for 0", Stream(base.times, np.where(clipped.frames == 0, -0.0, clipped.frames)), at, alone=True)
+        yield Case("denormals", Series(base.times, frames))
+    yield Case("-0.0 for 0", Series(base.times, np.where(clipped.frames == 0, -0.0, clipped.frames)), at, alone=True)
     for place in range(0, 81, few):
         for value in (np.nan, np.inf, -np.inf):
             for moment in (0.5, 1.2, 1.8):
                 frames = base.frames.copy()
                 frames[int(moment * 15)].reshape(-1)[place] = value
-                yield Case("NaN, infinity at each position", Stream(base.times, frames), at, alone=True)
+                yield Case("NaN, infinity at each position", Series(base.times, frames), at, alone=True)
     yield from _steps_and_spikes()
 
 
@@ -169,25 +169,25 @@ def _steps_and_spikes() -> Iterator[Case]:
         frames = long.frames.copy()
         frames[int(1.85 * 15) :] *= step
         after = tuple(t for t in at if t > 1.85 + bounded_s)
-        yield Case("gain step of 1000 in mid-gesture, 13 s later", Stream(long.times, frames), after)
+        yield Case("gain step of 1000 in mid-gesture, 13 s later", Series(long.times, frames), after)
     for size in (1e6, 1e12, -1e12, 1e30):
         for moment in (0.5, 1.2, 1.8):
             for taxels in (1, 81):
                 frames = long.frames.copy()
                 frames[int(moment * 15)].reshape(-1)[:taxels] = size
                 after = tuple(t for t in at if t > moment + 8.0)
-                yield Case("one spike of 1e6 to 1e30, 8 s later", Stream(long.times, frames), after)
+                yield Case("one spike of 1e6 to 1e30, 8 s later", Series(long.times, frames), after)
 
 
-def _with(base: Stream, touched: Array, value: float) -> Stream:
-    return Stream(base.times, np.where(touched[:, None, None], value, base.frames))
+def _with(base: Series, touched: Array, value: float) -> Series:
+    return Series(base.times, np.where(touched[:, None, None], value, base.frames))
 
 
-def _held(count: int) -> Stream:
+def _held(count: int) -> Series:
     times = np.arange(1500 + count + 1000) / 1000
-    frames = LEVEL + NOISE * np.random.default_rng(count).standard_normal((len(times), 9, 9))
+    frames = IDLE_LEVEL + NOISE * np.random.default_rng(count).standard_normal((len(times), 9, 9))
     frames[1500 : 1500 + count] += finger(4, 4, 9, 9, 1.0)
-    return Stream(times, frames)
+    return Series(times, frames)
 
 
 def judged(case: Case, classifier: Classifier) -> tuple[int, str]:
@@ -210,7 +210,7 @@ def whole_path_table(classifier: Classifier, quick: bool) -> Table:
     kept: dict[str, list[tuple[int, int, str]]] = {}
     for case in streams(quick):
         kept.setdefault(case.family, []).append((len(case.swipes), *judged(case, classifier)))
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[tuple[Value, ...]] = []
     for family, verdicts in kept.items():
         wrong = [reason for _, _, reason in verdicts if reason]
         asked, found = sum(v[0] for v in verdicts), sum(v[1] for v in verdicts)
@@ -237,7 +237,7 @@ def parts_table(models: list[Model], quick: bool) -> Table:
     for family, segment in broken_segments(quick):
         sure = [model.name for model in models if model.classify(segment).unknown != 1.0]
         kept.setdefault(family, []).append(f"{', '.join(sure)} gave an answer" if sure else "")
-    rows: list[tuple[Cell, ...]] = [
+    rows: list[tuple[Value, ...]] = [
         (family, len(found), sum(map(bool, found)), next(filter(None, found), "")) for family, found in kept.items()
     ]
     return Table(
@@ -287,15 +287,15 @@ def month_table(classifier: Classifier, days: float) -> Table:
     front = FrontEnd("stability", 9, 9)
     recognizer = Recognizer(front, classifier)
     for k in range(30):
-        recognizer.push(Frame(k / 15, LEVEL + NOISE * rng.standard_normal((9, 9))))
+        recognizer.push(Frame(k / 15, IDLE_LEVEL + NOISE * rng.standard_normal((9, 9))))
     heard: Counter[type] = Counter()
     for part in np.array_split(times, max(len(times) // 10_000, 1)):
         noise = NOISE * rng.standard_normal((len(part), 9, 9))
-        noise += LEVEL + swing * np.sin(2 * np.pi * part / 86_400.0)[:, None, None]
+        noise += IDLE_LEVEL + swing * np.sin(2 * np.pi * part / 86_400.0)[:, None, None]
         for t, frame in zip(part, noise, strict=True):
             heard.update(map(type, events_of(recognizer.push(Frame(float(t), frame)))))
     end = float(times[-1])
-    level = LEVEL + swing * float(np.sin(2 * np.pi * end / 86_400.0))
+    level = IDLE_LEVEL + swing * float(np.sin(2 * np.pi * end / 86_400.0))
     off = level - front.baseline
     after, _ = swipes(1, level=level)
     found: list[Event] = []

@@ -11,8 +11,8 @@ import numpy as np
 
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Classifier
-from gestured.lab.stability.path import Array, Stream, events, labels, segments, simulated
-from gestured.lab.stability.table import Cell, Table
+from gestured.lab.stability.path import Array, Series, events, labels, segments, simulated
+from gestured.lab.stability.table import Table, Value
 
 MIRRORED = {
     "swipe_left": "swipe_right",
@@ -43,9 +43,9 @@ class Property:
     exact: bool = True  # in the front end
     rounded: bool = False  # whether a constant takes away a baseline's last digits: one step of float32 at the peak
 
-    def apply(self, stream: Stream) -> Stream:
+    def apply(self, stream: Series) -> Series:
         """The changed stream."""
-        return Stream(self.times(stream.times), self.frames(stream.frames))
+        return Series(self.times(stream.times), self.frames(stream.frames))
 
     def holds(self, before: list[Segment], after: list[Segment]) -> bool:
         """Whether the front end's segments are the same ones, changed."""
@@ -127,11 +127,11 @@ def properties() -> list[Property]:
     return [shifted(86_400.0), shifted(2.0**30), *gains, *levels, mirrored(), turned(), doubled()]
 
 
-def on_grid(stream: Stream) -> Stream:
+def on_grid(stream: Series) -> Series:
     """The same with times that can be shifted exactly."""
     times = np.rint(stream.times / GRID_S) * GRID_S
     keep = np.append(True, np.diff(times) > 0)
-    return Stream(times[keep], stream.frames[keep])
+    return Series(times[keep], stream.frames[keep])
 
 
 def renamed(found: tuple[str, ...], names: Mapping[str, str]) -> tuple[str, ...]:
@@ -144,11 +144,11 @@ def metamorphic_table(models: Mapping[str, Classifier], count: int) -> Table:
     streams = [on_grid(stream) for _, stream in simulated(count)]
     cut = [segments(stream) for stream in streams]
     said = {name: [labels(events(stream, model)) for stream in streams] for name, model in models.items()}
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[tuple[Value, ...]] = []
     for change in properties():
         after = [change.apply(stream) for stream in streams]
         same = sum(map(change.holds, cut, (segments(stream) for stream in after)))
-        shares: list[Cell] = []
+        shares: list[Value] = []
         for name, model in models.items():
             right = [
                 labels(events(stream, model)) == renamed(before, change.names)

@@ -18,16 +18,16 @@ from onnx.reference.op_run import OpRun
 
 from gestured.core.features import touch_pattern
 from gestured.lab.nets import CnnLstm, Decision, Judged, Lstm, last_active
-from gestured.lab.stability.table import Cell, Table
+from gestured.lab.stability.table import Table, Value
 from gestured.lab.trajectory import TrajectoryNet
 from gestured.model.model import LADDER, Model, shipped
 
-Windows = Sequence[NDArray[np.float32]]  # (T, R, C) each
-Scores = NDArray[np.float64]  # (B, G + 1): the gestures' scores, then unknown
-Run = Callable[[NDArray[np.float32]], Scores]  # (B, T, R, C) or (B, F)
-Way = Callable[[Windows], Scores]
+WindowList = Sequence[NDArray[np.float32]]  # (T, R, C) each
+ScoreTable = NDArray[np.float64]  # (B, G + 1): the gestures' scores, then unknown
+ModelRun = Callable[[NDArray[np.float32]], ScoreTable]  # (B, T, R, C) or (B, F)
+Way = Callable[[WindowList], ScoreTable]
 
-NETS = {"cnn_lstm": CnnLstm, "lstm": Lstm}
+NET_CLASSES = {"cnn_lstm": CnnLstm, "lstm": Lstm}
 LONG = (80, 10_000)  # frames; no segment at 15 Hz is longer than the first
 ONNX_GATES = (0, 2, 3, 1)  # torch's order i f g o, by ONNX's i o f c
 
@@ -82,7 +82,9 @@ def loaded(name: str, data: bytes) -> Judged:
     classes = len(found["net.head.bias"])
     gestures = proto.graph.output[0].type.tensor_type.shape.dim[1].dim_value
     rows, columns = (dim.dim_value for dim in proto.graph.input[0].type.tensor_type.shape.dim[2:])
-    module = Judged(NETS[name](rows, columns, classes), TrajectoryNet(rows, columns, classes), Decision(gestures))
+    module = Judged(
+        NET_CLASSES[name](rows, columns, classes), TrajectoryNet(rows, columns, classes), Decision(gestures)
+    )
     state |= {key: found[key] for key in module.state_dict() if key in found}
     module.load_state_dict({key: torch.from_numpy(np.array(value)) for key, value in state.items()})
     return module.eval()
@@ -106,7 +108,7 @@ def by_onnxruntime(data: bytes, threads: int = 1, batch: bool = False) -> Way:
     model = Model(data, "stability")  # also sees to it that onnxruntime is imported without its telemetry
     if threads == 1:
 
-        def run(values: NDArray[np.float32]) -> Scores:
+        def run(values: NDArray[np.float32]) -> ScoreTable:
             return _joined(*model.run(values))
     else:
         import onnxruntime
@@ -116,7 +118,7 @@ def by_onnxruntime(data: bytes, threads: int = 1, batch: bool = False) -> Way:
         session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
         (name,) = (value.name for value in session.get_inputs())
 
-        def run(values: NDArray[np.float32]) -> Scores:
+        def run(values: NDArray[np.float32]) -> ScoreTable:
             return _joined(*session.run(("scores", "unknown"), {name: values}))
 
     return _whole(run) if batch else _each(run)
@@ -125,7 +127,7 @@ def by_onnxruntime(data: bytes, threads: int = 1, batch: bool = False) -> Way:
 def by_torch(module: Judged, dtype: torch.dtype = torch.float32, threads: int = 1, batch: bool = False) -> Way:
     """The modules that were exported."""
 
-    def run(values: NDArray[np.float32]) -> Scores:
+    def run(values: NDArray[np.float32]) -> ScoreTable:
         with torch.no_grad():
             scores, unknown = module.to(dtype)(torch.from_numpy(values).to(dtype))
         return _joined(scores.numpy(), unknown.numpy())
@@ -138,7 +140,7 @@ def by_frames(module: Judged) -> Way:
     """The recurrent net one frame at a time, its state carried from frame to frame; the second opinion at the end."""
     net: Any = module.net
 
-    def run(values: NDArray[np.float32]) -> Scores:
+    def run(values: NDArray[np.float32]) -> ScoreTable:
         with torch.no_grad():
             frames = torch.from_numpy(values)
             state, last = None, int(last_active(frames))
@@ -152,16 +154,16 @@ def by_frames(module: Judged) -> Way:
     return _each(_on_threads(1, run))
 
 
-def models_table(windows: Windows, quick: bool) -> Table:
+def models_table(windows: WindowList, quick: bool) -> Table:
     """Every way against the reference: on windows of simulated gestures, and on one of `LONG` frames."""
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[tuple[Value, ...]] = []
     row = np.concatenate(list(windows) * (max(LONG) // sum(map(len, windows)) + 1))
     long = {f"one of {count} frames": [row[:count]] for count in LONG[: 1 if quick else None]}
     for name in LADDER:
         data = shipped()[name].read_bytes()
         ways: dict[str, Way] = {"onnxruntime, as the daemon": by_onnxruntime(data)}
         own = windows
-        if name in NETS:
+        if name in NET_CLASSES:
             module = loaded(name, data)
             ways["onnxruntime, batch of all"] = by_onnxruntime(data, batch=True)
             ways["onnxruntime, two threads"] = by_onnxruntime(data, threads=2)
@@ -175,7 +177,7 @@ def models_table(windows: Windows, quick: bool) -> Table:
             own = [touch_pattern(window, metadata.rate_hz) for window in windows]
             ways["onnxruntime, batch of all"] = by_onnxruntime(data, batch=True)
             ways["onnxruntime, two threads"] = by_onnxruntime(data, threads=2)
-        inputs: dict[str, Windows] = {f"{len(own)} gestures": own, **(long if name in NETS else {})}
+        inputs: dict[str, WindowList] = {f"{len(own)} gestures": own, **(long if name in NET_CLASSES else {})}
         for title, some in inputs.items():
             reference = by_reference(data) if some is own else ways["torch float64"]
             right, reference_s = _timed(reference, some, 1)
@@ -199,8 +201,8 @@ def models_table(windows: Windows, quick: bool) -> Table:
     )
 
 
-def _on_threads(threads: int, run: Run) -> Run:
-    def limited(values: NDArray[np.float32]) -> Scores:
+def _on_threads(threads: int, run: ModelRun) -> ModelRun:
+    def limited(values: NDArray[np.float32]) -> ScoreTable:
         before = torch.get_num_threads()
         torch.set_num_threads(threads)
         try:
@@ -211,7 +213,7 @@ def _on_threads(threads: int, run: Run) -> Run:
     return limited
 
 
-def _timed(way: Way, windows: Windows, repetitions: int) -> tuple[Scores, float]:
+def _timed(way: Way, windows: WindowList, repetitions: int) -> tuple[ScoreTable, float]:
     best = float("inf")
     for _ in range(repetitions):
         start = time.perf_counter()
@@ -220,19 +222,19 @@ def _timed(way: Way, windows: Windows, repetitions: int) -> tuple[Scores, float]
     return found, best / len(windows)
 
 
-def _each(run: Run) -> Way:
+def _each(run: ModelRun) -> Way:
     return lambda windows: np.concatenate([run(window[None]) for window in windows])
 
 
-def _whole(run: Run) -> Way:
+def _whole(run: ModelRun) -> Way:
     return lambda windows: run(_stacked(windows))
 
 
-def _joined(scores: NDArray[Any], unknown: NDArray[Any]) -> Scores:
+def _joined(scores: NDArray[Any], unknown: NDArray[Any]) -> ScoreTable:
     return np.concatenate([scores, unknown[:, None]], axis=1).astype(np.float64)
 
 
-def _stacked(windows: Windows) -> NDArray[np.float32]:
+def _stacked(windows: WindowList) -> NDArray[np.float32]:
     """(B, T, R, C); shorter ones end in zeros. Features (B, F) have one length."""
     out = np.zeros((len(windows), max(map(len, windows)), *windows[0].shape[1:]), np.float32)
     for row, window in zip(out, windows, strict=True):

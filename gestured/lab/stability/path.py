@@ -13,50 +13,50 @@ from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
 from gestured.core.mounting import Mounting
 from gestured.core.recognizer import Classifier, Recognizer, events_of
-from gestured.simulator import GESTURES, Participant, Sensor, generator, gesture_take
+from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
 
 Array = NDArray[Any]
-TAIL_S = 2.0
+FLUSH_AFTER_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Stream:
+class Series:
     """What a sensor sends: (n,) times in seconds, (n, R, C) raw counts."""
 
     times: Array
     frames: Array
 
 
-def simulated(count: int, seed: int = 41) -> Iterator[tuple[str, Stream]]:
+def simulated(count: int, seed: int = 41) -> Iterator[tuple[str, Series]]:
     """So many simulated gestures, ten kinds in turn, a new person and sensor after each ten."""
     for k in range(count):
         kind, person = GESTURES[k % len(GESTURES)], 7000 + seed * 100 + k // len(GESTURES)
-        take = gesture_take(kind, Participant(person), Sensor.nominal(day=person), generator(seed, k))
-        yield kind, Stream(take.sensor_times, take.frames.astype(np.float64))
+        take = gesture_take(kind, Participant(person), SimulatedSensor.nominal(day=person), generator(seed, k))
+        yield kind, Series(take.sensor_times, take.frames.astype(np.float64))
 
 
-def contacts(stream: Stream, mounting: Mounting | None = None) -> list[Any]:
+def contacts(stream: Series, mounting: Mounting | None = None) -> list[Any]:
     """What the front end makes of it."""
     front = FrontEnd("stability", *stream.frames.shape[1:], mounting=mounting)
     return _run(front.push, front.flush, stream)
 
 
-def segments(stream: Stream) -> list[Segment]:
+def segments(stream: Series) -> list[Segment]:
     """What the front end cuts out of it."""
     return [found.segment for found in contacts(stream) if isinstance(found, Cut)]
 
 
-def events(stream: Stream, classifier: Classifier, mounting: Mounting | None = None) -> list[Event]:
+def events(stream: Series, classifier: Classifier, mounting: Mounting | None = None) -> list[Event]:
     """What a recognizer makes of it."""
     recognizer = Recognizer(FrontEnd("stability", *stream.frames.shape[1:], mounting=mounting), classifier)
     return events_of(_run(recognizer.push, recognizer.flush, stream))
 
 
-def _run(push: Callable[[Frame], list[Any]], flush: Callable[[float], list[Any]], stream: Stream) -> list[Any]:
+def _run(push: Callable[[Frame], list[Any]], flush: Callable[[float], list[Any]], stream: Series) -> list[Any]:
     out: list[Any] = []
     for t, values in zip(stream.times, stream.frames, strict=True):
         out += push(Frame(float(t), values))
-    return out + flush(float(stream.times[-1]) + TAIL_S)
+    return out + flush(float(stream.times[-1]) + FLUSH_AFTER_S)
 
 
 def labels(found: list[Event]) -> tuple[str, ...]:

@@ -18,11 +18,13 @@ from gestured.core.activity import Activity
 from gestured.core.baseline import BASELINE_TAU_S, RECOVERY_TAU_S, Baseline
 from gestured.core.contact import AFTER_S, RECOVERY_S, AfterEffect
 from gestured.core.noise import NOISE_TAU_S, REVIEW_S, SIGMA_PER_DEVIATION, UNSEEN_S, Noise
-from gestured.lab.stability.table import Cell, Table
+from gestured.lab.stability.table import Table, Value
 from gestured.simulator.textile import REMANENCE_S, relax
 
 Array = NDArray[Any]
-Run = Callable[[Array, Array], Array]  # times (n,) s, inputs (n,) 0..1 -> outputs (n,), in the inputs' dtype or better
+FilterRun = Callable[
+    [Array, Array], Array
+]  # times (n,) s, inputs (n,) 0..1 -> outputs (n,), in the inputs' dtype or better
 
 DECADES = (-9, -6, -3, -1, 0, 1, 3, 6, 9)  # of dt / tau
 DAY_S = 86_400.0
@@ -34,7 +36,7 @@ class Filter:
 
     name: str
     tau_s: float
-    run: Run
+    run: FilterRun
     start: float  # its output at times[0]
     least_s: float = 0.0  # it does not step by less than this ...
     most_s: float = math.inf  # ... nor by more
@@ -43,7 +45,7 @@ class Filter:
     dtypes: tuple[Any, ...] = (np.float64, np.float32)  # that its state can have
 
 
-def _baseline(recovering: bool) -> Run:
+def _baseline(recovering: bool) -> FilterRun:
     def run(times: Array, inputs: Array) -> Array:
         made, out, since = Baseline(9), np.zeros_like(inputs), 0.0
         made.counts = made.counts.astype(inputs.dtype)
@@ -184,10 +186,10 @@ def _seconds(filter_: Filter, count: int) -> float:
 def filters_table(quick: bool) -> Table:
     """Every filter over every decade, in float64 and float32; the last but two columns mix all sizes of steps."""
     count = 32 if quick else 200
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[tuple[Value, ...]] = []
     for filter_ in FILTERS:
         for dtype in filter_.dtypes:
-            cells: list[Cell] = []
+            cells: list[Value] = []
             inside = True
             for decade in (*DECADES, None):
                 if decade is None and filter_.even:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-Cell = str | int | float
+Value = str | int | float
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +14,7 @@ class Table:
 
     title: str
     head: tuple[str, ...]
-    rows: list[tuple[Cell, ...]] = field(default_factory=list)
+    rows: list[tuple[Value, ...]] = field(default_factory=list)
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
@@ -30,7 +30,7 @@ class Table:
         return asdict(self)
 
 
-def _shown(cell: Cell) -> str:
+def _shown(cell: Value) -> str:
     return f"{cell:.2g}" if isinstance(cell, float) else str(cell)
 
 

@@ -16,7 +16,7 @@ TAXELS = 81
 SUBSTEPS = (1, 4, 16, 64, 256)
 
 # The share of the way from state to input that one step of dt / tau = z goes.
-METHODS: dict[str, Callable[[float], float]] = {
+INTEGRATORS: dict[str, Callable[[float], float]] = {
     "ours: -expm1(-z)": lambda z: -math.expm1(-z),
     "1 - exp(-z)": lambda z: 1.0 - math.exp(-z),
     "explicit Euler: z": lambda z: z,
@@ -61,7 +61,7 @@ def points(low: float, high: float, dtype: Any, quick: bool) -> list[Point]:
     inputs = np.repeat(rng.random((count + 1, 1)), TAXELS, axis=1).astype(dtype)
     right = exact(times, inputs[:, 0], 1.0, 0.0)[:, None]
     found = []
-    for name, share in METHODS.items():
+    for name, share in INTEGRATORS.items():
         for substeps in SUBSTEPS[: 1 if name in EXACT else 4 if quick else None]:
             with np.errstate(all="ignore"):
                 best = math.inf
@@ -84,7 +84,7 @@ def small_steps(dtype: Any) -> dict[str, float]:
     right = exact(times, inputs[:, 0], 1.0, 0.0)
     return {
         name: float(np.abs(advance(share, 1, times, inputs)[:, 0] - right).max() / right.max())
-        for name, share in METHODS.items()
+        for name, share in INTEGRATORS.items()
     }
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 DRAWS = 1000
-LEVEL = 0.95
+CONFIDENCE_LEVEL = 0.95
 
 
 def interval(right: ArrayLike, people: ArrayLike, seed: int = 0) -> tuple[float, float, float]:
@@ -22,7 +22,7 @@ def interval(right: ArrayLike, people: ArrayLike, seed: int = 0) -> tuple[float,
     rng = np.random.default_rng([seed, 0xB0])
     drawn = rng.integers(0, len(all_of), (DRAWS, len(all_of)))
     shares: NDArray[np.float64] = good[drawn].sum(axis=1) / all_of[drawn].sum(axis=1)
-    low, high = np.quantile(shares, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    low, high = np.quantile(shares, [(1 - CONFIDENCE_LEVEL) / 2, (1 + CONFIDENCE_LEVEL) / 2])
     return float(hits.mean()), float(low), float(high)
 
 

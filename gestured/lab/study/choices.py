@@ -14,7 +14,7 @@ from gestured.lab.dataset import WINDOW, Samples
 from gestured.lab.study.bootstrap import summary
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.cohort import Cohort
-from gestured.lab.study.material import NONE, SHIFT, Data
+from gestured.lab.study.material import SHIFT, UNCHANGED, Data
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import LENGTH, PAPER, PARTICIPANTS, Task
@@ -22,7 +22,7 @@ from gestured.lab.study.shifting import THRESHOLD
 from gestured.lab.study.tables import right, task
 from gestured.lab.study.views import Values
 
-WAVELETS, LEVELS = ("haar", "db2", "db4", "sym4"), (1, 2, 3, 4)
+WAVELET_NAMES, WAVELET_LEVELS = ("haar", "db2", "db4", "sym4"), (1, 2, 3, 4)
 DECAYS_S = {0.0: "the whole gesture", 0.5: "0.5 s", 1.0: "1 s", 2.0: "2 s"}
 CHANNELS = (4, 8)
 AVERAGES = (1, 2, 3, 5)
@@ -63,13 +63,13 @@ def wanted(plan: Plan, tuned: Mapping[str, Values]) -> Iterator[Choice]:
     """Every choice with its tasks."""
 
     def alone(method: str, data: str = "simulated", **changed: Any) -> Task:
-        return task(METHODS[method], {**tuned[method], **changed}, NONE, PARTICIPANTS, data, plan)
+        return task(METHODS[method], {**tuned[method], **changed}, UNCHANGED, PARTICIPANTS, data, plan)
 
     def leaky(augmentation: str, **changed: Any) -> Task:
         return replace(task(METHODS["lstm"], tuned["lstm"], augmentation, PAPER, "simulated", plan), **changed)
 
-    yield Choice("wavelet", "haar", "st_rf", {name: alone("st_rf", wavelet=name) for name in WAVELETS})
-    yield Choice("wavelet level", "3", "st_rf", {str(n): alone("st_rf", level=n) for n in LEVELS})
+    yield Choice("wavelet", "haar", "st_rf", {name: alone("st_rf", wavelet=name) for name in WAVELET_NAMES})
+    yield Choice("wavelet level", "3", "st_rf", {str(n): alone("st_rf", level=n) for n in WAVELET_LEVELS})
     decays = {name: alone("mhi_cnn", decay_s=s) for s, name in DECAYS_S.items()}
     yield Choice("decay of the motion history image", DECAYS_S[0.0], "mhi_cnn", decays)
     widths = {f"{n} and {2 * n} channels": alone("cnn_lstm", channels=n) for n in CHANNELS}
@@ -91,7 +91,7 @@ def wanted(plan: Plan, tuned: Mapping[str, Values]) -> Iterator[Choice]:
     yield Choice(
         "what is in the bounding box (paper's protocol, shifted)", f"above {THRESHOLD:g} of the peak", "lstm", boxes
     )
-    lengths = {name: leaky(NONE, length=q) for q, name in LENGTHS.items()}
+    lengths = {name: leaky(UNCHANGED, length=q) for q, name in LENGTHS.items()}
     yield Choice("length of all windows (paper's protocol)", LENGTHS[LENGTH], "lstm", lengths)
 
 

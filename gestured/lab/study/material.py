@@ -10,8 +10,8 @@ from gestured.lab.dataset import Samples, join
 from gestured.lab.study.shifting import THRESHOLD, copies
 from gestured.simulator import GESTURES
 
-NONE, SHIFT, WIDE = "none", "shift", "wide"
-AUGMENTATIONS = (NONE, SHIFT, WIDE)
+UNCHANGED, SHIFT, WIDE = "none", "shift", "wide"
+AUGMENTATIONS = (UNCHANGED, SHIFT, WIDE)
 
 
 @dataclass(frozen=True)

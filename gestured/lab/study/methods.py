@@ -26,7 +26,11 @@ from gestured.lab.study.training import Inputs, train
 from gestured.lab.study.views import FRAMES, TOUCHES, TRAJECTORIES, WAVELETS, Values, View
 
 Indices = NDArray[np.int64]
-SPATIO_TEMPORAL, TOUCH_PATTERN, HISTORY = "spatio-temporal features", "touch-pattern features", "motion history image"
+SPATIO_TEMPORAL, TOUCH_PATTERN, MOTION_HISTORY = (
+    "spatio-temporal features",
+    "touch-pattern features",
+    "motion history image",
+)
 RECURRENT, BEYOND = "recurrent", "beyond the paper"
 
 
@@ -108,7 +112,7 @@ class Method:
     @property
     def elapses(self) -> bool:
         """Whether it can answer after every frame."""
-        return self.network and self.family != HISTORY
+        return self.network and self.family != MOTION_HISTORY
 
 
 KINDS = {
@@ -150,7 +154,7 @@ def _classical(
 
 
 HAAR = {"wavelet": "haar", "level": 3}
-STEPS = 800  # batches
+TRAINING_STEPS = 800  # batches
 
 
 def _net(
@@ -158,8 +162,8 @@ def _net(
     published: tuple[float, float, float] | None,
 ) -> Method:  # fmt: skip
     channels = {"channels": 8} if kind.startswith("cnn_") else {}
-    grid = [{"units": u, "rate": r, "steps": STEPS, **channels} for u in widths for r in rates]
-    given = {"units": 32, "rate": rates[0], "steps": STEPS, **channels}
+    grid = [{"units": u, "rate": r, "steps": TRAINING_STEPS, **channels} for u in widths for r in rates]
+    given = {"units": 32, "rate": rates[0], "steps": TRAINING_STEPS, **channels}
 
     def make(classes: int, values: Values) -> nn.Module:
         return sequence_net(kind, values["units"], classes, values.get("channels", 16))
@@ -180,7 +184,7 @@ def _train(
 
 
 HISTORY_GRID = [
-    {"decay_s": 0.0, "channels": c, "rate": r, "steps": STEPS} for c, r in ((8, 4e-3), (16, 2e-3), (16, 4e-3))
+    {"decay_s": 0.0, "channels": c, "rate": r, "steps": TRAINING_STEPS} for c, r in ((8, 4e-3), (16, 2e-3), (16, 4e-3))
 ]
 
 METHODS: dict[str, Method] = {
@@ -206,7 +210,7 @@ METHODS: dict[str, Method] = {
             {"knn": (0.56, 0.98), "rf": (0.60, 0.98), "svm": (0.56, 0.97)},
         ),
         Method(
-            "mhi_cnn", "CNN on motion history images", HISTORY,
+            "mhi_cnn", "CNN on motion history images", MOTION_HISTORY,
             "Four convolutions with leaky ReLU and two fully connected layers on one image of the whole movement.",
             views.HISTORY, partial(_train, lambda classes, values: HistoryNet(classes, values["channels"])),
             tuple(HISTORY_GRID), dict.fromkeys(("none", "shift", "wide"), HISTORY_GRID[2]),

@@ -13,13 +13,13 @@ from torch import Tensor, nn
 
 from gestured.lab.nets import SCALE
 
-SIDE = 9
+SENSOR_SIDE = 9
 
 
 class Flat(nn.Module):
     """The frame's 81 taxels as they are."""
 
-    width = SIDE * SIDE
+    width = SENSOR_SIDE * SENSOR_SIDE
 
     def forward(self, x: Tensor) -> Tensor:
         """(N, 1, R, C) -> (N, R * C)."""
@@ -43,7 +43,7 @@ class Convolutions(nn.Module):
         return y.flatten(1)
 
 
-class Recurrent(nn.Module):
+class RecurrentNet(nn.Module):
     """LSTM or GRU over the frames."""
 
     def __init__(self, inputs: int, units: int, kind: str) -> None:
@@ -155,7 +155,7 @@ def sequence_net(kind: str, units: int, classes: int, channels: int = 16) -> Seq
     elif kind == "transformer":
         temporal = Attention(inputs, units)
     else:
-        temporal = Recurrent(inputs, units, kind.removeprefix("cnn_"))
+        temporal = RecurrentNet(inputs, units, kind.removeprefix("cnn_"))
     encoder.to(memory_format=torch.channels_last)  # type: ignore[call-overload]  # a quarter faster
     return SequenceNet(encoder, temporal, units, classes)
 

@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from gestured.lab.forest_graph import OPSET, forest_graph
 from gestured.lab.nets import last_active
-from gestured.lab.study.nets import SIDE
+from gestured.lab.study.nets import SENSOR_SIDE
 from gestured.simulator import GESTURES
 
 
@@ -58,7 +58,7 @@ class _AtTheEnd(nn.Module):
 def of_net(module: nn.Module, *, images: bool) -> Graph:
     """A trained network; batch, and time where there is one, stay open."""
     net = module.eval() if images else _AtTheEnd(module).eval()
-    example = torch.rand(2, SIDE, SIDE) if images else torch.rand(2, 5, SIDE, SIDE)
+    example = torch.rand(2, SENSOR_SIDE, SENSOR_SIDE) if images else torch.rand(2, 5, SENSOR_SIDE, SENSOR_SIDE)
     axes = {0: "B"} if images else {0: "B", 1: "T"}
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")  # the tracer's; tests compare the graph with the network

@@ -13,7 +13,7 @@ import torch
 
 import gestured
 from gestured.core.errors import GesturedError
-from gestured.lab.cli import REAL
+from gestured.lab.cli import REAL_FOLDER
 from gestured.lab.dataset import NONE, Samples, simulated
 from gestured.lab.digest import file_digest
 from gestured.lab.study import cohort, elapsed, failures, own, signals, tables
@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     """`gestured-lab study`."""
     if args.jobs < 1:
         raise GesturedError(f"--jobs: expected 1 or more, found {args.jobs}")
-    if args.real != REAL and not args.real.is_dir():
+    if args.real != REAL_FOLDER and not args.real.is_dir():
         raise GesturedError(f"--real: {args.real} is no folder")
     torch.set_num_threads(1)
     plan = Plan.small(args.seed) if args.quick else Plan(args.seed)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.lab.study.bootstrap import curve, summary
-from gestured.lab.study.material import AUGMENTATIONS, NONE, SHIFT, WIDE, Data
+from gestured.lab.study.material import AUGMENTATIONS, SHIFT, UNCHANGED, WIDE, Data
 from gestured.lab.study.methods import METHODS, Method
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import CLEAN, PAPER, PARTICIPANTS, REAL, Result, Task, values_of
@@ -114,8 +114,8 @@ def copies(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:
             "method": cell.method, "settings": cell.settings, "test": len(good),
             "with_copy": int(same.sum()), "with_version": int(np.sum(result["version"])),
             "right_with_copy": _mean(good[same]), "right_without_copy": _mean(good[~same]),
-            "gain_leaky": round(share(PAPER, SHIFT) - share(PAPER, NONE), 4),
-            "gain_clean": round(share(CLEAN, SHIFT) - share(CLEAN, NONE), 4),
+            "gain_leaky": round(share(PAPER, SHIFT) - share(PAPER, UNCHANGED), 4),
+            "gain_clean": round(share(CLEAN, SHIFT) - share(CLEAN, UNCHANGED), 4),
         })  # fmt: skip
     return out
 

@@ -14,11 +14,11 @@ from gestured.core.features import feature_names
 from gestured.lab.dataset import WINDOW
 
 PLAIN = ("mean_pressure", "maximum_pressure", "variability", "maximum_area", "mean_area", "duration_s")
-NAMES = feature_names(WINDOW.rows, WINDOW.columns)
+FEATURE_NAMES = feature_names(WINDOW.rows, WINDOW.columns)
 
 
 def _plain(name: str) -> bool:
     return name in PLAIN or (name.endswith("_mean") and name.startswith(("row_", "column_")))
 
 
-PAPER = np.array([_plain(name) for name in NAMES])
+PAPER_FEATURES = np.array([_plain(name) for name in FEATURE_NAMES])

@@ -17,7 +17,7 @@ from gestured.lab.dataset import Samples
 from gestured.lab.fit import padded
 from gestured.lab.nets import last_active
 
-BATCH = 64
+BATCH_SEQUENCES = 64
 LONGEST = 80  # frames
 Indices = NDArray[np.int64]
 
@@ -38,7 +38,7 @@ class Windows:
         """`index` in random order, but so that neighbours are of similar length."""
         lengths = self.samples.lengths()
         mixed = rng.permutation(index)
-        pools = [mixed[i : i + 20 * BATCH] for i in range(0, len(mixed), 20 * BATCH)]
+        pools = [mixed[i : i + 20 * BATCH_SEQUENCES] for i in range(0, len(mixed), 20 * BATCH_SEQUENCES)]
         return np.concatenate([pool[np.argsort(lengths[pool] + 3 * rng.random(len(pool)))] for pool in pools])
 
 
@@ -106,6 +106,6 @@ def _batches(inputs: Inputs, index: Indices, rng: np.random.Generator) -> Iterat
     """Batches without end, each epoch in another order."""
     while True:
         order = inputs.order(index, rng)
-        starts = np.arange(0, len(order), BATCH)
+        starts = np.arange(0, len(order), BATCH_SEQUENCES)
         for start in rng.permutation(starts):
-            yield order[start : start + BATCH]
+            yield order[start : start + BATCH_SEQUENCES]

@@ -12,7 +12,7 @@ from gestured.lab.dataset import Samples
 from gestured.lab.fit import padded
 from gestured.lab.trajectory import trajectory_features
 
-BATCH = 256
+BATCH_WINDOWS = 256
 LONGEST = 80  # frames
 
 
@@ -21,8 +21,8 @@ def trajectory_matrix(samples: Samples) -> NDArray[np.float32]:
     order = np.argsort(samples.lengths(), kind="stable")
     with torch.no_grad():
         parts = [
-            trajectory_features(padded(samples, order[i : i + BATCH], LONGEST)).numpy()
-            for i in range(0, len(order), BATCH)
+            trajectory_features(padded(samples, order[i : i + BATCH_WINDOWS], LONGEST)).numpy()
+            for i in range(0, len(order), BATCH_WINDOWS)
         ]
     found = np.concatenate(parts)
     return np.asarray(found[np.argsort(order, kind="stable")], np.float32)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gestured.lab.study.cells import Schedule
-from gestured.lab.study.material import NONE, Data
+from gestured.lab.study.material import UNCHANGED, Data
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import PARTICIPANTS, Result, Task
@@ -29,7 +29,7 @@ def tune(plan: Plan, sets: Mapping[str, Data], schedule: Schedule) -> tuple[dict
             shorter = {**values, "steps": plan.tuning_steps} if method.network else values
             asked[method.id, len(asked)] = (
                 values,
-                replace(task(method, shorter, NONE, PARTICIPANTS, "simulated", plan), folds=plan.tuning_folds),
+                replace(task(method, shorter, UNCHANGED, PARTICIPANTS, "simulated", plan), folds=plan.tuning_folds),
             )
     found = schedule.results([item[1] for item in asked.values()], sets, "hyperparameters")
     chosen: dict[str, Values] = {}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gestured.core.features import touch_pattern
 from gestured.lab.dataset import WINDOW, Samples
 from gestured.lab.study.motion_history import motion_history
-from gestured.lab.study.touch_patterns import PAPER
+from gestured.lab.study.touch_patterns import PAPER_FEATURES
 from gestured.lab.study.training import Images, Windows
 from gestured.lab.study.trajectory_boosting import trajectory_matrix, trajectory_row
 from gestured.lab.study.wavelets import spatio_temporal
@@ -39,7 +39,7 @@ def _alone(one: Callable[[Rows, Values], Rows], *by: str, form: Callable[[Rows],
 
 def _listed(found: Rows, values: Values) -> Rows:
     """(G, F) touch-pattern features: the set that the paper lists, or all that the daemon's forest sees."""
-    return found[:, PAPER] if values["features"] == "paper" else found
+    return found[:, PAPER_FEATURES] if values["features"] == "paper" else found
 
 
 WAVELETS = _alone(

@@ -13,23 +13,25 @@ import pywt
 from numpy.typing import NDArray
 
 WAVELET = "haar"
-LEVEL = 3
+WAVELET_LEVEL = 3
 STATISTICS = 5
-EPS = 1e-9
+TINY = 1e-9
 
 
 def band_statistics(band: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n, taxels) coefficients -> (5, taxels): L1, L2, skewness, kurtosis (0 for a Gaussian), standard deviation."""
     centred = band - band.mean(axis=0)
     variance = np.mean(centred**2, axis=0)
-    still = variance <= EPS
+    still = variance <= TINY
     safe = np.where(still, 1.0, variance)
     skewness = np.where(still, 0.0, np.mean(centred**3, axis=0) / safe**1.5)
     kurtosis = np.where(still, 0.0, np.mean(centred**4, axis=0) / safe**2 - 3.0)
     return np.stack([np.abs(band).sum(0), np.sqrt((band**2).sum(0)), skewness, kurtosis, np.sqrt(variance)])
 
 
-def spatio_temporal(window: NDArray[np.floating], wavelet: str = WAVELET, level: int = LEVEL) -> NDArray[np.float32]:
+def spatio_temporal(
+    window: NDArray[np.floating], wavelet: str = WAVELET, level: int = WAVELET_LEVEL
+) -> NDArray[np.float32]:
     """(T, R, C) window -> ((level + 1) * 15,) features; mean, maximum and variance over taxels of each statistic."""
     signals = window.reshape(len(window), -1).astype(np.float64)
     least = 2**level * (pywt.Wavelet(wavelet).dec_len - 1)

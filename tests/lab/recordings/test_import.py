@@ -9,11 +9,11 @@ import pytest
 
 from gestured.lab.cli import main
 from gestured.record.arrays import read
-from gestured.simulator import Participant, Sensor, Take, generator, gesture_take
+from gestured.simulator import Participant, SimulatedSensor, Take, generator, gesture_take
 
 
 def take(gesture: str = "swipe_left") -> Take:
-    return gesture_take(gesture, Participant(901), Sensor.nominal(day=901), generator(3, 1), "normal", 1)
+    return gesture_take(gesture, Participant(901), SimulatedSensor.nominal(day=901), generator(3, 1), "normal", 1)
 
 
 def csv_lines(made: Take, scale: float = 1.0) -> list[str]:

@@ -11,7 +11,7 @@ from gestured.control.play import frames
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.lab.recordings.live import LiveSensor
-from gestured.simulator import Participant, Sensor, Take, generator, gesture_take, session
+from gestured.simulator import Participant, SimulatedSensor, Take, generator, gesture_take, session
 
 Send = Callable[..., None]
 
@@ -39,7 +39,7 @@ def sender() -> Iterator[Send]:
 
 
 def made(gesture: str, person: int = 901) -> Take:
-    sensor = Sensor.nominal(day=person)
+    sensor = SimulatedSensor.nominal(day=person)
     return gesture_take(gesture, Participant(person), sensor, generator(4, person), "normal", 1)
 
 
@@ -66,7 +66,7 @@ def test_a_take_holds_the_frames_that_were_sent(gesture: str, live: LiveSensor, 
 
 def test_two_gestures_in_a_row_are_told(live: LiveSensor, sender: Send) -> None:
     kinds = ("swipe_left", "swipe_left")
-    nominal = Sensor.nominal(day=901)
+    nominal = SimulatedSensor.nominal(day=901)
     live.begin()
     sender(live, session(Participant(901), nominal, generator(4), 8.0, kinds=kinds, idle_s=(0.8, 0.8)))
     live.pump()

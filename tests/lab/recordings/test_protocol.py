@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.lab.recordings.protocol import INCLINATIONS, Trial, left, order, pseudonym
+from gestured.lab.recordings.protocol import INCLINATION_NAMES, Exercise, left, order, pseudonym
 from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES, SPEEDS
 
 
-def kept(trials: list[Trial]) -> Recordings:
+def kept(trials: list[Exercise]) -> Recordings:
     n = len(trials)
     return Recordings(
         np.zeros((n, 2, 2)), np.zeros(n), np.arange(n + 1), np.array([t.gesture for t in trials]),
@@ -24,13 +24,13 @@ def kept(trials: list[Trial]) -> Recordings:
 @pytest.mark.parametrize("repeats", [1, 3])
 def test_everything_is_performed_as_often_as_asked(repeats: int) -> None:
     trials = order("07", 0, GESTURES, repeats)
-    expected = {Trial(g, s, i) for g in GESTURES for s in SPEEDS for i in range(len(INCLINATIONS))}
+    expected = {Exercise(g, s, i) for g in GESTURES for s in SPEEDS for i in range(len(INCLINATION_NAMES))}
     assert Counter(trials) == dict.fromkeys(expected, repeats)
 
 
 def test_the_sensor_is_moved_as_seldom_as_can_be() -> None:
     poses = [trial.inclination for trial in order("07", 0, GESTURES, 2)]
-    assert sum(a != b for a, b in zip(poses, poses[1:], strict=False)) == len(INCLINATIONS) - 1
+    assert sum(a != b for a, b in zip(poses, poses[1:], strict=False)) == len(INCLINATION_NAMES) - 1
 
 
 def test_an_order_is_a_participants_own_and_the_same_again() -> None:

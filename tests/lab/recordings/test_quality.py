@@ -6,31 +6,31 @@ import numpy as np
 import pytest
 
 from gestured.core.frames import Frame
-from gestured.lab.recordings.quality import Take, faults, gaps, saturated
-from gestured.simulator import GESTURES, Participant, Sensor, generator, gesture_take
+from gestured.lab.recordings.quality import Captured, faults, gaps, saturated
+from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
 
 
-def performed(gesture: str, person: int, sensor: Sensor | None = None) -> Take:
+def performed(gesture: str, person: int, sensor: SimulatedSensor | None = None) -> Captured:
     """A simulated take with the onset and release that the simulator says."""
-    sensor = sensor or Sensor.nominal(day=person)
+    sensor = sensor or SimulatedSensor.nominal(day=person)
     rng = generator(5, person, GESTURES.index(gesture))
     made = gesture_take(gesture, Participant(person), sensor, rng, "normal", 1)
     onset, release = np.searchsorted(made.times, [made.events[0].onset_s, made.events[0].offset_s])
     frames = [Frame(float(t), values) for t, values in zip(made.times, made.frames, strict=True)]
-    return Take(tuple(frames), int(onset), max(int(onset), int(release) - 1), sensor.noise * sensor.gain)
+    return Captured(tuple(frames), int(onset), max(int(onset), int(release) - 1), sensor.noise * sensor.gain)
 
 
 @pytest.mark.parametrize("gesture", GESTURES)
 def test_ordinary_gestures_are_good(gesture: str) -> None:
     for person in range(900, 906):
-        nominal = replace(Sensor.nominal(day=person), loss=0.0, late=0.0, duplicates=0.0, jitter_s=0.0)
+        nominal = replace(SimulatedSensor.nominal(day=person), loss=0.0, late=0.0, duplicates=0.0, jitter_s=0.0)
         assert faults(performed(gesture, person, nominal), gesture) == []
 
 
 def test_a_sensor_that_ends_below_the_pressure_is_told() -> None:
     told = 0
     for person in range(900, 920):
-        nominal = replace(Sensor.nominal(day=person), loss=0.0, late=0.0)
+        nominal = replace(SimulatedSensor.nominal(day=person), loss=0.0, late=0.0)
         low = replace(nominal, saturation=int((nominal.offset + 0.4) * nominal.gain))
         told += any("saturated" in fault for fault in faults(performed("swipe_left", person, low), "swipe_left"))
     assert told >= 18
@@ -41,7 +41,7 @@ def test_a_coarse_sensor_is_not_called_saturated() -> None:
 
 
 def test_a_stroke_of_two_frames_is_too_short_and_a_tap_is_not() -> None:
-    take = performed("one_tap", 900, replace(Sensor.nominal(day=900), loss=0.0, late=0.0, jitter_s=0.0))
+    take = performed("one_tap", 900, replace(SimulatedSensor.nominal(day=900), loss=0.0, late=0.0, jitter_s=0.0))
     short = replace(take, release=take.onset + 1)
     assert faults(short, "one_tap") == []
     (fault,) = faults(short, "swipe_up")
@@ -49,7 +49,7 @@ def test_a_stroke_of_two_frames_is_too_short_and_a_tap_is_not() -> None:
 
 
 def test_lost_frames_are_counted_by_the_counter_or_by_gaps() -> None:
-    whole = performed("swipe_up", 900, replace(Sensor.nominal(day=900), loss=0.0, late=0.0, jitter_s=0.0))
+    whole = performed("swipe_up", 900, replace(SimulatedSensor.nominal(day=900), loss=0.0, late=0.0, jitter_s=0.0))
     frames = list(whole.frames)
     del frames[whole.onset + 1]
     gap = replace(whole, frames=tuple(frames), release=whole.release - 1)

@@ -10,7 +10,7 @@ import pytest
 
 from gestured.lab.recordings import session as module
 from gestured.lab.recordings.protocol import order
-from gestured.lab.recordings.quality import Take
+from gestured.lab.recordings.quality import Captured
 from gestured.lab.recordings.session import Session
 from gestured.lab.recordings.terminal import Terminal
 from gestured.record.arrays import read
@@ -48,12 +48,12 @@ class Script(Terminal):
 class FakeSensor:
     """Feels the next of `takes` at each `begin`; None is nothing."""
 
-    def __init__(self, *takes: Take | None) -> None:
+    def __init__(self, *takes: Captured | None) -> None:
         self.takes = list(takes)
         self.where, self.name, self.rate_hz, self.silent = "127.0.0.1:9000", "armrest", 15.0, False
         self.grid, self.touched = (9, 9), False
         self.not_yet: Iterator[bool] = iter(())  # what it answers before it is ready
-        self.felt: Take | None = None
+        self.felt: Captured | None = None
         self._fd, self._pipe = os.pipe()
         self.socket = SimpleNamespace(fileno=lambda: self._fd)
 
@@ -74,13 +74,13 @@ class FakeSensor:
     def quiet(self, seconds: float) -> bool:
         return True
 
-    def take(self) -> Take | None:
+    def take(self) -> Captured | None:
         return self.felt
 
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(module, "PATIENCE_S", 0.01)
+    monkeypatch.setattr(module, "GESTURE_TIMEOUT_S", 0.01)
     yield
 
 

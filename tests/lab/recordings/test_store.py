@@ -8,7 +8,7 @@ import pytest
 from gestured.core.errors import RecordingError
 from gestured.lab.recordings.store import compact, join, touched
 from gestured.record.check import check
-from gestured.simulator import GESTURES, Participant, Sensor, generator, gesture_take
+from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
 from tests.small_recording import example, same, session
 
 
@@ -65,7 +65,7 @@ def test_counts_are_kept_exactly_in_the_smallest_type(values: list[float], kind:
 @pytest.mark.parametrize("gesture", GESTURES)
 @pytest.mark.parametrize("cut", [False, True], ids=["with idle frames", "cut close"])
 def test_the_touched_frames_are_found(gesture: str, cut: bool) -> None:
-    made = gesture_take(gesture, Participant(901), Sensor.nominal(day=901), generator(1, 1), "normal", 1)
+    made = gesture_take(gesture, Participant(901), SimulatedSensor.nominal(day=901), generator(1, 1), "normal", 1)
     event = made.events[0]
     onset, release = np.searchsorted(made.times, [event.onset_s, event.offset_s])
     start = onset - 2 if cut else 0

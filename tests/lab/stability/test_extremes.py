@@ -17,7 +17,7 @@ from gestured.lab.stability.extremes import (
     swipes,
     whole_path_table,
 )
-from gestured.lab.stability.path import Stream, fault
+from gestured.lab.stability.path import Series, fault
 from gestured.model.model import LADDER, Model, open_model, shipped
 
 
@@ -66,7 +66,7 @@ def test_the_judge_sees_what_is_wrong(models: list[Model]) -> None:
     assert judged(Case("", stream, when, alone=True), models[0]) == (1, "")
     assert judged(Case("", stream, alone=True), models[0])[1] == "answered swipe_right"
     assert judged(Case("", stream, (0.2,)), models[0]) == (0, "")
-    backwards = Stream(stream.times[::-1], stream.frames)
+    backwards = Series(stream.times[::-1], stream.frames)
     assert judged(Case("", backwards), models[0])[1].startswith("ValueError")
     assert "overflow" in judged(Case("", stream), Careless())[1]
     assert fault([Onset("s", 1, 0.0), Release("s", 1, 1.0)])

@@ -10,7 +10,15 @@ pytest.importorskip("sklearn", reason="needs the extra [lab]")
 import onnx
 from onnx import TensorProto
 
-from gestured.lab.stability.models import NETS, by_frames, by_onnxruntime, by_reference, by_torch, loaded, widened
+from gestured.lab.stability.models import (
+    NET_CLASSES,
+    by_frames,
+    by_onnxruntime,
+    by_reference,
+    by_torch,
+    loaded,
+    widened,
+)
 from gestured.lab.stability.path import segments, simulated
 from gestured.model.model import LADDER, open_model, shipped
 
@@ -25,7 +33,7 @@ def windows() -> list[np.ndarray]:
     return [window.apply(segment) for _, stream in simulated(6) for segment in segments(stream)]
 
 
-@pytest.mark.parametrize("name", NETS)
+@pytest.mark.parametrize("name", NET_CLASSES)
 def test_every_way_to_run_a_net_gives_the_same(name: str, windows: list[np.ndarray]) -> None:
     data = shipped()[name].read_bytes()
     module = loaded(name, data)

@@ -12,7 +12,7 @@ pytest.importorskip("mpmath", reason="needs the extra [lab]")
 
 from gestured.lab.stability.figure import svg
 from gestured.lab.stability.relaxation import DECADES, FILTERS, Filter, error, exact
-from gestured.lab.stability.textbook import METHODS, points
+from gestured.lab.stability.textbook import INTEGRATORS, points
 
 DRIVEN = [
     (filter_, dtype, decade)
@@ -71,8 +71,8 @@ def test_the_figure_is_a_picture_of_every_point() -> None:
     some = points(-1, 1, np.float64, quick=True)
     tree = ElementTree.fromstring(svg({"one": some, "the same": some}))
     circles = [e for e in tree.iter() if e.tag.endswith("circle")]
-    assert len(circles) == 2 * len(some) + len(METHODS)
+    assert len(circles) == 2 * len(some) + len(INTEGRATORS)
     box = [float(v) for v in tree.attrib["viewBox"].split()]
     assert all(0 <= float(c.attrib["cy"]) <= box[3] for c in circles)
     words = "".join(tree.itertext())
-    assert all(method in words for method in METHODS)
+    assert all(method in words for method in INTEGRATORS)

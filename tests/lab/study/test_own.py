@@ -13,13 +13,13 @@ from gestured.core.errors import GesturedError
 from gestured.lab.study.own import own
 from gestured.record.arrays import write
 from gestured.record.recordings import Recordings
-from gestured.simulator import Participant, Sensor, generator, gesture_take
+from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
 
 
 def recordings(people: tuple[str, ...], labels: tuple[str, ...] = ("swipe_up", "one_tap")) -> Recordings:
     """One simulated performance of each gesture by each person, as a collector writes them."""
     takes = [
-        gesture_take(label, Participant(7 + k), Sensor.nominal(day=7 + k), generator(5, k, n))
+        gesture_take(label, Participant(7 + k), SimulatedSensor.nominal(day=7 + k), generator(5, k, n))
         for k in range(len(people)) for n, label in enumerate(labels)
     ]  # fmt: skip
     return Recordings(

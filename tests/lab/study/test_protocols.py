@@ -7,7 +7,7 @@ pytest.importorskip("torch")
 pytest.importorskip("pywt")
 
 from gestured.lab.study.bootstrap import interval
-from gestured.lab.study.material import NONE, SHIFT
+from gestured.lab.study.material import SHIFT, UNCHANGED
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.protocols import CLEAN, PAPER, PARTICIPANTS, Task, material, run, splits, values_of
 from tests.lab.study.material_made import data
@@ -36,7 +36,7 @@ def test_no_other_protocol_does(protocol: str) -> None:
 
 
 def test_everybody_is_judged_once_and_the_same_on_every_run() -> None:
-    first, second = (run(task(PARTICIPANTS, NONE), data()) for _ in range(2))
+    first, second = (run(task(PARTICIPANTS, UNCHANGED), data()) for _ in range(2))
     assert sorted(first["source"]) == list(range(len(data().gestures)))
     assert {**first, "seconds": 0} == {**second, "seconds": 0}
 
