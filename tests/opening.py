@@ -23,7 +23,7 @@ Open = Callable[[Path], object]
 def npz(path: Path) -> object:
     """As `replay` plays it, and as `inspect` shows what is good of it."""
     from gestured.control.labelled import Labelled
-    from gestured.lab.recordings.looking import one, summary
+    from gestured.lab.recordings.looking import one, overview
     from gestured.lab.recordings.safe import read_what_is_good
 
     try:
@@ -33,7 +33,7 @@ def npz(path: Path) -> object:
     else:
         assert all(str(path) in str(what) for what in left)
         if len(good):
-            json.dumps([summary(good), one(good, 0)])
+            json.dumps([overview(good), one(good, 0)])
     return Labelled(path, "arm").tape
 
 

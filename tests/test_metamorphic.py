@@ -13,35 +13,36 @@ from hypothesis import strategies as st
 
 from gestured.core.mounting import Mounting
 from gestured.core.wire import Addresses, Decoder
+from gestured.lab.dataset import cuts
 from gestured.lab.stability.metamorphic import (
     Property,
     doubled,
     mirrored,
     on_grid,
+    postponed,
     raised,
     renamed,
     scaled,
-    shifted,
-    turned,
+    upside_down,
 )
-from gestured.lab.stability.path import Series, events, labels, segments, simulated
+from gestured.lab.stability.path import Series, events, labels, simulated_series
 from gestured.model.model import LADDER, Model, open_model, shipped
 
 COUNT = 40
 LEAST = 0.98  # of the labels, where a learned net decides
 numbers = st.integers(0, COUNT - 1)
 changes = st.one_of(
-    st.integers(-(2**40), 2**40).map(lambda n: shifted(n / 4096)),
+    st.integers(-(2**40), 2**40).map(lambda n: postponed(n / 4096)),
     st.integers(-2, 10).map(lambda n: scaled(2.0**n)),  # much less, and a constant would be much larger than counts
     st.integers(-200, 10_000).map(raised),
     st.just(mirrored()),
-    st.just(turned()),
+    st.just(upside_down()),
 )
 
 
 @cache
 def streams() -> list[Series]:
-    return [on_grid(stream) for _, stream in simulated(COUNT)]
+    return [on_grid(stream) for _, stream in simulated_series(COUNT)]
 
 
 @cache
@@ -61,11 +62,11 @@ def said(name: str) -> list[tuple[str, ...]]:
 def test_the_front_end_sees_the_same_segments(number: int, several: list[Property]) -> None:
     """One after the other, in any order."""
     stream = streams()[number]
-    before = segments(stream)
+    before = cuts(stream.frames, stream.times)
     assert len(before) == 1
     for change in several:
         stream = change.apply(stream)
-        after = segments(stream)
+        after = cuts(stream.frames, stream.times)
         assert change.holds(before, after), change.name
         before = after
 
@@ -85,7 +86,7 @@ def test_a_sensor_that_is_mounted_otherwise_and_says_so_gives_the_same_events(
 @pytest.mark.parametrize("name", LADDER[:2])
 @pytest.mark.parametrize(
     "change",
-    [shifted(86_400.0), scaled(1e-3), scaled(1e3), raised(-200.0), raised(6e6), mirrored(), turned(), doubled()],
+    [postponed(86_400.0), scaled(1e-3), scaled(1e3), raised(-200.0), raised(6e6), mirrored(), upside_down(), doubled()],
     ids=lambda change: change.name,
 )
 def test_the_nets_say_the_same_or_what_it_became(name: str, change: Property) -> None:

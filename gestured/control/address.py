@@ -12,7 +12,7 @@ SYSTEM = Path("/run/gestured/events.sock")  # of the installed service
 SHARED = Path("/tmp")  # where a daemon without a session keeps its folder; anybody can make it first
 
 
-def default_socket(environ: Mapping[str, str]) -> Path:
+def find_socket(environ: Mapping[str, str]) -> Path:
     """The event socket that is meant where none is named, the first of these.
 
     What the environment says, as the daemon reads it; that of a daemon in the session; the installed service's; the one
@@ -29,11 +29,11 @@ def default_socket(environ: Mapping[str, str]) -> Path:
     return SYSTEM if SYSTEM.parent.is_dir() else own
 
 
-def default_control(environ: Mapping[str, str]) -> Path:
+def find_control(environ: Mapping[str, str]) -> Path:
     """Where it keeps its control socket: beside the other."""
     if path := environ.get("GESTURED_CONTROL"):
         return Path(path)
-    return default_socket(environ).with_suffix(".ctl")
+    return find_socket(environ).with_suffix(".ctl")
 
 
 def add_control(parser: argparse.ArgumentParser) -> None:
@@ -50,4 +50,4 @@ def finish_on_signals(control: Control) -> None:
 
 def connect(args: argparse.Namespace) -> Control:
     """The daemon that `--control` names. Raises Unreachable."""
-    return Control(args.control or default_control(os.environ))
+    return Control(args.control or find_control(os.environ))

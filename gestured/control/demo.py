@@ -18,7 +18,7 @@ from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form, Sensor
 from gestured.client.stream import Stream
 from gestured.control.play import add_arguments, frames, play_from
-from gestured.control.show import as_dict, block, summary
+from gestured.control.show import as_dict, block, in_words
 from gestured.core.errors import GesturedError
 from gestured.simulator import Take
 
@@ -132,7 +132,7 @@ class Show:
         if self.as_json:
             say_json({"type": "summary"} | figures)
         else:
-            say_drawn(summary(figures, self.colour))
+            say_drawn(in_words(figures, self.colour))
 
     def _show(self, outcome: Outcome, sensor: Sensor) -> None:
 

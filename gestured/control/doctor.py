@@ -16,7 +16,7 @@ from gestured.client.control import Control
 from gestured.client.lines import JOIN, Forbidden, Refused, Unreachable
 from gestured.client.peer import Stranger
 from gestured.client.say import say, say_json
-from gestured.control.address import add_control, default_control
+from gestured.control.address import add_control, find_control
 from gestured.core.address import Address
 from gestured.core.errors import ModelError
 from gestured.model.model import check
@@ -67,7 +67,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
 def run(args: argparse.Namespace) -> int:
     """Look at everything, and say it."""
     bad = 0
-    for finding in examine(args.control or default_control(os.environ)):
+    for finding in examine(args.control or find_control(os.environ)):
         bad += finding.level == "bad"
         if args.json:
             say_json(asdict(finding))

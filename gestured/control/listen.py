@@ -10,7 +10,7 @@ from typing import Any
 
 from gestured.client.say import say, say_drawn, say_json
 from gestured.client.subscriber import Subscriber
-from gestured.control.address import default_socket
+from gestured.control.address import find_socket
 
 TYPES = ("gesture", "unknown", "cancelled", "onset", "release", "status")
 
@@ -38,7 +38,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
 
 def run(args: argparse.Namespace) -> int:
     """Print until the count is reached, the daemon ends, or Ctrl-C."""
-    path = args.socket or default_socket(os.environ)
+    path = args.socket or find_socket(os.environ)
     wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture}
     left = args.count
     with Subscriber(path, **wanted, reconnect=args.reconnect) as subscriber:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from gestured.client.address import host_port
 from gestured.client.say import say, say_drawn, say_json, tell
-from gestured.control.address import default_socket
+from gestured.control.address import find_socket
 from gestured.control.diff import Answer, Knew, Line, Recorded
 from gestured.control.labelled import Labelled
 from gestured.control.listen import readable
@@ -139,7 +139,7 @@ def _there(args: argparse.Namespace, source: Playable) -> int:
     rehearsal = Replay(source.tape, scene, Mute(scene.gestures))  # when sensors are known, and contacts begin
     for _ in rehearsal.events():
         pass
-    with closing(Hearing(args.socket or default_socket(os.environ), frozenset(rehearsal.played))) as hearing:
+    with closing(Hearing(args.socket or find_socket(os.environ), frozenset(rehearsal.played))) as hearing:
         sent = _send(args, source)
         heard = hearing.all(time.time())
     status = _compare(args, source, retimed(heard, sent, source.tape, rehearsal), _knew(rehearsal))

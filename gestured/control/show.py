@@ -61,7 +61,7 @@ def as_dict(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def summary(figures: Mapping[str, Any], colour: bool) -> str:
+def in_words(figures: Mapping[str, Any], colour: bool) -> str:
     """The tally in words."""
     gestures = figures["right"] + figures["wrong"] + figures["missed"]
     others = figures["rejected"] + figures["false"]

@@ -13,7 +13,7 @@ from gestured.control.play import add_arguments, frames, play_from
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
-from gestured.simulator import Event
+from gestured.simulator import Act
 
 DESCRIPTION = """Send the pressure frames of a simulated person on a simulated textile sensor,
 as OSC over UDP, in real time. Says what is performed as it ends, to be compared
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
 def _telling(
     frames: Iterator[tuple[int, Frame]],
     start: float,
-    events: tuple[Event, ...],
+    events: tuple[Act, ...],
     sensor: Sensor,
     as_json: bool,
 ) -> Iterator[tuple[int, Frame]]:
@@ -84,7 +84,7 @@ def _telling(
         yield counter, frame
 
 
-def _tell(event: Event, start: float, sensor: str, as_json: bool) -> None:
+def _tell(event: Act, start: float, sensor: str, as_json: bool) -> None:
     performed: dict[str, Any] = {
         "type": "performed",
         "sensor": sensor,

@@ -9,7 +9,7 @@ from typing import Any
 
 from gestured import __version__
 from gestured.core.errors import GesturedError, ModelError, SettingsError
-from gestured.daemon.merge import load
+from gestured.daemon.merge import load_settings
 from gestured.daemon.settings import FLAGS, REPEATED, Settings
 
 EXAMPLE = """\
@@ -72,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from gestured.daemon import log
 
     try:
-        settings, sources = load(given, os.environ)
+        settings, sources = load_settings(given, os.environ)
         log.configure(settings.log_level)
         if explain:
             from gestured.daemon.explain import explain as describe
@@ -81,9 +81,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 0
         from gestured.daemon.start import run
 
-        run(settings, lambda: load(given, os.environ)[0])
+        run(settings, lambda: load_settings(given, os.environ)[0])
     except GesturedError as error:
-        log.say(f"gestured: {error}")
+        log.print_log(f"gestured: {error}")
         return 2 if isinstance(error, SettingsError) else 3 if isinstance(error, ModelError) else 4
     except KeyboardInterrupt:  # before the daemon could take signals itself
         return 0

@@ -104,7 +104,7 @@ class LineWriter:
 _errors: LineWriter | None = None
 
 
-def say(line: str) -> None:
+def print_log(line: str) -> None:
     """Have a line written to standard error, where there is one."""
     global _errors
     if sys.stderr is not None:
@@ -112,7 +112,7 @@ def say(line: str) -> None:
         _errors.put(line)
 
 
-def answer(line: str) -> None:
+def print_line(line: str) -> None:
     """Write one line to standard output, where there is one; waits LAST_S for a reader, not longer."""
     if sys.stdout is not None:
         writer = LineWriter(STDOUT)
@@ -132,7 +132,7 @@ class _Printer:
     """What structlog hands finished lines to."""
 
     def msg(self, line: str) -> None:
-        say(line)
+        print_log(line)
 
     debug = info = warning = error = exception = critical = msg
 

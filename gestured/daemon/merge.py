@@ -93,7 +93,7 @@ def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     return f"{key} = {problem['input']!r} ({source}): {expected}"
 
 
-def load(flags: Mapping[str, Any], environ: Mapping[str, str]) -> tuple[Settings, dict[str, str]]:
+def load_settings(flags: Mapping[str, Any], environ: Mapping[str, str]) -> tuple[Settings, dict[str, str]]:
     """Merge and validate. `flags` holds only what was given on the command line, and `config`.
 
     Returns the settings and where each key that was set came from. Raises SettingsError.

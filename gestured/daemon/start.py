@@ -122,7 +122,7 @@ def _announce(service: Service) -> None:
     control = where.pop("control")
     ready: dict[str, Any] = {"type": "ready", **where, "model": model, "control": control}
     log.info("ready", **where, model=model)
-    logging.answer(json.dumps(ready, separators=(",", ":")))
+    logging.print_line(json.dumps(ready, separators=(",", ":")))
     systemd.notify(f"READY=1\nSTATUS={model} on {where['listen']}")
 
 

@@ -13,7 +13,7 @@ from gestured.lab.cards import write_block, write_cards
 from gestured.lab.cli import REAL_FOLDER
 from gestured.lab.evaluate import Evaluation, held_out_kinds, real_figures, simulated_figures
 from gestured.lab.export import write_manifest
-from gestured.lab.train import TrainingPlan, calibration_set, learn, load, train
+from gestured.lab.train import TrainingPlan, calibration_set, learn, load_data, train
 from gestured.model.model import LADDER, open_model
 
 
@@ -46,7 +46,7 @@ def evaluate_models(args: argparse.Namespace) -> int:
     paths = {name: args.models / f"{name}.onnx" for name in LADDER}
     for path in paths.values():
         open_model(path)  # says what is wrong before anything is simulated
-    data = load(plan, args.cache, real, args.jobs)
+    data = load_data(plan, args.cache, real, args.jobs)
     print(Evaluation.HEAD, flush=True)
     figures: dict[str, dict[str, Any]] = {
         name: {"simulated": found} for name, found in simulated_figures(paths, data).items()

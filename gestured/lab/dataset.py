@@ -26,6 +26,7 @@ from gestured.lab.progress import progress
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import (
     NON_GESTURES,
+    NONE,
     SPEEDS,
     Participant,
     SimulatedSensor,
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
     from gestured.record.recordings import Recordings
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
-NONE = "none"
 OVERLAP = 0.5  # of a performed gesture must lie in a segment for it to carry its label
 
 
@@ -96,7 +96,7 @@ class Samples:
 
 
 @dataclass(frozen=True, slots=True)
-class Performed:
+class Truth:
     """What was performed from `onset` to `offset` seconds."""
 
     label: str
@@ -145,7 +145,7 @@ def cuts(frames: NDArray[np.generic], times: NDArray[np.float64]) -> list[Segmen
     return [x.segment for x in found if isinstance(x, Cut)]
 
 
-def matched(segments: Iterable[Segment], performed: Sequence[Performed]) -> Iterator[Sample]:
+def matched(segments: Iterable[Segment], performed: Sequence[Truth]) -> Iterator[Sample]:
     """Windows of the segments that hold a performed gesture, or nothing but a non-gesture.
 
     A frame stands for the time up to its neighbours: contact is known to one frame only.
@@ -164,10 +164,14 @@ def matched(segments: Iterable[Segment], performed: Sequence[Performed]) -> Iter
         yield WINDOW.apply(segment).astype(np.float16), best.label, best.kind, best.person, strength
 
 
+def truths(take: Take) -> list[Truth]:
+    """What was performed in a simulated take."""
+    return [Truth(act.label, act.kind, act.participant, act.onset_s, act.offset_s) for act in take.events]
+
+
 def from_take(take: Take) -> list[Sample]:
     """One simulated take."""
-    performed = [Performed(e.label, e.kind, e.participant, e.onset_s, e.offset_s) for e in take.events]
-    return list(matched(cuts(take.frames, take.times), performed))
+    return list(matched(cuts(take.frames, take.times), truths(take)))
 
 
 TRIALS = tuple(cohort_plan())  # 34 participants x 10 gestures x 3 speeds x 3 inclinations = 3060
@@ -228,7 +232,7 @@ def _recorded(recordings: "Recordings", i: int, seed: int) -> Iterator[Sample]:
             _needed(recordings, f"event_{name}") for name in ("recording", "labels", "kinds", "onsets", "offsets")
         )
         performed = [
-            Performed(str(labels[k]), str(kinds[k]), person, float(onsets[k]) - half, float(offsets[k]) + half)
+            Truth(str(labels[k]), str(kinds[k]), person, float(onsets[k]) - half, float(offsets[k]) + half)
             for k in np.flatnonzero(of == i)
         ]
         known = [p for p in performed if p.label != "other"]
@@ -240,7 +244,7 @@ def _recorded(recordings: "Recordings", i: int, seed: int) -> Iterator[Sample]:
     frames, times, lead = with_idle(frames, times, first, last, seed + i)
     label, kind = str(recordings.labels[i]), str(_needed(recordings, "kinds")[i])
     onset, offset = times[first + lead] - half, times[last + lead] + half
-    yield from matched(cuts(frames, times), [Performed(label, kind, person, onset, offset)])
+    yield from matched(cuts(frames, times), [Truth(label, kind, person, onset, offset)])
 
 
 def _needed(recordings: "Recordings", field: str) -> NDArray[Any]:

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from gestured.lab.augment import varied
-from gestured.lab.dataset import NONE, Samples
+from gestured.lab.dataset import Samples
 from gestured.lab.decide import fit_decision, threshold
 from gestured.lab.fit import CLASSES, padded, targets
 from gestured.lab.nets import Perceptron, Recurrent
 from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan, folds, judged
 from gestured.lab.trajectory import trajectory_features
 from gestured.model.model import Model, open_model
-from gestured.simulator import GESTURES
+from gestured.simulator import GESTURES, NONE
 
 GROUPS = 3  # of kinds of non-gestures held out
 
@@ -73,7 +73,7 @@ def outcome(answers: Answers, labels: NDArray[np.int64], least: float, performed
     )  # fmt: skip
 
 
-def answers(model: Model, samples: Samples) -> Answers:
+def model_answers(model: Model, samples: Samples) -> Answers:
     """Scores (N, G) and unknown (N,) of a model for all samples, in their order."""
     if model.metadata.features is not None:
         return model.run(samples.features())
@@ -90,7 +90,7 @@ def simulated_figures(models: Mapping[str, Path], data: TrainingData) -> dict[st
         model = open_model(path)
         found[name] = {}
         for test, samples in data.tests.items():
-            given = answers(model, samples)
+            given = model_answers(model, samples)
             result = outcome(given, targets(samples), model.threshold, data.performed[test])
             found[name][test] = asdict(result) | {"kinds": by_kind(given, samples, model.threshold)}
             print(result.row(f"{name}, simulated, {test}"), flush=True)

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from gestured.lab.augment import symmetry_table, turned, varied
-from gestured.lab.dataset import NONE, WINDOW, Samples
+from gestured.lab.dataset import WINDOW, Samples
 from gestured.lab.nets import CnnLstm, Lstm
 from gestured.lab.progress import progress
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features
 from gestured.record.files import PUBLIC, atomic_write
-from gestured.simulator import GESTURES, NON_GESTURES
+from gestured.simulator import GESTURES, NON_GESTURES, NONE
 
 REAL_KINDS = {"tap_hold": "long_press", "drag_diagonal": "diagonal_swipe"}  # what real non-gestures are
 CLASSES: list[str] = [*GESTURES, *NON_GESTURES]  # non-gestures are classes of their own: they reject better so

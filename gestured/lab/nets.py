@@ -7,8 +7,9 @@ change nothing by construction: every answer is taken at the last active frame.
 import torch
 from torch import Tensor, nn
 
+from gestured.core.measures import ACTIVE
+
 SCALE = 3.0  # windows are mostly zeros: without it the first layers hardly move
-ACTIVE = 0.15  # of the segment's peak: below it a frame shows no contact
 
 
 def active_frames(x: Tensor) -> Tensor:

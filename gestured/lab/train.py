@@ -67,7 +67,7 @@ class TrainingData:
     real: Samples | None
 
 
-def load(plan: TrainingPlan, cache: Path, real: Path | None, jobs: int) -> TrainingData:
+def load_data(plan: TrainingPlan, cache: Path, real: Path | None, jobs: int) -> TrainingData:
     """Simulate, or take from the cache, and read the real recordings where they are."""
     teach, check, test = (
         simulated(cache, "wide", seed, count, jobs)
@@ -163,7 +163,7 @@ def calibration_set(trained: Trained, data: TrainingData, plan: TrainingPlan) ->
 
 
 def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged, dict[str, Any], dict[str, Any]]:
-    """A network with its second opinion, their calibration, and how it answers then (`answers`)."""
+    """A network with its second opinion, their calibration, and how it answers then (`answer_figures`)."""
     first, second = calibrated.logits[name], calibrated.logits["trajectory"]
     decision = fit_decision(first, second, calibrated.labels, len(GESTURES))
     with torch.no_grad():
@@ -177,7 +177,7 @@ def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged,
         "threshold": least,
     }
     module = Judged(trained.nets[name], trained.nets["trajectory"], decision).eval()
-    return module, calibration, answers(scores.numpy().max(axis=1) * (1 - unknown.numpy()), known, least)
+    return module, calibration, answer_figures(scores.numpy().max(axis=1) * (1 - unknown.numpy()), known, least)
 
 
 def grow_forest(
@@ -204,7 +204,7 @@ def grow_forest(
     calibration = _forest_calibration(chances, labels)
     scores, unknown = forest_outputs(chances, len(GESTURES), calibration)
     confidence = scores.max(axis=1) * (1 - unknown)
-    return forest, calibration, answers(confidence, labels < len(GESTURES), calibration["threshold"])
+    return forest, calibration, answer_figures(confidence, labels < len(GESTURES), calibration["threshold"])
 
 
 def _classes(samples: Samples) -> NDArray[np.int64]:
@@ -250,7 +250,7 @@ def _at(values: NDArray[np.floating]) -> list[float]:
     return [float(f"{value:.5g}") for value in np.quantile(values, QUANTILES)]
 
 
-def answers(confidence: NDArray[np.floating], known: NDArray[np.bool_], least: float) -> dict[str, Any]:
+def answer_figures(confidence: NDArray[np.floating], known: NDArray[np.bool_], least: float) -> dict[str, Any]:
     """How a model answers gestures of people whom it has not seen: confidence where it answers, and how often not."""
     given = confidence[known]
     return {"confidence": _at(given[given >= least]), "unknown": round(float((given < least).mean()), 4)}
@@ -259,7 +259,7 @@ def answers(confidence: NDArray[np.floating], known: NDArray[np.bool_], least: f
 def train(plan: TrainingPlan, out: Path, cache: Path, real: Path | None, jobs: int) -> TrainingData:
     """Make the three models in `out`, with an empty manifest; the figures come from `evaluate`."""
     torch.set_num_threads(max(jobs, 1))
-    data = load(plan, cache, real, jobs)
+    data = load_data(plan, cache, real, jobs)
     trained = learn(plan, data, cache)
     calibrated = calibration_set(trained, data, plan)
     digest = hashlib.sha256((data.teach.digest() + (data.real.digest() if data.real else "")).encode()).hexdigest()

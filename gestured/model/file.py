@@ -34,7 +34,7 @@ MAX_METADATA = 4 << 20  # bytes of all of them
 MAX_ITEMS = 50_000  # of the lists and objects in one; each costs a hundred times as much memory as text
 MAX_NESTING = 16  # lists and objects inside each other in one
 MAX_SELF_TEST = 400_000  # values; more are no MAX_TEXT
-LABEL = re.compile(r"[a-z0-9_]{1,64}")
+GESTURE_NAME = re.compile(r"[a-z0-9_]{1,64}")
 
 # (message, field number) -> the message inside that is looked at; everything else is skipped.
 _INSIDE = {
@@ -276,7 +276,7 @@ class Metadata:
         for key, text in properties.items():
             _check_extent(key, text)
         gestures = _names(properties, "gestures", 2, 64)
-        if not all(LABEL.fullmatch(name) for name in (*gestures, properties["kind"])):
+        if not all(GESTURE_NAME.fullmatch(name) for name in (*gestures, properties["kind"])):
             raise ValueError("metadata 'gestures' and 'kind': expected 1 to 64 of a-z, 0-9, _ each")
         if not 1 <= len(properties["version"]) <= 64 or not properties["version"].isprintable():
             raise ValueError("metadata 'version': expected 1 to 64 printable characters")

@@ -27,7 +27,7 @@ from gestured.core.frames import Segment
 from gestured.core.recognizer import Scores
 
 OPEN_S = 8  # s to start, to open a model and to test it; half a second is usual, and an operator's client waits for 20
-RUN_S = 5  # s for a segment, after which the child ends; what can be ended otherwise is ended after models.RUN_S
+CHILD_RUN_S = 5  # s for a segment, after which the child ends; what can be ended otherwise is ended after models.RUN_S
 MAX_ANSWER = 16 << 20  # bytes of a line; a report holds some of the metadata, which are bounded
 # The folders of our own interpreter, wherever we were started, and nothing from the environment or the current folder.
 START = "import sys; sys.path[:] = sys.argv[1:]; from gestured.model.worker import main; main()"
@@ -61,7 +61,7 @@ class ModelProcess:
             noise=segment.noise,
         )  # fmt: skip
         try:
-            answer = self._ask(content.getvalue(), RUN_S)
+            answer = self._ask(content.getvalue(), CHILD_RUN_S)
         except ValueError as error:
             raise ModelError(f"{self.name}: {error}") from None
         return Scores(

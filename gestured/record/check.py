@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.model.file import GESTURE_NAME
 from gestured.record.recordings import Recordings
 
 FINGERS = 3
 MAX_FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; checking their times takes a multiple of their size
 RECORDINGS = 1 << 20  # of a file, and as many events; each of their texts is checked alone
 CHARACTERS = 1024  # of one text
-LABEL = re.compile(r"[a-z0-9_]{1,64}")
 DAY = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 # What a field may hold: i and u integers, f floats, U text.
 PER_RECORDING = {
@@ -199,7 +199,7 @@ def _first(
 
 def _labels(field: str, value: NDArray[np.str_], *, of: str = "recording") -> None:
     _text(field, value)
-    right = np.array([LABEL.fullmatch(label) is not None for label in value.tolist()], bool)
+    right = np.array([GESTURE_NAME.fullmatch(label) is not None for label in value.tolist()], bool)
     _first(field, right, "1 to 64 of a-z, 0-9 and _", of=of)
 
 

@@ -24,7 +24,7 @@ from gestured.simulator.cohort import (
     wide,
 )
 from gestured.simulator.people import INCLINATIONS, SPEEDS, Artefact, Participant, Performance, Press, generator
-from gestured.simulator.sensor import Event, SimulatedSensor, Take
+from gestured.simulator.sensor import Act, SimulatedSensor, Take
 
 __all__ = [
     "GESTURES",
@@ -35,7 +35,7 @@ __all__ = [
     "SPEEDS",
     "Artefact",
     "Press",
-    "Event",
+    "Act",
     "Participant",
     "Performance",
     "SimulatedSensor",

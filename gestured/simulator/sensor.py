@@ -21,7 +21,7 @@ from gestured.simulator.textile import compress, leak, relax
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class Act:
     """What really happened in a take; times in seconds on the take's clock, first and last contact."""
 
     label: str
@@ -43,7 +43,7 @@ class Take:
     counter: NDArray[np.int64]  # (N,) the sensor's frame counter: a gap is a lost frame, a repeat a duplicate
     touches: NDArray[np.float32]  # (N, 3, 2) x right, y upward from the bottom-left taxel, in pitches; NaN
     touch_ids: NDArray[np.int32]  # (N, 3), -1 for none
-    events: tuple[Event, ...]
+    events: tuple[Act, ...]
     sensor: "SimulatedSensor"
 
     @property
@@ -108,7 +108,7 @@ class SimulatedSensor(Nature):
         frames = digitise(self, signal)
         order, arrival = transmit(self, times, rng)
         events = tuple(
-            Event(p.label, p.kind, start, start + p.duration_s, p.speed, p.inclination, p.participant)
+            Act(p.label, p.kind, start, start + p.duration_s, p.speed, p.inclination, p.participant)
             for start, p in todo
         )
         return Take(

@@ -19,19 +19,19 @@ def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_daemon_of_ones_own_comes_before_the_installed_service(tmp_path: Path, system: Path):
     own = tmp_path / "gestured" / "events.sock"
     environ = {"XDG_RUNTIME_DIR": str(tmp_path)}
-    assert address.default_socket(environ) == own
+    assert address.find_socket(environ) == own
     system.parent.mkdir()
-    assert address.default_socket(environ) == system
-    assert address.default_control(environ) == system.with_suffix(".ctl")
+    assert address.find_socket(environ) == system
+    assert address.find_control(environ) == system.with_suffix(".ctl")
     own.parent.mkdir()
     own.touch()
-    assert address.default_socket(environ) == own
+    assert address.find_socket(environ) == own
 
 
 def test_what_the_environment_says_comes_first(tmp_path: Path, system: Path):
     system.parent.mkdir()
-    assert address.default_socket({"GESTURED_SOCKET": "/a/b.sock", "RUNTIME_DIRECTORY": "/c"}) == Path("/a/b.sock")
-    assert address.default_socket({"RUNTIME_DIRECTORY": "/c:/d"}) == Path("/c/events.sock")
+    assert address.find_socket({"GESTURED_SOCKET": "/a/b.sock", "RUNTIME_DIRECTORY": "/c"}) == Path("/a/b.sock")
+    assert address.find_socket({"RUNTIME_DIRECTORY": "/c:/d"}) == Path("/c/events.sock")
 
 
 def test_the_installed_service_comes_before_any_folder_in_tmp(
@@ -41,6 +41,6 @@ def test_the_installed_service_comes_before_any_folder_in_tmp(
     anybodys = tmp_path / f"gestured-{os.getuid()}" / "events.sock"
     anybodys.parent.mkdir()
     anybodys.touch()
-    assert address.default_socket({}) == anybodys
+    assert address.find_socket({}) == anybodys
     system.parent.mkdir()
-    assert address.default_socket({}) == system
+    assert address.find_socket({}) == system

@@ -6,7 +6,7 @@ from gestured.core.events import Event
 from gestured.core.hub import Hub
 from gestured.core.reading import Reading
 from gestured.daemon.desk import Desk
-from gestured.daemon.merge import load
+from gestured.daemon.merge import load_settings
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.scene import scene_of
@@ -44,7 +44,7 @@ class Parts:
         self.metrics, self.watch, self.taps, kept = Metrics(), Watch(ladder), Taps(0), Kept()
         self.events = kept.events
         self.desk = Desk(self.metrics, Publisher(self.metrics, (kept,)), self.watch)
-        self.hub = Hub(scene_of(load({"model": str(model), **given}, {})[0], ladder), ladder)
+        self.hub = Hub(scene_of(load_settings({"model": str(model), **given}, {})[0], ladder), ladder)
 
     def feed(self, name: str, frames: list[Frame], t: float) -> float:
         """Frames of a sensor at 15 Hz, from `t` s on; when the last one came."""

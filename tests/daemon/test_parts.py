@@ -20,7 +20,7 @@ from gestured.core.wire import Decoder
 from gestured.daemon import http, log
 from gestured.daemon.health import Pulse
 from gestured.daemon.http import HttpThread, as_json
-from gestured.daemon.merge import load
+from gestured.daemon.merge import load_settings
 from gestured.daemon.settings import FLAGS, Settings
 from gestured.daemon.sockets import AddressError, bind_udp
 from gestured.daemon.udp import Receiver
@@ -33,7 +33,7 @@ def test_flags_win_over_the_environment_that_over_the_file_that_over_defaults(tm
     path = tmp_path / "gestured.toml"
     path.write_text('model = "file"\nstale_s = 3\nmax_sensors = 7\npublish = ["osc://a:1"]\n')
     env = {"GESTURED_MODEL": "env", "GESTURED_STALE_S": "4", "GESTURED_CONFIG": str(path), "OTHER": "x"}
-    settings, sources = load({"model": "flag"}, env)
+    settings, sources = load_settings({"model": "flag"}, env)
     assert (settings.model, settings.stale_s, settings.max_sensors, settings.clock) == (
         "flag",
         4.0,
@@ -46,12 +46,12 @@ def test_flags_win_over_the_environment_that_over_the_file_that_over_defaults(tm
         "max_sensors": str(path),
         "publish": str(path),
     }
-    assert load({"config": str(path)}, {})[0].model == "file"
+    assert load_settings({"config": str(path)}, {})[0].model == "file"
 
 
 def test_lists_are_written_with_commas_or_repeated(tmp_path: Path) -> None:
     env = {"GESTURED_PUBLISH": "osc://127.0.0.1:1, osc://[::1]:2", "GESTURED_ALLOW": "10.0.0.0/8,::1"}
-    settings, _ = load({"gestures": "one_tap,swipe_left"}, env)
+    settings, _ = load_settings({"gestures": "one_tap,swipe_left"}, env)
     assert [str(a) for a in settings.publish] == ["127.0.0.1:1", "[::1]:2"]
     assert settings.allow == (ipaddress.ip_network("10.0.0.0/8"), ipaddress.ip_network("::1/128"))
     assert settings.gestures == ("one_tap", "swipe_left")
@@ -60,7 +60,7 @@ def test_lists_are_written_with_commas_or_repeated(tmp_path: Path) -> None:
 def test_a_subset_and_thresholds_stand_side_by_side_in_the_file(tmp_path: Path) -> None:
     path = tmp_path / "gestured.toml"
     path.write_text('[gestures]\nuse = ["one_tap"]\n[gestures.one_tap]\nthreshold = 0.9\nrefractory_s = 1\n')
-    settings, _ = load({"config": str(path)}, {})
+    settings, _ = load_settings({"config": str(path)}, {})
     assert settings.gestures == ("one_tap",)
     assert settings.per_gesture["one_tap"].threshold == 0.9 and settings.per_gesture["one_tap"].refractory_s == 1
 
@@ -68,7 +68,7 @@ def test_a_subset_and_thresholds_stand_side_by_side_in_the_file(tmp_path: Path) 
 @pytest.mark.parametrize("text", ["127.0.0.1", "127.0.0.1:70000", ":9000", "::1:9000", "a b:1", "", "host:-1"])
 def test_what_is_no_address(text: str) -> None:
     with pytest.raises(SettingsError, match=r"listen = .*command line.*expected HOST:PORT"):
-        load({"listen": text}, {})
+        load_settings({"listen": text}, {})
 
 
 def test_every_setting_is_described_and_the_defaults_can_be_written_down() -> None:

@@ -11,7 +11,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Onset
 from gestured.core.facts import Dropped
 from gestured.core.feed import HELD_S
 from gestured.core.hub import FORGET_S, Hub
-from gestured.daemon.merge import load
+from gestured.daemon.merge import load_settings
 from gestured.daemon.scene import scene_of
 from gestured.model.ladder import ladder_for
 from tests.daemon.harness import Daemon, Frame, Hand, Sensor, floats
@@ -27,7 +27,7 @@ class Room:
         self.events: list[Event] = []
         self.dropped: Counter[str] = Counter()
         ladder = ladder_for(model)
-        self.hub = Hub(scene_of(load({"model": str(model), **given}, {})[0], ladder), ladder)
+        self.hub = Hub(scene_of(load_settings({"model": str(model), **given}, {})[0], ladder), ladder)
         self.now = 0.0
         self._hand = Hand()
 

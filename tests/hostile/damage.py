@@ -29,7 +29,7 @@ from gestured.core.hub import Hub
 from gestured.daemon import log
 from gestured.daemon.backlog import Backlog, Datagram
 from gestured.daemon.health import TICK_S
-from gestured.daemon.merge import load
+from gestured.daemon.merge import load_settings
 from gestured.daemon.scene import scene_of
 from gestured.model.ladder import ladder_for
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
@@ -86,7 +86,7 @@ class Bench:
     def __init__(self, model: str) -> None:
         # Nothing here may depend on how fast this machine is: no rung is ever too slow.
         self._ladder = ladder_for(model, [], slow_s=math.inf)
-        self._scene = scene_of(load({"model": model}, {})[0], self._ladder)
+        self._scene = scene_of(load_settings({"model": model}, {})[0], self._ladder)
 
     def events(self, arrivals: list[tuple[float, bytes]], stalls: Sequence[Stall] = ()) -> list[dict[str, Any]]:
         """What the daemon says to (time in s, packet), in order of arrival, as a client's lines.

@@ -9,10 +9,10 @@ torch = pytest.importorskip("torch", reason="needs the extra [lab]")
 
 from torch import Tensor
 
+from gestured.core.measures import ACTIVE
 from gestured.lab.augment import symmetry_table, turned, varied
 from gestured.lab.dataset import from_take
 from gestured.lab.fit import CLASSES
-from gestured.lab.nets import ACTIVE
 from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
 from tests.lab.made import direction, direction_of, gestures
 

@@ -16,8 +16,8 @@ from gestured.lab.dataset import (
     STREAMS,
     TRIALS,
     WINDOW,
-    Performed,
     Samples,
+    Truth,
     collect,
     cuts,
     from_take,
@@ -97,13 +97,13 @@ def segment(onset: float, offset: float) -> Segment:
     return Segment(frames, onset + (np.arange(count + 2) - 1) / 15, 1, count, 2.0)
 
 
-def named(found: Segment, *performed: Performed) -> list[str]:
+def named(found: Segment, *performed: Truth) -> list[str]:
     return [label for _, label, *_ in matched([found], performed)]
 
 
 def test_a_segment_is_named_after_what_it_holds() -> None:
-    swipe = Performed("swipe_up", "swipe_up", 1, 10.0, 11.0)
-    palm = Performed("none", "palm", 1, 12.0, 13.0)
+    swipe = Truth("swipe_up", "swipe_up", 1, 10.0, 11.0)
+    palm = Truth("none", "palm", 1, 12.0, 13.0)
     assert named(segment(10.0, 11.0), swipe, palm) == ["swipe_up"]
     assert named(segment(12.2, 12.8), swipe, palm) == ["none"]
     assert named(segment(10.0, 10.2), swipe) == []  # a piece of a gesture is no example of it

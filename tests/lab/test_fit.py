@@ -196,7 +196,7 @@ def few(everyone: dict[str, Samples], monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("few")
 def test_nobody_is_on_two_sides_of_the_split(tmp_path: Path, everyone: dict[str, Samples]) -> None:
-    data = train.load(train.TrainingPlan(), tmp_path, None, 1)
+    data = train.load_data(train.TrainingPlan(), tmp_path, None, 1)
     parts = {"teach": data.teach, "calibrate": data.calibrate, **data.tests}
     people = {name: set(samples.people.tolist()) for name, samples in parts.items()}
     for a in people:
@@ -211,7 +211,7 @@ def test_nobody_is_on_two_sides_of_the_split(tmp_path: Path, everyone: dict[str,
 
 @pytest.mark.usefixtures("few")
 def test_the_plan_counts_what_was_performed(tmp_path: Path) -> None:
-    data = train.load(train.TrainingPlan(), tmp_path, None, 1)
+    data = train.load_data(train.TrainingPlan(), tmp_path, None, 1)
     assert data.performed["nominal"] == 6 * 90
 
 
@@ -224,7 +224,7 @@ def test_no_real_subject_is_judged_by_a_net_that_has_seen_it(
     tmp_path: Path, samples: Samples, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     real = named_people(samples, np.arange(len(samples)) % 7)
-    data = replace(train.load(train.TrainingPlan(), tmp_path, None, 1), real=real)
+    data = replace(train.load_data(train.TrainingPlan(), tmp_path, None, 1), real=real)
     taught: list[set[int]] = []
     judged: list[set[int]] = []
 

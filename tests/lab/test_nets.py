@@ -7,8 +7,9 @@ torch = pytest.importorskip("torch", reason="needs the extra [lab]")
 
 from torch import Tensor, nn
 
+from gestured.core.measures import ACTIVE
 from gestured.lab.fit import NETS, build
-from gestured.lab.nets import ACTIVE, CnnLstm, Decision, Judged, Lstm
+from gestured.lab.nets import CnnLstm, Decision, Judged, Lstm
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features
 from tests.lab.made import gestures
 

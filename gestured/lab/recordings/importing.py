@@ -10,7 +10,7 @@ from gestured.client.say import say, tell
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.recordings.safe import LeftOut
 from gestured.lab.recordings.sources import SESSION, Csv, read_capfingerid, read_csv
-from gestured.lab.recordings.store import join
+from gestured.lab.recordings.store import join_recordings
 from gestured.record.arrays import write
 from gestured.record.recordings import Recordings
 
@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
         say(line, to=sys.stderr if args.json else sys.stdout)
     if not parts:
         raise GesturedError("nothing could be imported, so nothing was written")
-    together = join(parts)
+    together = join_recordings(parts)
     write(args.out, together)
     found = {"recordings": len(together), "frames": len(together.frames), "lines_left_out": len(left),
              "files_left_out": len(refused)}  # fmt: skip

@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
     if not len(recordings):
         raise GesturedError(f"{args.file}: none of its recordings can be used; {left[0] if left else 'it is empty'}")
     if args.index is None:
-        figures = summary(recordings)
+        figures = overview(recordings)
     elif 0 <= args.index < len(recordings):
         figures = one(recordings, args.index)
     else:
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def summary(r: Recordings) -> dict[str, Any]:
+def overview(r: Recordings) -> dict[str, Any]:
     """Counts and figures over all recordings; times in seconds, pressure in counts above each taxel's own median."""
     rows, columns = r.frames.shape[1:]
     timing = [_timing(r.times_of(i)) for i in range(len(r))]

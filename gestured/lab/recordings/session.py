@@ -16,7 +16,7 @@ from gestured.client.picture import draw, trace
 from gestured.lab.recordings.live import LiveSensor
 from gestured.lab.recordings.protocol import INCLINATION_NAMES, Exercise, left
 from gestured.lab.recordings.quality import Captured, faults
-from gestured.lab.recordings.store import compact, join
+from gestured.lab.recordings.store import compact, join_recordings
 from gestured.lab.recordings.terminal import Ended, Terminal
 from gestured.record.arrays import write
 from gestured.record.check import FINGERS
@@ -163,7 +163,7 @@ class Session:
 
     def _keep(self, take: Captured, trial: Exercise) -> None:
         new = recording(take, trial, self.participant, self._consent)
-        together = new if self.kept is None else join([self.kept, new])
+        together = new if self.kept is None else join_recordings([self.kept, new])
         write(self.path, together)
         self.kept = together
         self._terminal.say(f"  kept, {len(together)} in {self.path}")

@@ -1,6 +1,6 @@
 """Sets of recordings put together, and what the front end marks in them."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
-from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, FrontEnd
-from gestured.lab.dataset import with_idle
+from gestured.lab.dataset import cuts, with_idle
 from gestured.record.check import EVENT_FIELDS, FINGERS
 from gestured.record.recordings import Recordings
 
@@ -23,7 +21,7 @@ UNKNOWN_VALUES = {
 TOGETHER = ("onsets", "releases")  # are left out where one set does not know them
 
 
-def join(parts: Sequence[Recordings]) -> Recordings:
+def join_recordings(parts: Sequence[Recordings]) -> Recordings:
     """Several sets as one, in that order; RecordingError where their grids differ.
 
     What one set does not know of its recordings is empty there (NaN for touches).
@@ -88,20 +86,9 @@ def touched(frames: NDArray[Any], times: NDArray[np.float64]) -> tuple[int, int]
     if first > 1 or last + 3 < len(times):
         tries.append(with_idle(frames, times, first, last, 0))
     for values, stamps, lead in tries:
-        found = list(segments(Frame(float(t), one) for t, one in zip(stamps, values, strict=True)))
+        found = cuts(values, stamps)
         if len(found) == 1:
             first, last = np.searchsorted(stamps, [found[0].onset, found[0].offset]) - lead
             if 0 <= first <= last < len(times):
                 return int(first), int(last)
     return None
-
-
-def segments(frames: Iterable[Frame]) -> Iterator[Segment]:
-    """What the front end cuts out of one recording."""
-    front, t = None, 0.0
-    for frame in frames:
-        front = front or FrontEnd("lab", *frame.values.shape)
-        t = frame.t
-        yield from (x.segment for x in front.push(frame) if isinstance(x, Cut))
-    if front is not None:
-        yield from (x.segment for x in front.flush(t + front.timing.stale_s) if isinstance(x, Cut))

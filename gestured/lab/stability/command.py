@@ -10,18 +10,19 @@ from pathlib import Path
 
 import numpy as np
 
+from gestured.lab.dataset import cuts
 from gestured.lab.stability.extremes import month_table, parts_table, whole_path_table
 from gestured.lab.stability.figure import svg
 from gestured.lab.stability.metamorphic import metamorphic_table
 from gestured.lab.stability.models import models_table
-from gestured.lab.stability.path import segments, simulated
+from gestured.lab.stability.path import simulated_series
 from gestured.lab.stability.relaxation import filters_table
 from gestured.lab.stability.table import Table
 from gestured.lab.stability.textbook import RANGES, points, textbook_table
 from gestured.model.model import LADDER, open_model
 
 
-def tables(quick: bool, out: Path | None) -> Iterator[Table]:
+def all_tables(quick: bool, out: Path | None) -> Iterator[Table]:
     """One after the other, as they are done; `out` is the folder that gets stability.svg."""
     yield filters_table(quick)
     panels = {title: points(low, high, np.float64, quick) for title, (low, high) in RANGES.items()}
@@ -36,8 +37,10 @@ def tables(quick: bool, out: Path | None) -> Iterator[Table]:
     yield whole_path_table(best, quick)
     yield month_table(best, 0.1 if quick else 30.0)
     window = best.metadata.window
-    some = simulated(10 if quick else 60)
-    yield models_table([window.apply(segment) for _, stream in some for segment in segments(stream)], quick)
+    some = simulated_series(10 if quick else 60)
+    yield models_table(
+        [window.apply(segment) for _, stream in some for segment in cuts(stream.frames, stream.times)], quick
+    )
     yield metamorphic_table(models, 10 if quick else 150)
 
 
@@ -48,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.json:
         print(where + "\n")
     done = []
-    for table in tables(args.quick, args.out):
+    for table in all_tables(args.quick, args.out):
         done.append(table.plain())
         if not args.json:
             print(table, flush=True)

@@ -190,7 +190,7 @@ def _held(count: int) -> Series:
     return Series(times, frames)
 
 
-def judged(case: Case, classifier: Classifier) -> tuple[int, str]:
+def swipes_found(case: Case, classifier: Classifier) -> tuple[int, str]:
     """(how many of the swipes were found, what is wrong otherwise)."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -209,7 +209,7 @@ def whole_path_table(classifier: Classifier, quick: bool) -> Table:
     """Each family of streams: how many swipes were found, and what went wrong."""
     kept: dict[str, list[tuple[int, int, str]]] = {}
     for case in streams(quick):
-        kept.setdefault(case.family, []).append((len(case.swipes), *judged(case, classifier)))
+        kept.setdefault(case.family, []).append((len(case.swipes), *swipes_found(case, classifier)))
     rows: list[tuple[Value, ...]] = []
     for family, verdicts in kept.items():
         wrong = [reason for _, _, reason in verdicts if reason]

@@ -11,7 +11,8 @@ import numpy as np
 
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Classifier
-from gestured.lab.stability.path import Array, Series, events, labels, segments, simulated
+from gestured.lab.dataset import cuts
+from gestured.lab.stability.path import Array, Series, events, labels, simulated_series
 from gestured.lab.stability.table import Table, Value
 
 MIRRORED = {
@@ -65,7 +66,7 @@ class Property:
         return one.shape == two.shape and bool((np.abs(one - two) <= step).all())
 
 
-def shifted(seconds: float) -> Property:
+def postponed(seconds: float) -> Property:
     """All times later."""
     return Property(f"{seconds:g} s later", times=lambda times: times + seconds)
 
@@ -101,7 +102,7 @@ def mirrored() -> Property:
     return Property("mirrored", frames=flip, picture=flip, names=MIRRORED)
 
 
-def turned() -> Property:
+def upside_down() -> Property:
     """Turned by 180 degrees."""
 
     def turn(frames: Array) -> Array:
@@ -124,7 +125,7 @@ def properties() -> list[Property]:
     """Those of the table."""
     gains = [scaled(gain) for gain in (1e-3, 2.0**-10, 0.5, 2.0, 2.0**10, 1e3)]
     levels = [raised(counts) for counts in (-200.0, 1e4, 6e6)]
-    return [shifted(86_400.0), shifted(2.0**30), *gains, *levels, mirrored(), turned(), doubled()]
+    return [postponed(86_400.0), postponed(2.0**30), *gains, *levels, mirrored(), upside_down(), doubled()]
 
 
 def on_grid(stream: Series) -> Series:
@@ -141,13 +142,13 @@ def renamed(found: tuple[str, ...], names: Mapping[str, str]) -> tuple[str, ...]
 
 def metamorphic_table(models: Mapping[str, Classifier], count: int) -> Table:
     """Each property on so many simulated gestures: segments that are the same, labels as they must be, by model."""
-    streams = [on_grid(stream) for _, stream in simulated(count)]
-    cut = [segments(stream) for stream in streams]
+    streams = [on_grid(stream) for _, stream in simulated_series(count)]
+    cut = [cuts(stream.frames, stream.times) for stream in streams]
     said = {name: [labels(events(stream, model)) for stream in streams] for name, model in models.items()}
     rows: list[tuple[Value, ...]] = []
     for change in properties():
         after = [change.apply(stream) for stream in streams]
-        same = sum(map(change.holds, cut, (segments(stream) for stream in after)))
+        same = sum(map(change.holds, cut, (cuts(stream.frames, stream.times) for stream in after)))
         shares: list[Value] = []
         for name, model in models.items():
             right = [

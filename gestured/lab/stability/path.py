@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
-from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.frames import Frame
+from gestured.core.front_end import FrontEnd
 from gestured.core.mounting import Mounting
 from gestured.core.recognizer import Classifier, Recognizer, events_of
 from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
@@ -27,7 +27,7 @@ class Series:
     frames: Array
 
 
-def simulated(count: int, seed: int = 41) -> Iterator[tuple[str, Series]]:
+def simulated_series(count: int, seed: int = 41) -> Iterator[tuple[str, Series]]:
     """So many simulated gestures, ten kinds in turn, a new person and sensor after each ten."""
     for k in range(count):
         kind, person = GESTURES[k % len(GESTURES)], 7000 + seed * 100 + k // len(GESTURES)
@@ -39,11 +39,6 @@ def contacts(stream: Series, mounting: Mounting | None = None) -> list[Any]:
     """What the front end makes of it."""
     front = FrontEnd("stability", *stream.frames.shape[1:], mounting=mounting)
     return _run(front.push, front.flush, stream)
-
-
-def segments(stream: Series) -> list[Segment]:
-    """What the front end cuts out of it."""
-    return [found.segment for found in contacts(stream) if isinstance(found, Cut)]
 
 
 def events(stream: Series, classifier: Classifier, mounting: Mounting | None = None) -> list[Event]:

@@ -59,7 +59,7 @@ def _scaled(samples: Samples, factor: Any) -> Samples:
     return replace(samples, frames=(samples.frames.astype(np.float32) * factor).astype(np.float16))
 
 
-def wanted(plan: Plan, tuned: Mapping[str, Values]) -> Iterator[Choice]:
+def wanted_choices(plan: Plan, tuned: Mapping[str, Values]) -> Iterator[Choice]:
     """Every choice with its tasks."""
 
     def alone(method: str, data: str = "simulated", **changed: Any) -> Task:
@@ -103,7 +103,7 @@ def choices(
     plan: Plan, tuned: Mapping[str, Values], cohort: Cohort, sets: Mapping[str, Data], schedule: Schedule
 ) -> list[dict[str, Any]]:
     """The section of study.json."""
-    asked = list(wanted(plan, tuned))
+    asked = list(wanted_choices(plan, tuned))
     tasks = [one for choice in asked for one in choice.tasks.values()]
     found = schedule.results(tasks, {**sets, **variants(cohort)}, "open choices")
     out = []

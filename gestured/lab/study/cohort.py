@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gestured.core.frames import Segment
 from gestured.core.window import Window
-from gestured.lab.dataset import TRIALS, WINDOW, Performed, Samples, collect, cuts, matched
+from gestured.lab.dataset import TRIALS, WINDOW, Samples, collect, cuts, matched, truths
 from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.record.files import PUBLIC, atomic_write
@@ -76,12 +76,12 @@ def _peak(segment: Segment) -> float:
 def _cut(seed: int, index: int) -> Segment | None:
     """The segment that holds most of a trial's gesture."""
     take = cohort_take(TRIALS[index], seed)
-    performed = [Performed(e.label, e.kind, e.participant, e.onset_s, e.offset_s) for e in take.events]
+    performed = truths(take)
     found = [segment for segment in cuts(take.frames, take.times) if any(matched([segment], performed))]
     return max(found, key=lambda s: min(s.offset, performed[0].offset) - max(s.onset, performed[0].onset), default=None)
 
 
-def load(cache: Path, trials: NDArray[np.int64], jobs: int) -> Cohort:
+def load_cohort(cache: Path, trials: NDArray[np.int64], jobs: int) -> Cohort:
     """The cohort's gestures of these trials, from `cache` where they were made before."""
     key = hashlib.sha256(code_digest(__name__).encode() + trials.tobytes()).hexdigest()
     path = cache / f"study-cohort-{len(trials)}-{key[:12]}.npz"

@@ -11,8 +11,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from gestured.core.measures import ACTIVE
 from gestured.lab.dataset import WINDOW, Samples
-from gestured.lab.nets import ACTIVE
 from gestured.lab.study.training import Indices, Net
 
 SHARES = (0.25, 0.5, 0.75, 1.0)
@@ -30,7 +30,7 @@ def moments(window: NDArray[np.floating]) -> tuple[int, list[int]]:
     return first, [first + max(math.ceil(share * (last - first + 1)), 1) - 1 for share in SHARES]
 
 
-def answers(model: Net, samples: Samples, chosen: Indices, seed: int) -> NDArray[np.int64]:
+def answers_over_time(model: Net, samples: Samples, chosen: Indices, seed: int) -> NDArray[np.int64]:
     """(n, points) class that the network names for each chosen gesture at each of `POINTS`."""
     out = np.zeros((len(chosen), len(POINTS)), np.int64)
     for row, i in enumerate(chosen):

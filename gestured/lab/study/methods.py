@@ -22,10 +22,9 @@ from torch import nn
 
 from gestured.lab.study import views
 from gestured.lab.study.nets import HistoryNet, sequence_net
-from gestured.lab.study.training import Inputs, train
+from gestured.lab.study.training import Indices, Inputs, train_net
 from gestured.lab.study.views import FRAMES, TOUCHES, TRAJECTORIES, WAVELETS, Values, View
 
-Indices = NDArray[np.int64]
 SPATIO_TEMPORAL, TOUCH_PATTERN, MOTION_HISTORY = (
     "spatio-temporal features",
     "touch-pattern features",
@@ -180,7 +179,7 @@ def _train(
     make: Callable[[int, Values], nn.Module],
     inputs: Inputs, index: Indices, labels: Indices, classes: int, values: Values, seed: int,
 ) -> Scorer:  # fmt: skip
-    return train(partial(make, classes, values), inputs, index, labels, values["steps"], values["rate"], seed)
+    return train_net(partial(make, classes, values), inputs, index, labels, values["steps"], values["rate"], seed)
 
 
 HISTORY_GRID = [

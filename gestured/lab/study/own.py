@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from gestured.core.errors import GesturedError, RecordingError
-from gestured.lab.dataset import NONE, Samples, join, recorded
+from gestured.lab.dataset import Samples, join, recorded
 from gestured.lab.recordings.safe import read_what_is_good
 from gestured.record.arrays import read
 from gestured.record.recordings import Recordings
-from gestured.simulator import GESTURES
+from gestured.simulator import GESTURES, NONE
 
 REAL_FILE = "capfingerid_gestures_dev.npz"
 REAL_NAME = "CapFingerId, development subjects: a capacitive touchscreen, no textile"

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from gestured.lab.study import elapsed
 from gestured.lab.study.material import SHIFT, Data, Pool, pool
-from gestured.lab.study.methods import METHODS, Indices, Scorer
+from gestured.lab.study.methods import METHODS, Scorer
 from gestured.lab.study.shifting import THRESHOLD
-from gestured.lab.study.training import Net
+from gestured.lab.study.training import Indices, Net
 from gestured.simulator import GESTURES
 
 PAPER, CLEAN, PARTICIPANTS, REAL = "paper", "clean", "participants", "real"
@@ -128,7 +128,7 @@ def run(task: Task, data: Data) -> Result:
             seen["version"] += np.isin(of.source[test], of.source[train]).tolist()
         if task.elapsed:
             assert isinstance(model, Net)
-            named = elapsed.answers(model, of.samples, test, task.seed)
+            named = elapsed.answers_over_time(model, of.samples, test, task.seed)
             early += (named == of.labels[test, None]).tolist()
     folds = found["fold"][-1] + 1
     return {**found, **seen, "elapsed": early, "train": taught // folds, "seconds": round(seconds, 3)}

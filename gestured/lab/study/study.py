@@ -14,7 +14,7 @@ import torch
 import gestured
 from gestured.core.errors import GesturedError
 from gestured.lab.cli import REAL_FOLDER
-from gestured.lab.dataset import NONE, Samples, simulated
+from gestured.lab.dataset import Samples, simulated
 from gestured.lab.digest import file_digest
 from gestured.lab.study import cohort, elapsed, failures, own, signals, tables
 from gestured.lab.study.cells import Schedule
@@ -32,7 +32,7 @@ from gestured.lab.study.tuning import tune
 from gestured.lab.study.views import Values
 from gestured.model.model import shipped
 from gestured.record.files import PUBLIC, atomic_write
-from gestured.simulator import GESTURES
+from gestured.simulator import GESTURES, NONE
 
 WIDE_SEED = 1  # of the stream that the shipped models learn from as well
 
@@ -59,7 +59,7 @@ def compute(plan: Plan, schedule: Schedule, folder: Path, recordings: Sequence[P
     start = time.monotonic()
     schedule.cache.mkdir(parents=True, exist_ok=True)
     mine = own.own(recordings)  # first, so that a wrong file is told of before half an hour of work
-    people = cohort.load(schedule.cache, plan.trials(), schedule.jobs)
+    people = cohort.load_cohort(schedule.cache, plan.trials(), schedule.jobs)
     real = own.real(folder, plan.real)
     wide = _strangers(plan, schedule)
     sets = {"simulated": Data.of("simulated", people.samples, wide)}

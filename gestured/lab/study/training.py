@@ -79,7 +79,7 @@ class Net:
         return found if order is None else found[np.argsort(order, kind="stable")]
 
 
-def train(
+def train_net(
     make: Callable[[], nn.Module], inputs: Inputs, index: Indices, labels: Indices, steps: int, rate: float, seed: int
 ) -> Net:
     """Fit a fresh network to the samples `index` (their classes are labels[index]) in `steps` batches."""

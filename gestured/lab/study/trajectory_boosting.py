@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from gestured.lab.dataset import Samples
 from gestured.lab.fit import padded
+from gestured.lab.study.training import LONGEST
 from gestured.lab.trajectory import trajectory_features
 
 BATCH_WINDOWS = 256
-LONGEST = 80  # frames
 
 
 def trajectory_matrix(samples: Samples) -> NDArray[np.float32]:

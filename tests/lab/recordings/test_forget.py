@@ -10,7 +10,7 @@ import pytest
 
 from gestured.lab.cli import main
 from gestured.lab.recordings.origin import Origin, origins
-from gestured.lab.recordings.store import join
+from gestured.lab.recordings.store import join_recordings
 from gestured.record.arrays import read, write
 from tests.small_recording import example, same, save, session
 
@@ -165,6 +165,6 @@ def vars_of(origin: Origin) -> dict[str, object]:
 
 def test_what_is_no_model_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "broken.onnx").write_bytes(b"no model at all")
-    write(tmp_path / "07.npz", join([of("07", "08"), of("08", "08")]))
+    write(tmp_path / "07.npz", join_recordings([of("07", "08"), of("08", "08")]))
     _, out, _ = run(capsys, "07", tmp_path / "07.npz", "--models", tmp_path, "--dry-run")
     assert f"model {tmp_path / 'broken.onnx'}: cannot be read: " in out

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gestured.core.errors import RecordingError
-from gestured.lab.recordings.store import compact, join, touched
+from gestured.lab.recordings.store import compact, join_recordings, touched
 from gestured.record.check import check
 from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
 from tests.small_recording import example, same, session
@@ -14,7 +14,7 @@ from tests.small_recording import example, same, session
 
 @pytest.mark.parametrize(("one", "other"), [(example(), example()), (session(), session()), (example(), session())])
 def test_what_was_joined_can_be_taken_apart(one, other) -> None:
-    together = join([one, other])
+    together = join_recordings([one, other])
     check(together)
     same(replace(together.take([0, 1]), **empty_events(one)), one)
     same(together.take([2, 3]), other)
@@ -29,7 +29,7 @@ def test_what_one_set_does_not_know_is_empty_there() -> None:
     bare = replace(
         example(), speeds=None, consents=None, touches=None, touch_ids=None, onsets=None, subjects=np.array(["a", "b"])
     )
-    together = join([bare, example()])
+    together = join_recordings([bare, example()])
     check(together)
     assert together.speeds is not None and together.consents is not None and together.touches is not None
     assert together.speeds.tolist() == ["", "", "fast", "slow"]
@@ -42,7 +42,7 @@ def test_what_one_set_does_not_know_is_empty_there() -> None:
 
 def test_two_grids_are_refused() -> None:
     with pytest.raises(RecordingError, match="one grid, found 2x3 and 3x3"):
-        join([example(), replace(example(), frames=np.zeros((10, 3, 3)))])
+        join_recordings([example(), replace(example(), frames=np.zeros((10, 3, 3)))])
 
 
 @pytest.mark.parametrize(

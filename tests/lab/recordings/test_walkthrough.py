@@ -13,7 +13,7 @@ from gestured.lab.cli import main, parser
 from gestured.lab.recordings.protocol import Exercise
 from gestured.lab.recordings.quality import Captured
 from gestured.lab.recordings.session import recording
-from gestured.lab.recordings.store import join, touched
+from gestured.lab.recordings.store import join_recordings, touched
 from gestured.record.arrays import read, write
 from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
 from tests.lab.recordings.test_import import capfingerid_lines, csv_lines, take, written
@@ -37,7 +37,7 @@ def test_the_walk_through_runs(
     monkeypatch.chdir(tmp_path)
     Path("recordings").mkdir()
     takes = [recording(collected(g), Exercise(g, "normal", 0), "07", "2026-01-31") for g in GESTURES]
-    write("recordings/07.npz", join(takes))
+    write("recordings/07.npz", join_recordings(takes))
     for name in ("left-1.csv", "left-2.csv"):
         written(Path(name), csv_lines(take()))
     written(Path("session.csv"), csv_lines(take(), 1e3))

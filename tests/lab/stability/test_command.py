@@ -33,7 +33,7 @@ def test_tables_are_printed_as_they_are_done_or_as_json(
         assert quick and out is None
         yield TABLE
 
-    monkeypatch.setattr(command, "tables", tables)
+    monkeypatch.setattr(command, "all_tables", tables)
     assert command.run(argparse.Namespace(quick=True, json=False, out=None)) == 0
     assert str(TABLE) in capsys.readouterr().out
     assert command.run(argparse.Namespace(quick=True, json=True, out=None)) == 0
@@ -43,6 +43,6 @@ def test_tables_are_printed_as_they_are_done_or_as_json(
 
 
 def test_the_figure_is_written_where_it_is_asked_for(tmp_path: Path) -> None:
-    some = command.tables(quick=True, out=tmp_path / "new")
+    some = command.all_tables(quick=True, out=tmp_path / "new")
     assert [next(some).title.split(":")[0] for _ in range(2)] == ["Filters", "Methods"]
     assert (tmp_path / "new" / "stability.svg").read_text().startswith("<svg")

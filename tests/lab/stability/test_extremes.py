@@ -10,11 +10,11 @@ from gestured.core.frames import Segment
 from gestured.core.recognizer import Scores
 from gestured.lab.stability.extremes import (
     Case,
-    judged,
     month_table,
     parts_table,
     streams,
     swipes,
+    swipes_found,
     whole_path_table,
 )
 from gestured.lab.stability.path import Series, fault
@@ -63,12 +63,12 @@ class Careless:
 def test_the_judge_sees_what_is_wrong(models: list[Model]) -> None:
     """Or the tables above would say nothing."""
     stream, when = swipes(1)
-    assert judged(Case("", stream, when, alone=True), models[0]) == (1, "")
-    assert judged(Case("", stream, alone=True), models[0])[1] == "answered swipe_right"
-    assert judged(Case("", stream, (0.2,)), models[0]) == (0, "")
+    assert swipes_found(Case("", stream, when, alone=True), models[0]) == (1, "")
+    assert swipes_found(Case("", stream, alone=True), models[0])[1] == "answered swipe_right"
+    assert swipes_found(Case("", stream, (0.2,)), models[0]) == (0, "")
     backwards = Series(stream.times[::-1], stream.frames)
-    assert judged(Case("", backwards), models[0])[1].startswith("ValueError")
-    assert "overflow" in judged(Case("", stream), Careless())[1]
+    assert swipes_found(Case("", backwards), models[0])[1].startswith("ValueError")
+    assert "overflow" in swipes_found(Case("", stream), Careless())[1]
     assert fault([Onset("s", 1, 0.0), Release("s", 1, 1.0)])
     assert fault([Onset("s", 1, 0.0), Cancelled("s", 2, "held")])
     assert next(streams(quick=True)).swipes

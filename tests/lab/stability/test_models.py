@@ -10,6 +10,7 @@ pytest.importorskip("sklearn", reason="needs the extra [lab]")
 import onnx
 from onnx import TensorProto
 
+from gestured.lab.dataset import cuts
 from gestured.lab.stability.models import (
     NET_CLASSES,
     by_frames,
@@ -19,7 +20,7 @@ from gestured.lab.stability.models import (
     loaded,
     widened,
 )
-from gestured.lab.stability.path import segments, simulated
+from gestured.lab.stability.path import simulated_series
 from gestured.model.model import LADDER, open_model, shipped
 
 TOLERANCE = 2e-6
@@ -30,7 +31,7 @@ def windows() -> list[np.ndarray]:
     if not all(path.exists() for path in shipped().values()):
         pytest.skip("the shipped models are not there")
     window = open_model(LADDER[0]).metadata.window
-    return [window.apply(segment) for _, stream in simulated(6) for segment in segments(stream)]
+    return [window.apply(segment) for _, stream in simulated_series(6) for segment in cuts(stream.frames, stream.times)]
 
 
 @pytest.mark.parametrize("name", NET_CLASSES)
