@@ -97,7 +97,7 @@ def _here(args: argparse.Namespace, source: Playable) -> int:
     try:
         replay = Replay(source.tape, scene, ladder)
     except RecordingError as error:
-        raise RecordingError(f"{args.file}: {error}") from None
+        raise RecordingError(f"{args.file}: {error}") from error
     lines = (json.loads(messages.to_json(event, replay.epoch)) for event in replay.events())
     if args.diff:
         return _compare(args, source, list(lines), _knew(replay))

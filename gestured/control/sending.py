@@ -41,7 +41,7 @@ def send(found: Tape, to: Address, speed: float) -> tuple[list[float], int]:
     try:
         family, kind, _, _, where = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
     except OSError as error:
-        raise GesturedError(f"cannot send to {to}: {error.strerror or error}") from None
+        raise GesturedError(f"cannot send to {to}: {error.strerror or error}") from error
     senders: dict[tuple[str, int], socket.socket] = {}
     sent: list[float] = []
     unheard = 0

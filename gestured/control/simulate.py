@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         sensor = Sensor(args.to, form)
     except OSError as error:
-        raise GesturedError(f"cannot send to {args.to}: {error.strerror or error}") from None
+        raise GesturedError(f"cannot send to {args.to}: {error.strerror or error}") from error
     what = f"{play.rows} x {play.columns} taxels at {play.rate_hz:g} Hz"
     say(f"sending {what} to {args.to} as {args.sensor}; Ctrl-C ends", to=sys.stderr)
     try:

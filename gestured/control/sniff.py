@@ -233,7 +233,7 @@ def _listen(address: Address, seconds: float) -> Iterator[tuple[float, str, byte
         receiver.bind(where)
     except OSError as error:
         hint = "; without --listen I ask the daemon that has it" if error.errno == 98 else ""
-        raise GesturedError(f"cannot listen on {address}: {error.strerror}{hint}") from None
+        raise GesturedError(f"cannot listen on {address}: {error.strerror}{hint}") from error
     with receiver:
         end = time.monotonic() + seconds
         say(f"listening on {address}", to=sys.stderr)

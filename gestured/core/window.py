@@ -35,7 +35,7 @@ class Window:
         try:
             found = json.loads(text)
         except (ValueError, RecursionError) as error:
-            raise ValueError(f"window: expected a JSON object, {error}") from None
+            raise ValueError(f"window: expected a JSON object, {error}") from error
         names = {f.name: f.type for f in fields(cls)}
         if not isinstance(found, dict) or set(found) != set(names):
             odd = sorted(set(found) ^ set(names)) if isinstance(found, dict) else []

@@ -29,7 +29,7 @@ class Canary:
         try:
             values = np.array([self._random.gauss(100.0, 1.0) for _ in range(CANARY_TAXELS * CANARY_TAXELS)])
             self._front_end.push(Frame(self._t, values.reshape(CANARY_TAXELS, CANARY_TAXELS)))
-        except Exception:
+        except Exception:  # whatever ends this frame ends those of every sensor
             self._desk.bug("in the way of the watchdog's frame")
             return False
         return True

@@ -36,9 +36,9 @@ def _from_file(path: str) -> dict[str, Any]:
     try:
         found = tomllib.loads(_read(path))
     except OSError as error:
-        raise SettingsError(f"config: cannot read {path}: {error.strerror}") from None
+        raise SettingsError(f"config: cannot read {path}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise SettingsError(f"config: {path} is not valid TOML: {error}") from None
+        raise SettingsError(f"config: {path} is not valid TOML: {error}") from error
     if "per_gesture" in found:  # our own name for the tables of [gestures], no key of the file's
         raise SettingsError(f"per_gesture ({path}): unknown key, expected [gestures.NAME]")
     if isinstance(found.get("gestures"), dict):
@@ -115,4 +115,4 @@ def load_settings(flags: Mapping[str, Any], environ: Mapping[str, str]) -> tuple
         return Settings.model_validate(merged), sources
     except ValidationError as error:
         problems = error.errors(include_url=False, include_context=False)
-        raise SettingsError("; ".join(dict.fromkeys(_explain(problem, sources) for problem in problems))) from None
+        raise SettingsError("; ".join(dict.fromkeys(_explain(problem, sources) for problem in problems))) from error

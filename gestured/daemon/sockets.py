@@ -33,14 +33,14 @@ def _bind(key: str, address: Address, kind: int) -> socket.socket:
         family, where = resolve(address, kind)
         sock = socket.socket(family, kind | socket.SOCK_NONBLOCK)
     except OSError as error:
-        raise AddressError(f"{key}: cannot use {address}: {error.strerror}") from None
+        raise AddressError(f"{key}: cannot use {address}: {error.strerror}") from error
     try:
         if kind == socket.SOCK_STREAM:
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         sock.bind(where)
     except OSError as error:
         sock.close()
-        raise AddressError(f"{key}: cannot bind {address}: {error.strerror}") from None
+        raise AddressError(f"{key}: cannot bind {address}: {error.strerror}") from error
     return sock
 
 
@@ -99,7 +99,7 @@ class UnixListener(Listener):
         try:
             self._lock = self._take_lock()
         except OSError as error:
-            raise AddressError(f"{self._key}: cannot make {self._lock_path}: {error.strerror}") from None
+            raise AddressError(f"{self._key}: cannot make {self._lock_path}: {error.strerror}") from error
         try:
             self._clear()
             self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK)
@@ -112,7 +112,7 @@ class UnixListener(Listener):
             self._inode = path.stat().st_ino
         except OSError as error:
             self._release_lock()
-            raise AddressError(f"{self._key}: cannot bind {path}: {error.strerror}") from None
+            raise AddressError(f"{self._key}: cannot bind {path}: {error.strerror}") from error
         except AddressError:
             self._release_lock()
             raise
@@ -169,6 +169,8 @@ def make_default_directory(directory: Path) -> None:
         directory.mkdir(0o700, parents=True, exist_ok=True)
         found = directory.lstat() if shared else directory.stat()
     except OSError as error:
-        raise AddressError(f"socket: cannot make {directory}: {error.strerror}; choose another with --socket") from None
+        raise AddressError(
+            f"socket: cannot make {directory}: {error.strerror}; choose another with --socket"
+        ) from error
     if not stat.S_ISDIR(found.st_mode) or (shared and found.st_uid != os.getuid()):
         raise AddressError(f"socket: {directory} is not a folder of ours; choose another with --socket")

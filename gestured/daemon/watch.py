@@ -37,7 +37,7 @@ class Watch:
             self.shift.see(decided.segment, decided.scores, decided.known)
             if self.shadow is not None:
                 self.shadow.see(decided.segment, decided.scores)
-        except Exception:
+        except Exception:  # the answer is out already, and is not the worse for it
             self._throttle.error("a bug, caught", "in what looks on while models answer")
 
     def compare(self, candidate: ModelProcess) -> Shadow:

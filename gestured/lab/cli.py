@@ -98,7 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             package = (error.name or "").split(".")[0]
             if package not in LAB_PACKAGES:
                 raise
-            raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from None
+            raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from error
         if args.command == "stability":
             return stability.run(args)
         if args.command == "study":

@@ -61,7 +61,7 @@ def evaluate_models(args: argparse.Namespace) -> int:
         try:
             write_block(args.readme, figures)
         except ValueError as error:
-            raise GesturedError(str(error)) from None
+            raise GesturedError(str(error)) from error
     if args.json:
         print(json.dumps(figures, indent=2))
     return 0

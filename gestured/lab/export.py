@@ -138,7 +138,7 @@ def write_manifest(directory: str | Path, figures: Mapping[str, Any]) -> Path:
                 "figures": figures.get(path.stem, {}),
             }
         except (ValueError, KeyError) as error:
-            raise ModelError(f"{path}: {error}") from None
+            raise ModelError(f"{path}: {error}") from error
     target = Path(directory) / "manifest.json"
     _write(target, (json.dumps({"models": _plain(models)}, indent=2, allow_nan=False) + "\n").encode())
     return target
@@ -196,7 +196,7 @@ def _finish(
         data = proto.SerializeToString(deterministic=True)
         largest = _compare(Model(data, path.stem), truth, inputs)
     except (ValueError, onnx.checker.ValidationError, onnx.shape_inference.InferenceError) as error:
-        raise ModelError(f"{path}: not written: {error}") from None
+        raise ModelError(f"{path}: not written: {error}") from error
     _write(path, data)
     return {"size": len(data), "largest_difference": largest}
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gestured.client.engine import Engine
-from gestured.client.score import Performed, Tally
+from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form, Sensor
 from gestured.client.stream import Stream
 from gestured.core.errors import GesturedError
@@ -71,6 +71,16 @@ def play(model: str, take: Take, speed: float) -> tuple[list[dict[str, Any]], fl
     return [e for e in heard if e["type"] in ("gesture", "unknown")], epoch - first, took
 
 
+def tallied(take: Take, zero: float, events: list[dict[str, Any]]) -> tuple[Tally, list[Outcome]]:
+    """The tally of a take whose time 0 was at `zero` (epoch seconds), and what became of each gesture that was told."""
+    tally = Tally()
+    for act in take.events:
+        tally.begin(Performed(act.label, act.kind, zero + act.onset_s, zero + act.offset_s))
+    outcomes = [outcome for event in events if (outcome := tally.hear(event, event["decided"]))]
+    tally.settle(float("inf"))
+    return tally, outcomes
+
+
 def run(args: argparse.Namespace) -> int:
     """`gestured-lab online`."""
     counts: Counter[str] = Counter()
@@ -87,16 +97,12 @@ def run(args: argparse.Namespace) -> int:
             idle_minutes, idle_false = idle_minutes + length / 60, idle_false + len(published)
             continue
         minutes += length / 60
-        tally = Tally()
-        for e in take.events:
-            tally.begin(Performed(e.label, e.kind, zero + e.onset_s, zero + e.offset_s))
-        for event in events:
-            outcome = tally.hear(event, event["decided"])
-            if outcome and outcome.verdict == "wrong" and outcome.performed:
-                wrong[f"{outcome.performed.label} -> {event['gesture']}"] += 1
-            if outcome and outcome.verdict == "false":
-                wrong[f"{outcome.performed.kind if outcome.performed else 'nothing'} -> {event['gesture']}"] += 1
-        tally.settle(float("inf"))
+        tally, outcomes = tallied(take, zero, events)
+        for outcome in outcomes:
+            if outcome.event is not None and outcome.verdict in ("wrong", "false"):
+                act = outcome.performed
+                done = "nothing" if act is None else act.label if outcome.verdict == "wrong" else act.kind
+                wrong[f"{done} -> {outcome.event['gesture']}"] += 1
         counts.update(tally.counts)
         waits += tally.latencies
         false += tally.counts["false"]

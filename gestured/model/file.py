@@ -69,7 +69,7 @@ def read_bytes(path: Path) -> bytes:
         # Non-blocking: opening a FIFO must not wait for a writer.
         file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
     except (OSError, ValueError) as error:
-        raise ValueError(f"cannot be opened: {getattr(error, 'strerror', None) or error}") from None
+        raise ValueError(f"cannot be opened: {getattr(error, 'strerror', None) or error}") from error
     with file:
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):
@@ -79,7 +79,7 @@ def read_bytes(path: Path) -> bytes:
         try:
             data = file.read(MAX_MODEL_BYTES + 1)
         except OSError as error:
-            raise ValueError(f"cannot be read: {error.strerror or error}") from None
+            raise ValueError(f"cannot be read: {error.strerror or error}") from error
     if not data:
         raise ValueError("is empty, expected an ONNX model")
     if len(data) > MAX_MODEL_BYTES:
@@ -285,7 +285,7 @@ class Metadata:
         try:
             window = Window.from_json(properties["window"])
         except ValueError as error:
-            raise ValueError(f"metadata 'window': {error}") from None
+            raise ValueError(f"metadata 'window': {error}") from error
         grid = {}
         for key in ("rows", "columns", "rate_hz"):
             try:

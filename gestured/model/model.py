@@ -74,7 +74,7 @@ class Model:
         try:
             scores, unknown = self.run(window[np.newaxis], RUN_S)
         except ValueError as error:
-            raise ModelError(f"{self.name}: {error}") from None
+            raise ModelError(f"{self.name}: {error}") from error
         return Scores(scores[0], float(unknown[0]), self.name, threshold=self.threshold)
 
     def run(
@@ -93,8 +93,8 @@ class Model:
                 scores, unknown = self._session.run(("scores", "unknown"), {self._input: batch}, options)
         except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
             if options.terminate:
-                raise ValueError(f"was ended after {limit_s:g} s, in which it did not answer") from None
-            raise ValueError(f"onnxruntime cannot run it: {_brief(error)}") from None
+                raise ValueError(f"was ended after {limit_s:g} s, in which it did not answer") from error
+            raise ValueError(f"onnxruntime cannot run it: {_brief(error)}") from error
         expected = (len(batch), len(self.gestures))
         if scores.shape != expected or unknown.shape != expected[:1]:
             found = f"{scores.shape} and {unknown.shape}"
@@ -160,7 +160,7 @@ class Model:
         try:
             scores, unknown = self.run(test.values, SELF_TEST_S)
         except ValueError as error:
-            raise ValueError(f"self-test: {error}") from None
+            raise ValueError(f"self-test: {error}") from error
         difference = float(max(np.abs(scores - test.scores).max(), np.abs(unknown - test.unknown).max()))
         if not difference <= TOLERANCE:
             raise ValueError(f"self-test: {difference:.3g} from the stored outputs, expected {TOLERANCE} at most")
@@ -190,7 +190,7 @@ def _open_session(data: bytes) -> Any:
     try:
         return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"], enable_fallback=0)
     except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
-        raise ValueError(f"onnxruntime cannot open it: {_brief(error)}") from None
+        raise ValueError(f"onnxruntime cannot open it: {_brief(error)}") from error
 
 
 def _brief(error: BaseException) -> str:
@@ -255,7 +255,7 @@ def _read(source: str | Path) -> tuple[Path, str | None, bytes]:
             if hashlib.sha256(data).hexdigest() != expected:
                 raise ValueError(f"is not the shipped file: expected the sha256 {expected} of manifest.json")
     except ValueError as error:
-        raise ModelError(f"{path}: {error}") from None
+        raise ModelError(f"{path}: {error}") from error
     return path, name, data
 
 
@@ -281,7 +281,7 @@ def open_model(source: str | Path, tried: str | None = None) -> Model:
             raise ValueError("is not the file that was tried any more; a reload takes the new one")
         return Model(data, path.stem)
     except ValueError as error:
-        raise ModelError(f"{path}: {error}") from None
+        raise ModelError(f"{path}: {error}") from error
 
 
 def look_at(source: str | Path) -> tuple[tuple[str, ...], str]:
@@ -296,7 +296,7 @@ def look_at(source: str | Path) -> tuple[tuple[str, ...], str]:
             return tuple(report["gestures"]), report["sha256"]
         return Metadata.parse(inspect(data)).gestures, hashlib.sha256(data).hexdigest()
     except ValueError as error:
-        raise ModelError(f"{path}: {error}") from None
+        raise ModelError(f"{path}: {error}") from error
 
 
 def open_apart(source: str | Path) -> ModelProcess:
@@ -305,7 +305,7 @@ def open_apart(source: str | Path) -> ModelProcess:
     try:
         return ModelProcess(data, path.stem)
     except ValueError as error:
-        raise ModelError(f"{path}: {error}") from None
+        raise ModelError(f"{path}: {error}") from error
 
 
 def check(source: str | Path) -> dict[str, Any]:
@@ -314,6 +314,6 @@ def check(source: str | Path) -> dict[str, Any]:
     try:
         report = try_out(data) if name is None else Model(data, path.stem).report()
     except ValueError as error:
-        raise ModelError(f"{path}: {error}") from None
+        raise ModelError(f"{path}: {error}") from error
     first = {key: report[key] for key in ("kind", "version")}
     return {"file": str(path), "name": path.stem, **first, "shipped": name is not None} | report

@@ -63,7 +63,7 @@ class ModelProcess:
         try:
             answer = self._ask(content.getvalue(), CHILD_RUN_S)
         except ValueError as error:
-            raise ModelError(f"{self.name}: {error}") from None
+            raise ModelError(f"{self.name}: {error}") from error
         return Scores(
             np.array(answer["scores"], np.float32), answer["unknown"], self.name, threshold=answer["threshold"]
         )
@@ -144,7 +144,7 @@ def _start() -> "subprocess.Popen[bytes]":
             start_new_session=True,  # Ctrl-C is for us
         )
     except OSError as error:
-        raise ValueError(f"no process could be started to try it: {error.strerror or error}") from None
+        raise ValueError(f"no process could be started to try it: {error.strerror or error}") from error
     _children.add(child)
     if _ending:
         child.kill()

@@ -33,7 +33,7 @@ def read(path: str | Path) -> Recordings:
         found = load(path, look=check_all_but_frames)
         check_frames(found)
     except Wrong as error:
-        raise RecordingError(f"{path}: {error}") from None
+        raise RecordingError(f"{path}: {error}") from error
     return found
 
 
@@ -48,9 +48,9 @@ def write(path: str | Path, recordings: Recordings) -> None:
         with atomic_write(path) as file:
             _pack(file, recordings)
     except Wrong as error:
-        raise RecordingError(f"{path}: not written: {error}") from None
+        raise RecordingError(f"{path}: not written: {error}") from error
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be written: {brief(error)}") from None
+        raise RecordingError(f"{path}: cannot be written: {brief(error)}") from error
 
 
 def load(path: str | Path, without: Collection[str] = (), look: Callable[[Recordings], None] = structure) -> Recordings:
@@ -72,7 +72,7 @@ def load(path: str | Path, without: Collection[str] = (), look: Callable[[Record
     except Wrong:
         raise
     except Exception as error:  # of a damaged file zipfile raises a dozen types
-        raise Wrong(f"cannot be read as a recording (.npz): {brief(error)}") from None
+        raise Wrong(f"cannot be read as a recording (.npz): {brief(error)}") from error
 
 
 def _pack(file: IO[bytes], recordings: Recordings) -> None:

@@ -102,7 +102,7 @@ def _unpacked(chunk: bytes) -> bytes:
     except Damaged:
         raise
     except Exception as error:  # each library has errors of its own
-        raise Damaged(f"a chunk cannot be unpacked: {error}") from None
+        raise Damaged(f"a chunk cannot be unpacked: {error}") from error
     if len(data) != size or (checksum and zlib.crc32(data) != checksum):
         raise Damaged(f"a chunk does not unpack to its {size} bytes")
     return data

@@ -107,9 +107,9 @@ class Archive:
             with self._zip.open(info) as member:
                 yield member
         except Wrong as error:
-            raise Wrong(f"{field}: {error}", field) from None
+            raise Wrong(f"{field}: {error}", field) from error
         except Exception as error:  # of a damaged file zipfile and NumPy's header parser raise a dozen types
-            raise Wrong(f"{field}: is damaged: {brief(error)}", field) from None
+            raise Wrong(f"{field}: is damaged: {brief(error)}", field) from error
 
 
 def _check_directory(file: BinaryIO) -> None:

@@ -117,7 +117,7 @@ class Writer:
         try:
             self._file = create(path)
         except OSError as error:
-            raise RecordingError(f"{path}: cannot be made: {error.strerror}") from None
+            raise RecordingError(f"{path}: cannot be made: {error.strerror}") from error
         self._mcap = mcap.writer.Writer(self._file, chunk_size=CHUNK_BYTES)
         self._mcap.start(profile="gestured", library="gestured")
         self._mcap.add_metadata(SCENE, {"json": json.dumps(scene)})
@@ -178,7 +178,7 @@ class Writer:
             yield
         except OSError as error:
             self._broken = True
-            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}; good up to there") from None
+            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}; good up to there") from error
 
     def _add(self, channel: int, t_ns: int, data: bytes) -> None:
         with self._writing():  # a chunk that is full is written now
@@ -219,12 +219,12 @@ def read(path: str | Path) -> Tape:
         whole = False
     except Damaged as error:
         if reading.scene is None:
-            raise RecordingError(f"{path}: is no recording of gesturectl (MCAP): {error}") from None
+            raise RecordingError(f"{path}: is no recording of gesturectl (MCAP): {error}") from error
         whole = False
     except (_Wrong, TooLarge) as error:
-        raise RecordingError(f"{path}: {error}") from None
+        raise RecordingError(f"{path}: {error}") from error
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
+        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
     if reading.scene is None:
         raise RecordingError(f"{path}: has no metadata {SCENE!r}, expected a recording of gesturectl (MCAP)")
     return Tape(reading.scene, tuple(reading.packets), tuple(reading.events), whole)

@@ -70,7 +70,7 @@ class LiveSensor:
             self.socket.bind(where)
         except OSError as error:
             reason = error.strerror or error
-            raise GesturedError(f"cannot listen on {self.where}: {reason}; does a daemon listen there?") from None
+            raise GesturedError(f"cannot listen on {self.where}: {reason}; does a daemon listen there?") from error
 
     def close(self) -> None:
         """Stop listening."""

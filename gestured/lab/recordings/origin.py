@@ -37,4 +37,4 @@ def said(model: Path) -> list[Origin] | None:
     try:
         return [Origin(str(o["file"]), str(o["sha256"]), [str(s) for s in o["subjects"]]) for o in json.loads(text)]
     except (TypeError, KeyError, RecursionError) as error:
-        raise ValueError(f"{KEY}: expected a list of file, sha256 and subjects: {error}") from None
+        raise ValueError(f"{KEY}: expected a list of file, sha256 and subjects: {error}") from error

@@ -50,7 +50,7 @@ def read_what_is_good(path: str | Path) -> tuple[Recordings, list[LeftOut]]:
             break
         except Wrong as error:
             if error.field in without or error.field not in OPTIONAL:
-                raise RecordingError(f"{path}: {error}") from None
+                raise RecordingError(f"{path}: {error}") from error
             without |= OPTIONAL[error.field]
             left.append(LeftOut(path, None, error.field, str(error)))
     try:

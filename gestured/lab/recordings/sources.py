@@ -186,7 +186,7 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
                 if text := line.strip():
                     yield number, text
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
+        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def _number(cell: str) -> float | None:

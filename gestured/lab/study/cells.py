@@ -90,7 +90,7 @@ def _backend(cluster: str | None, sets: Mapping[str, Data]) -> Iterator[None]:
     try:
         client = Client(cluster, timeout=10)
     except (OSError, ValueError) as error:
-        raise GesturedError(f"--cluster: no Dask scheduler answers at {cluster}: {error}") from None
+        raise GesturedError(f"--cluster: no Dask scheduler answers at {cluster}: {error}") from error
     with client, parallel_config(backend="dask", scatter=list(sets.values())):
         yield
 

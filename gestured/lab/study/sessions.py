@@ -14,12 +14,11 @@ import torch
 from torch import Tensor, nn
 
 import gestured
-from gestured.client.score import Performed, Tally
 from gestured.core.features import feature_names
 from gestured.lab.dataset import WINDOW
 from gestured.lab.export import export_forest, export_net
 from gestured.lab.nets import last_active
-from gestured.lab.online import play, takes
+from gestured.lab.online import play, takes, tallied
 from gestured.lab.progress import progress
 from gestured.lab.study.bootstrap import interval
 from gestured.lab.study.material import SHIFT, Data, pool
@@ -77,12 +76,7 @@ def score(model: str, sessions: list[Take], title: str) -> dict[str, Any]:
     minutes = 0.0
     for person, take in enumerate(progress(sessions, len(sessions), title)):
         events, zero, _ = play(model, take, SPEED)
-        tally = Tally()
-        for e in take.events:
-            tally.begin(Performed(e.label, e.kind, zero + e.onset_s, zero + e.offset_s))
-        for event in events:
-            tally.hear(event, event["decided"])
-        tally.settle(float("inf"))
+        tally, _ = tallied(take, zero, events)
         for key in counts:
             counts[key] += tally.counts[key]
         performed = tally.counts["right"] + tally.counts["wrong"] + tally.counts["missed"]
