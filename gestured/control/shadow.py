@@ -42,9 +42,8 @@ def run(args: argparse.Namespace) -> int:
                 report = control.ask("shadow", model=model)["shadow"]
             except Refused as error:
                 hint = "; you see this file, the service sees neither /home nor /tmp: put it into /etc/gestured"
-                raise Refused(
-                    f"{error}{hint if path.is_file() and 'cannot be opened' in str(error) else ''}"
-                ) from error
+                unseen = path.is_file() and "cannot be opened" in str(error)
+                raise Refused(f"{error}{hint if unseen else ''}") from error
         else:
             report = control.ask("status")["shadow"]
     if args.json:

@@ -10,6 +10,7 @@ import math
 import tempfile
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -33,27 +34,44 @@ BATCHES = (1, 2, 7)
 CHECKED_LENGTHS = (1, 2, 15, 60, 500)  # frames
 
 
-def export_net(
-    module: torch.nn.Module,
-    path: str | Path,
-    *,
-    kind: str,
-    version: str,
-    gestures: Sequence[str],
-    window: Window,
-    calibration: Mapping[str, Any],
-    training_data: str,
-    quantiles: Mapping[str, Any],
-    learned_from: Sequence[Mapping[str, Any]] | None = None,
-) -> dict[str, float]:
+@dataclass(frozen=True)
+class Facts:
+    """What a model's file says of it, whatever its kind."""
+
+    kind: str
+    version: str
+    gestures: Sequence[str]
+    window: Window
+    calibration: Mapping[str, Any]
+    training_data: str  # sha256
+    quantiles: Mapping[str, Any]
+    learned_from: Sequence[Mapping[str, Any]] | None = None  # `origins`; None where nobody knows
+
+    def metadata(self) -> dict[str, str]:
+        """As it stands in the file."""
+        people = {} if self.learned_from is None else {origin.KEY: json.dumps([dict(one) for one in self.learned_from])}
+        return people | {
+            "gestures": json.dumps(list(self.gestures)),
+            "kind": self.kind,
+            "version": self.version,
+            "rows": str(self.window.rows),
+            "columns": str(self.window.columns),
+            "rate_hz": repr(self.window.rate_hz),
+            "window": self.window.to_json(),
+            "calibration": json.dumps(dict(self.calibration), allow_nan=False),
+            "training_data": self.training_data,
+            "quantiles": json.dumps(dict(self.quantiles), allow_nan=False),
+        }
+
+
+def export_net(module: torch.nn.Module, path: str | Path, facts: Facts) -> dict[str, float]:
     """Write a torch module whose `forward` takes frames (B, T, R, C) and gives calibrated outputs.
 
-    `forward` returns (scores (B, G), unknown (B,)). B and T stay open. `learned_from` are the recordings of people
-    (`recordings.origin`), None where nobody knows. Gives the file's size in bytes and the
-    largest difference from torch; raises ModelError where it is above `PARITY` or a check fails.
+    `forward` returns (scores (B, G), unknown (B,)). B and T stay open. Gives the file's size in bytes and the largest
+    difference from torch; raises ModelError where it is above `PARITY` or a check fails.
     """
     module = module.eval()
-    rows, columns = window.rows, window.columns
+    rows, columns = facts.window.rows, facts.window.columns
 
     def truth(frames: NDArray[np.float32]) -> Outputs:
         with torch.no_grad():
@@ -78,44 +96,31 @@ def export_net(
         )
         proto = onnx.load(traced)
     example = np.round(_windows(2, 12, rows, columns), 3)
-    metadata = _metadata(kind, version, gestures, window, calibration, training_data, quantiles, learned_from)
     inputs = [_windows(b, t, rows, columns) for b in BATCHES for t in CHECKED_LENGTHS]
-    return _finish(proto, Path(path), metadata, example, truth, inputs)
+    return _finish(proto, Path(path), facts.metadata(), example, truth, inputs)
 
 
 def export_forest(
-    forest: RandomForestClassifier,
-    path: str | Path,
-    *,
-    kind: str,
-    version: str,
-    gestures: Sequence[str],
-    window: Window,
-    calibration: Mapping[str, Any],
-    training_data: str,
-    quantiles: Mapping[str, Any],
-    features: Sequence[str],
-    learned_from: Sequence[Mapping[str, Any]] | None = None,
+    forest: RandomForestClassifier, path: str | Path, facts: Facts, features: Sequence[str]
 ) -> dict[str, float]:
     """Write a random forest over `features`; its classes are 0 .. G-1 for the gestures, the others for none.
 
     The outputs are those of `forest_outputs`. Gives the file's size in bytes and the largest difference from
     scikit-learn; raises ModelError where it is above `PARITY` or a check fails.
     """
-    count = len(gestures)
+    count = len(facts.gestures)
     if not np.array_equal(forest.classes_, np.arange(len(forest.classes_))) or len(forest.classes_) < count:
         raise ModelError(f"{path}: the forest's classes are {forest.classes_}, expected 0, 1 ... {count - 1} first")
     if forest.n_features_in_ != len(features):
         raise ModelError(f"{path}: the forest takes {forest.n_features_in_} features, expected {len(features)}")
 
     def truth(values: NDArray[np.float32]) -> Outputs:
-        return forest_outputs(forest.predict_proba(values), count, calibration)
+        return forest_outputs(forest.predict_proba(values), count, facts.calibration)
 
     sample = around_thresholds(forest, 508)
-    metadata = _metadata(kind, version, gestures, window, calibration, training_data, quantiles, learned_from)
-    metadata["features"] = json.dumps(list(features))
+    metadata = facts.metadata() | {"features": json.dumps(list(features))}
     inputs = [sample[start : start + size] for start, size in ((0, 1), (1, 2), (3, 5), (8, 500))]
-    return _finish(forest_graph(forest, count, calibration), Path(path), metadata, sample[:4], truth, inputs)
+    return _finish(forest_graph(forest, count, facts.calibration), Path(path), metadata, sample[:4], truth, inputs)
 
 
 def write_manifest(directory: str | Path, figures: Mapping[str, Any]) -> Path:
@@ -149,31 +154,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _plain(of) for key, of in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _metadata(
-    kind: str,
-    version: str,
-    gestures: Sequence[str],
-    window: Window,
-    calibration: Mapping[str, Any],
-    training_data: str,
-    quantiles: Mapping[str, Any],
-    learned_from: Sequence[Mapping[str, Any]] | None,
-) -> dict[str, str]:
-    people = {} if learned_from is None else {origin.KEY: json.dumps([dict(one) for one in learned_from])}
-    return people | {
-        "gestures": json.dumps(list(gestures)),
-        "kind": kind,
-        "version": version,
-        "rows": str(window.rows),
-        "columns": str(window.columns),
-        "rate_hz": repr(window.rate_hz),
-        "window": window.to_json(),
-        "calibration": json.dumps(dict(calibration), allow_nan=False),
-        "training_data": training_data,
-        "quantiles": json.dumps(dict(quantiles), allow_nan=False),
-    }
 
 
 def _finish(

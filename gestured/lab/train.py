@@ -7,7 +7,6 @@ networks that have not seen them: three folds, which share what was learned from
 
 import hashlib
 import json
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ from gestured.core.measures import MEASURES, measures
 from gestured.lab.dataset import OTHER_TRIALS, TRIALS, WINDOW, Samples, join, recorded, simulated
 from gestured.lab.decide import fit_decision, threshold
 from gestured.lab.digest import code_digest
-from gestured.lab.export import export_forest, export_net, write_manifest
+from gestured.lab.export import Facts, export_forest, export_net, write_manifest
 from gestured.lab.fit import CLASSES, FitConfig, finetune, load_nets, logits, pretrain, save_nets, targets
 from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.nets import Judged
@@ -272,11 +271,10 @@ def train(plan: TrainingPlan, out: Path, cache: Path, real: Path | None, jobs: i
     for name in ("cnn_lstm", "lstm"):
         module, calibration, answered = judged(trained, name, calibrated)
         common |= {"kind": name, "calibration": calibration, "quantiles": seen | answered}
-        export_net(module, out / f"{name}.onnx", **common)
+        export_net(module, out / f"{name}.onnx", Facts(**common))
     forest, calibration, answered = grow_forest(data, plan, jobs)
     common |= {"kind": "touch_pattern_rf", "calibration": calibration, "quantiles": seen | answered}
-    features: Sequence[str] = feature_names(WINDOW.rows, WINDOW.columns)
     path = out / "touch_pattern_rf.onnx"
-    export_forest(forest, path, features=features, **common)
+    export_forest(forest, path, Facts(**common), feature_names(WINDOW.rows, WINDOW.columns))
     write_manifest(out, {})
     return data

@@ -176,7 +176,7 @@ def test_the_default_socket_is_where_the_daemon_keeps_it(monkeypatch, tmp_path):
         {"XDG_RUNTIME_DIR": "/run/user/1"},
         {"RUNTIME_DIRECTORY": "/run/a:/run/b", "XDG_RUNTIME_DIR": "/c"},
     ):
-        assert address.default_socket(given) == daemons(given)
+        assert address.find_socket(given) == daemons(given)
 
 
 def test_a_gesture_that_the_daemon_does_not_know_is_said(start, fake):

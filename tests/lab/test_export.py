@@ -25,7 +25,7 @@ from gestured.core.errors import ModelError
 from gestured.core.features import feature_names
 from gestured.core.frames import Segment
 from gestured.core.window import Window
-from gestured.lab.export import export_forest, export_net, write_manifest
+from gestured.lab.export import Facts, export_forest, export_net, write_manifest
 from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.recordings.origin import Origin, said
 from gestured.model.model import open_model
@@ -84,7 +84,7 @@ def one_thread() -> Iterator[None]:
 def net(tmp_path_factory: pytest.TempPathFactory) -> tuple[Net, Path, dict[str, float]]:
     module = Net()
     path = tmp_path_factory.mktemp("net") / "test_net.onnx"
-    return module, path, export_net(module, path, **CARD)
+    return module, path, export_net(module, path, Facts(**CARD))
 
 
 def segment() -> Segment:
@@ -131,7 +131,7 @@ def test_file_names_no_place_on_this_machine(net: tuple[Net, Path, dict[str, flo
 
 
 def test_the_same_module_is_the_same_file(net: tuple[Net, Path, dict[str, float]], tmp_path: Path) -> None:
-    export_net(net[0], tmp_path / "again.onnx", **CARD)
+    export_net(net[0], tmp_path / "again.onnx", Facts(**CARD))
     assert (tmp_path / "again.onnx").read_bytes() == net[1].read_bytes()
 
 
@@ -162,7 +162,7 @@ class Logits(Net):
 @pytest.mark.parametrize("module", [Frozen(), Mixing(), Logits()], ids=lambda m: type(m).__name__)
 def test_net_that_the_file_cannot_stand_for_is_not_written(module: Net, tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"wrong\.onnx: not written"):
-        export_net(module, tmp_path / "wrong.onnx", **CARD)
+        export_net(module, tmp_path / "wrong.onnx", Facts(**CARD))
     assert os.listdir(tmp_path) == []
 
 
@@ -172,7 +172,7 @@ def test_net_that_the_file_cannot_stand_for_is_not_written(module: Net, tmp_path
 )
 def test_metadata_that_would_be_refused_is_not_written(key: str, value: Any, tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="not written"):
-        export_net(Net(), tmp_path / "wrong.onnx", **{**CARD, key: value})
+        export_net(Net(), tmp_path / "wrong.onnx", Facts(**{**CARD, key: value}))
     assert os.listdir(tmp_path) == []
 
 
@@ -191,7 +191,7 @@ def forest(classes: int, trees: int = 12, depth: int | None = 5, seed: int = 0) 
 @pytest.mark.parametrize(("classes", "trees", "depth"), [(3, 1, 1), (3, 12, 5), (5, 12, 5), (4, 3, None), (6, 40, 9)])
 def test_forest_equals_scikit_learn(classes: int, trees: int, depth: int | None, tmp_path: Path) -> None:
     trained = forest(classes, trees, depth)
-    report = export_forest(trained, tmp_path / "rf.onnx", **CARD, features=FEATURES)
+    report = export_forest(trained, tmp_path / "rf.onnx", Facts(**CARD), FEATURES)
     assert report["largest_difference"] <= 1e-4
     model = open_model(tmp_path / "rf.onnx")
     values = np.random.default_rng(5).normal(size=(300, len(FEATURES))).astype(np.float32) * 3
@@ -205,7 +205,7 @@ def test_forest_equals_scikit_learn(classes: int, trees: int, depth: int | None,
 
 def test_values_on_a_threshold_go_where_scikit_learn_sends_them(tmp_path: Path) -> None:
     trained = forest(5)
-    export_forest(trained, tmp_path / "rf.onnx", **CARD, features=FEATURES)
+    export_forest(trained, tmp_path / "rf.onnx", Facts(**CARD), FEATURES)
     model = open_model(tmp_path / "rf.onnx")
     thresholds = np.concatenate([tree.tree_.threshold for tree in trained.estimators_])
     for toward in (-np.inf, 0.0, np.inf):
@@ -233,17 +233,17 @@ def test_temperature_sharpens_and_flattens() -> None:
 def test_forest_that_does_not_fit_is_not_written(tmp_path: Path) -> None:
     path = tmp_path / "rf.onnx"
     with pytest.raises(ModelError, match="features"):
-        export_forest(forest(5), path, **CARD, features=FEATURES[:-1])
+        export_forest(forest(5), path, Facts(**CARD), FEATURES[:-1])
     with pytest.raises(ModelError, match="'features'"):
-        export_forest(forest(5), path, **CARD, features=FEATURES[::-1])
+        export_forest(forest(5), path, Facts(**CARD), FEATURES[::-1])
     with pytest.raises(ModelError, match="classes"):
-        export_forest(forest(2), path, **CARD, features=FEATURES)
+        export_forest(forest(2), path, Facts(**CARD), FEATURES)
     named = forest(5).set_params(n_estimators=1)
     named.fit(np.zeros((6, len(FEATURES))), np.array(["a", "b", "c"] * 2))
     with pytest.raises(ModelError, match="classes"):
-        export_forest(named, path, **CARD, features=FEATURES)
+        export_forest(named, path, Facts(**CARD), FEATURES)
     with pytest.raises(ModelError, match="temperature"):
-        export_forest(forest(3), path, **{**CARD, "calibration": {"temperature": 0}}, features=FEATURES)
+        export_forest(forest(3), path, Facts(**{**CARD, "calibration": {"temperature": 0}}), FEATURES)
     assert os.listdir(tmp_path) == []
 
 
@@ -251,7 +251,7 @@ def test_forest_that_does_not_fit_is_not_written(tmp_path: Path) -> None:
 def test_a_model_says_whose_recordings_it_learned_from(learned: list[Origin] | None, tmp_path: Path) -> None:
     path = tmp_path / "model.onnx"
     people = None if learned is None else [asdict(one) for one in learned]
-    export_forest(forest(5), path, **CARD, features=FEATURES, learned_from=people)
+    export_forest(forest(5), path, Facts(**CARD, learned_from=people), FEATURES)
     assert said(path) == learned
     assert open_model(path).gestures == GESTURES
 
@@ -261,7 +261,7 @@ def test_a_model_says_whose_recordings_it_learned_from(learned: list[Origin] | N
 
 def test_manifest_knows_every_file(net: tuple[Net, Path, dict[str, float]], tmp_path: Path) -> None:
     (tmp_path / "cnn_lstm.onnx").write_bytes(net[1].read_bytes())
-    export_forest(forest(5), tmp_path / "touch_pattern_rf.onnx", **CARD, features=FEATURES)
+    export_forest(forest(5), tmp_path / "touch_pattern_rf.onnx", Facts(**CARD), FEATURES)
     path = write_manifest(tmp_path, {"cnn_lstm": {"accuracy": 0.97}})
     models = json.loads(path.read_text())["models"]
     assert sorted(models) == ["cnn_lstm.onnx", "touch_pattern_rf.onnx"]

@@ -8,13 +8,12 @@ from pathlib import Path
 
 from gestured.client.say import say, tell
 from gestured.core.errors import GesturedError, RecordingError
-from gestured.lab.recordings.safe import LeftOut
+from gestured.lab.recordings.safe import LEFT_OUT_SHOWN, LeftOut
 from gestured.lab.recordings.sources import SESSION, Csv, read_capfingerid, read_csv
 from gestured.lab.recordings.store import join_recordings
 from gestured.record.arrays import write
 from gestured.record.recordings import Recordings
 
-SHOWN = 10  # of what was left out; the rest is counted
 CSV_ALONE = ("rows", "columns", "time_unit", "label", "participant", "consent")
 
 
@@ -36,8 +35,8 @@ def run(args: argparse.Namespace) -> int:
             raise GesturedError(f"{path}: expected the grid of {args.files[0]}")
         parts.append(recordings)
         left += gone
-    more = [f"and {len(left) - SHOWN} lines more"] if len(left) > SHOWN else []
-    for line in [*refused, *map(str, left[:SHOWN]), *more]:
+    more = [f"and {len(left) - LEFT_OUT_SHOWN} lines more"] if len(left) > LEFT_OUT_SHOWN else []
+    for line in [*refused, *map(str, left[:LEFT_OUT_SHOWN]), *more]:
         say(line, to=sys.stderr if args.json else sys.stdout)
     if not parts:
         raise GesturedError("nothing could be imported, so nothing was written")

@@ -14,10 +14,9 @@ from gestured.client.say import say, say_drawn, say_json
 from gestured.core.errors import GesturedError
 from gestured.lab.recordings.protocol import INCLINATION_NAMES
 from gestured.lab.recordings.quality import gaps
-from gestured.lab.recordings.safe import LeftOut, read_what_is_good
+from gestured.lab.recordings.safe import LEFT_OUT_SHOWN, LeftOut, read_what_is_good
 from gestured.record.recordings import Recordings
 
-SHOWN = 10  # of what was left out; the rest is counted
 BAR = 30  # characters
 DRAWN_FRAMES = 72  # frames of a drawn pressure; longer recordings are drawn in groups of frames
 SNAPSHOTS = 6
@@ -153,7 +152,7 @@ def _tell(file: Path, figures: dict[str, Any], left: list[LeftOut]) -> None:
                 say(f"  {title if not k else '':<14}{key or '(not known)':<26}{count:6d}  {bar}")
         else:
             say(f"  {title:<14}{value}")
-    for what in left[:SHOWN]:
+    for what in left[:LEFT_OUT_SHOWN]:
         say(f"  {what}")
     say(f"  {'left out':<14}{len(left)}")
 

@@ -18,6 +18,8 @@ OPTIONAL = {field: {field} for field in ("speeds", "inclinations", "kinds", "con
     field: pair for pair in ({"onsets", "releases"}, {"touches", "touch_ids"}) for field in pair
 }
 
+LEFT_OUT_SHOWN = 10  # of what was left out; the rest is counted
+
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:

@@ -16,7 +16,7 @@ from torch import Tensor, nn
 import gestured
 from gestured.core.features import feature_names
 from gestured.lab.dataset import WINDOW
-from gestured.lab.export import export_forest, export_net
+from gestured.lab.export import Facts, export_forest, export_net
 from gestured.lab.nets import last_active
 from gestured.lab.online import play, takes, tallied
 from gestured.lab.progress import progress
@@ -55,16 +55,13 @@ def export(name: str, values: Values, data: Data, seed: int, path: Path) -> None
         values = {**values, "features": "daemon"}  # the daemon computes these, and no others
     inputs = method.view.all(of.samples, values, False)
     model = method.fit(inputs, np.arange(len(of.labels)), of.labels, len(GESTURES), values, seed)
-    common: dict[str, Any] = {
-        "kind": SHIPPED[name], "version": gestured.__version__, "gestures": list(GESTURES), "window": WINDOW,
-        "calibration": CALIBRATION, "training_data": data.gestures.digest(), "quantiles": {},
-    }  # fmt: skip
+    facts = Facts(SHIPPED[name], gestured.__version__, GESTURES, WINDOW, CALIBRATION, data.gestures.digest(), {})
     if isinstance(model, Estimator):
-        export_forest(model.fitted, path, features=feature_names(WINDOW.rows, WINDOW.columns), **common)
+        export_forest(model.fitted, path, facts, feature_names(WINDOW.rows, WINDOW.columns))
     else:
         assert isinstance(model, Net)
         torch.set_num_threads(1)
-        export_net(Answering(model.module), path, **common)
+        export_net(Answering(model.module), path, facts)
 
 
 def score(model: str, sessions: list[Take], title: str) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 WAVELET = "haar"
 WAVELET_LEVEL = 3
-STATISTICS = 5
 TINY = 1e-9
 
 
