@@ -13,10 +13,10 @@ from gestured.core.errors import RecordingError
 from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
 from gestured.record import arrays as recording
+from gestured.record.check import SESSION
 from gestured.record.tape import Packet, Tape
 
 BETWEEN_RECORDINGS_S = 3.0  # between two recordings: whatever is open is answered
-SESSION = "session"
 SOURCE = Address("127.0.0.1", 9)  # of all its packets
 DIFFERENT = ("wrong", "missed", "false")
 

@@ -9,7 +9,7 @@ from gestured.client.address import host_port
 from gestured.core.address import Address
 from gestured.core.wire import is_sensor
 from gestured.lab.recordings.protocol import pseudonym
-from gestured.lab.recordings.sources import SESSION
+from gestured.record.check import SESSION
 from gestured.simulator import GESTURES, NONE
 
 COMMANDS = ("collect", "import", "inspect", "forget")

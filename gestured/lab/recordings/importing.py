@@ -9,9 +9,10 @@ from pathlib import Path
 from gestured.client.say import say, tell
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.recordings.safe import LEFT_OUT_SHOWN, LeftOut
-from gestured.lab.recordings.sources import SESSION, Csv, read_capfingerid, read_csv
+from gestured.lab.recordings.sources import Csv, read_capfingerid, read_csv
 from gestured.lab.recordings.store import join_recordings
 from gestured.record.arrays import write
+from gestured.record.check import SESSION
 from gestured.record.recordings import Recordings
 
 CSV_ALONE = ("rows", "columns", "time_unit", "label", "participant", "consent")

@@ -19,10 +19,10 @@ from gestured.core.errors import RecordingError
 from gestured.lab.recordings.protocol import PSEUDONYM
 from gestured.lab.recordings.safe import LeftOut
 from gestured.lab.recordings.store import compact, touched
+from gestured.record.check import SESSION
 from gestured.record.files import open_regular
 from gestured.record.recordings import Recordings
 
-SESSION = "session"
 UNNAMED = "other"  # something was performed, and nobody knows exactly what
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 CAPFINGERID = (27, 15)  # electrodes of the Nexus 5's panel
