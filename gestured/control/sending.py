@@ -18,6 +18,8 @@ from gestured.client.stream import Stream
 from gestured.control.diff import ONSET_S, Line
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
+from gestured.core.messages import EVENT_TYPES
+from gestured.core.reading import SILENT
 from gestured.core.stamping import Stamper
 from gestured.record.replay import Replay
 from gestured.record.tape import Packet, Tape
@@ -27,9 +29,7 @@ Times = NDArray[np.float64]
 BUNDLE = b"#bundle\0"
 STATUS_TIMEOUT_S = 10.0  # a daemon says something once a second
 BACKLOG_S = 0.5  # what a daemon needs for a receive buffer that is full
-SILENT = ("stale", "no_data")  # states of a sensor that nobody feeds
 CONTACTS = 1000  # enough to tell
-TYPES = ("onset", "gesture", "unknown", "cancelled", "release", "status")
 TIMES = ("onset", "offset", "decided")
 
 
@@ -107,7 +107,7 @@ class Hearing:
     def __init__(self, path: Path, sensors: frozenset[str]) -> None:
         """Begins once nobody else feeds these sensors."""
         self._sensors = sensors
-        self._stream = Stream(path, {"types": TYPES})
+        self._stream = Stream(path, {"types": EVENT_TYPES})
         self._heard: queue.Queue[dict[str, Any] | None] = queue.Queue()
         threading.Thread(target=self._read, daemon=True).start()
         end = time.monotonic() + STATUS_TIMEOUT_S

@@ -23,7 +23,6 @@ from gestured.simulator import Participant, SimulatedSensor, Take, generator, se
 
 SESSION_S = 120.0
 NON_GESTURE_SHARE = 0.2  # share of what is performed
-TAIL_S = 2.0
 
 
 def takes(minutes: float, idle_minutes: float, seed: int) -> Iterator[tuple[str, Take]]:
