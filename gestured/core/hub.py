@@ -44,7 +44,7 @@ class Hub:
 
     @property
     def owners(self) -> frozenset[Source]:
-        """Sources that own a sensor which is there, as of the last tick."""
+        """Sources that own a sensor and were heard within the last minute, as of the last tick."""
         return self._owners
 
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
@@ -65,8 +65,9 @@ class Hub:
     def tick(self, now: float) -> list[Fact]:
         """What the time alone decides, once everything that arrived until `now` was received: who fell silent."""
         facts: list[Fact] = []
-        self._owners = frozenset(feed.owner.source for feed in self._feeds.values() if not feed.silent)
-        for feed in self._feeds.values():
+        feeds = self._feeds.values()
+        self._owners = frozenset(feed.owner.source for feed in feeds if now - feed.owner.heard <= FORGET_S)
+        for feed in feeds:
             feed.review()
             if not feed.silent and feed.stale(now):
                 facts.append(Changed(feed.name, "silent", feed.owner.source))

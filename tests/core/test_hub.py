@@ -13,7 +13,7 @@ from gestured.control.export import sessions_of
 from gestured.core.events import Cancelled, Event, Onset, Release
 from gestured.core.facts import Changed, Dropped, Taken
 from gestured.core.frames import Segment
-from gestured.core.hub import Hub
+from gestured.core.hub import FORGET_S, Hub
 from gestured.core.recognizer import Scores
 from gestured.core.scene import Scene, Setup
 from gestured.lab.recordings.live import LiveSensor
@@ -165,3 +165,15 @@ def test_another_scene_keeps_what_was_learned_where_it_holds() -> None:
     (fact,) = hub.receive([(b"rubbish!", STRANGER)], t)
     assert isinstance(fact, Dropped) and fact.reason == "not_allowed"
     assert [fact.what for fact in hub.tick(t + 2.0) if isinstance(fact, Changed)] == ["silent"]
+
+
+def test_who_pauses_still_owns_a_sensor_until_it_is_forgotten() -> None:
+    """What owners may do in a flood must not end with a pause: on return it would be one more stranger of its host."""
+    hub = Hub(SCENE, Sure())
+    hub.receive([(floats("/arm/pressure", Hand().frame(), 0), FIRST)], 1.0)
+    hub.tick(1.0)
+    assert hub.owners == {FIRST}
+    hub.tick(0.9 * FORGET_S)
+    assert hub.states(0.9 * FORGET_S) == {"arm": "stale"} and hub.owners == {FIRST}
+    hub.tick(1.1 + FORGET_S)
+    assert hub.owners == set()
