@@ -173,6 +173,7 @@ def test_who_pauses_still_owns_a_sensor_until_it_is_forgotten() -> None:
     hub.receive([(floats("/arm/pressure", Hand().frame(), 0), FIRST)], 1.0)
     hub.tick(1.0)
     assert hub.owners == {FIRST}
+    hub.tick(0.8 * FORGET_S)
     hub.tick(0.9 * FORGET_S)
     assert hub.states(0.9 * FORGET_S) == {"arm": "stale"} and hub.owners == {FIRST}
     hub.tick(1.1 + FORGET_S)
