@@ -48,7 +48,7 @@ class Receiver:
         self._sock, self._hub, self._desk, self._taps, self._clock = sock, hub, desk, taps, clock
         self._backlog = Backlog(lambda source: source in hub.owners)
         self._muted = Muted()
-        self._wall = time.time() - clock()  # s, from the monotonic clock to the one that the kernel stamps with
+        _, self._wall = self._clocks()  # s, from the monotonic clock to the one that the kernel stamps with
         self._empty = clock()  # s, when the socket was last seen empty
         self._drops = 0  # packets that the kernel had dropped then
         self._dropping = -FLOOD_S  # s, when it began to
@@ -96,9 +96,9 @@ class Receiver:
         if self._again is not None:
             self._again.cancel()
             self._again = None
+        began = self._clock()
         found, full = self._receive()
-        now = self._clock()
-        wall = time.time() - now
+        now, wall = self._clocks()
         if abs(wall - self._wall) > STEP_S:
             found = [(packet, b"", source) for packet, _, source in found]
         self._found = len(found)
@@ -109,7 +109,7 @@ class Receiver:
         elif found:
             self._serve([(packet, source) for packet, _, source in found], now)
         if not full:
-            self._empty = now
+            self._empty = began  # whatever is found next came later, also where we were stopped since
         self._wall = wall
         if self._backlog:
             self._work(now)
@@ -117,6 +117,13 @@ class Receiver:
         self._behind_s = self._backlog.age(now)
         if self._backlog or full:
             self._again = self._loop.call_soon(self.read)
+
+    def _clocks(self) -> tuple[float, float]:
+        """The time, and the wall clock's lead; read at one moment, so that a stall does not look like a step."""
+        while True:
+            before, wall, now = self._clock(), time.time(), self._clock()
+            if now - before < STEP_S:
+                return now, wall - now
 
     def _receive(self) -> tuple[list[tuple[bytes, bytes, Source]], bool]:
         """Packets with the kernel's time and their source; whether some may be left."""

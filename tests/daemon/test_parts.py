@@ -5,10 +5,13 @@ import errno
 import ipaddress
 import json
 import socket
+import time
 import tomllib
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -17,7 +20,7 @@ from gestured.core.errors import SettingsError
 from gestured.core.front_end import FrontEnd
 from gestured.core.scene import Scene
 from gestured.core.wire import Decoder
-from gestured.daemon import http, log
+from gestured.daemon import http, log, udp
 from gestured.daemon.health import Pulse
 from gestured.daemon.http import HttpThread, as_json
 from gestured.daemon.merge import load_settings
@@ -159,6 +162,41 @@ def test_packets_that_come_thick_are_taken_together_and_no_others_wait(
             await asyncio.sleep(0)
 
     asyncio.run(main())
+
+
+@pytest.mark.parametrize("call", range(8))
+def test_wherever_in_a_read_a_stall_begins_no_frame_moves(
+    parts: Parts, monkeypatch: pytest.MonkeyPatch, call: int
+) -> None:
+    """Both clocks leap by ten seconds at one of the looks at them, and a packet arrives just before that."""
+    calls, leap, sent, served = -100, 0.0, 0.0, []  # the looks at a clock before the first read do not count
+    receive = parts.hub.receive
+    monkeypatch.setattr(parts.hub, "receive", lambda packets, now: served.append(now) or receive(packets, now))
+
+    async def main() -> None:
+        nonlocal calls
+        with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
+            sender.connect(sock.getsockname())
+
+            def look(clock: Callable[[], float]) -> float:
+                nonlocal calls, leap, sent
+                if calls == call:
+                    sent = time.monotonic()
+                    sender.send(harness.floats("/a/pressure", Hand().frame(), 0))
+                    leap = 10.0
+                calls += 1
+                return clock() + leap
+
+            receiver = Receiver(sock, parts.hub, parts.desk, parts.taps, lambda: look(time.monotonic))
+            calls = 0
+            clocks = {name: getattr(time, name) for name in ("monotonic", "thread_time")}
+            monkeypatch.setattr(udp, "time", SimpleNamespace(**clocks, time=lambda: look(time.time)))
+            while not served:
+                receiver.read()
+            receiver.close()
+
+    asyncio.run(main())
+    assert served[0] - sent < 5.0
 
 
 def test_healthz_and_readyz_say_what_is_wrong() -> None:
