@@ -108,7 +108,7 @@ def test_there_is_one_place_that_puts_a_file_into_anothers_stead() -> None:
                     found.add(path.relative_to(PACKAGE).as_posix())
                 if name == "replace" and len(node.args) == 1 and not node.keywords:
                     found.add(path.relative_to(PACKAGE).as_posix())
-    assert found == {"files.py"}
+    assert found == {"record/files.py"}
 
 
 @pytest.mark.parametrize("kind", ["folder", "fifo", "device"])

@@ -18,7 +18,7 @@ from typing import Any
 
 from gestured.daemon import log as logging
 from gestured.daemon import systemd
-from gestured.daemon.bound import bind_all
+from gestured.daemon.bound import Bound, bind_all
 from gestured.daemon.ladder import open_ladder
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.service import Loader, Service
@@ -55,9 +55,9 @@ async def _run(settings: Settings, load: Loader) -> None:
     )
     _when(signal.SIGHUP, partial(loop.call_soon_threadsafe, reload.set))
     _end_surely(loop)
-    for number in STOPS:
-        _when(number, partial(sys.exit, 0))  # nobody waits for a model whose opening never ends
     bound = bind_all(settings, systemd.passed_sockets())
+    for number in STOPS:
+        _when(number, partial(_end_at_once, bound))
     try:
         service = Service(settings, open_ladder(settings), bound, load)  # it alone holds them: a reload lets them go
         for number in STOPS:
@@ -91,6 +91,17 @@ def _when(number: signal.Signals, act: Callable[[], object]) -> None:
     signal.signal(number, lambda *_: act())
 
 
+def _end_at_once(bound: Bound) -> None:
+    """End a start: nobody waits for a model whose opening never ends.
+
+    Not by an exception: a library that is being imported makes an error of its own of it.
+    """
+    bound.close()
+    end_all()
+    logging.close()
+    os._exit(0)
+
+
 def _end_surely(loop: asyncio.AbstractEventLoop) -> None:
     """See to it that a stop ends the process even where the loop's thread never comes back from a model.
 
@@ -110,6 +121,7 @@ def _end_surely(loop: asyncio.AbstractEventLoop) -> None:
             if number[0] in STOPS:
                 time.sleep(END_S)
                 log.error("ended by force: it did not end by itself", seconds=END_S)
+                logging.close()  # what was said last is read before the process is gone
                 os._exit(1)
 
     threading.Thread(target=watch, name="signals", daemon=True).start()

@@ -3,13 +3,14 @@
 import math
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 pytest.importorskip("matplotlib", reason="needs the extra [lab]")
 pytest.importorskip("jinja2", reason="needs the extra [lab]")
 
 from gestured.lab.stability.figure import svg
-from gestured.lab.stability.textbook import Point
+from gestured.lab.stability.textbook import Point, points
 
 SVG = "{http://www.w3.org/2000/svg}"
 POINTS = [Point("ours <&> theirs", 1, 0.0, 2e-6, False), Point("ours <&> theirs", 4, 1e-3, 8e-6, False)]
@@ -34,3 +35,11 @@ def test_it_stands_alone_on_a_ground_of_its_own_and_is_the_same_again() -> None:
     assert "var(" not in written and "url(http" not in written and written == svg(PANELS)
     ground = ElementTree.fromstring(written).find(f".//{SVG}path")
     assert ground is not None and "fill: #" in (ground.get("style") or "")
+
+
+def test_the_figure_tells_of_every_point_that_is_measured() -> None:
+    some = points(-1, 1, np.float64, quick=True)
+    root = ElementTree.fromstring(svg({"one": some, "the same": some}))
+    told = [title.text or "" for title in root.iter(f"{SVG}title")][1:]
+    assert len(told) == 2 * len(some)
+    assert all(sum(one.startswith(f"{method}, ") for one in told) > 0 for method in {p.method for p in some})

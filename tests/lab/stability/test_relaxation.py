@@ -1,7 +1,6 @@
 """The code's filters against 50 digits, and the figure of what the textbook's methods cost."""
 
 import math
-import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pytest
@@ -10,9 +9,8 @@ from hypothesis import strategies as st
 
 pytest.importorskip("mpmath", reason="needs the extra [lab]")
 
-from gestured.lab.stability.figure import svg
 from gestured.lab.stability.relaxation import DECADES, FILTERS, Filter, error, exact
-from gestured.lab.stability.textbook import INTEGRATORS, points
+from gestured.lab.stability.textbook import points
 
 DRIVEN = [
     (filter_, dtype, decade)
@@ -65,14 +63,3 @@ def test_the_textbook_is_as_the_textbook_says() -> None:
     assert found["bilinear"].negative
     assert not found["implicit Euler"].negative
     assert 1e-3 < found["implicit Euler"].error < 0.5
-
-
-def test_the_figure_is_a_picture_of_every_point() -> None:
-    some = points(-1, 1, np.float64, quick=True)
-    tree = ElementTree.fromstring(svg({"one": some, "the same": some}))
-    circles = [e for e in tree.iter() if e.tag.endswith("circle")]
-    assert len(circles) == 2 * len(some) + len(INTEGRATORS)
-    box = [float(v) for v in tree.attrib["viewBox"].split()]
-    assert all(0 <= float(c.attrib["cy"]) <= box[3] for c in circles)
-    words = "".join(tree.itertext())
-    assert all(method in words for method in INTEGRATORS)
