@@ -35,8 +35,8 @@ _ARRAYS = {"i": np.dtype(">i4"), "f": np.dtype(">f4")}
 _RUNS = tuple(tag * RUN for tag in _ARRAYS)
 _PLACED = ("", "s", "r", "sr", "b", "sb")  # what has a place in a layout: scalars, a run, a blob that is not empty
 _LAYOUTS_BYTES = 8 << 20  # for the layouts that are remembered: 8,000 sensors of 9 x 9 floats
-_PLACE_BYTES = 600  # what Python takes for a place, beside its head, address and type tags,
-_SCALAR_BYTES = 48  # and for each scalar in it
+_PLACE_BYTES = 600  # that Python takes for a place, its head, address, type tags and scalars not counted
+_SCALAR_BYTES = 48  # that Python takes for a scalar in a place
 
 
 class Message(NamedTuple):

@@ -10,13 +10,13 @@ from gestured.daemon.mute import Sender
 TOGETHER_S = 0.004  # packets that arrived so close to each other are looked at together
 GROUP_BYTES = 64 << 10  # in one go at the most: 150 frames of 9 x 9 floats
 MOST_BYTES = 32 << 20  # four times what a kernel's buffer of 4 MiB hands over after a stall
-FLOOD_S = 1.0  # of work, after which it shows whether we catch up
-PACE = 0.5  # where it served less than this share of as much time of arrivals, we do not
+FLOOD_S = 1.0  # of work, after which it is looked whether the backlog shrinks
+PACE = 0.5  # seconds of arrivals that a second of work has to serve; where it serves fewer, that is a flood
 OWNERS_SHARE = 0.75  # of the time, in a flood, for those who own a sensor; strangers get the rest
 CREDIT_S = 0.02  # of work that a sender may save up, and begins with: what the largest packet of frames costs
 FIRST_GUESS = 3e-7  # s of work a byte, until a sender's packets have been served
-NEWEST = 0.2  # weight of the newest measurement of that
-REMEMBERED_SENDERS = 4096  # whose credit is remembered
+NEWEST = 0.2  # weight of the newest measurement of what a sender's packets cost
+REMEMBERED_SENDERS = 4096  # senders whose costs and credit are remembered in a flood
 
 
 class Datagram(NamedTuple):

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 from gestured.core.owner import Source
 
-TOO_MANY = 100  # packets of a sender that were dropped within a second
-FIRST_S = 1.0  # for which a sender is muted; each further time twice as long,
-LONGEST_S = 8.0  # but never longer
+TOO_MANY = 100  # packets dropped within a second, for which their sender is muted
+FIRST_S = 1.0  # for which a sender is muted at first; each further time lasts twice as long as the one before
+LONGEST_S = 8.0  # for which a sender is muted at the most: whoever has mended his flood is heard soon
 SO_ATTACH_FILTER, SO_DETACH_FILTER = 26, 27  # Linux; not in Python's socket module
 NETWORK = 0xFFF00000
 LOAD_WORD, LOAD_HALF, LOAD_BYTE, AND, JUMP_EQUAL, RETURN = 0x20, 0x28, 0x30, 0x54, 0x15, 0x06  # of absolute offsets

@@ -22,15 +22,15 @@ from gestured.daemon.sockets import kernel_drops
 from gestured.daemon.tap import Taps
 
 PACKET_BYTES = 65_536
-BATCH = 256  # packets in one read: half a millisecond, so that the kernel's buffer is empty again soon
-SLICE_S = 0.005  # of work on what waits, before others have their turn
-FLOOD_SLICE_S = 0.001  # the same in a flood of the largest packets, which fills the kernel's buffer in two milliseconds
-TURN_S = 0.05  # of work in a flood, where packets cost far more than those before them
-DRAIN_S = 0.25  # for what is left when the daemon ends
-PAUSE_S = 0.001  # after packets that come closer together than this we wait as long for more of them,
-FEW = 8  # where no more than these were waiting: to be woken for each one is a large part of its price
-FULL_S = 0.25  # after which a stall no longer explains that the kernel has no room
-STEP_S = 0.05  # the wall clock was set by more than this while packets waited: their times say nothing
+BATCH = 256  # packets in one read at the most: others have their turn between two reads
+SLICE_S = 0.005  # of work on waiting packets, before the loop serves everybody else
+FLOOD_SLICE_S = 0.001  # of work on waiting packets in a flood, which fills the kernel's buffer while we work
+TURN_S = 0.05  # of work in one turn of a flood at the most, where packets cost more than their sender's last ones
+DRAIN_S = 0.25  # for serving what still waits when the daemon ends
+PAUSE_S = 0.001  # between reads of packets that come thick: to be woken for each is a large part of its price
+FEW = 8  # packets found by a read, up to which it is followed by a pause
+FULL_S = 0.25  # for which a stall explains that the kernel drops packets; if it lasts longer, it is a flood
+STEP_S = 0.05  # by which the wall clock may move against ours; after a larger step the kernel's times say nothing
 
 SO_TIMESTAMPNS = 35  # Linux; not in Python's socket module
 TIMESTAMP = struct.Struct("@qq")  # s and ns since the epoch, by the wall clock
