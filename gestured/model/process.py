@@ -17,6 +17,7 @@ import subprocess
 import sys
 import threading
 import weakref
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ START = "import sys; sys.path[:] = sys.argv[1:]; from gestured.model.worker impo
 ENVIRONMENT_KEPT = ("LD_LIBRARY_PATH",)  # of the environment: some systems find the C++ library by it
 
 _turn = threading.Lock()  # one file is opened at a time: each child may take memory of the same service
+_birth = threading.Lock()  # between a child's start and its place among `_children`
 _children: "weakref.WeakSet[subprocess.Popen[bytes]]" = weakref.WeakSet()  # one that nobody holds ends by itself
 _ending = False
 
@@ -120,35 +122,43 @@ def try_out(data: bytes) -> dict[str, Any]:
 
 
 def end_all() -> None:
-    """End all children, and let no more begin: the program ends."""
+    """End all children, and let no more begin: the program ends. A signal's handler may ask for it."""
     global _ending
-    _ending = True
-    for child in tuple(_children):
-        child.kill()
+    with _birth:
+        _ending = True
+        for child in tuple(_children):
+            child.kill()
 
 
 def _start() -> "subprocess.Popen[bytes]":
+    """A child. It is born in a thread of its own, so that a handler that interrupts this one can wait for the birth."""
+    if _ending:  # no thread can be started then
+        raise ValueError("was not opened: the program ends")
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(_bear).result()
+
+
+def _bear() -> "subprocess.Popen[bytes]":
     root = Path(__file__).resolve().parents[2]
     folders = [str(root), *(folder for folder in sys.path if os.path.isabs(folder))]
-    if _ending:
-        raise ValueError("was not opened: the program ends")
-    try:
-        child = subprocess.Popen(
-            [sys.executable, "-I", "-S", "-c", START, *folders],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            cwd="/",
-            env={name: os.environ[name] for name in ENVIRONMENT_KEPT if name in os.environ}
-            | {"ORT_DISABLE_TELEMETRY": "1", "OPENBLAS_NUM_THREADS": "1"},
-            start_new_session=True,  # Ctrl-C is for us
-        )
-    except OSError as error:
-        raise ValueError(f"no process could be started to try it: {error.strerror or error}") from error
-    _children.add(child)
-    if _ending:
-        child.kill()
-    return child
+    with _birth:
+        try:
+            child = subprocess.Popen(
+                [sys.executable, "-I", "-S", "-c", START, *folders],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                cwd="/",
+                env={name: os.environ[name] for name in ENVIRONMENT_KEPT if name in os.environ}
+                | {"ORT_DISABLE_TELEMETRY": "1", "OPENBLAS_NUM_THREADS": "1"},
+                start_new_session=True,  # Ctrl-C is for us
+            )
+        except OSError as error:
+            raise ValueError(f"no process could be started to try it: {error.strerror or error}") from error
+        _children.add(child)
+        if _ending:
+            child.kill()
+        return child
 
 
 def _collect(child: "subprocess.Popen[bytes]") -> None:

@@ -249,16 +249,22 @@ def trial_of(daemon: Daemon) -> int:
     while True:
         assert daemon.process.poll() is None, daemon.stderr()
         for task in Path(f"/proc/{daemon.process.pid}/task").iterdir():
-            if found := (task / "children").read_text().split():
+            try:
+                found = (task / "children").read_text().split()
+            except OSError:  # a thread that has ended
+                continue
+            if found:
                 return int(found[0])
 
 
 def alive(pid: int) -> bool:
-    """Whether a process runs; one that is dead and waits to be collected does not."""
+    """Whether a process runs and will; one that is dead, or has been killed and waits for its turn to die, does not."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        status = dict(line.split(":\t", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
     except OSError:
         return False
+    pending = int(status["SigPnd"], 16) | int(status["ShdPnd"], 16)
+    return not status["State"].startswith(("Z", "X")) and not pending & 1 << signal.SIGKILL - 1
 
 
 @pytest.mark.parametrize("how", ["replaced", "truncated", "removed"])
