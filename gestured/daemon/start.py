@@ -67,8 +67,7 @@ async def _run(settings: Settings, load: Loader) -> None:
         _abort(signal.SIG_UNBLOCK)
         _announce(service)
         await service.serve(stop, reload)
-        for number in (*STOPS, signal.SIGHUP):  # a stop that is repeated now must not look like a crash
-            signal.signal(number, signal.SIG_IGN)
+        _ignore_stops()
     finally:
         bound.close()
         end_all()  # threads may wait for a model that is being opened, and the end waits for threads
@@ -91,11 +90,18 @@ def _when(number: signal.Signals, act: Callable[[], object]) -> None:
     signal.signal(number, lambda *_: act())
 
 
+def _ignore_stops() -> None:
+    """It ends already: a stop that is repeated now must not look like a crash."""
+    for number in (*STOPS, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+
+
 def _end_at_once(bound: Bound) -> None:
     """End a start: nobody waits for a model whose opening never ends.
 
     Not by an exception: a library that is being imported makes an error of its own of it.
     """
+    _ignore_stops()
     bound.close()
     end_all()
     logging.close()

@@ -162,7 +162,7 @@ def test_the_end_does_not_wait_for_a_model_at_the_start(model: Path, tmp_path: P
     daemon = Daemon(tmp_path, "--model", bad, "--listen", "127.0.0.1:0", "--socket", tmp_path / "events.sock")
     tried = trial_of(daemon)
     daemon.signal(signal.SIGTERM)
-    assert daemon.stop() == 0 and daemon.stderr() == ""
+    assert (daemon.stop(), daemon.stderr()) == (0, "")
     assert not alive(tried) and not (tmp_path / "events.sock").exists()
 
 
