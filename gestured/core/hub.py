@@ -22,7 +22,7 @@ FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one 
 REMEMBERED = 4096  # names of sensors that are not there, whose numbers are known
 HOSTS = 1024  # decisions about who may send that are known
 
-Found = dict[str, tuple[Feed, list[Arrival]]]  # by sensor: its frames among some packets
+Waiting = dict[str, tuple[Feed, list[Arrival]]]  # by sensor: its frames among some packets
 
 
 class Hub:
@@ -50,13 +50,13 @@ class Hub:
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
         """Take packets that were found waiting at `now`, each with its source."""
         facts: list[Fact] = []
-        found: Found = {}
+        waiting: Waiting = {}
         for packet, source in packets:
             try:
-                self._decode(packet, source, now, found, facts)
+                self._decode(packet, source, now, waiting, facts)
             except Exception as error:  # what came before and after it is good
                 facts.append(Fault(None, error))
-        for name, (feed, arrivals) in found.items():
+        for name, (feed, arrivals) in waiting.items():
             missed = self._told[name] != self._missed
             self._told[name] = self._missed
             feed.take(arrivals, now, facts, missed=missed)
@@ -132,7 +132,7 @@ class Hub:
         self._decoder = Decoder(scene.addresses, scene.grid_of, keep_touches=scene.touches)
         self._allowed: dict[str, bool] = {}  # by host
 
-    def _decode(self, packet: bytes, source: Source, now: float, found: Found, facts: list[Fact]) -> None:
+    def _decode(self, packet: bytes, source: Source, now: float, waiting: Waiting, facts: list[Fact]) -> None:
         if self._scene.allow and not self._may_send(source[0]):
             facts.append(Dropped("not_allowed", source))
             return
@@ -142,7 +142,7 @@ class Hub:
         for arrival in arrivals:
             feed = self._admit(arrival.sensor, source, now, facts)
             if feed is not None:
-                found.setdefault(arrival.sensor, (feed, []))[1].append(arrival)
+                waiting.setdefault(arrival.sensor, (feed, []))[1].append(arrival)
 
     def _may_send(self, host: str) -> bool:
         known = self._allowed.get(host)
