@@ -13,7 +13,7 @@ from benchmarks.timing import Row
 
 
 def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
-    from benchmarks import inside, latency, scenes, side_by_side, start, traffic
+    from benchmarks import inside, latency, replay, scenes, side_by_side, start, traffic
 
     return {
         "decode": inside.decode,
@@ -21,6 +21,7 @@ def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
         "latency": lambda: latency.latency(model),
         "sensors": lambda: [traffic.sensors(model, 1000), traffic.sensors(model, 500)],
         "recognise": lambda: inside.recognise(model),
+        "replay": lambda: replay.replay(model),
         "start": lambda: start.start_and_memory(model),
         "imports": start.imports,
         "further": lambda: start.further_sensors(model),

@@ -58,8 +58,6 @@ def parser() -> argparse.ArgumentParser:
     online.add_argument("--idle-minutes", type=float, default=5, help="minutes of an untouched sensor (5)")
     online.add_argument("--speed", type=float, default=100, help="times real time (100)")
     online.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (900)")
-    bench = add("bench", "measure replay, start and memory on this machine", "gestured-lab bench")
-    bench.add_argument("--model", default="cnn_lstm", help="the model to run (cnn_lstm)")
     stability = add("stability", "measure filters, extreme inputs, models and symmetries of the whole path",
                     "gestured-lab stability --quick")  # fmt: skip
     stability.add_argument("--quick", action="store_true", help="some seconds instead of some minutes")
@@ -84,10 +82,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from gestured.lab import online
 
             return online.run(args)
-        if args.command == "bench":
-            from gestured.lab import bench
-
-            return bench.run(args)
         if args.command in recordings.COMMANDS:
             return recordings.run(args)
         try:

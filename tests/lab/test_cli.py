@@ -57,9 +57,7 @@ def test_help_needs_no_torch(command: str, tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize(
-    "line", ["", "fly", "train --jobs many", "train --epochs 3", "online --minutes long", "bench --quick"]
-)
+@pytest.mark.parametrize("line", ["", "fly", "train --jobs many", "train --epochs 3", "online --minutes long"])
 def test_arguments_that_mean_nothing_are_usage_errors(line: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(line.split())
@@ -88,10 +86,9 @@ def test_a_folder_that_cannot_be_made_is_named_before_anything_is_simulated(
     assert "taken" in line
 
 
-@pytest.mark.parametrize("command", ["online", "bench"])
-def test_a_model_that_is_not_there_is_named(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_model_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(tmp_path / "nowhere.onnx")
-    assert main([command, "--model", path]) == 1
+    assert main(["online", "--model", path]) == 1
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("gestured-lab:")]
     assert "nowhere.onnx" in line
 
@@ -99,13 +96,13 @@ def test_a_model_that_is_not_there_is_named(command: str, tmp_path: Path, capsys
 def test_an_interrupted_run_says_that_nothing_finished_is_lost(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from gestured.lab import bench
+    from gestured.lab import online
 
     def interrupt(_: object) -> int:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(bench, "run", interrupt)
-    assert main(["bench"]) == 130
+    monkeypatch.setattr(online, "run", interrupt)
+    assert main(["online"]) == 130
     assert "what is finished is kept" in capsys.readouterr().err
 
 
