@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: the table of speed. Example: python -m benchmarks --only decode recognise"""
+"""`python -m benchmarks`: the table of speed, such as `python -m benchmarks --only decode recognise`."""
 
 import argparse
 import json

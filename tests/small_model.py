@@ -39,7 +39,7 @@ def build(
     path: Path,
     *,
     takes: str = "frames",
-    shape: tuple | None = None,
+    shape: tuple[int | str, ...] | None = None,
     number: str = "float",
     outputs: tuple[str, ...] = ("scores", "unknown"),
     gain: float = 40.0,

@@ -164,7 +164,7 @@ def test_what_is_no_event_is_named(tmp_path: Path, kind: str) -> None:
     assert f"{path}: event 2: expected" in refused("mcap", path)
 
 
-SCENES = {
+SCENES: dict[str, dict[str, Any]] = {
     "model": {"model": 5},
     "fallback": {"fallback": 5},
     "stale": {"stale_s": 10**400},

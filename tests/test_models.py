@@ -8,6 +8,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -203,7 +204,7 @@ def test_grid_of_the_window_must_be_that_of_the_graph(tmp_path: Path) -> None:
         ({"keep_graph": False}, ["not an ONNX model"]),
     ],
 )
-def test_wrong_graph(tmp_path: Path, changes: dict, words: list[str]) -> None:
+def test_wrong_graph(tmp_path: Path, changes: dict[str, Any], words: list[str]) -> None:
     message = refusal(build(tmp_path / "m.onnx", **changes))
     for word in words:
         assert word in message

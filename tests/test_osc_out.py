@@ -2,6 +2,7 @@
 
 import math
 import socket
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ touches = st.lists(st.builds(Touch, st.integers(0, 2**31 - 1), st.floats(0, 8), 
 
 
 @given(names, st.lists(argument, max_size=8))
-def test_a_message_is_written_as_osc_asks_for(name: str, pairs: list) -> None:
+def test_a_message_is_written_as_osc_asks_for(name: str, pairs: list[Any]) -> None:
     types, args = "".join(tag for tag, _ in pairs), [value for _, value in pairs]
     assert osc_out.message(f"/{name}", types, args).dgram == encoding.message(f"/{name}", types, args)
 

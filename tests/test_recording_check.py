@@ -129,7 +129,7 @@ def test_fortran_order_and_other_byte_order(tmp_path: Path) -> None:
 class Surprise:
     """What a pickle would run."""
 
-    def __reduce__(self) -> tuple:
+    def __reduce__(self) -> tuple[Any, ...]:
         return (pytest.fail, ("unpickled",))
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from gestured.client.score import MISSED_AFTER_S, NONE, Performed, Tally
 
 
-def gesture(name: str, onset: float, offset: float) -> dict:
+def gesture(name: str, onset: float, offset: float) -> dict[str, object]:
     return {"type": "gesture", "gesture": name, "onset": onset, "offset": offset}
 
 

@@ -143,7 +143,7 @@ def test_a_mounted_sensor_gives_segments_as_a_person_sees_them(
     assert frame.shape == mounting.shape(rows, columns) == (front_end.rows, front_end.columns)
     at = np.unravel_index(int(frame.argmax()), frame.shape)
     (seen,) = segment.touches[segment.first]
-    assert (seen.id, seen.x, seen.y) == (1, at[1], frame.shape[0] - 1 - at[0])
+    assert (seen.id, seen.x, seen.y) == (1, float(at[1]), float(frame.shape[0] - 1 - at[0]))
     assert len(segment.touches) == len(segment.frames)
 
 

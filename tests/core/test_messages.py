@@ -6,7 +6,7 @@ import typing
 from collections.abc import Mapping
 from dataclasses import fields
 from types import MappingProxyType
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_every_event_survives_its_json_line(event: Event, epoch: float) -> None:
 
 GESTURE = Gesture(
     "armrest", 41, "swipe_up", 0.98, 17, 10.0, 10.5, 10.6, 12, 0, "cnn_lstm", False,
-    MappingProxyType({"swipe_up": np.float32(0.5), "circle": 0.5}),
+    MappingProxyType[str, Any]({"swipe_up": np.float32(0.5), "circle": 0.5}),
 )  # fmt: skip
 
 

@@ -24,7 +24,7 @@ def test_a_touch_stays_at_the_taxel_it_presses(grid: Shape, mounting: Mounting, 
     assert seen.shape == mounting.shape(rows, columns) and seen.sum() == 1
     (seen_row,), (seen_column,) = np.nonzero(seen)
     x, y = mounting.point(column, rows - 1 - row, rows, columns)
-    assert (x, y) == (seen_column, seen.shape[0] - 1 - seen_row)
+    assert (x, y) == (float(seen_column), float(seen.shape[0] - 1 - seen_row))
 
 
 @given(grids, turns, turns, st.booleans())

@@ -4,6 +4,7 @@ import math
 import struct
 import tracemalloc
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,23 +38,23 @@ messages = st.tuples(addresses.map("/".__add__), argument_lists)
 timetags = st.none() | st.floats(0, 2**31)
 
 
-def encoded(message: tuple[str, list]) -> bytes:
+def encoded(message: tuple[str, list[Any]]) -> bytes:
     address, pairs = message
     return encoding.message(address, "".join(t for t, _ in pairs), [value for _, value in pairs])
 
 
-def flat(args: tuple) -> Iterator:
+def flat(args: tuple[Any, ...]) -> Iterator[Any]:
     for arg in args:
         yield from arg.tolist() if isinstance(arg, np.ndarray) else [arg]
 
 
-def same(a: list, b: list) -> bool:
+def same(a: list[Any], b: list[Any]) -> bool:
     """Equal, NaN included."""
     return len(a) == len(b) and all(x == y or (x != x and y != y) for x, y in zip(a, b, strict=True))
 
 
 def decodes_or_refuses(data: bytes) -> None:
-    first: list | str
+    first: list[Any] | str
     try:
         first = [m.types for m in osc.decode(data)]
     except ProtocolError as error:
@@ -77,7 +78,7 @@ def test_any_bytes_decode_or_raise_protocol_error(data: bytes) -> None:
 
 @given(st.lists(messages, min_size=1, max_size=4), timetags, st.data())
 def test_damaged_packets_decode_or_raise_protocol_error(
-    several: list, timetag: float | None, data: st.DataObject
+    several: list[Any], timetag: float | None, data: st.DataObject
 ) -> None:
     parts = [encoded(m) for m in several]
     packet = parts[0] if len(parts) == 1 else encoding.bundle([parts[0], encoding.bundle(parts[1:])], timetag)
@@ -98,7 +99,7 @@ def test_bundles_of_any_sizes_decode_or_raise_protocol_error(sizes: list[int], r
 
 
 @given(messages)
-def test_a_message_comes_back_as_it_was_sent(message: tuple[str, list]) -> None:
+def test_a_message_comes_back_as_it_was_sent(message: tuple[str, list[Any]]) -> None:
     for _ in range(2):  # the second time its layout is known
         (got,) = osc.decode(encoded(message))
         assert (got.address, got.types) == (message[0], "".join(t for t, _ in message[1]))
@@ -107,7 +108,7 @@ def test_a_message_comes_back_as_it_was_sent(message: tuple[str, list]) -> None:
 
 
 @given(st.lists(st.lists(messages, max_size=3), max_size=4), st.lists(timetags, min_size=5, max_size=5))
-def test_bundles_are_flattened_in_order_with_their_own_time_tags(inner: list, tags: list) -> None:
+def test_bundles_are_flattened_in_order_with_their_own_time_tags(inner: list[Any], tags: list[float]) -> None:
     tail = ("/tail", [("i", 1)])
     nested = [encoding.bundle([encoded(m) for m in part], tags[i]) for i, part in enumerate(inner)]
     packet = encoding.bundle([*nested, encoded(tail)], tags[4])
@@ -121,7 +122,7 @@ def test_bundles_are_flattened_in_order_with_their_own_time_tags(inner: list, ta
 
 
 @given(st.lists(messages, min_size=1, max_size=3), st.floats(1, 2_085_978_000))
-def test_we_read_what_python_osc_builds(several: list, timetag: float) -> None:
+def test_we_read_what_python_osc_builds(several: list[Any], timetag: float) -> None:
     bundle = OscBundleBuilder(timetag)
     for address, pairs in several:
         builder = OscMessageBuilder(address)

@@ -1,7 +1,7 @@
 """When frames were felt: stamps that increase, whatever the network and the sensor's counter do."""
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ waiting = st.tuples(
 
 @given(st.sampled_from(["arrival", "sensor"]), st.lists(waiting, max_size=12), st.floats(0, 1e7))
 def test_times_increase_strictly_whatever_is_sent(
-    clock: Literal["arrival", "sensor"], calls: list, start: float
+    clock: Literal["arrival", "sensor"], calls: list[Any], start: float
 ) -> None:
     stamper = Stamper(clock)
     got: list[Stamp] = []

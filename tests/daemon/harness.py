@@ -1,5 +1,6 @@
-"""The real daemon as a process, a sensor that is made of arithmetic, and clients. Nothing here sleeps:
-everything waits for a message, with a deadline that only a failure reaches.
+"""The real daemon as a process, a sensor that is made of arithmetic, and clients.
+
+Nothing here sleeps: everything waits for a message, with a deadline that only a failure reaches.
 """
 
 import json

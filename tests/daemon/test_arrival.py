@@ -5,6 +5,7 @@ import select
 import shutil
 import subprocess
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -13,7 +14,7 @@ from tests.daemon.harness import Client, Daemon, Frame, Hand
 STEP_S = 1 / 60  # faster than a real sensor, so that the test is
 
 
-def stream(client: Client, send: Callable[[Frame], None], sensor: str) -> dict:
+def stream(client: Client, send: Callable[[Frame], None], sensor: str) -> dict[str, Any]:
     """Be a sensor: quiet until it is known, then one swipe, then quiet until it is answered."""
     hand = Hand()
     client.subscribe("gesture", "unknown", "cancelled", "status", sensors=[sensor])

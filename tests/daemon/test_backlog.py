@@ -73,7 +73,9 @@ def test_what_fills_the_memory_is_a_flood_at_once() -> None:
     assert waiting.flooded(0.0)
 
 
-def flood(senders: dict[tuple[str, int], int], turns: int = 100, seconds: float = 0.001, cost: float = 3e-5) -> dict:
+def flood(
+    senders: dict[tuple[str, int], int], turns: int = 100, seconds: float = 0.001, cost: float = 3e-5
+) -> dict[tuple[str, int], int]:
     """How many packets of each sender are served, where so many come in each turn and each costs so much."""
     waiting, served, now = backlog(), dict.fromkeys(senders, 0), 0.0
     for _ in range(turns):

@@ -6,6 +6,7 @@ import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -224,7 +225,7 @@ def test_more_unknown_than_known_is_a_shift_and_a_fallback_says_nothing() -> Non
     "quantiles",
     [{}, {"at": []}, {"at": [0.01, 0.99], "strength": "x"}, {"at": 3}, {"at": [0.01, 0.99], "strength": [2, 1]}],
 )
-def test_metadata_that_say_nothing_give_no_verdict(quantiles: dict) -> None:
+def test_metadata_that_say_nothing_give_no_verdict(quantiles: dict[str, Any]) -> None:
     shift = Shift(quantiles)
     for _ in range(LAST):
         shift.add({"strength": 1.0, "duration_s": 1.0, "area": 1.0})

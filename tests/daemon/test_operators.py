@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import AsyncIterator, Iterator
 from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -68,7 +69,7 @@ async def open_desk(folder: Path) -> AsyncIterator[tuple[Desk, str]]:
         server.close()
 
 
-async def answer(reader: asyncio.StreamReader) -> dict:
+async def answer(reader: asyncio.StreamReader) -> dict[str, Any]:
     return json.loads(await reader.readline())
 
 
@@ -141,7 +142,7 @@ def test_who_does_not_read_an_answer_is_hung_up_on(tmp_path: Path, monkeypatch) 
             reader, writer = await asyncio.open_unix_connection(path, limit=1)  # it reads next to nothing by itself
             writer.write(b'{"verb":"stream"}\n')
             other, asking = await asyncio.open_unix_connection(path, limit=2000)
-            said = {"ok": False, "reason": "somebody else"}
+            said: dict[str, Any] = {"ok": False, "reason": "somebody else"}
             while not said["ok"]:
                 assert "somebody else" in said["reason"]
                 asking.write(b'{"verb":"stream"}\n')

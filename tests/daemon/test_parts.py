@@ -7,7 +7,7 @@ import json
 import socket
 import time
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -220,7 +220,7 @@ def test_while_the_loop_hangs_its_age_grows() -> None:
 
 
 @pytest.fixture
-def web() -> "tuple[tuple[str, int], HttpThread]":
+def web() -> "Iterator[tuple[tuple[str, int], HttpThread]]":
     sock = socket.create_server(("127.0.0.1", 0))
     sock.setblocking(False)
 

@@ -7,6 +7,7 @@ import socket
 import time
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -195,7 +196,7 @@ def test_osc_goes_out_to_every_destination(start) -> None:
     Sensor(daemon, "arm").begin().perform("up")
     (event,) = client.events("gesture", "arm")
     for out in outs:
-        seen: dict[str, list] = {}
+        seen: dict[str, list[Any]] = {}
         while len(seen) < 2:
             message = osc_message.OscMessage(out.recv(9999))
             seen[message.address] = message.params

@@ -2,7 +2,9 @@
 
 import re
 import shlex
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -63,7 +65,7 @@ def test_each_command_in_the_text_exists():
             assert found in names, f"{path.name}: gesturectl {found}"
 
 
-def subparsers():
+def subparsers() -> Iterable[Any]:
     """gesturectl's subcommands."""
     (action,) = [a for a in PARSERS["gesturectl"]._actions if isinstance(getattr(a, "choices", None), dict)]
     return action.choices.values()

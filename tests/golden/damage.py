@@ -3,8 +3,10 @@
 import random
 import struct
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gestured.client.sensor import Form
 from tests import encoding
@@ -78,10 +80,11 @@ def silence() -> list[Tape]:
     middle = next((e.onset_s + e.offset_s) / 2 for e in take.events if e.offset_s - e.onset_s > 0.7 and e.onset_s > 20)
     cut = [p for p in packets if not any(t <= p[0] < t + 1.4 for t in onsets[1::4])]  # in the middle of a gesture
     brief = [p for p in packets if not any(t <= p[0] < t + 0.35 for t in onsets[1::3])]
-    shifted = replace(take, frames=take.frames.copy())
+    levels: NDArray[Any] = take.frames.copy()
+    shifted = replace(take, frames=levels)
     at = len(take.frames) // 3
-    shifted.frames[at:] += 40  # everything has another level after a restart that the counter does not show
-    shifted.frames[2 * at :] -= 60
+    levels[at:] += 40  # everything has another level after a restart that the counter does not show
+    levels[2 * at :] -= 60
     long = [*[p for p in packets if p[0] < 20], *[(t + 90, who, data) for t, who, data in packets if t >= 20]]
     new = [(t + 0.5 * (t > 30), who, data) for t, who, data in sent(shifted, UINT16, counter=lambda n: n % 450)]
     return [

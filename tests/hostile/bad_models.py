@@ -1,6 +1,7 @@
 """Model files that misbehave: when they are read, when they are opened, or when a touch lasts longer than usual."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -90,7 +91,7 @@ def verbose(good: Path, path: Path) -> Path:
     return path
 
 
-def _make(good: Path, path: Path, nodes: list, numbers: dict | None = None) -> Path:
+def _make(good: Path, path: Path, nodes: list[Any], numbers: dict[str, Any] | None = None) -> Path:
     """`nodes` make `extra` (0 in a short segment) of `duration` (frames of the segment); it is added to the logits."""
     import onnx
     from onnx import TensorProto, helper, numpy_helper

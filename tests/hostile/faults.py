@@ -77,7 +77,7 @@ def _dead_line(frames: Frames, times: Times, counts: Counts, rng: np.random.Gene
 
 def _saturated(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
     """Nothing above a third of a touch can be told apart."""
-    idle = np.median(frames, axis=0)
+    idle = np.median(frames.astype(np.float64), axis=0)
     top = idle + (np.quantile(frames.max(axis=(1, 2)) - idle.max(), 0.95) / 3)
     return np.minimum(frames, top.astype(frames.dtype)), times, counts
 

@@ -17,6 +17,7 @@ import threading
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class Watch:
 
     def __init__(self, daemon: Daemon) -> None:
         self.daemon, self.readings = daemon, [Reading(0, 0, 0, 0, 0, 0, 0)]
-        self.lines: list[dict] = []
+        self.lines: list[dict[str, Any]] = []
         self._latencies: list[float] = []
         self._client = daemon.client().subscribe(*TYPES)
         self._client.sock.settimeout(None)

@@ -15,6 +15,7 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from gestured.client.score import Performed, Tally
 from tests.daemon.harness import Client, Daemon, Frame, Hand, Sensor, floats
@@ -105,7 +106,7 @@ def play(daemon: Daemon, sensors: int, rate_hz: float, stall_s: float, seconds: 
     return result
 
 
-def listen(client: Client) -> list[dict]:
+def listen(client: Client) -> list[dict[str, Any]]:
     """What is still to come, until the daemon has heard nothing of any sensor for a while."""
     return client.until(lambda line: line["type"] == "status" and all(s == "stale" for s in line["sensors"].values()))
 

@@ -1,8 +1,11 @@
 """Whatever is wrong with the way or the sensor: nobody makes no gesture, each onset ends, what comes after counts."""
 
+from typing import Any
+
 import pytest
 
 from gestured.model.model import shipped
+from gestured.simulator import Take
 from tests.hostile import damage
 from tests.hostile.faults import FAULTS, Fault
 from tests.hostile.grammar import violations
@@ -21,17 +24,17 @@ def bench() -> damage.Bench:
 
 
 @pytest.fixture(scope="module")
-def somebody() -> damage.Take:
+def somebody() -> Take:
     return damage.take(damage.FIRST, SECONDS)
 
 
 @pytest.fixture(scope="module")
-def nobody() -> damage.Take:
+def nobody() -> Take:
     return damage.take(damage.FIRST, SECONDS, touched=False)
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_nobody_makes_no_gesture(bench: damage.Bench, nobody: damage.Take, name: str) -> None:
+def test_nobody_makes_no_gesture(bench: damage.Bench, nobody: Take, name: str) -> None:
     damaged = damage.damage(FAULTS[name], nobody, 1)
     lines = bench.events(damaged.arrivals, damaged.stalls)
     assert [line for line in lines if line["type"] == "gesture"] == []
@@ -39,19 +42,19 @@ def test_nobody_makes_no_gesture(bench: damage.Bench, nobody: damage.Take, name:
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_every_onset_of_somebody_ends(bench: damage.Bench, somebody: damage.Take, name: str) -> None:
+def test_every_onset_of_somebody_ends(bench: damage.Bench, somebody: Take, name: str) -> None:
     damaged = damage.damage(FAULTS[name], somebody, 1)
     lines = bench.events(damaged.arrivals, damaged.stalls)
     assert any(line["type"] == "onset" for line in lines)
     assert violations(lines) == []
 
 
-def gestures(lines: list[dict], after: float) -> list[tuple[str, float]]:
+def gestures(lines: list[dict[str, Any]], after: float) -> list[tuple[str, float]]:
     return [(line["gesture"], line["onset"]) for line in lines if line["type"] == "gesture" and line["onset"] > after]
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_what_comes_after_the_fault_counts(bench: damage.Bench, somebody: damage.Take, name: str) -> None:
+def test_what_comes_after_the_fault_counts(bench: damage.Bench, somebody: Take, name: str) -> None:
     damaged = damage.damage(FAULTS[name], somebody, 1)
     bad = [arrival for arrival in damaged.arrivals if arrival[0] < HEALED_S]
     good = damage.damage(Fault(), somebody, 1).arrivals
@@ -63,7 +66,7 @@ def test_what_comes_after_the_fault_counts(bench: damage.Bench, somebody: damage
     assert violations(healed) == []
 
 
-def test_a_stall_of_the_daemon_changes_no_event(bench: damage.Bench, somebody: damage.Take) -> None:
+def test_a_stall_of_the_daemon_changes_no_event(bench: damage.Bench, somebody: Take) -> None:
     """Whenever it stands still: what the kernel's buffer held counts as if it had been read at once."""
     healthy = bench.events(damage.damage(Fault(), somebody, 1).arrivals)
     for seed in range(5):

@@ -6,6 +6,7 @@ import resource
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,7 +16,7 @@ from gestured.record import tape
 from tests.daemon.harness import Sensor
 from tests.small_recording import example
 
-SCENE: dict = {"model": {"name": "tiny"}, "settings": {}}
+SCENE: dict[str, Any] = {"model": {"name": "tiny"}, "settings": {}}
 
 
 def refuses(number: int):

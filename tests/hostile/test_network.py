@@ -2,8 +2,9 @@
 
 import select
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
+from typing import Any
 
 from tests.daemon.harness import Client, Frame, Sensor, counted
 from tests.hostile.grammar import TYPES, violations
@@ -28,7 +29,7 @@ def swipe(sensor: Sensor, direction: str) -> list[Frame]:
     return [sensor.hand.frame(4.0, p) for p in way] + [sensor.hand.frame() for _ in range(60)]
 
 
-def play(client: Client, sensors: list[Sensor], scripts: list[Iterator[Frame]]) -> list[dict]:
+def play(client: Client, sensors: list[Sensor], scripts: Sequence[Iterable[Frame]]) -> list[dict[str, Any]]:
     """Send each sensor's frames side by side at their pace, which is kept by listening to what the daemon says."""
     lines, due = [], time.monotonic()
     for frames in zip(*scripts, strict=True):

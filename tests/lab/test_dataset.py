@@ -3,6 +3,7 @@
 import multiprocessing
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -117,7 +118,7 @@ def test_a_segment_is_named_after_what_it_holds() -> None:
 
 
 @pytest.mark.parametrize(("stream", "plan"), [("cohort", TRIALS), ("others", OTHER_TRIALS)])
-def test_a_sample_carries_the_participant_of_its_plan(stream: str, plan: tuple) -> None:
+def test_a_sample_carries_the_participant_of_its_plan(stream: str, plan: tuple[Any, ...]) -> None:
     for index in range(0, len(plan), 331):
         trial = plan[index]
         number, kind = (trial.participant, trial.gesture) if stream == "cohort" else trial[:2]

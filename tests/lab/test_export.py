@@ -65,7 +65,7 @@ class Net(nn.Module):
         active = (frames.flatten(2).amax(2) >= 0.1).to(frames.dtype)
         last = (active * torch.arange(length, dtype=frames.dtype)).amax(1).to(torch.int64)
         state = states.gather(1, last[:, None, None].expand(-1, 1, 16))[:, 0]
-        centre = frames.flatten(2) @ self.places / frames.flatten(2).sum(2, keepdim=True).clamp(min=1e-3)
+        centre = torch.matmul(frames.flatten(2), self.places) / frames.flatten(2).sum(2, keepdim=True).clamp(min=1e-3)
         step = nn.functional.pad((centre[:, 1:] - centre[:, :-1]) * active[:, 1:, None], (0, 0, 1, 0))
         cues = torch.stack([torch.cumsum(step.abs().sum(2), 1)[:, -1], active.sum(1), centre[:, 0, 0]], 1)
         return torch.softmax(self.head(state) / 1.7, 1), torch.sigmoid(self.judge(cues / 10))[:, 0]

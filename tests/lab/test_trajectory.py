@@ -16,7 +16,7 @@ MX, MY, WINDING, AREA, TURNING, FINGERS = 20, 21, 22, 24, 26, 28
 
 
 def features(frames: np.ndarray) -> Tensor:
-    """(T, R, C) -> (F,)"""
+    """The features (F,) of frames (T, R, C)."""
     return trajectory_features(torch.from_numpy(np.ascontiguousarray(frames, dtype=np.float32))[None])[0]
 
 

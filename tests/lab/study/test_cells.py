@@ -94,14 +94,14 @@ def test_other_shipped_models_are_played_again(tmp_path: Path, shelf: Path, monk
 def cluster() -> Iterator[str]:
     """A real scheduler and two workers, each a process of its own."""
     pytest.importorskip("distributed", reason="distributed is not installed: pip install 'gestured[cluster]'")
-    programs = []
+    programs: list[subprocess.Popen[str]] = []
     dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
     scheduler = subprocess.Popen([*dask, "--no-dashboard"], stderr=subprocess.PIPE, text=True)
     programs.append(scheduler)
     assert scheduler.stderr is not None
     address = next(line.split()[-1] for line in scheduler.stderr if "Scheduler at:" in line)
     worker = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
-    programs += [subprocess.Popen([*worker, "--no-nanny"], stderr=subprocess.DEVNULL) for _ in range(2)]
+    programs += [subprocess.Popen([*worker, "--no-nanny"], stderr=subprocess.DEVNULL, text=True) for _ in range(2)]
     yield address
     for program in reversed(programs):
         program.terminate()

@@ -142,6 +142,7 @@ def _p95(row: Row) -> float:
 
 
 def told(study: Study, row: Row) -> str:
+    """What a point of error against run time says when the pointer rests on it."""
     wrong, time = formats.with_unit(1 - row["right"]), formats.duration(row["median_us"])
     return f"{reading.title(study, row['method'])} ({row['settings']}, {row['precision']}): {wrong} wrong in {time}"
 

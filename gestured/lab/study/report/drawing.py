@@ -44,10 +44,12 @@ class Mark(NamedTuple):
 
     @property
     def id(self) -> str:
+        """Its name in the page, where it is drawn once and used by name."""
         return f"mark-{self.form}-{self.colour}-{self.filling}"
 
     @property
     def hue(self) -> str:
+        """Its colour on the light page, as #rrggbb."""
         return COLOURS[self.colour]
 
     @property
@@ -63,6 +65,7 @@ class Mark(NamedTuple):
 
     @property
     def dashes(self) -> Any:
+        """How matplotlib dashes a line of this mark."""
         return DASHES[self.filling]
 
     def symbol(self) -> Markup:
@@ -93,6 +96,7 @@ class Drawing:
         self._told: dict[str, str] = {}
 
     def tell(self, artist: Artist, words: str) -> None:
+        """Say `words` when the pointer rests on `artist`."""
         artist.set_gid(f"told-{len(self._told)}")
         self._told[str(artist.get_gid())] = words
 

@@ -15,6 +15,7 @@ def percent(share: float | None, digits: int = 1) -> str:
 
 
 def with_unit(share: float | None, digits: int = 1) -> str:
+    """A share in percent with its unit: 0.8321 -> 83.2 %."""
     return NONE if share is None else f"{percent(share, digits)}{THIN}%"
 
 
@@ -24,6 +25,7 @@ def points(difference: float | None) -> str:
 
 
 def interval(row: Mapping[str, Any]) -> str:
+    """A row's confidence interval in percent, empty where it has none."""
     low, high = row.get("low"), row.get("high")
     return "" if low is None or high is None else f"{percent(low)}–{percent(high)}"
 
@@ -34,6 +36,7 @@ def duration(value: float | None, unit_s: float = 1e-6) -> str:
 
 
 def count(number: int | None) -> str:
+    """A whole number with its thousands apart."""
     return NONE if number is None else f"{number:,}".replace(",", THIN)
 
 

@@ -18,6 +18,7 @@ class Missing(Undefined):
     """What a study lacks is null, in the template as in study.json."""
 
     def __new__(cls, *args: object, **names: object) -> None:  # type: ignore[misc]
+        """None in place of an object of this class."""
         return None
 
 

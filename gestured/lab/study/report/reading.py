@@ -39,6 +39,7 @@ def family(study: Study, method: str) -> int:
 
 
 def family_name(study: Study, method: str) -> str:
+    """The name of a method's family."""
     return FAMILIES[family(study, method)]
 
 
@@ -82,6 +83,7 @@ def lines(study: Study, rows: list[Row]) -> list[tuple[tuple[str, str, str], dic
 
 
 def published(study: Study, method: str, augmentation: str) -> float | None:
+    """The paper's figure for a method, None where the paper has none."""
     rows = cells(study, method=method, augmentation=augmentation)
     return next((float(row["published"]) for row in rows if row.get("published") is not None), None)
 
@@ -180,6 +182,7 @@ def lowest_drawn(found: dict[str, list[Row]], shown: list[str]) -> float:
 
 
 def group(rows: list[Row], method: str, name: str) -> Row | None:
+    """The group of this name in a method's row of failures."""
     groups = (group for row in rows if row["method"] == method for group in row["groups"])
     return next((group for group in groups if str(group["name"]) == name), None)
 
