@@ -9,7 +9,7 @@ from typing import Any
 
 from gestured import __version__
 from gestured.core.errors import GesturedError, ModelError, SettingsError
-from gestured.daemon.merge import load_settings
+from gestured.daemon.merge import load_settings, strange_variables
 from gestured.daemon.settings import FLAGS, REPEATED, Settings
 
 EXAMPLE = """\
@@ -74,6 +74,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         settings, sources = load_settings(given, os.environ)
         log.configure(settings.log_level)
+        for name in strange_variables(os.environ):
+            log.log.warning("a variable that is no setting", variable=name)
         if explain:
             from gestured.daemon.explain import explain as describe
 

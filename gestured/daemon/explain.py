@@ -1,7 +1,7 @@
 """`gestured --explain`: what a configuration loads, listens to, computes per frame, leaves out, and why."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from gestured import __version__
@@ -9,7 +9,7 @@ from gestured.core.scene import DOUBLE_TAP
 from gestured.core.timing import Timing
 from gestured.daemon import clients
 from gestured.daemon.ladder import open_ladder
-from gestured.daemon.settings import Settings, control_beside, default_socket
+from gestured.daemon.settings import TABLES, Settings, control_beside, default_socket
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
 
@@ -85,9 +85,24 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
         "publishes on": publishes,
         "computes per frame": computes,
         "leaves out": leaves,
-        "set by": [f"{key}: {source}" for key, source in sources.items()] or ["nothing, all defaults"],
+        "set by": list(_keys(settings, sources)) or ["nothing, all defaults"],
     }
     lines = [f"gestured {__version__}"]
     for title, items in parts.items():
         lines += ["", f"{title}:", *(f"  {item}" for item in items)]
     return "\n".join(lines)
+
+
+def _keys(settings: Settings, sources: Mapping[str, str]) -> Iterator[str]:
+    """What was set, each key as the file has it, and by what."""
+    for key, source in sources.items():
+        table = getattr(settings, key)
+        if key == "addresses":
+            yield from (f"addresses.{field}: {source}" for field in sorted(table.model_fields_set))
+        elif key in TABLES:
+            title = "gestures" if key == "per_gesture" else key
+            for name, part in table.items():
+                yield from (f"{title}.{name}.{field}: {source}" for field in sorted(part.model_fields_set))
+        else:
+            beside = key == "gestures" and sources.get("per_gesture") == source
+            yield f"{'gestures.use' if beside else key}: {source}"

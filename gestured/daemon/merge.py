@@ -6,6 +6,7 @@ was expected. pydantic-settings would do the merging for 105 ms more at every st
 """
 
 import os
+import re
 import stat
 from collections.abc import Mapping
 from typing import Any
@@ -16,6 +17,10 @@ from gestured.core.errors import SettingsError
 from gestured.daemon.settings import FLAGS, AddressSettings, GestureSettings, Part, SensorSettings, Settings
 
 ENVIRONMENT = "GESTURED_"
+KEYS = (*FLAGS, "config")  # that a variable can set
+# Kubernetes and Docker tell every container of every service: GESTURED_SERVICE_HOST, GESTURED_PORT_9000_UDP_ADDR.
+SERVICE = re.compile(r"GESTURED_(\w+_)?(SERVICE_HOST|SERVICE_PORT(_\w+)?|PORT_\d+_(TCP|UDP|SCTP)(_(ADDR|PORT|PROTO))?)")
+PORT = re.compile(r"GESTURED_(\w+_)?PORT")  # its value is a URL, as tcp://10.96.0.17:9000
 MAX_CONFIG_BYTES = 1 << 20  # of a configuration: many times what the largest number of sensors takes
 
 
@@ -50,15 +55,40 @@ def _from_file(path: str) -> dict[str, Any]:
 
 
 def _from_environment(environ: Mapping[str, str]) -> dict[str, str]:
+    """Keys and values of the variables that are set and not empty; one that is nearly a key is an error."""
     found = {
-        name.removeprefix(ENVIRONMENT).lower(): value for name, value in environ.items() if name.startswith(ENVIRONMENT)
+        name.removeprefix(ENVIRONMENT).lower(): value
+        for name, value in environ.items()
+        if name.startswith(ENVIRONMENT) and value
     }
     for key in found:
-        if key not in FLAGS and key != "config":
-            name = ENVIRONMENT + key.upper()
-            known = tuple(ENVIRONMENT + flag.upper() for flag in FLAGS)
-            raise SettingsError(f"{name} = {found[key]!r} (environment): {_unknown(name, known)}")
-    return found
+        name = ENVIRONMENT + key.upper()
+        if key not in KEYS and not _platforms(name, found[key]) and (near := _near(key)):
+            raise SettingsError(f"{name} = {found[key]!r} (environment): unknown key, did you mean {near}?")
+    return {key: value for key, value in found.items() if key in KEYS}
+
+
+def strange_variables(environ: Mapping[str, str]) -> list[str]:
+    """The variables `GESTURED_*` that are no settings, and that no container platform sets by itself."""
+    return [
+        name
+        for name, value in environ.items()
+        if name.startswith(ENVIRONMENT) and value
+        if name.removeprefix(ENVIRONMENT).lower() not in KEYS and not _platforms(name, value)
+    ]
+
+
+def _platforms(name: str, value: str) -> bool:
+    """Whether a container platform sets it by itself, for a service called gestured, or gestured-something."""
+    return bool(SERVICE.fullmatch(name) or (PORT.fullmatch(name) and "://" in value))
+
+
+def _near(key: str) -> str | None:
+    """The variable that is meant by one that is nearly a setting."""
+    import difflib
+
+    near = difflib.get_close_matches(key, KEYS, 1)
+    return ENVIRONMENT + near[0].upper() if near else None
 
 
 def _unknown(key: str, known: tuple[str, ...]) -> str:

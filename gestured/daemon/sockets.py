@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from gestured.client.holder import bind_failure
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
@@ -40,7 +41,7 @@ def _bind(key: str, address: Address, kind: int) -> socket.socket:
         sock.bind(where)
     except OSError as error:
         sock.close()
-        raise AddressError(f"{key}: cannot bind {address}: {error.strerror}") from error
+        raise AddressError(f"{key}: cannot bind {address}: {bind_failure(error, address, kind)}") from error
     return sock
 
 

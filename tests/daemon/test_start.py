@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.daemon import tiny_model
-from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
+from tests.daemon.harness import DEADLINE_S, Daemon, Sensor, lines_of
 
 
 def run(*flags: object, env: dict[str, str] | None = None) -> tuple[int, str, str]:
@@ -113,6 +113,8 @@ def test_the_default_socket_is_the_sessions(model: Path, tmp_path: Path) -> None
         (("--listen", "here"), {}, "", ("listen", "'here'", "HOST:PORT", "command line")),
         ((), {"GESTURED_STALE_S": "soon"}, "", ("stale_s", "'soon'", "number", "environment")),
         ((), {"GESTURED_SOCKETT": "/x"}, "", ("GESTURED_SOCKETT", "GESTURED_SOCKET")),
+        ((), {"GESTURED_ALOW": "10.0.0.1"}, "", ("GESTURED_ALOW", "GESTURED_ALLOW")),
+        ((), {"GESTURED_METRICS_PORT": "9108"}, "", ("GESTURED_METRICS_PORT", "GESTURED_METRICS")),
         ((), {}, "modell = 'x'", ("modell", "did you mean model", "gestured.toml")),
         (
             (),
@@ -140,6 +142,56 @@ def test_settings_that_are_not_valid(model, tmp_path, flags, env, file, said) ->
     where = () if "--config" in flags else ("--config", config)
     text = refused(2, "--listen", "127.0.0.1:0", "--model", model, "--socket", tmp_path / "s", *where, *flags, env=env)
     assert all(word in text for word in said), text
+
+
+KUBERNETES = {  # what it sets in each container of a namespace with the services gestured and gestured-metrics
+    "GESTURED_SERVICE_HOST": "10.96.0.17",
+    "GESTURED_SERVICE_PORT": "9000",
+    "GESTURED_SERVICE_PORT_OSC": "9000",
+    "GESTURED_PORT": "udp://10.96.0.17:9000",
+    "GESTURED_PORT_9000_UDP": "udp://10.96.0.17:9000",
+    "GESTURED_PORT_9000_UDP_PROTO": "udp",
+    "GESTURED_PORT_9000_UDP_PORT": "9000",
+    "GESTURED_PORT_9000_UDP_ADDR": "10.96.0.17",
+    "GESTURED_METRICS_SERVICE_HOST": "10.96.0.18",
+    "GESTURED_METRICS_SERVICE_PORT": "9108",
+    "GESTURED_METRICS_PORT": "tcp://10.96.0.18:9108",
+    "GESTURED_METRICS_PORT_9108_TCP": "tcp://10.96.0.18:9108",
+    "GESTURED_METRICS_PORT_9108_TCP_PROTO": "tcp",
+    "GESTURED_METRICS_PORT_9108_TCP_PORT": "9108",
+    "GESTURED_METRICS_PORT_9108_TCP_ADDR": "10.96.0.18",
+    "KUBERNETES_SERVICE_HOST": "10.96.0.1",
+    "KUBERNETES_PORT": "tcp://10.96.0.1:443",
+}
+
+
+def test_what_a_container_platform_sets_by_itself_is_passed_over(start) -> None:
+    empty = {f"GESTURED_{name}": "" for name in ("LISTEN", "METRICS", "ALLOW", "STALE_S", "CONFIG", "ALOW")}
+    daemon = start(env=KUBERNETES | empty | {"GESTURED_BUILT_BY": "somebody", "GESTURED_MAX_SENSORS": "3"})
+    assert daemon.client().hello["type"] == "hello"
+    daemon.stop()
+    said = [line for line in lines_of(daemon.stderr()) if line["level"] == "warning"]
+    assert [line["variable"] for line in said] == ["GESTURED_BUILT_BY"]
+
+
+def test_a_port_that_is_taken_names_the_process_that_has_it(model: Path, tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("0.0.0.0", 0))  # whatever it was bound to
+        address = f"127.0.0.1:{taken.getsockname()[1]}"
+        said = refused(4, "--model", model, "--listen", address, "--socket", tmp_path / "s")
+    assert f"(pid {os.getpid()})" in said and "in use" in said
+
+
+def test_explain_names_keys_as_the_file_has_them(model: Path, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text(
+        'stale_s = 2\n[gestures]\nuse = ["one_tap"]\n[gestures.one_tap]\nthreshold = 0.9\n[sensors.arm]\nrotate = 90\n'
+    )
+    status, out, _ = run("--model", model, "--listen", "127.0.0.1:0", "--config", config, "--explain")
+    assert status == 0
+    where = out[out.index("set by:") :].split()
+    assert {"gestures.one_tap.threshold:", "sensors.arm.rotate:", "gestures.use:", "stale_s:"} <= set(where)
+    assert "per_gesture" not in out
 
 
 @pytest.mark.parametrize("what", ["a FIFO", "a device", "too large"])
