@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.client import osc_out
+from gestured.core.address import Address
 from gestured.core.frames import Frame, Touch
 
 BLOBS: dict[str, np.dtype[Any]] = {
@@ -76,7 +77,7 @@ class Sensor:
         family, kind, _, _, address = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
         self.socket = socket.socket(family, kind)
         self.socket.connect(address)
-        self.form = form
+        self.to, self.form = Address(*to), form
         self.sent = 0
         self.unheard = 0  # packets that a closed port answered
         self.start = time.monotonic()

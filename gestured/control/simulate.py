@@ -48,7 +48,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
 
 
 def run(args: argparse.Namespace) -> int:
-    """Send until the time is over, or Ctrl-C."""
+    """Send until the time is over, or Ctrl-C. Raises GesturedError where nobody listens from the first packet on."""
     play = play_from(args)
     form = Form(args.sensor, "ints" if args.ints else args.blob or "floats", args.plain)
     try:
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
             sensor.send(_telling(frames(start, take), start, take.events, sensor, args.json))
     finally:
         sensor.close()
-        if sensor.unheard:
+        if 0 < sensor.unheard < sensor.sent - 1:  # a daemon that was there before has gone, or was started again
             lost = f"{sensor.unheard} of {sensor.sent} packets"
             say(f"nobody listened on {args.to} for {lost}", to=sys.stderr)
     return 0
@@ -78,6 +78,8 @@ def _telling(
     """The frames, and what was performed printed as each ends."""
     left = list(events)
     for counter, frame in frames:
+        if sensor.unheard and sensor.unheard >= sensor.sent - 1:  # of the last packet nobody can know
+            raise GesturedError(f"nobody listens on {sensor.to}: start gestured, or name its address with --to")
         while left and start + left[0].offset_s < frame.t:
             event = left.pop(0)
             _tell(event, sensor.moment(start), sensor.form.sensor, as_json)
