@@ -1,7 +1,6 @@
 """`gesturectl doctor`: what is wrong, and what to do about it."""
 
 import argparse
-import os
 import platform
 import socket
 import stat
@@ -13,10 +12,11 @@ from typing import Any
 
 import gestured
 from gestured.client.control import Control
+from gestured.client.holder import bind_failure
 from gestured.client.lines import JOIN, Forbidden, Refused, Unreachable
 from gestured.client.peer import Stranger
 from gestured.client.say import say, say_json
-from gestured.control.address import add_control, find_control
+from gestured.control.address import add_sockets, control_path
 from gestured.core.address import Address
 from gestured.core.errors import ModelError
 from gestured.model.model import check
@@ -59,7 +59,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="example:\n  gesturectl doctor",
     )
-    add_control(parser)
+    add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print the findings as JSON lines")
     parser.set_defaults(run=run)
 
@@ -67,7 +67,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
 def run(args: argparse.Namespace) -> int:
     """Look at everything, and say it."""
     bad = 0
-    for finding in examine(args.control or find_control(os.environ)):
+    for finding in examine(control_path(args)):
         bad += finding.level == "bad"
         if args.json:
             say_json(asdict(finding))
@@ -144,7 +144,7 @@ def _port(address: Address) -> Finding:
                 f"sudo ss -ulpn 'sport = :{address.port}' shows whose it is. systemd holds it for the service: good; "
                 "else end that program, or choose another --listen"
             )
-            return Finding("warn", f"{where}: {error.strerror}", remedy)
+            return Finding("warn", f"{where}: {bind_failure(error, address, socket.SOCK_DGRAM)}", remedy)
     return Finding("ok", f"{where} is free")
 
 

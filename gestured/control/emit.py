@@ -3,7 +3,7 @@
 import argparse
 
 from gestured.client.say import tell
-from gestured.control.address import add_control, connect
+from gestured.control.address import add_sockets, connect
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -19,7 +19,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
     )
     parser.add_argument("gesture", metavar="GESTURE", help="one of the gestures in use")
     parser.add_argument("--sensor", metavar="NAME", help="whose event it is to be (default: test)")
-    add_control(parser)
+    add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print the daemon's answer")
     parser.set_defaults(run=run)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gestured.client.lines import Unreachable
 from gestured.client.say import tell
-from gestured.control.address import add_control, connect
+from gestured.control.address import add_sockets, connect
 from gestured.control.record import Keeper
 from gestured.record.tape import Writer, library
 
@@ -25,7 +25,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
     )
     parser.add_argument("file", type=Path, nargs="?", metavar="FILE", help="default: flag-DATE-TIME.mcap")
     parser.add_argument("--note", default="", metavar="TEXT", help="what was wrong; kept with it")
-    add_control(parser)
+    add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print what was kept as JSON")
     parser.set_defaults(run=run)
 

@@ -1,16 +1,14 @@
 """`gesturectl listen`: events as they come."""
 
 import argparse
-import os
 import sys
 import time
 from datetime import datetime
-from pathlib import Path
 from typing import Any
 
 from gestured.client.say import say, say_drawn, say_json
 from gestured.client.subscriber import Subscriber
-from gestured.control.address import find_socket
+from gestured.control.address import add_sockets, event_path
 
 TYPES = ("gesture", "unknown", "cancelled", "onset", "release", "status")
 
@@ -25,8 +23,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         epilog="examples:\n  gesturectl listen --types gesture,unknown\n"
         "  gesturectl listen --json --gesture swipe_left --count 1",
     )
-    text = "the daemon's event socket (default: the daemon's own default)"
-    parser.add_argument("--socket", type=Path, metavar="PATH", help=text)
+    add_sockets(parser)
     parser.add_argument("--types", type=_types, help=f"comma-separated, of {', '.join(TYPES)} (default: gesture)")
     parser.add_argument("--sensor", action="append", metavar="NAME", help="only this sensor; may be repeated")
     parser.add_argument("--gesture", action="append", metavar="NAME", help="only this gesture; may be repeated")
@@ -38,7 +35,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
 
 def run(args: argparse.Namespace) -> int:
     """Print until the count is reached, the daemon ends, or Ctrl-C."""
-    path = args.socket or find_socket(os.environ)
+    path = event_path(args)
     wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture}
     left = args.count
     with Subscriber(path, **wanted, reconnect=args.reconnect) as subscriber:

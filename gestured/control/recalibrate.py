@@ -3,7 +3,7 @@
 import argparse
 
 from gestured.client.say import tell
-from gestured.control.address import add_control, connect
+from gestured.control.address import add_sockets, connect
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -17,7 +17,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         epilog="example:\n  gesturectl recalibrate --sensor armrest",
     )
     parser.add_argument("--sensor", metavar="NAME", help="only this sensor (default: all)")
-    add_control(parser)
+    add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print the daemon's answer")
     parser.set_defaults(run=run)
 

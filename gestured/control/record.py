@@ -15,7 +15,7 @@ from typing import Any
 from gestured.client.control import Control
 from gestured.client.lines import Refused, Unreachable
 from gestured.client.say import say, say_json
-from gestured.control.address import add_control, connect, finish_on_signals
+from gestured.control.address import add_sockets, connect, finish_on_signals
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.facts import Taken
@@ -41,7 +41,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
     parser.add_argument("file", type=Path, metavar="FILE", help="what to write; must not exist")
     parser.add_argument("--seconds", type=float, metavar="S", help="end after so long (default: at Ctrl-C)")
     parser.add_argument("--max-mib", type=int, default=1024, metavar="N", help="end at this size (default: 1024)")
-    add_control(parser)
+    add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
     parser.set_defaults(run=run)
 

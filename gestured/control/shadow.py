@@ -8,7 +8,7 @@ from typing import Any
 
 from gestured.client.lines import Refused
 from gestured.client.say import say, say_json
-from gestured.control.address import add_control, connect
+from gestured.control.address import add_sockets, connect
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -23,7 +23,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
     )
     parser.add_argument("model", metavar="MODEL", nargs="?", help="a path that the daemon can read, or a shipped name")
     parser.add_argument("--stop", action="store_true", help="end it, and print what came of it")
-    add_control(parser)
+    add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     parser.set_defaults(run=run)
 
@@ -50,6 +50,11 @@ def run(args: argparse.Namespace) -> int:
         say_json(report)
     elif report is None:
         say("no model runs in the shadow")
+    elif args.stop:
+        say(f"{report['model']} runs in the shadow no longer; what came of it:", *words(report))
+    elif args.model is not None:
+        further = "gesturectl shadow reports, gesturectl shadow --stop ends it"
+        say(f"{report['model']} runs in the shadow from now on: {further}")
     else:
         say(*words(report))
     return 1 if report is None else 0

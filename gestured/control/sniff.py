@@ -2,6 +2,7 @@
 
 import argparse
 import base64
+import errno
 import re
 import socket
 import sys
@@ -13,9 +14,10 @@ from dataclasses import dataclass, field
 from itertools import groupby
 
 from gestured.client.address import host_port
+from gestured.client.holder import bind_failure
 from gestured.client.lines import Unreachable
 from gestured.client.say import say, shown, tell
-from gestured.control.address import add_control, connect, finish_on_signals
+from gestured.control.address import add_sockets, connect, finish_on_signals
 from gestured.core import osc
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError, ProtocolError
@@ -41,7 +43,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
     )
     parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help="how long (default: 5)")
     parser.add_argument("--listen", type=host_port, metavar="HOST:PORT", help="a UDP address that nobody has")
-    add_control(parser)
+    add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print what was seen as JSON")
     parser.set_defaults(run=run)
 
@@ -232,8 +234,9 @@ def _listen(address: Address, seconds: float) -> Iterator[tuple[float, str, byte
         receiver = socket.socket(family, kind)
         receiver.bind(where)
     except OSError as error:
-        hint = "; without --listen I ask the daemon that has it" if error.errno == 98 else ""
-        raise GesturedError(f"cannot listen on {address}: {error.strerror}{hint}") from error
+        hint = "; without --listen I ask the daemon that has it" if error.errno == errno.EADDRINUSE else ""
+        reason = bind_failure(error, address, socket.SOCK_DGRAM)
+        raise GesturedError(f"cannot listen on {address}: {reason}{hint}") from error
     with receiver:
         end = time.monotonic() + seconds
         say(f"listening on {address}", to=sys.stderr)

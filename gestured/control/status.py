@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import Any
 
 from gestured.client.say import say, say_drawn, say_json
-from gestured.control.address import add_control, connect
+from gestured.control.address import add_sockets, connect
 from gestured.control.shadow import words as shadow_words
 
 CLEAR = "\x1b[2J\x1b[H"
@@ -28,7 +28,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         epilog="examples:\n  gesturectl status --watch\n  gesturectl status --json",
     )
     parser.add_argument("--watch", action="store_true", help="again every second, until Ctrl-C")
-    add_control(parser)
+    add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print all that is known as JSON, one line each time")
     parser.set_defaults(run=run)
 
@@ -105,9 +105,13 @@ def _recent(recent: list[dict[str, Any]]) -> Iterator[str]:
 def _shift(shift: dict[str, Any]) -> str:
     if not shift["outside"]:
         return f"nothing to say yet ({shift['gestures']} gestures)"
-    shares = ", ".join(f"{SHIFT_NAMES.get(name, name)} {100 * share:.0f} %" for name, share in shift["outside"].items())
-    verdict = "unlike the training data" if shift["unlike"] else "as in training"
-    return f"{verdict}; outside its range (2 % or less expected) in the last {shift['gestures']} gestures: {shares}"
+    seen = f"the last {shift['gestures']} gestures are"
+    if not shift["unlike"]:
+        return f"{seen} like those of the training"
+    shares = ", ".join(
+        f"{SHIFT_NAMES.get(name, name)} ({100 * shift['outside'][name]:.0f} %)" for name in shift["unlike"]
+    )
+    return f"{seen} unlike those of the training in {shares}: gesturectl doctor says more"
 
 
 def _span(seconds: float) -> str:

@@ -45,7 +45,7 @@ def test_status_of_a_daemon_that_is_not_ready_and_shifted() -> None:
     }  # fmt: skip
     text = "\n".join(screen(status))
     assert "not ready: no model could classify" in text and "a fallback for cnn_lstm, 2 failures" in text
-    assert "unlike the training data" in text and "strength 50 %" in text
+    assert "unlike those of the training in strength (50 %)" in text
     assert "and 8 more" in text and "4 size" in text and "2 held" in text
 
 
@@ -87,7 +87,7 @@ def test_recalibrate_and_reload(ctl, daemon: Daemon) -> None:
 def test_a_shadow_is_named_by_a_path_that_is_the_clients(ctl, run, start, daemon: Daemon, tmp_path: Path) -> None:
     tiny_model.make(tmp_path / "next.onnx")
     begin = start("shadow", "next.onnx", "--control", daemon.ready["control"], cwd=tmp_path)
-    assert b"next in the shadow: 0 segments" in begin.communicate(timeout=60)[0]
+    assert b"next runs in the shadow from now on" in begin.communicate(timeout=60)[0]
     client = daemon.client()
     Sensor(daemon, "lid").begin().perform("left", "tap")
     client.events("gesture", "lid", 2)
