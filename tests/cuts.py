@@ -1,0 +1,221 @@
+"""How the front end's cuts compare with cuts at the true marks: `python -m tests.cuts`.
+
+    python -m tests.cuts --level nominal hard faint --sessions 100
+    python -m tests.cuts --foreign --level nominal hard --sessions 100
+
+Short sessions of one person each on one sensor each, of this project's simulator or of the independent one (which
+judges: nothing is tuned on it). Each gesture is named twice: as the front end cuts it, and as it would be cut by
+somebody who knows when the finger came and left. A gesture is `one` if exactly one segment lies in it, and that
+segment in no other gesture; `split` if several do, `joined` if its segment holds another gesture too, `missed` if none
+does. Onsets and offsets are seconds after the true ones, of gestures that are one segment, at the quantiles 0.1, 0.5
+and 0.9. `false` are segments of nobody, an hour.
+"""
+
+import argparse
+import json
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.frames import Frame, Segment
+from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.recognizer import Decided, Recognizer
+from gestured.model.model import open_model
+from gestured.simulator import Participant, SimulatedSensor, generator, session
+from tests import foreign
+
+SESSION_S = 20.0
+NON_GESTURE_SHARE = 0.25
+HARDNESS = 0.6, 1.0
+FAINT = 8.0, 25.0  # times the noise, of a usual touch
+IDLE_S = 0.9, 3.0
+EDGE_S = 0.07  # a frame at the model's rate: a contact is known to one frame only
+LEVELS = ("nominal", "hard", "faint")
+
+
+class Performed(NamedTuple):
+    """What was really done, and when."""
+
+    label: str
+    kind: str
+    onset: float  # s
+    offset: float  # s
+
+
+class Recording(NamedTuple):
+    """Raw frames with the truth."""
+
+    frames: NDArray[np.generic]  # (N, R, C)
+    times: NDArray[np.float64]  # (N,) s
+    performed: tuple[Performed, ...]
+
+
+def ours(level: str, seed: int) -> Recording:
+    """A session of the project's own simulator: `hard` sensors are any, `faint` ones show little above their noise."""
+    rng = generator(seed, 0xC075, LEVELS.index(level))
+    sensor = SimulatedSensor.nominal(day=seed)
+    if level != "nominal":
+        while True:
+            sensor = SimulatedSensor.wide(rng, float(rng.uniform(*HARDNESS)))
+            if (sensor.rows, sensor.columns) == (9, 9) and 12 < sensor.rate_hz < 18:
+                break
+    if level == "faint":
+        strength = float(np.exp(rng.uniform(*np.log(FAINT))))
+        sensor = replace(sensor, noise=1 / strength)
+    person = Participant(int(rng.integers(1 << 40)) + 1_000_000)
+    take = session(person, sensor, rng, SESSION_S, NON_GESTURE_SHARE, IDLE_S)
+    return Recording(
+        take.frames, take.times, tuple(Performed(a.label, a.kind, a.onset_s, a.offset_s) for a in take.events)
+    )
+
+
+def others(level: str, seed: int) -> Recording:
+    """A session of the independent generator."""
+    made = foreign.session(seed, level, SESSION_S, NON_GESTURE_SHARE)
+    performed = tuple(Performed(e["label"], e["kind"], e["onset"], e["release"]) for e in made["events"])
+    return Recording(made["frames"], made["times"], performed)
+
+
+@dataclass
+class Sheet:
+    """What was counted."""
+
+    gestures: int = 0
+    cuts: Counter[str] = field(default_factory=Counter)  # one, split, joined, missed
+    cut: Counter[str] = field(default_factory=Counter)  # right, wrong, lost: named as the front end cuts
+    marked: Counter[str] = field(default_factory=Counter)  # the same at the true marks
+    best: Counter[str] = field(default_factory=Counter)  # the best score is right: "cut", "marked"
+    onsets: list[float] = field(default_factory=list)
+    offsets: list[float] = field(default_factory=list)
+    others: int = 0  # non-gestures
+    accepted: int = 0  # of them, taken for a gesture
+    false: int = 0  # segments of nobody
+    hours: float = 0.0
+
+    def __iadd__(self, other: "Sheet") -> "Sheet":
+        for name in self.__dataclass_fields__:
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        return self
+
+    def figures(self) -> dict[str, Any]:
+        """What is printed; shares are 0..1."""
+        n = max(self.gestures, 1)
+
+        def share(counts: Counter[str], *names: str) -> dict[str, float]:
+            return {name: round(counts[name] / n, 4) for name in names}
+
+        def quantiles(values: list[float]) -> list[float]:
+            return [round(float(q), 3) for q in np.quantile(values or [np.nan], [0.1, 0.5, 0.9])]
+
+        return {
+            "gestures": self.gestures,
+            **share(self.cuts, "one", "split", "joined", "missed"),
+            "onset_s": quantiles(self.onsets), "offset_s": quantiles(self.offsets),
+            "cut": {**share(self.cut, "right", "wrong", "lost"), "best": round(self.best["cut"] / n, 4)},
+            "marked": {**share(self.marked, "right", "wrong", "lost"), "best": round(self.best["marked"] / n, 4)},
+            "others": self.others, "accepted": round(self.accepted / max(self.others, 1), 4),
+            "false an hour": round(self.false / max(self.hours, 1e-9), 2),
+        }  # fmt: skip
+
+
+def measure(recording: Recording, model: Any) -> Sheet:
+    """One session."""
+    frames, times, performed = recording
+    sheet = Sheet(hours=float(times[-1]) / 3600)
+    front = FrontEnd("cuts", *frames.shape[1:])
+    machine = Recognizer(front, model)
+    looks: list[tuple[NDArray[np.float64], float]] = []  # baseline and noise, as known at each frame
+    decided: list[Decided] = []
+    for t, values in zip(times, frames, strict=True):
+        looks.append((front.baseline, front.noise))
+        decided += [x for x in machine.push(Frame(float(t), values)) if isinstance(x, Decided)]
+    decided += [x for x in machine.flush(float(times[-1]) + 5.0) if isinstance(x, Decided)]
+    within = [
+        [d for d in decided if d.segment.onset < p.offset + EDGE_S and d.segment.offset > p.onset - EDGE_S]
+        for p in performed
+    ]
+    owners = Counter(id(d) for found in within for d in found)
+    sheet.false = sum(id(d) not in owners for d in decided)
+    for act, found in zip(performed, within, strict=True):
+        named = [model.gestures[int(d.scores.values.argmax())] for d in found if d.known]
+        if act.label == "none":
+            sheet.others += 1
+            sheet.accepted += bool(named)
+            continue
+        sheet.gestures += 1
+        joined = any(owners[id(d)] > 1 for d in found)
+        sheet.cuts["missed" if not found else "split" if len(found) > 1 else "joined" if joined else "one"] += 1
+        sheet.cut["right" if named == [act.label] else "wrong" if set(named) - {act.label} else "lost"] += 1
+        if len(found) == 1:
+            (one,) = found
+            sheet.best["cut"] += model.gestures[int(one.scores.values.argmax())] == act.label
+            if not joined:
+                sheet.onsets.append(one.segment.onset - act.onset)
+                sheet.offsets.append(one.segment.offset - act.offset)
+        first = int(np.searchsorted(times, act.onset))
+        if looks[first][1] > 0:
+            scores = model.classify(at_marks(front, recording, act, *looks[first]))
+            best = model.gestures[int(scores.values.argmax())]
+            sheet.best["marked"] += best == act.label
+            sure = scores.confidence >= scores.threshold
+            sheet.marked["lost" if not sure else "right" if best == act.label else "wrong"] += 1
+        else:
+            sheet.marked["lost"] += 1
+    return sheet
+
+
+def at_marks(
+    front: FrontEnd, recording: Recording, act: Performed, baseline: NDArray[np.float64], noise: float
+) -> Segment:
+    """The segment of somebody who knows when the finger came and left."""
+    times = recording.times
+    first = int(np.searchsorted(times, act.onset))
+    last = max(int(np.searchsorted(times, act.offset, side="right")) - 1, first)
+    low, high = max(first - 3, 0), min(last + 4, len(times))
+    raw = recording.frames[low:high].astype(np.float64).reshape(high - low, -1)
+    frames = front.conditioner.taxels.bridge(raw - baseline).astype(np.float32)
+    return Segment(
+        frames.reshape(-1, front.rows, front.columns), times[low:high], first - low, last - low, noise
+    )
+
+
+def _batch(task: tuple[str, bool, int, int, str]) -> Sheet:
+    level, is_foreign, first, count, source = task
+    model, sheet = open_model(source), Sheet()
+    for seed in range(first, first + count):
+        sheet += measure((others if is_foreign else ours)(level, seed), model)
+    return sheet
+
+
+def _tasks(args: argparse.Namespace, level: str) -> Iterator[tuple[str, bool, int, int, str]]:
+    step = 10
+    for first in range(args.first, args.first + args.sessions, step):
+        yield level, args.foreign, first, min(step, args.first + args.sessions - first), args.model
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--foreign", action="store_true", help="the independent generator: look, do not tune")
+    parser.add_argument("--level", nargs="+", choices=LEVELS, default=["nominal", "hard"])
+    parser.add_argument("--sessions", type=int, default=100, help=f"of {SESSION_S:.0f} s, of each level (%(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="first seed (%(default)s)")
+    parser.add_argument("--model", default="cnn_lstm", help="a shipped model's name or a path (%(default)s)")
+    parser.add_argument("--jobs", type=int, default=1, help="processes (%(default)s)")
+    args = parser.parse_args()
+    if args.foreign and "faint" in args.level:
+        parser.error("--foreign: its levels are nominal and hard")
+    with ProcessPoolExecutor(args.jobs) as pool:
+        for level in args.level:
+            sheet = Sheet()
+            for part in pool.map(_batch, _tasks(args, level)):
+                sheet += part
+            print(json.dumps({"level": level, **sheet.figures()}), flush=True)
+
+
+if __name__ == "__main__":
+    main()
