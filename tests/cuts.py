@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Decided, Recognizer
 from gestured.model.model import open_model
 from gestured.simulator import Participant, SimulatedSensor, generator, session
@@ -179,9 +179,7 @@ def at_marks(
     low, high = max(first - 3, 0), min(last + 4, len(times))
     raw = recording.frames[low:high].astype(np.float64).reshape(high - low, -1)
     frames = front.conditioner.taxels.bridge(raw - baseline).astype(np.float32)
-    return Segment(
-        frames.reshape(-1, front.rows, front.columns), times[low:high], first - low, last - low, noise
-    )
+    return Segment(frames.reshape(-1, front.rows, front.columns), times[low:high], first - low, last - low, noise)
 
 
 def _batch(task: tuple[str, bool, int, int, str]) -> Sheet:
