@@ -3,9 +3,7 @@
 import os
 import re
 import socket
-import subprocess
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +17,7 @@ from tests.daemon.parts import SOURCE, Parts
 
 NEVER = {"torch", "sklearn", "pywt", "matplotlib", "scipy", "onnx", "mcap"}
 EVERYTHING = ("--metrics", "127.0.0.1:0", "--publish", "osc://127.0.0.1:9", "--flight-recorder", "1")
-Start = Callable[..., Daemon]
+Used = Callable[[str], Daemon]
 
 
 def imported(daemon: Daemon) -> set[str]:
@@ -36,21 +34,6 @@ def libraries(daemon: Daemon) -> str:
 def count(daemon: Daemon, what: str) -> int:
     """Its threads ("task") or descriptors ("fd")."""
     return len(os.listdir(f"/proc/{daemon.process.pid}/{what}"))
-
-
-def used(
-    start: Start, *flags: str, model: object = "cnn_lstm", make: Callable[[Daemon, str], Sensor] = Sensor
-) -> Daemon:
-    """A daemon that has answered one swipe of a sensor, with `python -X importtime`."""
-    if model in shipped() and not shipped()[str(model)].exists():
-        pytest.skip(f"{shipped()[str(model)]} is not there")
-    daemon = start("--clock", "sensor", *flags, model=model, python=("-X", "importtime"))
-    with_client = daemon.client().subscribe("gesture", "unknown")
-    sensor = make(daemon, "armrest")
-    sensor.send(sensor.hand.idle(1.5) + sensor.hand.swipe("right") + sensor.hand.idle(1.0))
-    with_client.until(lambda line: line["type"] in ("gesture", "unknown"))
-    with_client.close()
-    return daemon
 
 
 class Fingers(Sensor):
@@ -72,6 +55,7 @@ def trajectory(sensor: str, types: str = "iffiff") -> bytes:
 SCENES: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "minimal": ((), {}),
     "metrics": (("--metrics", "127.0.0.1:0"), {}),
+    "all but OSC out": (("--metrics", "127.0.0.1:0", "--flight-recorder", "1"), {"make": Fingers}),
     "OSC out": (("--publish", "osc://127.0.0.1:9"), {}),
     "forest only": ((), {"model": "touch_pattern_rf"}),
     "trajectories": ((), {"make": Fingers}),
@@ -80,41 +64,65 @@ SCENES: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
 }
 
 
+@pytest.fixture(scope="module")
+def used(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Used]:
+    """Daemons of the scenes that have answered one swipe, with `python -X importtime`; one of each for all tests."""
+    running: dict[str, Daemon] = {}
+
+    def used(scene: str) -> Daemon:
+        if scene not in running:
+            flags, more = SCENES[scene]
+            model, make = more.get("model", "cnn_lstm"), more.get("make", Sensor)
+            if not shipped()[model].exists():
+                pytest.skip(f"{shipped()[model]} is not there")
+            folder = tmp_path_factory.mktemp("scene")
+            daemon = Daemon.start(folder, model, "--clock", "sensor", *flags, python=("-X", "importtime"))
+            running[scene] = daemon
+            client = daemon.client().subscribe("gesture", "unknown")
+            sensor = make(daemon, "armrest")
+            sensor.send(sensor.hand.idle(1.5) + sensor.hand.swipe("right") + sensor.hand.idle(1.0))
+            client.until(lambda line: line["type"] in ("gesture", "unknown"))
+            client.close()
+        return running[scene]
+
+    yield used
+    for daemon in running.values():
+        assert daemon.stop() == 0
+
+
 @pytest.mark.parametrize("scene", SCENES)
-def test_no_scene_loads_what_belongs_to_training(start: Start, scene: str) -> None:
-    flags, more = SCENES[scene]
-    daemon = used(start, *flags, **more)
+def test_no_scene_loads_what_belongs_to_training(used: Used, scene: str) -> None:
+    daemon = used(scene)
     assert not imported(daemon) & NEVER
     assert "libtorch" not in libraries(daemon)
     assert "numpy" in imported(daemon)  # so that an empty report does not pass
 
 
-def test_numpy_brings_no_threads_no_random_numbers_and_no_masked_arrays(start: Start) -> None:
-    daemon = used(start)
+def test_numpy_brings_no_threads_no_random_numbers_and_no_masked_arrays(used: Used) -> None:
+    daemon = used("minimal")
     # The loop, the log, what ends a run of a model that takes too long, and what ends the process where the loop hangs.
     assert count(daemon, "task") == 4
     assert "numpy.random" not in daemon.stderr() and "numpy.ma.core" not in daemon.stderr()
 
 
-def test_the_metrics_library_comes_with_metrics_alone(start: Start) -> None:
-    assert "prometheus_client" not in imported(used(start, "--publish", "osc://127.0.0.1:9"))
+def test_the_metrics_library_comes_with_metrics_alone(used: Used) -> None:
+    assert "prometheus_client" not in imported(used("OSC out"))
 
 
-def test_python_osc_comes_with_osc_output_alone(start: Start) -> None:
-    silent = used(start, "--metrics", "127.0.0.1:0", "--flight-recorder", "1")
-    silent.stop()
-    assert "pythonosc" not in imported(silent)
-    assert "pythonosc" in imported(used(start, "--publish", "osc://127.0.0.1:9"))
+def test_python_osc_comes_with_osc_output_alone(used: Used) -> None:
+    assert "pythonosc" not in imported(used("all but OSC out"))
+    assert "pythonosc" in imported(used("OSC out"))
 
 
-def test_the_metrics_library_comes_with_the_first_scrape(start: Start) -> None:
-    daemon = used(start, "--metrics", "127.0.0.1:0")
+def test_the_metrics_library_comes_with_the_first_scrape(used: Used) -> None:
+    daemon = used("metrics")
+    assert "prometheus_client" not in imported(daemon)
     daemon.get("/metrics")
     assert "prometheus_client" in imported(daemon)
 
 
-def test_a_daemon_without_metrics_has_no_http_thread_and_no_tcp_socket(start: Start) -> None:
-    daemon = used(start)
+def test_a_daemon_without_metrics_has_no_http_thread_and_no_tcp_socket(used: Used) -> None:
+    daemon = used("minimal")
     with_http = Path(f"/proc/{daemon.process.pid}/net/tcp").read_text()
     own = {os.readlink(f"/proc/{daemon.process.pid}/fd/{fd}") for fd in os.listdir(f"/proc/{daemon.process.pid}/fd")}
     listening = {line.split()[9] for line in with_http.splitlines()[1:] if line.split()[3] == "0A"}
@@ -122,25 +130,22 @@ def test_a_daemon_without_metrics_has_no_http_thread_and_no_tcp_socket(start: St
     assert "gestured.daemon.http" not in daemon.stderr()
 
 
-def test_threads_and_descriptors_of_http_are_there_with_metrics_alone(start: Start) -> None:
-    plain = used(start)
-    before = count(plain, "task"), count(plain, "fd")
-    plain.stop()
-    watched = used(start, "--metrics", "127.0.0.1:0")
+def test_threads_and_descriptors_of_http_are_there_with_metrics_alone(used: Used) -> None:
+    plain, watched = used("minimal"), used("all but OSC out")
     watched.get("/healthz")
-    assert count(watched, "task") > before[0]
-    assert count(watched, "fd") > before[1]
+    assert count(watched, "task") > count(plain, "task")
+    assert count(watched, "fd") > count(plain, "fd")
 
 
-def test_the_forest_alone_opens_no_network(start: Start) -> None:
-    daemon = used(start, model="touch_pattern_rf")
+def test_the_forest_alone_opens_no_network(used: Used) -> None:
+    daemon = used("forest only")
     assert "cnn_lstm" not in daemon.stderr() + libraries(daemon)
     assert daemon.client().hello["model"] == "touch_pattern_rf"
 
 
-def test_finger_positions_cost_nothing_that_is_kept(start: Start) -> None:
+def test_finger_positions_cost_nothing_that_is_kept(used: Used) -> None:
     """Nothing in the daemon asks for them: right or wrong ones, with a frame or without, leave no trace."""
-    daemon = used(start, "--metrics", "127.0.0.1:0", make=Fingers)
+    daemon = used("all but OSC out")
     before = daemon.get("/metrics")[1].count("\n")
     with socket.socket(type=socket.SOCK_DGRAM) as sender:
         sender.connect(daemon.address)
@@ -168,15 +173,3 @@ def test_finger_positions_are_passed_over_at_their_address(model: Path, monkeypa
         packet = encoding.bundle([trajectory(f"s{n}"), frame, trajectory("armrest")], 1.7e9 + n)
         parts.desk.take(parts.hub.receive([(packet, SOURCE)], n / 15))
     assert parts.metrics.frames.values == {("armrest", "ok"): 100} and parts.metrics.dropped.values == {}
-
-
-def test_the_explanation_names_what_is_left_out() -> None:
-    def explained(*flags: str) -> str:
-        command = [sys.executable, "-m", "gestured.daemon", "--model", "cnn_lstm", *flags, "--explain"]
-        return subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
-
-    minimal, everything = explained(), explained(*EVERYTHING)
-    for text in ("no --metrics", "python-osc, OSC output: no --publish"):
-        assert text in minimal
-        assert text not in everything
-    assert "second tap" in explained("--gestures", "swipe_left,swipe_right")

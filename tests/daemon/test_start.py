@@ -10,6 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from gestured.core.errors import SettingsError
+from gestured.daemon.cli import parser
+from gestured.daemon.explain import explain
+from gestured.daemon.merge import load_settings
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor, lines_of
 
@@ -107,6 +111,15 @@ def test_the_default_socket_is_the_sessions(model: Path, tmp_path: Path) -> None
     assert daemon.stop() == 0
 
 
+def unread(*flags: object, env: dict[str, str] | None = None) -> str:
+    """What is said of flags, variables and a file that are no settings, before anything is started."""
+    given = vars(parser().parse_args(list(map(str, flags))))
+    given.pop("explain")
+    with pytest.raises(SettingsError) as found:
+        load_settings(given, env or {})
+    return str(found.value)
+
+
 @pytest.mark.parametrize(
     ("flags", "env", "file", "said"),
     [
@@ -128,19 +141,17 @@ def test_the_default_socket_is_the_sessions(model: Path, tmp_path: Path) -> None
             "[gestures.one_tap]\nthreshold = 2",
             ("gestures.one_tap.threshold", "2", "less than or equal to 1"),
         ),
-        ((), {}, "[gestures.one_tab]\nthreshold = 0.5", ("gestures", "one_tab", "one_tap")),
         ((), {}, "[addresses]\npressure = 'x'", ("addresses", "pressure", "{sensor}")),
         ((), {}, "max_sensors = 0", ("max_sensors", "0", "greater than or equal to 1")),
         ((), {}, "listen = !", ("gestured.toml", "TOML", "line 1")),
-        (("--gestures", "wink"), {}, "", ("gestures", "wink", "one_tap")),
         (("--config", "/no/such/file"), {}, "", ("config", "/no/such/file")),
     ],
 )
-def test_settings_that_are_not_valid(model, tmp_path, flags, env, file, said) -> None:
+def test_settings_that_are_not_valid(tmp_path: Path, flags, env, file, said) -> None:
     config = tmp_path / "gestured.toml"
     config.write_text(file)
     where = () if "--config" in flags else ("--config", config)
-    text = refused(2, "--listen", "127.0.0.1:0", "--model", model, "--socket", tmp_path / "s", *where, *flags, env=env)
+    text = unread("--model", "tiny", *where, *flags, env=env)
     assert all(word in text for word in said), text
 
 
@@ -194,8 +205,22 @@ def test_explain_names_keys_as_the_file_has_them(model: Path, tmp_path: Path) ->
     assert "per_gesture" not in out
 
 
+def test_settings_that_are_not_valid_end_the_program(model: Path, tmp_path: Path) -> None:
+    """One of them that reading finds, in a real process; and two that the model's gestures refute."""
+    config = tmp_path / "gestured.toml"
+    flags = ("--listen", "127.0.0.1:0", "--model", model, "--socket", tmp_path / "s", "--config", config)
+    for text, env, said in (
+        ("", {"GESTURED_STALE_S": "soon"}, ("stale_s", "'soon'", "number", "environment")),
+        ("[gestures.one_tab]\nthreshold = 0.5", {}, ("gestures", "one_tab", "one_tap")),
+        ("gestures = ['wink']", {}, ("gestures", "wink", "one_tap")),
+    ):
+        config.write_text(text)
+        found = refused(2, *flags, env=env)
+        assert all(word in found for word in said), found
+
+
 @pytest.mark.parametrize("what", ["a FIFO", "a device", "too large"])
-def test_a_configuration_that_is_no_small_file(model: Path, tmp_path: Path, what: str) -> None:
+def test_a_configuration_that_is_no_small_file(tmp_path: Path, what: str) -> None:
     path = tmp_path / "gestured.toml"
     if what == "a FIFO":
         os.mkfifo(path)
@@ -204,8 +229,7 @@ def test_a_configuration_that_is_no_small_file(model: Path, tmp_path: Path, what
     else:
         path.touch()
         os.truncate(path, 300 << 20)
-    flags = ("--listen", "127.0.0.1:0", "--socket", tmp_path / "s")
-    text = refused(2, "--model", model, *flags, "--config", path)
+    text = unread("--model", "tiny", "--config", path)
     assert f"config: {path}" in text and "expected a regular file of at most 1 MiB" in text
 
 
@@ -260,42 +284,26 @@ def test_a_fallback_must_know_the_same_gestures(model: Path, tmp_path: Path) -> 
     assert "same gestures" in said and "wink" in said
 
 
-def test_explain_says_what_is_loaded_and_what_is_left_out(model: Path, tmp_path: Path) -> None:
-    minimal = run("--model", model, "--explain")[1]
+def test_explain_says_what_is_loaded_and_what_is_left_out(model: Path) -> None:
+    def explained(*flags: str) -> str:
+        given = vars(parser().parse_args(["--model", str(model), *flags]))
+        given.pop("explain")
+        return explain(*load_settings(given, {}))
+
+    def words(text: str) -> list[str]:
+        """Without what the one process alone has: its session's sockets."""
+        return [line for line in text.splitlines() if "/" not in line]
+
+    minimal = explained()
+    status, printed, _ = run("--model", model, "--explain")
+    assert status == 0 and words(printed) == words(minimal)
     assert "prometheus_client, HTTP: no --metrics" in minimal and "python-osc, OSC output: no --publish" in minimal
-    flags = (
-        "--metrics",
-        "127.0.0.1:0",
-        "--publish",
-        "osc://127.0.0.1:9",
-        "--gestures",
-        "swipe_left,swipe_right",
-    )
-    full = run("--model", model, *flags, "--flight-recorder", "4", "--explain")[1]
+    full = explained(
+        "--metrics", "127.0.0.1:0", "--publish", "osc://127.0.0.1:9", "--gestures", "swipe_left,swipe_right",
+        "--flight-recorder", "4",
+    )  # fmt: skip
     assert "flight recorder: flight_recorder is 0" in minimal
     assert "flight recorder: the last 30 s of packets, at most 4 MiB" in full
-    assert "osc://127.0.0.1:9:" in full
+    assert "osc://127.0.0.1:9:" in full and "no --publish" not in full
     assert "waiting for a second tap: double_tap is not in use" in full and "no --metrics" not in full
     assert "gestures: command line" in full
-
-
-def test_a_scene_loads_only_what_it_needs(start, tmp_path: Path) -> None:
-    never = ("torch", "sklearn", "pythonosc", "onnx", "matplotlib", "pywt", "mcap")
-    for flags, also_never in (
-        ((), ("prometheus_client", "gestured.daemon.http")),
-        (("--metrics", "127.0.0.1:0"), ()),
-    ):
-        daemon = start("--clock", "sensor", *flags, python=["-X", "importtime"])
-        client = daemon.client()
-        Sensor(daemon, "arm").begin().perform("left")
-        client.events("gesture", "arm")
-        if flags:
-            daemon.get("/metrics")
-        daemon.stop()
-        lines = daemon.stderr().splitlines()
-        loaded = {line.rsplit("|", 1)[1].strip() for line in lines if line.startswith("import time:")}
-        assert "onnxruntime" in loaded
-        roots = {name.split(".")[0] for name in loaded} | loaded
-        assert not roots & {*never, *also_never}
-        assert ("prometheus_client" in loaded) == bool(flags)
-        daemon.stderr_path.unlink()

@@ -17,7 +17,7 @@ def tables(study: dict[str, Any], out: Path) -> str:
     return write_report(study, out).with_name("tables.md").read_text("utf-8")
 
 
-def test_each_table_is_rectangular_and_every_cell_of_the_study_stands_in_it(tmp_path: Path) -> None:
+def test_each_table_is_rectangular_and_every_cell_of_the_study_stands_in_it(tmp_path: Path, undrawn: None) -> None:
     study = small_study()
     text = tables(study, tmp_path)
     for block in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
@@ -27,7 +27,7 @@ def test_each_table_is_rectangular_and_every_cell_of_the_study_stands_in_it(tmp_
             assert f"{row['right']:.2f} ({row['low']:.2f}-{row['high']:.2f})" in text
 
 
-def test_what_was_not_computed_is_a_dash_or_no_row(tmp_path: Path) -> None:
+def test_what_was_not_computed_is_a_dash_or_no_row(tmp_path: Path, undrawn: None) -> None:
     study = small_study() | {"online": [], "online_shipped": [], "choices": [], "copies": []}
     for row in study["run_time"]:
         row["memory_bytes"] = None

@@ -74,9 +74,15 @@ def measured(page: Path, width: int) -> dict[str, Any]:
     return dict(json.loads(html.unescape(found[1])))
 
 
+@pytest.fixture(scope="module")
+def full(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of a study with everything."""
+    return write_report(made_study(), tmp_path_factory.mktemp("full"))
+
+
 @pytest.mark.parametrize("width", [400, 1400])
-def test_only_boxes_scroll_all_words_can_be_read_and_tables_sort(width: int, tmp_path: Path) -> None:
-    found = measured(write_report(made_study(), tmp_path), width)
+def test_only_boxes_scroll_all_words_can_be_read_and_tables_sort(width: int, full: Path) -> None:
+    found = measured(full, width)
     assert found["inner"] == width
     assert found["scroll"] <= width and found["wide"] == []
     assert found["clipped"] == []

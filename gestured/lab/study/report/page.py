@@ -1,6 +1,7 @@
 """The page: study.json in the template page.html, with the charts that matplotlib draws."""
 
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,7 @@ def _written(study: Study, template: str) -> str:
     return _environment().get_template(template).render(study=_writable(study))
 
 
+@cache
 def _environment() -> Environment:
     env = Environment(
         loader=PackageLoader("gestured.lab.study", "report"), autoescape=select_autoescape(), undefined=Missing,
