@@ -17,7 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.client.say import MOST, shown
-from gestured.control.sniff import Sight, propose
+from gestured.control.proposal import propose
+from gestured.control.sight import Sight
 from gestured.core.errors import RecordingError
 from gestured.core.wire import Addresses, is_sensor
 from gestured.record import arrays as recording

@@ -8,8 +8,11 @@ from pathlib import Path
 import pytest
 
 from gestured.control.cli import main
-from gestured.control.doctor import BUFFER_BYTES, _buffer, _clock, _permissions, _port
-from gestured.control.sniff import Sight, lines, propose
+from gestured.control.doctor import _buffer, _clock, _permissions, _port
+from gestured.control.findings import BUFFER_BYTES
+from gestured.control.proposal import propose
+from gestured.control.sight import Sight
+from gestured.control.sniff import lines
 from gestured.control.status import screen
 from gestured.core.address import Address
 from tests import encoding
@@ -174,7 +177,7 @@ def test_sniff_says_what_may_be_wrong(run) -> None:
     two = Sight()
     for n, source in enumerate(("a:1", "a:2", "a:2")):
         two.packet(n, source, floats("/arm/pressure", Hand().frame(), n))
-    assert "has several senders" in "\n".join(lines(two))
+    assert "has several senders" in "\n".join(lines(two, []))
 
 
 def test_sniff_on_a_port_of_its_own(start, udp: socket.socket) -> None:

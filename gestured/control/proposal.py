@@ -1,0 +1,144 @@
+"""What to set for the messages that arrive: lines for the configuration file."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gestured.control.sight import Seen
+from gestured.core.frames import Frame
+from gestured.core.front_end import FrontEnd
+from gestured.core.habits import ALIKE, Habits, neighbours_alike
+from gestured.core.mounting import Mounting
+from gestured.core.scene import SIDE
+from gestured.core.wire import is_sensor
+
+USUAL = "/{sensor}/pressure"
+LONGEST_ADDRESS = 255  # characters of an address that is proposed
+TRAJECTORY = "/trajectory"
+STEP_S = 1e-6  # from frame to frame at the least: some were read at one time
+
+Grid = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What is set so far: the defaults, or what a running daemon says."""
+
+    pressure: str = USUAL
+    grid: Grid = (9, 9)
+    sensors: Mapping[str, tuple[Grid | None, bool]] = field(default_factory=dict)  # grid, and whether it is inverted
+    told: bool = False  # by a daemon
+
+    @classmethod
+    def of(cls, scene: Mapping[str, Any]) -> "Known":
+        """Of a daemon's answer to `tap`."""
+        settings, model = scene["settings"], scene["model"]
+        sensors = {
+            name: (tuple(own["grid"]) if own.get("grid") else None, bool(own.get("invert")))
+            for name, own in settings["sensors"].items()
+        }
+        grid = tuple(settings["grid"] or (model["rows"], model["columns"]))
+        return cls(settings["addresses"]["pressure"], grid, sensors, True)
+
+
+def propose(rows: Sequence[Seen], known: Known = Known()) -> list[str]:  # noqa: B008  # it is frozen
+    """Lines for the configuration file, from what looks like frames: many numbers, or one blob, again and again.
+
+    Anybody may have sent them. So there is nothing in these lines but numbers and names that were checked, whose
+    characters mean nothing in TOML.
+    """
+    patterns: Counter[str] = Counter()
+    likeliest: dict[tuple[str, str], Seen] = {}
+    for seen in rows:
+        split = split_address(seen.address)
+        if seen.taxels() and split is not None:
+            patterns[split[0]] += seen.count
+            likeliest.setdefault(split, seen)
+    if not patterns:
+        return []
+    pressure, *others = [pattern for pattern, _ in patterns.most_common()]
+    lines = [] if pressure == known.pressure else ["[addresses]", f'pressure = "{pressure}"']
+    for (pattern, name), seen in likeliest.items():
+        if pattern == pressure:
+            lines += _sensor(name, seen, known)
+    lines = lines or [f"{'the settings of the daemon' if known.told else 'the defaults'} fit what arrives"]
+    return lines + [f"# {other} looks like frames, too; a daemon takes one pattern" for other in others]
+
+
+def _sensor(name: str, seen: Seen, known: Known) -> list[str]:
+    """What to set for one sensor; nothing where all fits."""
+    own, inverted = known.sensors.get(name, (None, False))
+    grid = own or known.grid
+    keys = []
+    if grid[0] * grid[1] not in seen.taxels():
+        found = next((shape for n in seen.taxels() if (shape := _shape(seen, n)) is not None), None)
+        if found is None:
+            sizes = " or ".join(map(str, seen.taxels()))
+            return [f"# {name}: {sizes} values are no grid of {SIDE[0]} to {SIDE[1]} rows and columns"]
+        grid = found
+        keys.append(f'grid = "{grid[0]}x{grid[1]}"')
+    habits = _habits(seen, grid, inverted)
+    if not keys and habits.exchanges > habits.fits:
+        keys.append(f'grid = "{grid[1]}x{grid[0]}"  # rows and columns: neighbours fit better this way round')
+    if habits.falls and not habits.rises:
+        keys.append(f"invert = {str(not inverted).lower()}  # its counts fell where it was touched")
+    return [f"[sensors.{name}]", *keys] if keys else []
+
+
+def _shape(seen: Seen, taxels: int) -> Grid | None:
+    """Rows and columns for so many taxels: those with which a touch looks like a finger's, else the squarest."""
+    shapes = list(_shapes(taxels))
+    if not shapes:
+        return None
+    frames = np.array([frame.reshape(-1) for _, frame in seen.matrices(*shapes[0])])
+    if len(frames):
+        changes = frames - np.median(frames, axis=0)
+        changes -= np.median(changes, axis=1, keepdims=True)  # what all taxels share is no finger
+        strongest = changes[np.abs(changes).max(axis=1).argmax()]
+        alike = {shape: neighbours_alike(strongest, shape[1]) for shape in shapes}
+        best = max(shapes, key=alike.__getitem__)
+        if alike[best] > ALIKE:
+            return best
+    return shapes[0]
+
+
+def _shapes(taxels: int) -> Iterator[Grid]:
+    """Grids of so many taxels, the squarest first."""
+    sides = range(SIDE[0], SIDE[1] + 1)
+    shapes = [(rows, taxels // rows) for rows in sides if taxels % rows == 0 and taxels // rows in sides]
+    yield from sorted(shapes, key=lambda shape: (abs(shape[0] - shape[1]), -shape[0]))
+
+
+def _habits(seen: Seen, grid: Grid, inverted: bool) -> Habits:
+    """What the daemon's own front end makes of the frames."""
+    front_end = FrontEnd("", *grid, mounting=Mounting(invert=inverted))
+    last = -np.inf
+    for t, frame in seen.matrices(*grid):
+        last = max(t, last + STEP_S)
+        front_end.push(Frame(last, frame))
+    front_end.flush(last + 1.0)
+    return front_end.habits
+
+
+def split_address(address: str) -> tuple[str, str] | None:
+    """(pattern, sensor) of an address: the last part but one that can be a name, else the last.
+
+    None where there is none, or where a part could be more than a name.
+    """
+    if (
+        address.endswith(TRAJECTORY)
+        or len(address) > LONGEST_ADDRESS
+        or not re.fullmatch(r"(/[A-Za-z0-9_.-]+)+", address)
+    ):
+        return None
+    parts = address.split("/")[1:]
+    places = [i for i, part in enumerate(parts) if is_sensor(part)]
+    if not places:
+        return None
+    place = places[0] if len(places) == 1 else places[-2]
+    pattern = "/".join(["", *parts[:place], "{sensor}", *parts[place + 1 :]])
+    return pattern, parts[place]

@@ -1,0 +1,128 @@
+"""What was seen of OSC packets; bounded whatever arrives, since anybody may have sent them."""
+
+import re
+from collections import Counter
+from dataclasses import dataclass, field
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core import osc
+from gestured.core.errors import ProtocolError
+
+MOST_ADDRESSES = 256  # addresses; what comes after that is counted together
+LEAST_TAXELS = 4  # 2 x 2
+KEPT_BYTES = 64 << 20  # of frames, which are looked at in the end
+ARRAY = re.compile(rb"\0,[a-z]*\[")  # type tags of an OSC array
+
+
+@dataclass
+class Seen:
+    """What came to one address with one kind of arguments."""
+
+    address: str
+    types: str
+    count: int = 0
+    first: float = 0.0  # s
+    last: float = 0.0
+    sources: set[str] = field(default_factory=set)
+    frames: list[tuple[float, NDArray[np.generic] | bytes]] = field(default_factory=list)  # s, what may be a frame
+    steps: int = 0  # by which the first integer grew by one from message to message
+
+    @property
+    def rate_hz(self) -> float:
+        """Messages a second, 0 for a single one."""
+        return (self.count - 1) / (self.last - self.first) if self.last > self.first else 0.0
+
+    @property
+    def counted(self) -> bool:
+        """Whether the first of many integers counts the frames."""
+        return self.types.startswith("i*") and self.count > 1 and self.steps >= (self.count - 1) / 2
+
+    def taxels(self) -> tuple[int, ...]:
+        """How many taxels a message may hold, the likeliest number first; () where it is no frame."""
+        if match := re.fullmatch(r"(?:i )?b\[(\d+)\]", self.types):  # of uint16, float32 or uint8
+            size = int(match[1])
+            return tuple(size // n for n in (2, 4, 1) if size % n == 0 and size // n >= LEAST_TAXELS)
+        if match := re.fullmatch(r"(?:i )?[fi]\*(\d+)", self.types):
+            size = int(match[1])
+            if self.types.startswith("i*"):
+                found = (size - 1,) if self.counted else (size,) if self.count > 1 else (size, size - 1)
+            else:
+                found = (size,)
+            return tuple(n for n in found if n >= LEAST_TAXELS)
+        return ()
+
+    def matrices(self, rows: int, columns: int) -> list[tuple[float, NDArray[np.float64]]]:
+        """(s, (R, C) counts) of the frames that were kept and have that size."""
+        size = rows * columns
+        found = []
+        for t, what in self.frames:
+            if isinstance(what, bytes):
+                kind = {size: ">u1", 2 * size: ">u2", 4 * size: ">f4"}.get(len(what))
+                what = np.frombuffer(what, kind) if kind else np.empty(0)
+            if what.size >= size and np.isfinite(what[-size:].astype(np.float64)).all():
+                found.append((t, what[-size:].astype(np.float64).reshape(rows, columns)))
+        return found
+
+
+class Sight:
+    """All that was seen."""
+
+    def __init__(self) -> None:
+        self.packets = 0
+        self.seen: dict[tuple[str, str], Seen] = {}
+        self.errors: Counter[str] = Counter()
+        self.arrays = 0  # packets with an OSC array
+        self._kept = 0  # bytes of frames
+        self._firsts: dict[tuple[str, str], int] = {}  # the first integer of the last message
+
+    def rows(self) -> list[Seen]:
+        """Each address with each kind of arguments, the most frequent first."""
+        return sorted(self.seen.values(), key=lambda seen: -seen.count)
+
+    def packet(self, t: float, source: str, packet: bytes) -> None:
+        """Take one packet, read at `t` s."""
+        self.packets += 1
+        errors: list[ProtocolError] = []
+        try:
+            messages = osc.decode(packet, errors)
+        except ProtocolError as error:
+            messages, errors = [], [error]
+        self.errors.update(error.reason for error in errors)
+        self.arrays += bool(errors) and ARRAY.search(packet[: osc.MAX_ADDRESS + osc.MAX_TAGS]) is not None
+        for message in messages:
+            key = message.address, short_types(message)
+            if key not in self.seen and len(self.seen) >= MOST_ADDRESSES:
+                key = "(others)", ""
+            seen = self.seen.setdefault(key, Seen(*key, first=t))
+            seen.count += 1
+            seen.last = t
+            if len(seen.sources) < 4:
+                seen.sources.add(source)
+            if key[1] and message.args and isinstance(message.args[-1], np.ndarray | bytes):
+                self._keep(key, seen, t, message.args[-1])
+
+    def _keep(self, key: tuple[str, str], seen: Seen, t: float, what: NDArray[np.generic] | bytes) -> None:
+        if isinstance(what, np.ndarray) and what.dtype.kind == "i":
+            first, before = int(what[0]), self._firsts.get(key)
+            seen.steps += before is not None and first - before in (1, 1 - 2**32)
+            self._firsts[key] = first
+        size = len(what) if isinstance(what, bytes) else what.nbytes
+        if self._kept + size <= KEPT_BYTES:
+            self._kept += size
+            seen.frames.append((t, what))
+
+
+def short_types(message: osc.Message) -> str:
+    """Type tags with runs written as a number, such as `i f*81`; a blob with its size, as `b[162]`."""
+    words = []
+    sizes = iter([len(a) for a in message.args if isinstance(a, bytes)])
+    for tag, run_of in groupby(message.types):
+        count = len(list(run_of))
+        if tag == "b":
+            words += [f"b[{next(sizes)}]" for _ in range(count)]
+        else:
+            words.append(tag if count == 1 else f"{tag}*{count}")
+    return " ".join(words)

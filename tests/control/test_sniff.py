@@ -1,0 +1,118 @@
+"""What `gesturectl sniff` makes of packets: forms that are not taken, counters, grids, counts that fall."""
+
+import socket
+import tomllib
+
+import numpy as np
+import pytest
+
+from gestured.control.proposal import Known, propose
+from gestured.control.sight import Sight
+from gestured.control.sniff import lines
+from gestured.daemon.merge import load_settings
+from tests import encoding
+from tests.daemon.harness import Hand, counted, floats
+from tests.test_docs import ROOT
+
+
+def seen(packets, rate: float = 15.0) -> Sight:
+    sight = Sight()
+    for n, packet in enumerate(packets):
+        sight.packet(n / rate, "127.0.0.1:5", packet)
+    return sight
+
+
+def counted_ints(address: str, frame, n: int) -> bytes:
+    return encoding.message(address, "i" * (frame.size + 1), (np.concatenate([[1000 + n], frame.ravel()]),))
+
+
+def touched(rows: int, columns: int, sign: float = 1.0) -> list[np.ndarray]:
+    """An idle second and a half, and two swipes along the rows, of a sensor with that grid."""
+    random = np.random.default_rng(1)
+    y, x = np.mgrid[:rows, :columns]
+    frames = [np.zeros((rows, columns))] * 25
+    for row in (rows // 3, 2 * rows // 3):
+        for column in np.linspace(1, columns - 2, 8):
+            frames.append(200 * np.exp(-((y - row) ** 2 + (x - column) ** 2) / 1.6))
+        frames += [np.zeros((rows, columns))] * 10
+    return [np.rint(300 + sign * f + random.normal(0, 1, f.shape)) for f in frames]
+
+
+def valid(proposed: list[str], tmp_path) -> dict:
+    """The proposal as the daemon reads it."""
+    path = tmp_path / "gestured.toml"
+    path.write_text("\n".join(proposed) + "\n")
+    tomllib.loads(path.read_text())
+    settings, _ = load_settings({"config": str(path)}, {})
+    return {name: (sensor.grid, sensor.invert) for name, sensor in settings.sensors.items()}
+
+
+def test_a_counter_before_ints_is_told_from_a_taxel(tmp_path) -> None:
+    fits = seen(counted_ints("/arm/pressure", Hand().frame(), n) for n in range(8))
+    assert propose(fits.rows()) == ["the defaults fit what arrives"]
+    larger = seen(counted_ints("/arm/pressure", frame, n) for n, frame in enumerate(touched(16, 12)))
+    assert valid(propose(larger.rows()), tmp_path) == {"arm": ((16, 12), False)}
+    without = seen(
+        encoding.message("/arm/pressure", "i" * 192, (frame.ravel(),)) for n, frame in enumerate(touched(12, 16))
+    )
+    assert valid(propose(without.rows()), tmp_path) == {"arm": ((12, 16), False)}
+
+
+def test_a_grid_is_proposed_whether_or_not_somebody_touched_it(tmp_path) -> None:
+    idle = seen(floats("/arm/pressure", np.zeros((6, 4)) + n % 2, n) for n in range(8))
+    assert valid(propose(idle.rows()), tmp_path)["arm"][0] in ((6, 4), (4, 6))
+    prime = seen(encoding.message("/arm/pressure", "f" * 83, (np.zeros(83),)) for _ in range(8))
+    (words,) = propose(prime.rows())
+    assert words.startswith("# ") and "83" in words and "no grid" in words
+
+
+def test_nothing_is_proposed_where_the_daemon_is_set_to_what_arrives() -> None:
+    sight = seen(floats("/x/arm/y", frame, n) for n, frame in enumerate(touched(27, 15)))
+    assert propose(sight.rows())
+    known = Known(pressure="/x/{sensor}/y", grid=(9, 9), sensors={"arm": ((27, 15), False)}, told=True)
+    assert propose(sight.rows(), known) == ["the settings of the daemon fit what arrives"]
+    scene = {
+        "settings": {"grid": None, "addresses": {"pressure": "/x/{sensor}/y"},
+                     "sensors": {"arm": {"grid": [27, 15], "invert": False}, "lap": {"grid": None}}},
+        "model": {"rows": 9, "columns": 9},
+    }  # fmt: skip
+    assert Known.of(scene) == Known("/x/{sensor}/y", (9, 9), {"arm": ((27, 15), False), "lap": (None, False)}, True)
+
+
+def test_rows_and_columns_the_other_way_round(tmp_path) -> None:
+    sight = seen(floats("/arm/pressure", frame, n) for n, frame in enumerate(touched(12, 6)))
+    known = Known(sensors={"arm": ((6, 12), False)})
+    proposed = propose(sight.rows(), known)
+    assert valid(proposed, tmp_path) == {"arm": ((12, 6), False)} and "rows and columns" in "\n".join(proposed)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_counts_that_fall(tmp_path, sign: float) -> None:
+    sight = seen(counted("/arm/pressure", frame, n) for n, frame in enumerate(touched(9, 9, sign)))
+    proposed = propose(sight.rows())
+    if sign > 0:
+        assert proposed == ["the defaults fit what arrives"]
+    else:
+        assert valid(proposed, tmp_path) == {"arm": (None, True)}
+
+
+@pytest.mark.parametrize(("types", "words"), [("d", "doubles"), ("[f", "arrays"), ("h", "64-bit integers")])
+def test_what_is_not_taken_is_named_and_fails(start, types: str, words: str) -> None:
+    frame = [float(v) if types != "h" else int(v) for v in Hand().frame().ravel()]
+    if types == "[f":
+        packet = encoding._string("/arm/pressure") + encoding._string(",[" + "f" * 81 + "]") + bytes(4 * 81)
+    else:
+        packet = encoding.message("/arm/pressure", types * 81, frame)
+    sight = seen([packet] * 4)
+    text = "\n".join(lines(sight, propose(sight.rows())))
+    assert f"{words} are not taken: send f" in text
+    with socket.socket(type=socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    process = start("sniff", "--listen", f"127.0.0.1:{port}", "--seconds", "0.5", cwd=ROOT)
+    assert b"listening" in process.stderr.readline()
+    with socket.socket(type=socket.SOCK_DGRAM) as sender:
+        while process.poll() is None:
+            sender.sendto(packet, ("127.0.0.1", port))
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 1 and f"{words} are not taken: send f" in out.decode()
