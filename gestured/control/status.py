@@ -10,10 +10,12 @@ from typing import Any
 from gestured.client.say import say, say_drawn, say_json
 from gestured.control.address import add_sockets, connect
 from gestured.control.shadow import words as shadow_words
+from gestured.core.pace import RANGE_HZ, outside
 
 CLEAR = "\x1b[2J\x1b[H"
 REFRESH_S = 1.0
 SHIFT_NAMES = {"duration_s": "duration", "unknown": "answered by unknown"}
+RATES = f"{RANGE_HZ[0]:.0f} to {RANGE_HZ[1]:.0f} Hz"
 SENSOR_LINES = 12  # lines; what is more is counted
 
 
@@ -53,7 +55,7 @@ def screen(status: dict[str, Any]) -> Iterator[str]:
     """The lines for a person."""
     model, out, ready = status["model"], status["output"], status["ready"]
     word = status["state"] if ready["ready"] else f"not ready: {ready['reason']}"
-    yield f"gestured {status['version']}, {word}, up {_span(status['uptime_s'])}, pid {status['pid']}"
+    yield f"gestured {status['version']}, {word}, up {span(status['uptime_s'])}, pid {status['pid']}"
     where = ", ".join(f"{key} {value}" for key, value in status["addresses"].items() if value)
     yield f"  {where}"
     fallback = f", a fallback for {model['asked']}" if model["degraded"] else ""
@@ -84,12 +86,14 @@ def _sensors(sensors: dict[str, dict[str, Any]]) -> Iterator[str]:
     if not sensors:
         yield "no sensor was heard so far (gesturectl sniff shows what arrives)"
         return
-    yield "sensor           state         Hz  jitter   lost  bad  drift gestures  grid"
+    yield "sensor           state            Hz  jitter   lost  bad  drift gestures  grid"
     for name, s in list(sensors.items())[:SENSOR_LINES]:
         numbers = f"{s['rate_hz']:6.1f} {1000 * s['jitter_s']:4.0f} ms {s.get('lost', 0):6d} {s['bad_taxels']:4d}"
         touched = "  touched" if s.get("touched") else ""
+        touched += f"  made for {RATES}" if outside(s["rate_hz"]) else ""
+        touched += "  rows and columns are exchanged" if s.get("exchanged") else ""
         tail = f"{s['drift']:6.1f} {s.get('gestures', 0):8d}  {s['grid']}{touched}"
-        yield f"{name[:16]:<16} {s['state']:<9} {numbers} {tail}"
+        yield f"{name[:16]:<16} {s['state']:<12} {numbers} {tail}"
     if len(sensors) > SENSOR_LINES:
         yield f"and {len(sensors) - SENSOR_LINES} more"
 
@@ -114,6 +118,7 @@ def _shift(shift: dict[str, Any]) -> str:
     return f"{seen} unlike those of the training in {shares}: gesturectl doctor says more"
 
 
-def _span(seconds: float) -> str:
+def span(seconds: float) -> str:
+    """A time in words."""
     hours, rest = divmod(int(seconds), 3600)
     return f"{hours} h {rest // 60} min" if hours else f"{rest // 60} min {rest % 60} s"

@@ -63,6 +63,10 @@ class Conditioner:
         burst = lowest < -level
         return Look(t, raw, above, activity, True, burst, burst and _shifted(scaled, level))
 
+    def fallen(self, look: Look) -> float:
+        """The activity that the frame would have, were its counts inverted."""
+        return self.activity.measure(-look.above * self._weight)[0]
+
     def place(self, look: Look) -> tuple[float, float]:
         """Where a frame is pressed, its centroid (row, column); bad taxels are left out."""
         return self.activity.place(np.where(self._weight > 0, look.above, 0.0), self.noise.level)

@@ -14,6 +14,7 @@ from gestured.core.stamping import Stamper
 from gestured.core.vitals import Vitals, faulty
 from gestured.core.wire import Arrival
 
+ABSENT_S = 60.0  # of silence: whoever touches a sensor that sends only then has gone, or it has
 HELD_S = 60.0  # of arrivals: a contact that lasts longer by the sensor's own clock is given up
 
 
@@ -37,6 +38,7 @@ class Feed:
         self._since = 0.0  # s, when the frame arrived that opened it
         self._answered = True  # whether that contact has its answer
         self._lost = 0  # frames
+        self._lost_at: float | None = None  # s
 
     @property
     def numbers(self) -> tuple[int, int]:
@@ -82,7 +84,8 @@ class Feed:
                 self._tell(found, now, facts)
         if self._open is not None and now - self._since > HELD_S:
             self._run(self._recognizer.give_up, now, facts)
-        self._lost += lost
+        if lost:
+            self._lost, self._lost_at = self._lost + lost, now
         facts.append(Arrived(self.name, taken, lost, duplicates, late, implausible))
 
     def flush(self, now: float, facts: list[Fact]) -> None:
@@ -122,10 +125,14 @@ class Feed:
     def state(self, now: float) -> str:
         """How the sensor is; see `Reading`."""
         front_end = self._recognizer.front_end
+        if self._vitals.intermittent and now - self.owner.heard <= ABSENT_S:
+            return "intermittent"
         if self.stale(now):
             return "stale"
         if not front_end.ready:
             return "starting"
+        if front_end.habits.inverted:
+            return "inverted"
         return "faulty" if faulty(front_end) else "degraded" if front_end.bad_taxels else "ok"
 
     def reading(self, now: float) -> Reading:
@@ -141,6 +148,8 @@ class Feed:
             source=self.owner.source,
             heard=self.owner.heard,
             lost=self._lost,
+            lost_at=self._lost_at,
+            exchanged=front_end.habits.exchanged,
             touched=front_end.touched,
             contact=self._open,
             sequence=self._recognizer.sequence,

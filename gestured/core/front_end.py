@@ -9,6 +9,7 @@ from gestured.core.conditioning import Conditioner, Look
 from gestured.core.cutter import LARGEST, Cutter
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Frame, Segment
+from gestured.core.habits import Habits
 from gestured.core.mounting import Mounting
 from gestured.core.pace import Pace
 from gestured.core.phases import Action
@@ -61,6 +62,7 @@ class FrontEnd:
         travel = self.timing.tap_travel * min(rows, columns)
         self._segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
         self._cutter = Cutter(self.conditioner)
+        self.habits = Habits(rows, columns)
         self._pace = Pace()
         self._below_since: float | None = None  # s, since when the frames lie far below the baseline
 
@@ -132,6 +134,8 @@ class FrontEnd:
                 cutter.settled(t)
             return found
         look = conditioner.look(t, raw, segmenter.after)
+        if look.burst and conditioner.fallen(look) >= segmenter.on:
+            self.habits.fall(t)
         if look.shifted:
             return found + self._shift(look)
         self._below_since = None
@@ -144,12 +148,14 @@ class FrontEnd:
         if segmenter.phase.pending and len(cutter) > self.timing.limit_frames:
             found += self.give_up(t)
         if segmenter.phase.pending:
+            self.habits.pressed(frame.values, look.activity)
             conditioner.busy(look)
             return found + self._draft(t)
         cutter.trim(t)
         if segmenter.phase.touched:
             conditioner.settle(t, raw)  # what stays on the sensor becomes part of its baseline
         else:
+            self.habits.idle(frame.values)
             conditioner.idle(look, recovering=segmenter.after.recovering(t))
         return found
 
@@ -207,6 +213,8 @@ class FrontEnd:
         self.conditioner.baseline.forget(keep=keep)
         self._cutter.clear()
         self._below_since = None
+        if not keep:
+            self.habits.clear()
         return found
 
     def _done(self, deeds: list[Deed], t: float, seen: float) -> list[Contact]:
@@ -228,6 +236,7 @@ class FrontEnd:
     def _open(self, onset: float) -> list[Contact]:
         """A segment begins, with the next id."""
         self.segments += 1
+        self.habits.rise()
         return [Onset(self.sensor, self.segments, onset)]
 
     def _close(self, onset: float, offset: float, t: float, seen: float) -> list[Contact]:
@@ -235,6 +244,7 @@ class FrontEnd:
         release = Release(self.sensor, self.segments, offset)
         if self._glitch(onset, offset):
             return [Cancelled(self.sensor, self.segments, "glitch"), release]
+        self.habits.touched()
         made = self._cutter.cut(onset, offset)
         if made.peak < self._segmenter.off * made.segment.noise:  # nothing is left without its bad taxels
             return [Cancelled(self.sensor, self.segments, "stuck"), release]

@@ -14,6 +14,7 @@ class Mounting:
 
     rotate: int = 0  # degrees clockwise: 0, 90, 180, 270
     mirror: bool = False
+    invert: bool = False  # its counts fall under pressure
 
     def __post_init__(self) -> None:
         if self.rotate not in (0, 90, 180, 270):
@@ -25,6 +26,8 @@ class Mounting:
 
     def frame(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
         """(R, C) as sent -> (R', C') as a person in front of the sensor sees it."""
+        if self.invert:
+            values = -values.astype(np.float64)
         if self.mirror:
             values = values[:, ::-1]
         return np.rot90(values, -(self.rotate // 90)) if self.rotate else values

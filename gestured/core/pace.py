@@ -1,5 +1,7 @@
 """How fast the frames of one sensor come."""
 
+RANGE_HZ = (5.0, 1000.0)  # for which everything is made
+MARGIN = 1.1  # by which a rate may lie outside: clocks differ, and a rate is measured
 SHARE = 0.05  # of the difference to the last interval that is followed: one late frame says little
 
 
@@ -22,3 +24,8 @@ class Pace:
     def learn(self, step: float) -> None:
         """A frame has come so many seconds after the last one, without a silence between them."""
         self.interval_s += (step - self.interval_s) * (SHARE if self.interval_s else 1.0)
+
+
+def outside(rate_hz: float) -> bool:
+    """Whether frames come so slowly or so fast that nothing is promised; not before the rate is known."""
+    return rate_hz > 0 and not RANGE_HZ[0] / MARGIN <= rate_hz <= RANGE_HZ[1] * MARGIN

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from gestured.core.quantiles import median
 
-STATES = ("ok", "starting", "degraded", "stale", "no_data", "faulty")  # from good to bad
+# From good to bad.
+STATES = ("ok", "starting", "degraded", "intermittent", "inverted", "stale", "no_data", "faulty")
 SILENT = ("no_data", "stale")  # states of sensors that are not there now
 SMALLEST = 1e-30  # counts; noise that is nothing divides nothing
 
@@ -17,7 +18,8 @@ class Reading:
     """One sensor at a moment; all but the state and the grid are 0 or None where it was never heard.
 
     `state`: "no_data" (in the configuration, never heard), "starting", "ok", "degraded" (taxels are bridged), "faulty"
-    (too many are) or "stale" (heard, but not now).
+    (too many are), "intermittent" (it falls silent between touches), "inverted" (its counts fall when it is touched) or
+    "stale" (heard, but not now).
     """
 
     state: str
@@ -29,6 +31,8 @@ class Reading:
     source: tuple[str, int] | None = None
     heard: float = 0.0  # s, on the hub's clock
     lost: int = 0  # frames
+    lost_at: float | None = None  # s, on the hub's clock: when the last of them were
+    exchanged: bool = False  # touches look like a finger's with rows and columns the other way round
     touched: bool = False
     contact: int | None = None  # id of the contact that was not released yet
     sequence: int = 0  # of its last gesture

@@ -1,26 +1,37 @@
-"""How a sensor's stream is: its jitter, and the baseline from which it drifts."""
+"""How a sensor's stream is: its jitter, its silences, and the baseline from which it drifts."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.front_end import FrontEnd
 
+SHORT_S = 5.0  # a stretch of frames between two silences that holds no more than some gestures
+STRETCHES = 3  # of them in a row: the sensor sends only while it is touched
 FAULTY = 0.25  # of the taxels bad: what is bridged between them is guesswork
 WEIGHT = 1 / 16  # of the newest interval in the jitter (RFC 3550, 6.4.1)
 
 
 class Vitals:
-    """Jitter and first baseline of one sensor."""
+    """Jitter, silences and first baseline of one sensor."""
 
     def __init__(self) -> None:
         self.jitter_s = 0.0
         self.first: NDArray[np.float64] | None = None  # (N,) counts
         self._last: float | None = None
+        self._began = 0.0  # s, the first frame after the last silence
+        self._stretches = 0  # short ones, in a row
+
+    @property
+    def intermittent(self) -> bool:
+        """Whether the sensor falls silent again and again, after a few seconds each time."""
+        return self._stretches >= STRETCHES and (self._last is None or self._last - self._began < SHORT_S)
 
     def arrived(self, now: float, frames: int, rate_hz: float) -> None:
         """`frames` came together at `now` s. Interarrival jitter as RTP has it."""
         if self._last is not None and rate_hz > 0:
             self.jitter_s += (abs(now - self._last - frames / rate_hz) - self.jitter_s) * WEIGHT
+        if self._last is None:
+            self._began = now
         self._last = now
 
     def review(self, front_end: FrontEnd) -> None:
@@ -30,6 +41,8 @@ class Vitals:
 
     def silent(self) -> None:
         """The sensor has fallen silent: the next interval says nothing of its jitter."""
+        if self._last is not None:
+            self._stretches = self._stretches + 1 if self._last - self._began < SHORT_S else 0
         self._last = None
 
     def restart(self) -> None:

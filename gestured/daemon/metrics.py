@@ -6,6 +6,7 @@ The loop's thread counts, the HTTP thread reads copies. The number of series is 
 labels that a peer can choose (sensors) are folded together after the first few.
 """
 
+import time
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,15 +30,19 @@ CONFIDENCE_BUCKETS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 class Counter:
     """A total for each combination of labels; `most` of them, those after that together as "other"."""
 
-    def __init__(self, name: str, text: str, *labels: str, most: int = 64) -> None:
-        self.name, self.text, self.labels, self._most = name, text, labels, most
+    def __init__(self, name: str, text: str, *labels: str, most: int = 64, dated: bool = False) -> None:
+        """`dated`: it is remembered when each was last counted."""
+        self.name, self.text, self.labels, self._most, self._dated = name, text, labels, most, dated
         self.values: dict[tuple[str, ...], int] = {}
+        self.last: dict[tuple[str, ...], float] = {}  # monotonic s
 
     def add(self, *labels: str, count: int = 1) -> None:
         """Count `count` more under these labels."""
         if labels not in self.values and len(self.values) >= self._most:
             labels = (OTHER,) * len(labels)
         self.values[labels] = self.values.get(labels, 0) + count
+        if self._dated:
+            self.last[labels] = time.monotonic()
 
     def total(self) -> int:
         """The sum over all labels."""
@@ -67,17 +72,19 @@ class Metrics:
 
     def __init__(self) -> None:
         self.frames = Counter("gestured_frames", "Frames by what became of them", "sensor", "result")
-        self.dropped = Counter("gestured_dropped", "Packets and messages that were dropped", "reason")
+        self.dropped = Counter("gestured_dropped", "Packets and messages that were dropped", "reason", dated=True)
         self.implausible = Counter("gestured_implausible_time_tags", "Time tags replaced by the arrival time")
         self.gestures = Counter("gestured_gestures", "Recognised gestures", "gesture", most=NAMED_GESTURES)
         self.unknown = Counter("gestured_unknown", "Segments that are none of the gestures")
         self.cancelled = Counter("gestured_cancelled", "Segments that were not answered", "reason")
-        self.internal_errors = Counter("gestured_internal_errors", "Bugs caught; the sensor's recognizer was reset")
+        self.internal_errors = Counter(
+            "gestured_internal_errors", "Bugs caught; the sensor's recognizer was reset", dated=True
+        )
         self.degraded = Counter("gestured_degraded_answers", "Segments answered by a fallback model")
-        self.reloads = Counter("gestured_reloads", "Reloads of model and configuration", "result")
-        self.sent = Counter("gestured_osc_messages", "OSC messages to destinations", "result")
-        self.lost_lines = Counter("gestured_client_lines_lost", "Lines that slow clients did not get")
-        self.evicted = Counter("gestured_clients_evicted", "Clients that were cut off or turned away", "reason")
+        self.reloads = Counter("gestured_reloads", "Reloads of model and configuration", "result", dated=True)
+        self.sent = Counter("gestured_osc_messages", "OSC messages to destinations", "result", dated=True)
+        self.lost_lines = Counter("gestured_client_lines_lost", "Lines that slow clients did not get", dated=True)
+        self.evicted = Counter("gestured_clients_evicted", "Clients cut off or turned away", "reason", dated=True)
         self.tests = Counter("gestured_test_events", "Gestures that gesturectl emit made up")
         self.inference = Histogram(
             "gestured_inference_seconds",
@@ -88,7 +95,13 @@ class Metrics:
         )
         self.latency = Histogram("gestured_latency_seconds", "From the last touched frame to the event", LATENCY_S)
         self.confidence = Histogram("gestured_confidence", "Confidence of the published gestures", CONFIDENCE_BUCKETS)
+        self.kernel_drops, self.kernel_dropped_at = 0, 0.0  # packets, and monotonic s when there were last more of them
         self._named: set[str] = set()
+
+    def kernel(self, drops: int) -> None:
+        """Remember when the kernel last dropped packets, of which there were so many by now."""
+        if drops > self.kernel_drops:
+            self.kernel_drops, self.kernel_dropped_at = drops, time.monotonic()
 
     def event(self, event: Event) -> None:
         """Count an event."""

@@ -15,7 +15,8 @@ def scene_of(settings: Settings, ladder: Ladder) -> Scene:
         gestures=tuple(name for name in ladder.gestures if chosen is None or name in chosen),
         grid=settings.grid or (ladder.rows, ladder.columns),
         sensors={
-            name: Setup(own.grid, Mounting(own.rotate, own.mirror), own.clock) for name, own in settings.sensors.items()
+            name: Setup(own.grid, Mounting(own.rotate, own.mirror, own.invert), own.clock)
+            for name, own in settings.sensors.items()
         },
         addresses=Addresses(settings.addresses.pressure, settings.addresses.trajectory),
         clock=settings.clock,

@@ -150,6 +150,7 @@ class Service:
         self._clients.tick()
         self._taps.tick()
         snapshot = self.snapshot()
+        self._metrics.kernel(snapshot.kernel_drops)
         self._publisher.publish(Status(snapshot.state, snapshot.states, snapshot.models.active, snapshot.time))
         states = ", ".join(f"{name} {state}" for name, state in list(snapshot.states.items())[:SHOWN])
         words = f"{snapshot.state}: {snapshot.models.active} answers; sensors: {states or 'none yet'}"

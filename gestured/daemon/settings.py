@@ -35,6 +35,7 @@ class SensorSettings(Part):
     )
     rotate: Literal[0, 90, 180, 270] = Field(default=0, description="how far it is turned, in degrees clockwise")
     mirror: bool = Field(default=False, description="whether left and right are exchanged")
+    invert: bool = Field(default=False, description="whether its counts fall under pressure")
     clock: Literal["arrival", "sensor"] | None = Field(default=None, description="by default the general `clock`")
 
 

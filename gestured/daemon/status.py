@@ -7,7 +7,7 @@ from typing import Any
 from gestured import __version__
 from gestured.core.address import Address
 from gestured.core.reading import Reading
-from gestured.daemon.metrics import Metrics
+from gestured.daemon.metrics import Counter, Metrics
 from gestured.daemon.snapshot import Snapshot
 from gestured.daemon.values import Grid
 
@@ -57,6 +57,15 @@ def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
             "evicted": _by_label(metrics.evicted.values),
             "osc": _by_label(metrics.sent.values),
         },
+        "last_s_ago": {
+            "dropped": _ages(metrics.dropped, snapshot.now),
+            "kernel_drops": round(snapshot.now - metrics.kernel_dropped_at, 1) if metrics.kernel_drops else None,
+            "lines_lost": _ages(metrics.lost_lines, snapshot.now),
+            "evicted": _ages(metrics.evicted, snapshot.now),
+            "osc": _ages(metrics.sent, snapshot.now),
+            "internal_errors": _ages(metrics.internal_errors, snapshot.now),
+            "reloads": _ages(metrics.reloads, snapshot.now),
+        },
         "loop_lag_s": round(snapshot.loop_lag_s, 4),
         "internal_errors": metrics.internal_errors.total(),
         "reloads": _by_label(metrics.reloads.values),
@@ -98,6 +107,8 @@ def _sensor(reading: Reading, now: float) -> dict[str, Any]:
         "source": str(Address(*reading.source[:2])),
         "heard_s_ago": round(now - reading.heard, 3),
         "lost": reading.lost,
+        "lost_s_ago": None if reading.lost_at is None else round(now - reading.lost_at, 1),
+        "exchanged": reading.exchanged,
         "noise": round(reading.noise, 4),
         "touched": reading.touched,
         "gestures": reading.sequence,
@@ -106,3 +117,8 @@ def _sensor(reading: Reading, now: float) -> dict[str, Any]:
 
 def _by_label(values: Mapping[tuple[str, ...], int]) -> dict[str, int]:
     return {" ".join(labels) or "all": count for labels, count in dict(values).items()}
+
+
+def _ages(counter: Counter, now: float) -> dict[str, float]:
+    """By label, how many seconds ago it was last counted."""
+    return {" ".join(labels) or "all": round(now - last, 1) for labels, last in dict(counter.last).items()}

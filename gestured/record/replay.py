@@ -80,7 +80,8 @@ def maker(told: Mapping[str, Any]) -> Maker:
 
 def _setup(own: Mapping[str, Any]) -> Setup:
     grid = own.get("grid")
-    return Setup(grid and _grid(grid), Mounting(own.get("rotate", 0), own.get("mirror", False)), own.get("clock"))
+    mounting = Mounting(own.get("rotate", 0), own.get("mirror", False), own.get("invert", False))
+    return Setup(grid and _grid(grid), mounting, own.get("clock"))
 
 
 def _grid(value: Any) -> tuple[int, int]:

@@ -3,13 +3,20 @@
 import json
 import os
 import socket
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from gestured.client.control import Control
+from gestured.control.findings import RECENT_S, examine_status
 from gestured.control.status import screen
+from tests import encoding
 from tests.daemon import tiny_model
-from tests.daemon.harness import Daemon
+from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, counted, floats
 
 
 @pytest.fixture
@@ -64,6 +71,159 @@ def test_a_shadow_is_said_to_have_started_reports_and_is_said_to_have_stopped(ru
     assert reported[0].startswith("next in the shadow: 0 segments")
     assert stopped[0] == "next runs in the shadow no longer; what came of it:"
     assert stopped[1].startswith("next in the shadow: 0 segments")
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Iterator[Callable[..., Daemon]]:
+    """Starts a daemon with this configuration file, which the test alone uses."""
+    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+    daemons: list[Daemon] = []
+
+    def begin(config: str = "", *flags: object) -> Daemon:
+        (tmp_path / "gestured.toml").write_text(config)
+        model = tiny_model.make(tmp_path / "tiny.onnx")
+        daemons.append(Daemon.start(tmp_path, model, "--config", tmp_path / "gestured.toml", *flags))
+        return daemons[-1]
+
+    yield begin
+    for daemon in daemons:
+        daemon.stop()
+
+
+def asked(daemon: Daemon) -> dict[str, Any]:
+    """What the daemon answers to `status`."""
+    with Control(Path(daemon.ready["control"])) as control:
+        return control.ask("status")
+
+
+def awaited(daemon: Daemon, name: str, *states: str) -> dict[str, Any]:
+    """A sensor's part of the status, once its state is one of these."""
+    end = time.monotonic() + DEADLINE_S
+    while True:
+        found: dict[str, Any] = asked(daemon)["sensors"].get(name, {})
+        if found.get("state") in states:
+            return found
+        assert time.monotonic() < end, found
+
+
+def of(sensor: str, doctor: str) -> list[dict[str, str]]:
+    """The doctor's findings about a sensor."""
+    findings = [json.loads(line) for line in doctor.splitlines()]
+    return [finding for finding in findings if finding["what"].startswith(f"sensor {sensor}:")]
+
+
+def test_counts_that_fall_when_touched(run, own) -> None:
+    def falling(address: str, frame, count: int) -> bytes:
+        return floats(address, 300 - frame, count)
+
+    daemon = own("", "--clock", "sensor", "--stale-s", 30)
+    sensor = Sensor(daemon, "arm", falling).begin().perform("left", "right", "up", "down")
+    awaited(daemon, "arm", "inverted")
+    control = ("--control", daemon.ready["control"])
+    assert " inverted " in run("status", *control)[1]
+    status, out, _ = run("doctor", *control, "--json")
+    (found,) = of("arm", out)
+    assert status == 1 and "counts fall" in found["what"] and "[sensors.arm] invert = true" in found["remedy"]
+    sensor.sock.close()
+    daemon.stop()
+    mended = own("[sensors.arm]\ninvert = true\n", "--clock", "sensor")
+    client = mended.client()
+    Sensor(mended, "arm", falling).begin().perform("left")
+    assert client.events("gesture", "arm")[0]["gesture"] == "swipe_left"
+    assert asked(mended)["sensors"]["arm"]["state"] == "ok"
+
+
+def test_a_sensor_that_sends_only_while_it_is_touched(run, own) -> None:
+    daemon = own("", "--stale-s", 0.2)
+    sensor, hand = Sensor(daemon, "arm", counted), Hand()
+    for n in range(3):
+        sensor.count = 100 * n  # it counts on while it says nothing
+        sensor.send(hand.swipe("left"))
+        while asked(daemon)["sensors"].get("arm", {}).get("heard_s_ago", 0.0) < 1.0:
+            pass
+    sensor.send(hand.swipe("left"))
+    awaited(daemon, "arm", "intermittent")
+    status, out, _ = run("doctor", "--control", daemon.ready["control"], "--json")
+    (found,) = of("arm", out)
+    assert status == 1 and "falls silent between touches" in found["what"] and "idle frames" in found["remedy"]
+
+
+@pytest.mark.parametrize(("rate", "level"), [(3.0, "warn"), (15.0, "ok"), (960.0, "ok"), (1500.0, "warn")])
+def test_a_rate_outside_the_range_is_told_with_the_range(run, own, rate: float, level: str) -> None:
+    daemon = own("", "--clock", "sensor", "--stale-s", 30)
+    sensor, hand = Sensor(daemon, "arm"), Hand()
+    for n in range(round(max(2 * rate, 30))):
+        packet = encoding.bundle([floats("/arm/pressure", hand.frame(), n)], 1.7e9 + n / rate)
+        sensor.sock.send(packet)
+    awaited(daemon, "arm", "ok")
+    while abs(asked(daemon)["sensors"]["arm"]["rate_hz"] / rate - 1) > 0.1:
+        pass
+    control = ("--control", daemon.ready["control"])
+    found = of("arm", run("doctor", *control, "--json")[1])
+    words = [f for f in found if "5 to 1000 Hz" in f["what"]]
+    assert [f["level"] for f in words] == ([level] if level == "warn" else [])
+    assert ("5 to 1000 Hz" in run("status", *control)[1]) == (level == "warn")
+
+
+def swipes(rows: int, columns: int) -> np.ndarray:
+    """(T, R, C) counts: a sensor of that grid, touched by a finger that moves along its rows five times."""
+    random = np.random.default_rng(0)
+    y, x = np.mgrid[:rows, :columns]
+    frames = [np.zeros((rows, columns))] * 30
+    for row in np.linspace(1, rows - 2, 5):
+        ways = np.linspace(1, columns - 2, 7)
+        frames += [200 * np.exp(-((y - row) ** 2 + (x - column) ** 2) / 1.6) for column in ways]
+        frames += [np.zeros((rows, columns))] * 15
+    return np.rint(20 + np.array(frames) + random.normal(0, 1, (len(frames), rows, columns)))
+
+
+def test_rows_and_columns_that_are_exchanged(run, own) -> None:
+    daemon = own('[sensors.wrong]\ngrid = "6x12"\n[sensors.right]\ngrid = "12x6"\n', "--clock", "sensor")
+    for name in ("wrong", "right"):
+        sensor = Sensor(daemon, name)
+        for frame in swipes(12, 6):
+            sensor.sock.send(sensor.packet(frame))
+        while asked(daemon)["sensors"].get(name, {}).get("exchanged") is not (name == "wrong"):
+            pass
+    out = run("doctor", "--control", daemon.ready["control"], "--json")[1]
+    (remedy,) = [found["remedy"] for found in of("wrong", out) if "rows and columns" in found["what"]]
+    assert '[sensors.wrong] grid = "12x6"' in remedy
+    assert not any("rows and columns" in found["what"] for found in of("right", out))
+
+
+def test_doctor_says_what_still_happens_and_when_it_last_did(run, own) -> None:
+    daemon = own()
+    with socket.socket(type=socket.SOCK_DGRAM) as sender:
+        sender.connect(daemon.address)
+        sender.send(b"rubbish!")
+    while "not_osc" not in asked(daemon)["input"]["dropped"]:
+        pass
+    (found,) = [f for f in examine_status(asked(daemon)) if "not_osc" in f.what]
+    assert found.level == "warn" and " s ago" in found.what and found.remedy
+    later = asked(daemon)
+    later["last_s_ago"]["dropped"]["not_osc"] = RECENT_S + 7200.0
+    (found,) = [f for f in examine_status(later) if "not_osc" in f.what]
+    assert found.level == "ok" and "2 h 1 min ago" in found.what and not found.remedy
+
+
+@pytest.mark.parametrize("kind", ["lost frames", "kernel drops", "lines", "osc"])
+def test_what_is_over_is_no_finding(own, kind: str) -> None:
+    daemon = own("", "--clock", "sensor")
+    Sensor(daemon, "arm", counted).begin()
+    awaited(daemon, "arm", "ok")
+    for seconds, level in ((1.0, "warn"), (RECENT_S + 1, "ok")):
+        status = asked(daemon)
+        last = status["last_s_ago"]
+        if kind == "lost frames":
+            status["sensors"]["arm"] |= {"lost": 7, "lost_s_ago": seconds}
+        elif kind == "kernel drops":
+            status["input"]["kernel_drops"], last["kernel_drops"] = 7, seconds
+        elif kind == "lines":
+            status["output"]["lines_lost"], last["lines_lost"] = 7, {"all": seconds}
+        else:
+            status["output"]["osc"], last["osc"] = {"failed": 7}, {"failed": seconds}
+        (found,) = [f for f in examine_status(status) if "7 " in f.what and "ago" in f.what]
+        assert found.level == level
 
 
 def shift_line(shares: dict[str, float], unlike: list[str]) -> str:

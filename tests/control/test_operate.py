@@ -209,7 +209,8 @@ def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon) -> 
     status, out, err = ctl("doctor", "--json")
     findings = [json.loads(line) for line in out.splitlines()]
     assert err == "" and status == (1 if any(f["level"] == "bad" for f in findings) else 0)
-    dropped = {f["what"].rsplit(" ", 1)[1]: f["remedy"] for f in findings if "dropped" in f["what"]}
+    drops = ((re.search(r"since the start: (\w+)", f["what"]), f["remedy"]) for f in findings)
+    dropped = {found[1]: remedy for found, remedy in drops if found}
     assert "[addresses]" in dropped["address"] and "grid" in dropped["size"]
     assert any(f["level"] == "ok" and "passes its self-test" in f["what"] for f in findings)
     assert all(f["remedy"] for f in findings if f["level"] != "ok" and "limit" not in f["what"])

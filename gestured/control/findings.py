@@ -1,0 +1,177 @@
+"""What the doctor finds in a daemon's status: of itself, its model, its input, its sensors and its output."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import gestured
+from gestured.control.status import RATES, span
+from gestured.core.errors import ModelError
+from gestured.core.pace import outside as rate_is_outside
+from gestured.model.model import check
+
+BUFFER_BYTES = 4 << 20  # what the daemon asks of the kernel
+SLOW_S = 0.1
+RECENT_S = 60.0  # what has not happened for so long is over
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at: "ok", "warn" (it works, but) or "bad", and the remedy where it is not ok."""
+
+    level: str
+    what: str
+    remedy: str = ""
+
+
+DROPS = {  # why, and what to do
+    "address": "came to an address that no sensor has: gesturectl sniff proposes [addresses]",
+    "size": 'had another number of taxels than the grid: [sensors.NAME] grid = "ROWSxCOLUMNS" (gesturectl sniff)',
+    "types": "held neither numbers nor one blob: wire.md says what a frame is, gesturectl sniff what arrives",
+    "not_allowed": "came from a source that is not under allow",
+    "second_source": "came from a second sender for one sensor's name (gesturectl sniff): give each its own name",
+    "too_many_sensors": "were of more sensors than max_sensors: look for a sender that changes its name",
+    "flood": "were more than the daemon can take: their source is held to half a megabyte a second",
+    "not_osc": "were not OSC: something else is sent to this port",
+    "not_finite": "held NaN or infinity: look at the sensor's firmware",
+}
+
+
+def examine_status(status: dict[str, Any]) -> Iterator[Finding]:
+    """What the daemon's answer to `status` shows."""
+    for look in (_daemon, _ports, _active_model, _input, _sensors, _shift, _output):
+        yield from look(status)
+
+
+def model_finding(name: str, sha256: str | None) -> Finding:
+    """Whether a model can be used, and is the one that runs."""
+    try:
+        report = check(name)
+    except ModelError as error:
+        return Finding("bad", f"model {error}", "copy the file again, or choose another model")
+    if sha256 is not None and report["sha256"] != sha256:
+        return Finding("warn", f"model {report['file']} is not the one that runs", "gesturectl reload")
+    return Finding("ok", f"model {report['file']}: passes its self-test, sha256 {report['sha256'][:12]}")
+
+
+def _daemon(status: dict[str, Any]) -> Iterator[Finding]:
+    if status["version"] != gestured.__version__:
+        what = f"the daemon is {status['version']}, gesturectl {gestured.__version__}"
+        yield Finding("warn", what, "restart the daemon: systemctl restart gestured")
+    if not status["ready"]["ready"]:
+        yield Finding("bad", f"not ready: {status['ready']['reason']}", "see the daemon's log: journalctl -u gestured")
+    else:
+        yield Finding("ok", f"the daemon serves, {status['state']}, pid {status['pid']}")
+    if status["loop_lag_s"] > SLOW_S:
+        late = f"its loop is {1000 * status['loop_lag_s']:.0f} ms late"
+        yield Finding("warn", late, "the machine is too busy: give gestured a processor, or a higher priority")
+    if status["internal_errors"]:
+        bugs = f"{status['internal_errors']} bugs were caught"
+        found = _dated(bugs, status["last_s_ago"]["internal_errors"].get("all"), "")
+        yield Finding("bad", found.what, "report them with the daemon's log")
+    if status["reloads"].get("refused"):
+        ages = status["last_s_ago"]["reloads"]
+        if ages.get("refused", 0.0) <= ages.get("done", math.inf):  # none has succeeded since
+            refused = f"{status['reloads']['refused']} reloads were refused"
+            yield Finding("warn", refused, "gesturectl reload says why")
+
+
+def _ports(status: dict[str, Any]) -> Iterator[Finding]:
+    where = {key: value for key, value in status["addresses"].items() if value}
+    yield Finding("ok", ", ".join(f"{key} {value}" for key, value in where.items()))
+    if not where["listen"].startswith(("127.", "[::1]:")):
+        what = f"frames are taken from the network ({where['listen']}); OSC has no authentication"
+        yield Finding("warn", what, "name the senders with --allow, and keep the network private")
+
+
+def _active_model(status: dict[str, Any]) -> Iterator[Finding]:
+    model = status["model"]
+    if model["degraded"]:
+        yield Finding("bad", f"{model['active']} stands in for {model['asked']}", "gesturectl check says what is wrong")
+    yield model_finding(status["model"]["file"], model["sha256"])
+
+
+def _input(status: dict[str, Any]) -> Iterator[Finding]:
+    last = status["last_s_ago"]
+    for reason, count in status["input"]["dropped"].items():
+        why = DROPS.get(reason, "were not what is expected: gesturectl sniff shows what arrives")
+        what = f"{count} packets or messages dropped since the start: {reason}"
+        yield _dated(what, last["dropped"].get(reason), f"they {why}")
+    if status["input"]["kernel_drops"]:
+        what = f"the kernel dropped {status['input']['kernel_drops']} packets that found no room"
+        remedy = f"sysctl -w net.core.rmem_max={BUFFER_BYTES}, and look for a busy machine"
+        yield _dated(what, last["kernel_drops"], remedy)
+
+
+def _dated(what: str, seconds: float | None, remedy: str) -> Finding:
+    """What has happened, last so many seconds ago: after RECENT_S without it there is nothing to remedy."""
+    if seconds is None or seconds <= RECENT_S:
+        when = "" if seconds is None else f", the last {seconds:.0f} s ago"
+        return Finding("warn", what + when, remedy)
+    return Finding("ok", f"{what}, the last {span(seconds)} ago: that is over")
+
+
+def _sensors(status: dict[str, Any]) -> Iterator[Finding]:
+    if not status["sensors"]:
+        yield Finding("bad", "no sensor was heard", "gesturectl sniff shows whether anything arrives")
+    for name, sensor in status["sensors"].items():
+        for found in _sensor(name, sensor):
+            yield Finding(found.level, f"sensor {name}: {found.what}", found.remedy)
+
+
+def _sensor(name: str, sensor: dict[str, Any]) -> Iterator[Finding]:
+    words: dict[str, Callable[[dict[str, Any]], Finding]] = {
+        "ok": lambda s: Finding("ok", f"{s['rate_hz']:.1f} Hz from {s['source']}"),
+        "starting": lambda s: Finding("warn", "is being learned", "leave it untouched for a second"),
+        "degraded": lambda s: Finding(
+            "warn", f"{s['bad_taxels']} bad taxels are bridged", "look at its lines; gesturectl recalibrate"
+        ),
+        "faulty": lambda s: Finding("bad", f"{s['bad_taxels']} bad taxels", "replace it, or look at its connector"),
+        "stale": lambda s: Finding(
+            "bad", f"was heard {s['heard_s_ago']:.0f} s ago", "is it powered, and is the network up?"
+        ),
+        "no_data": lambda s: Finding(
+            "bad", "is configured, but was never heard", "gesturectl sniff; is its name right?"
+        ),
+        "intermittent": lambda s: Finding(
+            "bad",
+            "falls silent between touches, so the idle sensor cannot be learned",
+            "let it send idle frames, too: all the time, at one rate",
+        ),
+        "inverted": lambda s: Finding(
+            "bad", "its counts fall when it is touched", f"[sensors.{name}] invert = true in the configuration file"
+        ),
+    }
+    yield words[sensor["state"]](sensor)
+    if rate_is_outside(sensor["rate_hz"]):
+        remedy = "let it send at another rate; gestures of slower or faster sensors are unreliable"
+        yield Finding("warn", f"{sensor['rate_hz']:.1f} Hz, made for {RATES}", remedy)
+    if sensor.get("exchanged"):
+        rows, _, columns = sensor["grid"].partition("x")
+        what = f"rows and columns are exchanged: with {columns}x{rows} its touches look like a finger's"
+        yield Finding("bad", what, f'[sensors.{name}] grid = "{columns}x{rows}" in the configuration file')
+    if sensor.get("lost") and sensor["state"] != "intermittent":
+        remedy = "look at the network, or at kernel drops"
+        yield _dated(f"{sensor['lost']} frames lost on the way", sensor.get("lost_s_ago"), remedy)
+
+
+def _shift(status: dict[str, Any]) -> Iterator[Finding]:
+    for name in status["shift"]["unlike"]:
+        share = 100 * status["shift"]["outside"][name]
+        what = f"{name} of {share:.0f} % of the last gestures lies outside of what the model was trained on"
+        if name == "unknown":
+            what = f"{share:.0f} % of the last touches were answered by unknown"
+        yield Finding("warn", what, "check the mounting; record people here, and train with them")
+
+
+def _output(status: dict[str, Any]) -> Iterator[Finding]:
+    out, last = status["output"], status["last_s_ago"]
+    if out["lines_lost"] or out["evicted"]:
+        what = f"slow subscribers lost {out['lines_lost']} lines, {sum(out['evicted'].values())} were cut off"
+        ages = [*last["lines_lost"].values(), *last["evicted"].values()]
+        yield _dated(what, min(ages, default=None), "read in a thread of its own, and faster")
+    for result, count in out["osc"].items():
+        if result != "sent":
+            what, remedy = f"OSC output: {count} {result}", "does anybody listen at the --publish addresses?"
+            yield _dated(what, last["osc"].get(result), remedy)

@@ -1,0 +1,78 @@
+"""What the frames of one sensor say of how it was connected, beside what they say of gestures."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.generic]
+
+ENOUGH = 3  # contacts after which something is said
+MOSTLY = 3  # times as many contacts that say so as say the contrary
+PAUSE_S = 0.3  # after which counts that lie below the baseline again are another contact
+ALIKE = 0.3  # correlation from which neighbours are alike: a fingertip covers more than one taxel
+CLEARLY = 0.1  # by which the correlation must be higher than with rows and columns as they are
+
+
+class Habits:
+    """What was seen so far of a sensor that sends R x C taxels."""
+
+    def __init__(self, rows: int, columns: int) -> None:
+        self._rows, self._columns = rows, columns
+        self.clear()
+
+    def clear(self) -> None:
+        """Nothing was seen: the sensor is learned anew."""
+        self.falls = self.rises = 0  # contacts in which counts fell below the baseline, and in which they rose
+        self.exchanges = self.fits = 0  # contacts that look like one finger with R and C exchanged, and as they are
+        self._fell = -np.inf  # s, the last frame that lay below the baseline
+        self._idle: Counts | None = None  # (R, C) the last frame without a contact
+        self._strongest: tuple[float, Counts | None] = (
+            0.0,
+            None,
+        )  # activity and (R, C) of the contact's strongest frame
+
+    @property
+    def inverted(self) -> bool:
+        """Whether counts fall where the sensor is touched."""
+        return self.falls >= ENOUGH and self.falls >= MOSTLY * self.rises
+
+    @property
+    def exchanged(self) -> bool:
+        """Whether rows and columns are exchanged."""
+        return self.exchanges >= ENOUGH and self.exchanges >= MOSTLY * self.fits
+
+    def fall(self, t: float) -> None:
+        """A frame at `t` s lies as far below the baseline as a touched one lies above it."""
+        self.falls += t - self._fell > PAUSE_S
+        self._fell = t
+
+    def rise(self) -> None:
+        """A contact began."""
+        self.rises += 1
+        self._strongest = 0.0, None
+
+    def idle(self, values: Counts) -> None:
+        """A frame (R, C) without a contact, as it was sent."""
+        self._idle = values
+
+    def pressed(self, values: Counts, activity: float) -> None:
+        """A frame (R, C) of a contact, as it was sent."""
+        if activity > self._strongest[0]:
+            self._strongest = activity, values
+
+    def touched(self) -> None:
+        """A contact is over: its strongest frame is compared with an idle one."""
+        pressed = self._strongest[1]
+        if self._rows == self._columns or self._idle is None or pressed is None:
+            return
+        change = np.subtract(pressed, self._idle, dtype=np.float64).reshape(-1)
+        own, other = neighbours_alike(change, self._columns), neighbours_alike(change, self._rows)
+        self.fits += own > ALIKE and own > other
+        self.exchanges += other > ALIKE and other > own + CLEARLY
+
+
+def neighbours_alike(change: Array, columns: int) -> float:
+    """How alike vertical neighbours are in (N,) taxels, were there so many columns: their correlation, -1 to 1."""
+    change = np.where(np.abs(change) >= ALIKE * np.abs(change).max(), change, 0.0)  # without the idle sensor's noise
+    total = float(change @ change)
+    return float(change[:-columns] @ change[columns:]) / total if total > 0 else 0.0
