@@ -29,7 +29,7 @@ def bomb(path: Path, **big: tuple[str, tuple[int, ...]]) -> Path:
     save(path, example())
     with zipfile.ZipFile(path) as archive:
         members = {name.removesuffix(".npy"): archive.read(name) for name in archive.namelist()}
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name in FIELDS:
             with archive.open(f"{name}.npy", "w") as member:
                 if name not in big:
@@ -80,7 +80,7 @@ def test_frames_are_unpacked_last(tmp_path: Path) -> None:
     }
     with zipfile.ZipFile(path) as archive:
         frames = archive.open("frames.npy")
-        with zipfile.ZipFile(tmp_path / "s.npz", "w", zipfile.ZIP_DEFLATED) as other:
+        with zipfile.ZipFile(tmp_path / "s.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as other:
             for name, data in made.items():
                 other.writestr(f"{name}.npy", data)
             with other.open("frames.npy", "w") as member:
@@ -113,7 +113,7 @@ def test_a_header_that_is_larger_than_any_is_not_read(tmp_path: Path) -> None:
     path = archive_of(tmp_path / "r.npz")
     with zipfile.ZipFile(path) as archive:
         held = {name: archive.read(name) for name in archive.namelist() if name != "times.npy"}
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, data in held.items():
             archive.writestr(name, data)
         with archive.open("times.npy", "w") as member:
@@ -124,8 +124,8 @@ def test_a_header_that_is_larger_than_any_is_not_read(tmp_path: Path) -> None:
     assert ": times: " in reason and mib < 64
 
 
-def test_an_archive_of_a_hundred_thousand_names_is_not_listed(tmp_path: Path) -> None:
-    path = archive_of(tmp_path / "r.npz", **{f"{k}.npy": b"" for k in range(60_000)})
+def test_an_archive_of_thousands_of_names_is_not_listed(tmp_path: Path) -> None:
+    path = archive_of(tmp_path / "r.npz", **{f"{k}.npy": b"" for k in range(6_000)})
     assert "members" in refused("npz", path)
 
 
