@@ -5,6 +5,7 @@ import json
 import os
 import socket
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -120,17 +121,26 @@ def test_whatever_is_cut_off_the_rest_is_read(recorded, daemon: Daemon, tmp_path
             assert str(short) in str(error)
 
 
-def test_a_recording_ends_at_its_size_and_never_replaces_a_file(run, start, daemon: Daemon, tmp_path: Path) -> None:
+@pytest.fixture
+def flooded(tmp_path: Path) -> Iterator[Daemon]:
+    """A daemon of its own for a flood, which would fill the others' flight recorder and wait in their socket."""
+    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+    daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"))
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+
+
+def test_a_recording_ends_at_its_size_and_never_replaces_a_file(run, start, flooded: Daemon, tmp_path: Path) -> None:
     path = tmp_path / "full.mcap"
-    recorder = start("record", path, "--control", daemon.ready["control"], "--max-mib", "1", "--json")
+    recorder = start("record", path, "--control", flooded.ready["control"], "--max-mib", "1", "--json")
     with socket.socket(type=socket.SOCK_DGRAM) as sender:
-        sender.connect(daemon.address)
+        sender.connect(flooded.address)
         while recorder.poll() is None:
             sender.send(os.urandom(8000))  # nonsense is recorded, too
     summary = json.loads(recorder.communicate()[0])
     assert summary["ended"] == "the file is as large as it may be"
     assert path.stat().st_size < 1.5 * (1 << 20) and tape.read(path).whole
-    status, _, err = run("record", path, "--control", daemon.ready["control"])
+    status, _, err = run("record", path, "--control", flooded.ready["control"])
     assert status == 1 and str(path) in err and "File exists" in err
 
 
