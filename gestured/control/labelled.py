@@ -16,8 +16,8 @@ from gestured.record import arrays as recording
 from gestured.record.check import SESSION
 from gestured.record.tape import Packet, Tape
 
-BETWEEN_RECORDINGS_S = 3.0  # between two recordings: whatever is open is answered
-SOURCE = Address("127.0.0.1", 9)  # of all its packets
+BETWEEN_RECORDINGS_S = 3.0  # a pause in which every contact of the recording before is answered
+SOURCE = Address("127.0.0.1", 9)  # a sender to stand for the file; port 9 discards, and nobody sends from it
 DIFFERENT = ("wrong", "missed", "false")
 
 

@@ -29,7 +29,7 @@ Times = NDArray[np.float64]
 BUNDLE = b"#bundle\0"
 STATUS_TIMEOUT_S = 10.0  # a daemon says something once a second
 BACKLOG_S = 0.5  # what a daemon needs for a receive buffer that is full
-CONTACTS = 1000  # enough to tell
+CONTACTS = 1000  # onsets of a sensor that are compared with as many others: 8 MB, and an hour of gestures
 TIMES = ("onset", "offset", "decided")
 
 
@@ -80,7 +80,9 @@ def retimed(heard: Sequence[Line], sent: Sequence[float], found: Tape, rehearsal
     for name, stream in rehearsal.played.items():
         arrived, felt = np.array(stream.stamps).T
         told, waited = np.diff(felt), np.diff(np.interp(arrived, arrivals, sent))
-        steps = np.where(told <= Stamper.MAX_STEP_S, told, waited)  # no longer ones are believed
+        steps = np.where(
+            told <= Stamper.MAX_STEP_S, told, waited
+        )  # the daemon believes no longer step of a sensor, and takes the arrival's
         played = np.concatenate([[0.0], np.cumsum(steps)])
         here = np.interp(stream.onsets, felt, played)
         there = np.array([line["onset"] for line in heard if line["type"] == "onset" and line["sensor"] == name])

@@ -144,7 +144,7 @@ class LiveSensor:
                 self._free = self.now
 
     def begin(self) -> None:
-        """From now on it counts."""
+        """Begin a take: what was felt before does not belong to it."""
         self.found = []
         self._before = self._free
 

@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 from gestured.core.frames import Frame
 
 STROKE_FRAMES = 3  # fewer touched frames show no movement; a tap needs one
-GAP = 1.6  # times the usual step between frames: one was lost
-RAIL_FRAMES = 3  # so many frames, and this share of the contact, at exactly the largest count: cut off there
-RAIL_SHARE = 0.3  # in 997 touches of CapFingerId, whose counts end before their range does, 5 are so even
-RAIL_TAXELS = 3  # or so many taxels at once
-FINEST = 50  # a coarser sensor repeats its counts anyway
+GAP = 1.6  # times the usual step between two frames; from there on one was lost between them: 1.5 and some jitter
+RAIL_FRAMES = 3  # frames with a taxel at exactly the contact's largest count, fewer of which are chance
+RAIL_SHARE = (
+    0.3  # of a contact's frames with such a taxel; 5 of CapFingerId's 997 touches, none of them cut off, reach it
+)
+RAIL_TAXELS = 3  # taxels of one frame at exactly the largest count; so many are cut off whatever the other frames show
+FINEST = 50  # steps between least and largest count; a sensor with fewer shows the same count again by chance
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +81,8 @@ def gaps(times: NDArray[np.float64]) -> NDArray[np.int64]:
 def saturated(contact: NDArray[np.floating]) -> bool:
     """Whether the pressure of a contact (T, R, C) in counts was cut off at the top.
 
-    Under a finger, counts tremble; at the end of their range they stand still. Of a sensor with fewer than `FINEST`
-    steps nothing can be told.
+    Under a finger counts tremble, and at the end of their range they stand still. A contact with fewer than `FINEST`
+    steps of counts is never called cut off.
     """
     top = contact.max()
     if top - contact.min() < FINEST:

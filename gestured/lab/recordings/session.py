@@ -49,7 +49,7 @@ class Session:
         self._inclination: int | None = None
 
     def run(self, trials: Sequence[Exercise]) -> None:
-        """Until everything is kept, or somebody quits."""
+        """Ask for one trial after the other until all are kept, or somebody quits."""
         say = self._terminal.say
         try:
             if not self._agree():
@@ -169,9 +169,9 @@ class Session:
         self._terminal.say(f"  kept, {len(together)} in {self.path}")
 
     def _until(self, done: Callable[[], bool] | None, seconds: float = math.inf) -> str:
-        """Feed the front end until `done`, or for so long; without `done` until a key, which it gives.
+        """Feed the front end until `done` is true or `seconds` are over; returns "".
 
-        Raises Paused and Ended for their keys.
+        Without `done` and `seconds`, until a key is pressed, which is returned. Raises Paused and Ended for their keys.
         """
         end = time.monotonic() + seconds
         told = False

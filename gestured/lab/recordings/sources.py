@@ -29,7 +29,7 @@ CAPFINGERID = (27, 15)  # electrodes of the Nexus 5's panel
 PAUSE = "PAUSE"
 LINE = 256 << 10  # characters of a line; 64 x 64 numbers with all their digits have half as many
 NUMBERS = 1 << 27  # of all frames of a file: a gibibyte in memory
-BAD_LINES = 10_000
+BAD_LINES = 10_000  # lines of a file that are left out and named; with more it is no file of this kind
 LARGEST_COUNT = 1e30  # of any number; sums and differences of such counts still fit into a float32
 WORD = 40  # characters of a hand, a finger or a task
 

@@ -23,6 +23,7 @@ from gestured.lab.stability.table import Table, Value
 from gestured.model.model import Model
 
 SIGNAL, NOISE, IDLE_LEVEL = 600.0, 2.0, 300.0  # counts of a firm finger, of noise, of an idle taxel
+# The largest numbers of float32, one that its square overflows, ordinary ones, two denormals, and both zeros.
 FINITE = (float(np.finfo(np.float32).max), 1e30, 1.0, 1e-40, 1e-45, 0.0, -0.0, -1e-40, -1.0, -1e30)
 WINDOWS = (
     WINDOW,
@@ -30,7 +31,7 @@ WINDOWS = (
     Window(5, 7, 60.0, 1, 1 / 15, 1 / 15, 4.0),
     Window(27, 15, 5.0, 1, 1 / 15, 1 / 15, 0.0),
 )
-FOUND = "swipe_right"
+FOUND = "swipe_right"  # what all swipes of `swipes` are
 LEAST_GRID = 3  # on 2 x 2 taxels a swipe is two taps
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 WAVELET = "haar"
 WAVELET_LEVEL = 3
-TINY = 1e-9
+TINY = 1e-9  # variance (of shares of the peak) at which a band counts as constant
 
 
 def band_statistics(band: NDArray[np.float64]) -> NDArray[np.float64]:
