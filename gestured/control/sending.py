@@ -80,9 +80,8 @@ def retimed(heard: Sequence[Line], sent: Sequence[float], found: Tape, rehearsal
     for name, stream in rehearsal.played.items():
         arrived, felt = np.array(stream.stamps).T
         told, waited = np.diff(felt), np.diff(np.interp(arrived, arrivals, sent))
-        steps = np.where(
-            told <= Stamper.MAX_STEP_S, told, waited
-        )  # the daemon believes no longer step of a sensor, and takes the arrival's
+        # A daemon believes no longer step of a sensor's clock, and takes that of the arrivals.
+        steps = np.where(told <= Stamper.MAX_STEP_S, told, waited)
         played = np.concatenate([[0.0], np.cumsum(steps)])
         here = np.interp(stream.onsets, felt, played)
         there = np.array([line["onset"] for line in heard if line["type"] == "onset" and line["sensor"] == name])
