@@ -2,6 +2,7 @@
 
 import socket
 import tomllib
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,7 +39,7 @@ def touched(rows: int, columns: int, sign: float = 1.0) -> list[np.ndarray]:
     return [np.rint(300 + sign * f + random.normal(0, 1, f.shape)) for f in frames]
 
 
-def valid(proposed: list[str], tmp_path) -> dict:
+def valid(proposed: list[str], tmp_path) -> dict[str, Any]:
     """The proposal as the daemon reads it."""
     path = tmp_path / "gestured.toml"
     path.write_text("\n".join(proposed) + "\n")
