@@ -68,10 +68,10 @@ def _daemon(status: dict[str, Any]) -> Iterator[Finding]:
         yield Finding("warn", late, "the machine is too busy: give gestured a processor, or a higher priority")
     if status["internal_errors"]:
         bugs = f"{status['internal_errors']} bugs were caught"
-        found = _dated(bugs, status["last_s_ago"]["internal_errors"].get("all"), "")
+        found = _dated(bugs, _ages(status, "internal_errors").get("all"), "")
         yield Finding("bad", found.what, "report them with the daemon's log")
     if status["reloads"].get("refused"):
-        ages = status["last_s_ago"]["reloads"]
+        ages = _ages(status, "reloads")
         if ages.get("refused", 0.0) <= ages.get("done", math.inf):  # none has succeeded since
             refused = f"{status['reloads']['refused']} reloads were refused"
             yield Finding("warn", refused, "gesturectl reload says why")
@@ -93,15 +93,20 @@ def _active_model(status: dict[str, Any]) -> Iterator[Finding]:
 
 
 def _input(status: dict[str, Any]) -> Iterator[Finding]:
-    last = status["last_s_ago"]
+    ages = _ages(status, "dropped")
     for reason, count in status["input"]["dropped"].items():
         why = DROPS.get(reason, "were not what is expected: gesturectl sniff shows what arrives")
         what = f"{count} packets or messages dropped since the start: {reason}"
-        yield _dated(what, last["dropped"].get(reason), f"they {why}")
+        yield _dated(what, ages.get(reason), f"they {why}")
     if status["input"]["kernel_drops"]:
         what = f"the kernel dropped {status['input']['kernel_drops']} packets that found no room"
         remedy = f"sysctl -w net.core.rmem_max={BUFFER_BYTES}, and look for a busy machine"
-        yield _dated(what, last["kernel_drops"], remedy)
+        yield _dated(what, _ages(status, "kernel_drops"), remedy)
+
+
+def _ages(status: dict[str, Any], key: str) -> Any:
+    """How long ago something last happened, in s; by label, where it has some. A daemon of before does not say."""
+    return status.get("last_s_ago", {}).get(key, {} if key != "kernel_drops" else None)
 
 
 def _dated(what: str, seconds: float | None, remedy: str) -> Finding:
@@ -166,12 +171,12 @@ def _shift(status: dict[str, Any]) -> Iterator[Finding]:
 
 
 def _output(status: dict[str, Any]) -> Iterator[Finding]:
-    out, last = status["output"], status["last_s_ago"]
+    out = status["output"]
     if out["lines_lost"] or out["evicted"]:
         what = f"slow subscribers lost {out['lines_lost']} lines, {sum(out['evicted'].values())} were cut off"
-        ages = [*last["lines_lost"].values(), *last["evicted"].values()]
+        ages = [*_ages(status, "lines_lost").values(), *_ages(status, "evicted").values()]
         yield _dated(what, min(ages, default=None), "read in a thread of its own, and faster")
     for result, count in out["osc"].items():
         if result != "sent":
             what, remedy = f"OSC output: {count} {result}", "does anybody listen at the --publish addresses?"
-            yield _dated(what, last["osc"].get(result), remedy)
+            yield _dated(what, _ages(status, "osc").get(result), remedy)
