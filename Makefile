@@ -65,6 +65,7 @@ install:  ## into DESTDIR, below PREFIX=/usr, for PYTHON=/usr/bin/python3: progr
 	@rm -rf build/install && mkdir -p build  # the interpreter may be another one than the last time
 	$(call venv,build/install)
 	@deploy/install.sh build/install "$(DESTDIR)" "$(PREFIX)"
+	@deploy/installed.sh "$(DESTDIR)" "$(PREFIX)"
 
 uninstall:  ## remove what `make install` has put there; settings and account stay
 	@deploy/uninstall.sh "$(DESTDIR)" "$(PREFIX)"

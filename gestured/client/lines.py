@@ -24,6 +24,10 @@ class Refused(GesturedError):
     """The daemon answered something that this client cannot go on with."""
 
 
+class Unsubscribed(Refused):
+    """The daemon refused what a client asked to hear."""
+
+
 class Lines:
     """One connection; a context manager."""
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Self
 
-from gestured.client.lines import Forbidden, Lines, Refused, Unreachable, parsed
+from gestured.client.lines import Forbidden, Lines, Unreachable, Unsubscribed, parsed
 from gestured.client.stream import PATIENCE_S, SILENT, check_hello
 from gestured.core.errors import GesturedError
 
@@ -168,7 +168,7 @@ class Subscriber:
         if message.get("type") == "error":
             refusal = f"the daemon on {source.path} refused the request: {message.get('reason')}"
             if source.hello:
-                raise Refused(refusal)
+                raise Unsubscribed(refusal)
             self._gone(source, Unreachable(refusal))
             return None
         if not source.hello:

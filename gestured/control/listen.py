@@ -6,6 +6,7 @@ import time
 from datetime import datetime
 from typing import Any
 
+from gestured.client.lines import Unsubscribed
 from gestured.client.say import say, say_drawn, say_json
 from gestured.client.subscriber import Subscriber
 from gestured.control.address import add_sockets, event_path
@@ -34,7 +35,15 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print until the count is reached, the daemon ends, or Ctrl-C."""
+    """Print until the count is reached, the daemon ends, or Ctrl-C; exit status 2 for what no daemon sends."""
+    try:
+        return _listen(args)
+    except Unsubscribed as error:
+        say(f"gesturectl: {error}", to=sys.stderr)
+        return 2
+
+
+def _listen(args: argparse.Namespace) -> int:
     path = event_path(args)
     wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture}
     left = args.count
@@ -65,7 +74,8 @@ def readable(event: dict[str, Any]) -> str:
         waited = 1000 * (event["decided"] - event["offset"])
         tail = f"  by {event['model']}, degraded" if event["degraded"] else ""
         tail += "  (test)" if event.get("test") else ""
-        name = f"{event.get('gesture', 'unknown'):<24} {event['confidence']:4.2f}"
+        why = f"unknown ({event['reason']})" if "reason" in event else "unknown"
+        name = f"{event.get('gesture', why):<24} {event['confidence']:4.2f}"
         return f"{head}{name}  {number:<6} {waited:4.0f} ms{tail}"
     if kind == "status":
         sensors = ", ".join(f"{name} {state}" for name, state in sorted(event["sensors"].items()))

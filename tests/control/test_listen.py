@@ -132,8 +132,18 @@ def test_what_the_daemon_refuses_is_said(start, fake):
     fake.accept()
     fake.say({"type": "error", "reason": "gestures: 'wave' is not known"})
     _, err = process.communicate(timeout=30)
-    assert process.returncode == 1
+    assert process.returncode == 2
     assert "'wave' is not known" in err.decode()
+
+
+@pytest.mark.parametrize("reason", ["confidence", "hole", "rate"])
+def test_an_unknown_says_why(start, fake, reason):
+    process = start("listen", "--socket", fake.path, "--types", "unknown", "--count", 1)
+    fake.accept()
+    unknown = {key: value for key, value in GESTURE.items() if key not in ("gesture", "sequence")}
+    fake.say(unknown | {"type": "unknown", "reason": reason})
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 0 and f"unknown ({reason})" in out.decode()
 
 
 def test_ctrl_c_ends_without_a_word(start, fake):
