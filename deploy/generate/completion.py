@@ -5,6 +5,12 @@ from collections.abc import Iterator
 
 from deploy.generate.programs import Option, Program
 
+# Of what a flag, or what stands by itself, takes names.
+NAMES = {
+    **dict.fromkeys(("--gesture", "--gestures", "GESTURE"), "gestures"),
+    "--types": "types",
+    "--sensor": "sensors",
+}
 PATHS = ("FILE", "PATH", "FOLDER", "MODEL", "RECORDING")  # words in a metavar that mean something on disk
 
 
@@ -34,14 +40,17 @@ def bash(program: Program) -> str:
     for name, part in [*parts, ("*", program)]:
         lines += list(_values(name, part))
     lines += ["    esac", '    case "$command" in']
+    asked = 'COMPREPLY=($(compgen -W "$(gesturectl names {} 2>/dev/null)" -- "$word"))'
     for name, part in parts:
         files = any(not option.flags and takes_path(option) for option in part.options)
-        lines.append(f'        {name}) words="{" ".join(words(part))}"{_files(files)} ;;')
+        positional = [NAMES[option.metavar] for option in part.options if option.metavar in NAMES]
+        own = f"; [[ $word == -* ]] || {asked.format(positional[0])}" if positional else _files(files)
+        lines.append(f'        {name}) words="{" ".join(words(part))}"{own} ;;')
     lines += [
         f'        *) words="{" ".join(words(program))}" ;;',
         "    esac",
         *(['    [ "$COMP_CWORD" -gt 1 ] || words="' + " ".join(words(program)) + '"'] if parts else []),
-        '    COMPREPLY+=($(compgen -W "$words" -- "$word"))',
+        '    COMPREPLY+=($(compgen -W "$words" -- "$word" || :))',
         "}",
         f"complete -F {function} {program.name}",
     ]
@@ -59,6 +68,10 @@ def _values(name: str, program: Program) -> Iterator[str]:
             pattern = "|".join(f'"{name} {flag}"' if name != "*" else f'*" {flag}"' for flag in option.flags)
             source = f'-W "{" ".join(option.choices)}"' if option.choices else "-f" if takes_path(option) else ""
             reply = f'COMPREPLY=($(compgen {source} -- "$word")); return' if source else "return"
+            if (kind := next((NAMES[flag] for flag in option.flags if flag in NAMES), None)) is not None:
+                # After a comma the next name begins.
+                listed = f'-P "${{word%"${{word##*,}}"}}" -W "$(gesturectl names {kind} 2>/dev/null)"'
+                reply = f'COMPREPLY=($(compgen {listed} -- "${{word##*,}}")); return'
             yield f"        {pattern}) {reply} ;;"
 
 

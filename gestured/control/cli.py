@@ -17,6 +17,7 @@ from gestured.control import (
     export,
     flag,
     listen,
+    names,
     recalibrate,
     record,
     reload,
@@ -32,7 +33,7 @@ SUBCOMMANDS = (
     *(status, listen, doctor, sniff),
     *(reload, recalibrate, shadow, emit),
     *(record, flag, replay, export),
-    *(simulate, check, demo),
+    *(simulate, check, names, demo),
 )
 
 

@@ -13,6 +13,8 @@ import pytest
 
 from deploy.generate import completion, configuration, dashboard, man, programs
 from gestured.daemon.settings import FLAGS, TABLES, Settings
+from tests.daemon import tiny_model
+from tests.daemon.harness import Daemon, Sensor
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = {program.name: program for program in programs.all_programs()}
@@ -89,6 +91,29 @@ def test_bash_completes_commands_flags_choices_and_files():
         assert complete("gesturectl", name, "--") == flags
     assert "--model" in complete("gestured", "--mo")
     assert "README.md" in complete("gestured", "--config", "READ")
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
+def test_bash_completes_names_of_gestures_types_and_sensors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    program = tmp_path / "gesturectl"
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m gestured.control "$@"\n')
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    assert complete("gesturectl", "listen", "--types", "un") == {"unknown"}
+    assert complete("gesturectl", "listen", "--types", "gesture,un") == {"gesture,unknown"}
+    assert complete("gesturectl", "listen", "--sensor", "") == set()
+    assert complete("gesturectl", "emit", "circle_") == {"circle_clockwise", "circle_counter_clockwise"}
+    assert complete("gestured", "--gestures", "one_tap,swipe_l") == {"one_tap,swipe_left"}
+    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+    daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"), "--clock", "sensor")
+    try:
+        monkeypatch.setenv("GESTURED_SOCKET", str(daemon.socket))
+        client = daemon.client().subscribe("gesture")
+        Sensor(daemon, "armrest").begin().perform("left")
+        client.events("gesture", "armrest")
+        assert complete("gesturectl", "listen", "--sensor", "arm") == {"armrest"}
+    finally:
+        daemon.stop()
 
 
 class Zsh:
