@@ -11,6 +11,7 @@ from gestured.core.reading import Reading
 from gestured.core.recognizer import Classifier, Decided, Recognizer
 from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
+from gestured.core.view import View, view_of
 from gestured.core.vitals import Vitals, faulty
 from gestured.core.wire import Arrival
 
@@ -157,6 +158,10 @@ class Feed:
             first=self._vitals.first,
             baseline=front_end.baseline if front_end.ready else None,
         )
+
+    def view(self, *, raw: bool) -> View | None:
+        """The sensor as it is felt now; None before its first frame."""
+        return view_of(self._recognizer.front_end, raw=raw)
 
     def _run(self, act: Callable[[float], list[Event | Decided]], now: float, facts: list[Fact]) -> None:
         t = self._stamper.at(now)

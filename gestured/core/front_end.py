@@ -63,6 +63,7 @@ class FrontEnd:
         self._segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
         self._cutter = Cutter(self.conditioner)
         self.habits = Habits(rows, columns)
+        self.latest: tuple[Frame | None, Look | None] = (None, None)  # the last frame, and how it was seen
         self._pace = Pace()
         self._below_since: float | None = None  # s, since when the frames lie far below the baseline
 
@@ -116,6 +117,10 @@ class FrontEnd:
         """Frames a second as they come, 0 before it is known."""
         return 1.0 / self.interval_s if self.interval_s > 0 else 0.0
 
+    def levels(self, t: float) -> tuple[str, tuple[float, float]]:
+        """The segmenter's phase at `t` s, and the activity (noise units) that is strong then, and not quiet."""
+        return self._segmenter.phase.name, self._segmenter.levels(t)
+
     def push(self, frame: Frame) -> list[Found]:
         """Take one frame, give all that was found, in order.
 
@@ -130,10 +135,12 @@ class FrontEnd:
         found = self._pass(t)
         conditioner, segmenter, cutter = self.conditioner, self._segmenter, self._cutter
         if not conditioner.ready:
+            self.latest = frame, None
             if conditioner.settle(t, raw):
                 cutter.settled(t)
             return found
         look = conditioner.look(t, raw, segmenter.after)
+        self.latest = frame, look
         if look.burst and conditioner.fallen(look) >= segmenter.on:
             self.habits.fall(t)
         if look.shifted:

@@ -16,6 +16,7 @@ from gestured.core.owner import Source
 from gestured.core.reading import Reading
 from gestured.core.recognizer import Classifier
 from gestured.core.scene import Scene
+from gestured.core.view import View
 from gestured.core.wire import Arrival, Decoder
 
 FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one that sends
@@ -122,6 +123,12 @@ class Hub:
         """What is known of each sensor, heard or in the scene, at `now`. Any thread may ask."""
         silent = {name: Reading("no_data", self._scene.grid_of(name)) for name in self._scene.sensors}
         return silent | {name: feed.reading(now) for name, feed in tuple(self._feeds.items())}
+
+    def view(self, sensor: str, now: float, *, raw: bool) -> tuple[View, Reading] | None:
+        """A sensor as it is felt now, and what is known of it; None where it was not heard."""
+        feed = self._feeds.get(sensor)
+        found = None if feed is None else feed.view(raw=raw)
+        return None if feed is None or found is None else (found, feed.reading(now))
 
     def _set(self, scene: Scene, classifier: Classifier) -> None:
         missing = [gesture for gesture in scene.gestures if gesture not in classifier.gestures]

@@ -60,6 +60,22 @@ def _given_up(memory: Memory, t: float, activity: float) -> Signal:
     return Signal.QUIET if activity < memory.off else Signal.STRONG
 
 
+# --- the same as two numbers, for whoever looks at it: activity from which it is strong, and below which it is quiet
+
+
+def _levels_untouched(memory: Memory, t: float) -> tuple[float, float]:
+    return memory.on + memory.after.level(t), memory.off
+
+
+def _levels_touched(memory: Memory, t: float) -> tuple[float, float]:
+    peak = memory.after.peak
+    return max(memory.on, ON_SHARE * peak), max(memory.off, OFF_SHARE * peak)
+
+
+def _levels_given_up(memory: Memory, t: float) -> tuple[float, float]:
+    return memory.off, memory.off
+
+
 # --- what a wait says, after so many seconds of quiet
 
 
@@ -156,17 +172,18 @@ class Phase:
 
     name: str
     reads: Callable[[Memory, float, float], Signal]  # s and activity of a frame -> what it says
+    levels: Callable[[Memory, float], tuple[float, float]]  # s -> activity that is strong, and that is not quiet
     waits: Callable[[Memory, float], Signal | None] = _no_wait  # s of quiet -> what they say, if anything
     touched: bool = True  # a contact goes on, given up or not
     pending: bool = True  # it is not given up, and what becomes of it is open
     let_go: bool = False  # the finger is off: if the stream ends, what is open may be decided
 
 
-IDLE = Phase("IDLE", _untouched, touched=False, pending=False)
-CONTACT = Phase("CONTACT", _touched)
-RELEASING = Phase("RELEASING", _touched, _released, let_go=True)
-GAP = Phase("GAP", _touched, _gap_over, let_go=True)
-SPENT = Phase("SPENT", _given_up, _left, pending=False)
+IDLE = Phase("IDLE", _untouched, _levels_untouched, touched=False, pending=False)
+CONTACT = Phase("CONTACT", _touched, _levels_touched)
+RELEASING = Phase("RELEASING", _touched, _levels_touched, _released, let_go=True)
+GAP = Phase("GAP", _touched, _levels_touched, _gap_over, let_go=True)
+SPENT = Phase("SPENT", _given_up, _levels_given_up, _left, pending=False)
 
 
 class Row(NamedTuple):

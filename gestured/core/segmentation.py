@@ -57,6 +57,10 @@ class Segmenter:
         """When it was touched last, in s."""
         return self._memory.contact.touched
 
+    def levels(self, t: float) -> tuple[float, float]:
+        """Activity from which a frame at `t` s is strong, and below which it is quiet; noise units."""
+        return self.phase.levels(self._memory, t)
+
     def push(self, t: float, activity: float, place: Place | None) -> list[Deed]:
         """One frame at `t` s, after `flush(t)`; `place`: the centroid (row, column), if activity is at least `off`."""
         return self._step(self.phase.reads(self._memory, t, activity), t, activity, place)

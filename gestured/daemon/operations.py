@@ -1,6 +1,7 @@
 """What an operator may ask of a running daemon: the table of the control socket's verbs."""
 
 import asyncio
+import math
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -15,11 +16,13 @@ from gestured.daemon.metrics import Metrics
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.request import Parameter, Refusal, Reply, ReplyStream, Verb
 from gestured.daemon.snapshot import Snapshot
-from gestured.daemon.status import scene, status
+from gestured.daemon.status import scene, status, viewed
 from gestured.daemon.tap import Taps, as_lines
 from gestured.daemon.watch import Watch
 from gestured.model.model import open_apart
 
+VIEW_S = 1 / 30  # between two views of one sensor: nobody sees more
+VIEWS = 16  # sensors that are looked at
 TEST_SENSORS = 64  # names of sensors that are not there
 TEST_S = 0.4  # how long a made-up gesture took
 TEST_FRAMES = 6  # of it, at 15 Hz
@@ -27,6 +30,8 @@ TEST_FRAMES = 6  # of it, at 15 Hz
 SENSOR = Parameter(
     (str, type(None)), "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", check=lambda name: name is None or is_sensor(name)
 )
+VIEWED = Parameter(str, "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", required=True, check=is_sensor)
+RAW = Parameter(bool, "true or false")
 LABEL = Parameter(str, "a gesture's name", required=True)
 MODEL = Parameter((str, type(None)), "a model's path or name, or null to end it", required=True)
 
@@ -43,6 +48,7 @@ class Operations:
     metrics: Metrics
     snapshot: Callable[[], Snapshot]
     reload_all: Callable[[], Awaitable[str | None]]  # None, or why nothing has changed
+    _views: dict[tuple[str, bool], tuple[float, Reply]] = field(default_factory=dict)  # s, and the answer
     _tested: set[str] = field(default_factory=set)  # names of sensors that were not there
 
     def verbs(self) -> dict[str, Verb]:
@@ -53,6 +59,7 @@ class Operations:
             "recalibrate": Verb(self.recalibrate, {"sensor": SENSOR}),
             "emit": Verb(self.emit, {"gesture": LABEL, "sensor": SENSOR}),
             "shadow": Verb(self.shadow, {"model": MODEL}, slow=True),
+            "view": Verb(self.view, {"sensor": VIEWED, "raw": RAW}, changes=False),
             "tap": Verb(self.tap),
             "flight": Verb(self.flight),
         }
@@ -113,6 +120,21 @@ class Operations:
             return {"shadow": await asyncio.to_thread(last.finish) if last else None}
         candidate = await asyncio.to_thread(open_apart, model)
         return {"shadow": self.watch.compare(candidate).report()}
+
+    async def view(self, connection: Connection, sensor: str, raw: bool = False) -> Reply:
+        """One sensor as it is felt now; who asks again within VIEW_S, is answered the same."""
+        now = time.monotonic()
+        made, answer = self._views.get((sensor, raw), (-math.inf, {}))
+        if now - made < VIEW_S:
+            return answer
+        found = self.hub.view(sensor, now, raw=raw)
+        if found is None:
+            raise Refusal(f"no sensor {sensor!r}, expected one of {', '.join(self.hub.sequences()) or 'none'}")
+        if len(self._views) >= VIEWS:
+            self._views.clear()
+        answer = viewed(sensor, *found) | {"time": time.time()}
+        self._views[sensor, raw] = now, answer
+        return answer
 
     async def tap(self, connection: Connection) -> Reply:
         """Stream packets and events over this connection from now on."""

@@ -4,9 +4,13 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gestured import __version__
 from gestured.core.address import Address
 from gestured.core.reading import Reading
+from gestured.core.view import View
 from gestured.daemon.metrics import Counter, Metrics
 from gestured.daemon.snapshot import Snapshot
 from gestured.daemon.values import Grid
@@ -90,6 +94,32 @@ def scene(snapshot: Snapshot, epoch_ns: int) -> dict[str, Any]:
         "gestures": list(snapshot.gestures),
         "settings": snapshot.settings,
     }
+
+
+def viewed(sensor: str, view: View, reading: Reading) -> dict[str, Any]:
+    """One sensor at a moment, grids row by row; `values` are counts above the baseline, activity is in noise units."""
+    return {
+        "sensor": sensor,
+        "state": reading.state,
+        "t": view.t,
+        "grid": list(view.values.shape if view.values is not None else reading.grid),
+        "values": None if view.values is None else _rounded(view.values),
+        "bad": [] if view.bad is None else np.flatnonzero(view.bad).tolist(),
+        "raw_grid": list(reading.grid),
+        "raw": None if view.raw is None else _rounded(view.raw),
+        "noise": round(view.noise, 3),
+        "activity": round(view.activity, 2),
+        "on": round(view.on, 2),
+        "off": round(view.off, 2),
+        "phase": view.phase,
+        "centroid": None if view.centroid is None else [round(place, 3) for place in view.centroid],
+        "contact": reading.contact,
+    }
+
+
+def _rounded(grid: NDArray[Any]) -> list[float]:
+    numbers: list[float] = np.round(grid.astype(np.float64), 2).reshape(-1).tolist()
+    return numbers
 
 
 def _sensor(reading: Reading, now: float) -> dict[str, Any]:

@@ -1,0 +1,58 @@
+"""The control verb `view`: one sensor as it is felt now."""
+
+import asyncio
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gestured.client.control import Control
+from gestured.client.lines import Refused
+from gestured.daemon import operations
+from tests.daemon.harness import Daemon, Hand, Sensor
+from tests.daemon.parts import Parts
+
+
+def test_a_sensor_is_shown_as_it_is_felt(shared: Daemon) -> None:
+    sensor = Sensor(shared, "seen").begin()
+    frame = sensor.hand.frame(6.0, 2.0)
+    with Control(Path(shared.ready["control"])) as control:
+        sensor.send([frame, frame])
+        while (found := control.ask("view", sensor="seen", raw=True))["phase"] != "CONTACT":
+            pass
+        again = control.ask("view", sensor="seen")
+        with pytest.raises(Refused, match="no sensor 'nobody', expected one of .*seen"):
+            control.ask("view", sensor="nobody")
+        with pytest.raises(Refused, match="view.raw: expected true or false"):
+            control.ask("view", sensor="seen", raw=1)
+    assert found["raw"] == frame.ravel().tolist() and again["raw"] is None and found["grid"] == [9, 9]
+    values = np.array(found["values"]).reshape(9, 9)
+    assert np.abs(values - (frame - 20)).max() < 3 and np.unravel_index(values.argmax(), (9, 9)) == (6, 2)
+    assert found["activity"] > found["on"] > found["off"] > 0 and found["bad"] == []
+    assert found["centroid"] == pytest.approx([6.0, 2.0], abs=0.2)
+    sensor.perform()
+    shared.client().close()
+
+
+def test_it_is_made_at_most_thirty_times_a_second_and_only_when_somebody_asks(model, monkeypatch) -> None:
+    parts = Parts(model)
+    made: list[str] = []
+    view = parts.hub.view
+
+    def counted(sensor: str, now: float, *, raw: bool):
+        made.append(sensor)
+        return view(sensor, now, raw=raw)
+
+    monkeypatch.setattr(parts.hub, "view", counted)
+    clock = SimpleNamespace(now=100.0, monotonic=lambda: clock.now, time=lambda: 1.7e9 + clock.now)
+    monkeypatch.setattr(operations, "time", clock)
+    verbs = operations.Operations(
+        parts.hub, parts.desk, None, parts.watch, parts.taps, parts.metrics, lambda: None, None
+    ).verbs()
+    parts.feed("arm", Hand().idle(2.0), 90.0)
+    assert made == []
+    for _ in range(300):  # three viewers, a second
+        asyncio.run(verbs["view"].run(None, sensor="arm"))
+        clock.now += 1 / 300
+    assert 20 < len(made) <= 31
