@@ -74,6 +74,16 @@ def ours(level: str, seed: int) -> Recording:
     )
 
 
+def lossy(recording: Recording, burst: int, seed: int) -> Recording:
+    """The same without so many frames in a row somewhere in each performance."""
+    rng, keep = np.random.default_rng([seed, burst]), np.ones(len(recording.times), dtype=bool)
+    for act in recording.performed:
+        at = int(np.searchsorted(recording.times, rng.uniform(act.onset, act.offset)))
+        first = max(at - int(rng.integers(burst)), 0)
+        keep[first : first + burst] = False
+    return Recording(recording.frames[keep], recording.times[keep], recording.performed)
+
+
 def others(level: str, seed: int) -> Recording:
     """A session of the independent generator."""
     made = foreign.session(seed, level, SESSION_S, NON_GESTURE_SHARE)
@@ -182,18 +192,19 @@ def at_marks(
     return Segment(frames.reshape(-1, front.rows, front.columns), times[low:high], first - low, last - low, noise)
 
 
-def _batch(task: tuple[str, bool, int, int, str]) -> Sheet:
-    level, is_foreign, first, count, source = task
+def _batch(task: tuple[str, bool, int, int, int, str]) -> Sheet:
+    level, is_foreign, burst, first, count, source = task
     model, sheet = open_model(source), Sheet()
     for seed in range(first, first + count):
-        sheet += measure((others if is_foreign else ours)(level, seed), model)
+        recording = (others if is_foreign else ours)(level, seed)
+        sheet += measure(lossy(recording, burst, seed) if burst else recording, model)
     return sheet
 
 
-def _tasks(args: argparse.Namespace, level: str) -> Iterator[tuple[str, bool, int, int, str]]:
+def _tasks(args: argparse.Namespace, level: str) -> Iterator[tuple[str, bool, int, int, int, str]]:
     step = 10
     for first in range(args.first, args.first + args.sessions, step):
-        yield level, args.foreign, first, min(step, args.first + args.sessions - first), args.model
+        yield level, args.foreign, args.burst, first, min(step, args.first + args.sessions - first), args.model
 
 
 def main() -> None:
@@ -201,6 +212,7 @@ def main() -> None:
     parser.add_argument("--foreign", action="store_true", help="the independent generator: look, do not tune")
     parser.add_argument("--level", nargs="+", choices=LEVELS, default=["nominal", "hard"])
     parser.add_argument("--sessions", type=int, default=100, help=f"of {SESSION_S:.0f} s, of each level (%(default)s)")
+    parser.add_argument("--burst", type=int, default=0, help="frames lost in a row in each performance (%(default)s)")
     parser.add_argument("--first", type=int, default=0, help="first seed (%(default)s)")
     parser.add_argument("--model", default="cnn_lstm", help="a shipped model's name or a path (%(default)s)")
     parser.add_argument("--jobs", type=int, default=1, help="processes (%(default)s)")
@@ -212,7 +224,7 @@ def main() -> None:
             sheet = Sheet()
             for part in pool.map(_batch, _tasks(args, level)):
                 sheet += part
-            print(json.dumps({"level": level, **sheet.figures()}), flush=True)
+            print(json.dumps({"level": level, "burst": args.burst, **sheet.figures()}), flush=True)
 
 
 if __name__ == "__main__":
