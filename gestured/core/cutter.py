@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.conditioning import Conditioner, Look
+from gestured.core.contact import Place
 from gestured.core.frames import Segment, Touch
+from gestured.core.holes import CLEAR_S, HOLE_S, Sight, clear
 from gestured.core.taxels import Inspection
 
 LARGEST = float(np.finfo(np.float32).max)  # counts; also what a frame on the wire can hold
@@ -24,6 +26,7 @@ class Kept(NamedTuple):
     above: NDArray[np.float64]  # (N,) counts above the baseline
     touches: tuple[Touch, ...]
     lost: int  # frames, just before this one
+    place: Place | None  # where it is pressed, if it is
     new: float  # s, since when the sensor has shown just that: a frame that is repeated tells nothing
 
 
@@ -40,8 +43,10 @@ class Made:
 class Cutter:
     """Keeps the frames of a contact and shortly before it, and makes segments of them."""
 
-    def __init__(self, conditioner: Conditioner) -> None:
+    def __init__(self, conditioner: Conditioner, travel: float) -> None:
+        """`travel`: taxel pitches that a finger may move and still be where it was."""
         self._conditioner = conditioner
+        self._travel = travel
         self._kept: deque[Kept] = deque()
         self._made: Made | None = None
         self._settled = -math.inf  # s, the last frame of the quiet second after which the sensor was ready
@@ -65,13 +70,13 @@ class Cutter:
         """The sensor restarted: what was kept is no part of what follows."""
         self._kept.clear()
 
-    def keep(self, look: Look, touches: tuple[Touch, ...], lost: int) -> None:
+    def keep(self, look: Look, touches: tuple[Touch, ...], lost: int, place: Place | None) -> None:
         """Take a frame. Of a sensor that stands still when idle, a repeated one is as good as any."""
         t, shown = look.t, look.raw.tobytes()
         if shown != self._shown or not self._conditioner.noise.lively:
             self._new = t
         self._shown = shown
-        self._kept.append(Kept(t, look.above, touches, lost, self._new))
+        self._kept.append(Kept(t, look.above, touches, lost, place, self._new))
 
     def trim(self, t: float) -> None:
         """Nothing is open at `t` s: keep what the next contact may need before its onset."""
@@ -91,17 +96,26 @@ class Cutter:
         made, self._made = self._make(onset, offset), None
         return made
 
-    def hole(self, onset: float, until: float) -> float:
-        """The longest time in s in which a finger may have moved unseen, from before the onset to `until` s.
+    def hole(self, onset: float, offset: float, until: float) -> float:
+        """The longest time in s in which a finger may have done anything unseen, from before the onset to `until` s.
 
         Infinite where nobody saw it come. Of a sensor that says no more nobody knows, and that counts for nothing.
         """
         last, longest = self._settled, 0.0
         for new in (*(kept.new for kept in self._kept), until):
-            if new >= onset:
-                longest = max(longest, new - last)
+            if new >= onset and new - last > longest:
+                if not HOLE_S < new - last <= CLEAR_S or not self._clear(onset, last, new, offset):
+                    longest = new - last
             last = new
         return longest
+
+    def _clear(self, onset: float, begin: float, end: float, offset: float) -> bool:
+        """Whether nothing hides in the hole from `begin` to `end` s of a contact."""
+        if any(begin < kept.t < end for kept in self._kept):
+            return False  # the sensor repeated itself, and what the segment shows of that time is not so
+        seen = [Sight(k.t, k.place) for k in self._kept if k.place is not None and onset <= k.t <= offset]
+        before, after = [one for one in seen if one.t <= begin], [one for one in seen if one.t >= end]
+        return clear(before, after, self._travel)
 
     def _make(self, onset: float, offset: float) -> Made:
         """The segment of a contact: made once, unless a taxel has turned out to be bad since."""

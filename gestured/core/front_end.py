@@ -33,7 +33,7 @@ class Cut:
     id: int
     segment: Segment  # the same object as in the last draft, unless more has become known since
     decided: float  # s, the frame that completed it
-    hole_s: float = 0.0  # the longest time from one frame to the next until then
+    hole_s: float = 0.0  # the longest time until then in which the finger may have done anything unseen
 
 
 Contact = Onset | Cut | Cancelled | Release  # what happens to a contact, in this order
@@ -61,7 +61,7 @@ class FrontEnd:
         self.conditioner = Conditioner(self.rows, self.columns)
         travel = self.timing.tap_travel * min(rows, columns)
         self._segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
-        self._cutter = Cutter(self.conditioner)
+        self._cutter = Cutter(self.conditioner, travel)
         self.habits = Habits(rows, columns)
         self.latest: tuple[Frame | None, Look | None] = (None, None)  # the last frame, and how it was seen
         self._pace = Pace()
@@ -147,8 +147,8 @@ class FrontEnd:
             return found + self._shift(look)
         self._below_since = None
         touches = self.mounting.touches(frame.touches, *self.sent) if frame.touches else ()
-        cutter.keep(look, touches, frame.lost)
         place = conditioner.place(look) if look.activity >= segmenter.off else None
+        cutter.keep(look, touches, frame.lost, place)
         deeds = segmenter.push(t, look.activity, place)
         if deeds:
             found += self._done(deeds, t, t)
@@ -255,7 +255,7 @@ class FrontEnd:
         made = self._cutter.cut(onset, offset)
         if made.peak < self._segmenter.off * made.segment.noise:  # nothing is left without its bad taxels
             return [Cancelled(self.sensor, self.segments, "stuck"), release]
-        return [Cut(self.segments, made.segment, t, self._cutter.hole(onset, seen)), release]
+        return [Cut(self.segments, made.segment, t, self._cutter.hole(onset, offset, seen)), release]
 
     def _cancel(self, reason: str) -> list[Contact]:
         """The contact that goes on has no answer, and ends."""

@@ -11,9 +11,7 @@ from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Unknown
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Draft, Found, FrontEnd
-
-HOLE_S = 0.25  # longer without a frame, nobody knows what the finger did meanwhile;
-HOLE_FRAMES = 2.5  # a slow sensor may take so many of its own intervals
+from gestured.core.holes import HOLE_FRAMES, HOLE_S
 
 
 @dataclass(frozen=True, slots=True)

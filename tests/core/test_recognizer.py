@@ -201,11 +201,30 @@ def contacts(front_end: FrontEnd, frame: Frame) -> list[Contact]:
     return [found for found in front_end.push(frame) if not isinstance(found, Draft)]
 
 
-@pytest.mark.parametrize("where", [-4, 0, 3, 9, 11])  # frames from the onset; the last touched one is the eleventh
+@pytest.mark.parametrize("where", [-4, 0, 1, 9, 11])  # frames from the onset; the last touched one is the eleventh
 @pytest.mark.parametrize(("lost", "kind"), [(2, Gesture), (5, Unknown)])
 def test_a_gesture_with_a_hole_is_unknown(where: int, lost: int, kind: type) -> None:
     stream = frames(*SLOW_SWIPE)
     at = touched(stream)[0] + where
+    (answer,) = answers(run(recognizer(Fake()), stream[:at] + stream[at + lost :]))
+    assert isinstance(answer, kind)
+
+
+@pytest.mark.parametrize(
+    ("lines", "lost", "kind"),
+    [
+        (("move 4,1 to 4,7 0.8 in 800ms",), 5, Gesture),
+        (("move 4,1 to 4,7 0.8 in 800ms",), 6, Unknown),  # too long
+        (("circle 4,4 radius 2.5 0.8 in 1200ms",), 3, Gesture),
+        (("move 7,1 to 1,1 0.8 in 400ms", "move 1,1 to 1,7 0.8 in 400ms"), 4, Unknown),  # a corner
+        (("move 4,1 to 4,7 0.8 in 400ms", "move 4,7 to 4,1 0.8 in 400ms"), 4, Unknown),  # to and fro
+        (("press 4,4 0.8 for 800ms",), 4, Unknown),  # a second tap may hide
+        ((TAP, "quiet for 200ms", TAP), 3, Unknown),
+    ],
+)
+def test_a_hole_on_a_clear_path_hides_nothing(lines: tuple[str, ...], lost: int, kind: type) -> None:
+    stream = frames("quiet for 1500ms", *lines, "quiet for 900ms")
+    at = (sum(touched(stream)) - lost + 1) // 2
     (answer,) = answers(run(recognizer(Fake()), stream[:at] + stream[at + lost :]))
     assert isinstance(answer, kind)
 
