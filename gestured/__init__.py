@@ -8,7 +8,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from gestured.client.subscriber import Subscriber
     from gestured.core.errors import GesturedError
-    from gestured.core.events import Cancelled, Gesture, Onset, Release, Status, Unknown
+    from gestured.core.events import Cancelled, Gesture, Onset, Provisional, Release, Status, Unknown
     from gestured.core.frames import Frame, Touch
     from gestured.core.hub import Hub
     from gestured.core.recognizer import Recognizer
@@ -22,6 +22,7 @@ __all__ = [
     "GesturedError",
     "Hub",
     "Onset",
+    "Provisional",
     "Recognizer",
     "Release",
     "Scene",
@@ -35,7 +36,7 @@ __all__ = [
 _HOMES = {
     "client.subscriber": ("Subscriber",),
     "core.errors": ("GesturedError",),
-    "core.events": ("Cancelled", "Gesture", "Onset", "Release", "Status", "Unknown"),
+    "core.events": ("Cancelled", "Gesture", "Onset", "Provisional", "Release", "Status", "Unknown"),
     "core.frames": ("Frame", "Touch"),
     "core.hub": ("Hub",),
     "core.recognizer": ("Recognizer",),

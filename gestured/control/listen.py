@@ -10,8 +10,9 @@ from gestured.client.lines import Unsubscribed
 from gestured.client.say import say, say_drawn, say_json
 from gestured.client.subscriber import Subscriber
 from gestured.control.address import add_sockets, event_path
+from gestured.control.show import said_when
 
-TYPES = ("gesture", "unknown", "cancelled", "onset", "release", "status")
+TYPES = ("gesture", "provisional", "unknown", "cancelled", "onset", "release", "status")
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -22,6 +23,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         description="Connect to the daemon's event socket and print events as they come.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl listen --types gesture,unknown\n"
+        "  gesturectl listen --types gesture,provisional\n"
         "  gesturectl listen --json --gesture swipe_left --count 1",
     )
     add_sockets(parser)
@@ -47,13 +49,16 @@ def _listen(args: argparse.Namespace) -> int:
     path = event_path(args)
     wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture}
     left = args.count
+    early: dict[str, dict[str, Any]] = {}  # by sensor: what was said of a touch that has no answer yet
     with Subscriber(path, **wanted, reconnect=args.reconnect) as subscriber:
         for line, event in subscriber.lines():
             kind = event.get("type")
             if args.json:
                 _repeat(line, event)
             elif kind != "hello":
-                say(readable(event))
+                say(readable(event, early.pop(event.get("sensor", ""), None)))
+            if kind == "provisional":
+                early[event["sensor"]] = event
             if kind == "hello":
                 _greet(event, args)
             elif left is not None and kind != "lost":
@@ -63,8 +68,8 @@ def _listen(args: argparse.Namespace) -> int:
     return 0
 
 
-def readable(event: dict[str, Any]) -> str:
-    """One event as one line for a person."""
+def readable(event: dict[str, Any], early: dict[str, Any] | None = None) -> str:
+    """One event as one line for a person; `early` is the provisional event before an answer."""
     kind = event.get("type")
     moment = next((event[key] for key in ("decided", "onset", "offset", "time") if key in event), time.time())
     clock = datetime.fromtimestamp(moment).strftime("%H:%M:%S.%f")[:-3]
@@ -73,15 +78,21 @@ def readable(event: dict[str, Any]) -> str:
         number = f"#{event['sequence']}" if kind == "gesture" else ""
         waited = 1000 * (event["decided"] - event["offset"])
         tail = f"  by {event['model']}, degraded" if event["degraded"] else ""
+        if early is not None and event.get("provisional"):
+            when = said_when(early["decided"], event["offset"])
+            tail += f"  {event['provisional']}: {early['gesture']}, {when}"
         tail += "  (test)" if event.get("test") else ""
         why = f"unknown ({event['reason']})" if "reason" in event else "unknown"
         name = f"{event.get('gesture', why):<24} {event['confidence']:4.2f}"
         return f"{head}{name}  {number:<6} {waited:4.0f} ms{tail}"
+    if kind == "provisional":
+        return f"{head}{event['gesture'] + '?':<24} {event['confidence']:4.2f}  provisional"
     if kind == "status":
         sensors = ", ".join(f"{name} {state}" for name, state in sorted(event["sensors"].items()))
         return f"{head}status: {event['state']} ({sensors or 'no sensor'})"
     if kind == "cancelled":
-        return f"{head}cancelled: {event['reason']}"
+        tail = f"  revoked: {early['gesture']}" if early is not None and event.get("provisional") else ""
+        return f"{head}cancelled: {event['reason']}{tail}"
     if kind == "lost":
         return f"{head}{event['count']} events lost: this reader was too slow"
     return f"{head}{kind}"

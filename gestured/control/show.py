@@ -26,6 +26,12 @@ def name(performed: Performed | None) -> str:
     return f"no gesture ({performed.kind.replace('_', ' ')})" if performed.label == NONE else performed.label
 
 
+def said_when(decided: float, offset: float) -> str:
+    """When something was `decided`, in words; `offset` is the last touched frame, both in s."""
+    ms = round(1000 * (offset - decided))
+    return f"{abs(ms)} ms {'before' if ms >= 0 else 'after'} the finger left"
+
+
 def block(outcome: Outcome, picture: NDArray[np.float32], colour: bool) -> str:
     """Picture and words of one outcome, six lines with the empty one after it."""
     event, performed = outcome.event, outcome.performed

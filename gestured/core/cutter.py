@@ -90,6 +90,10 @@ class Cutter:
         made = self._make(onset, offset)
         return None if made is before else made.segment
 
+    def so_far(self, onset: float, offset: float) -> Segment:
+        """The segment of a contact that is not over; nothing is remembered of it."""
+        return self._segment(onset, offset)[0]
+
     def cut(self, onset: float, offset: float) -> Made:
         """The segment of a contact that is over, after what it says of the taxels."""
         self._conditioner.judge(self._make(onset, offset).inspection)
@@ -123,7 +127,14 @@ class Cutter:
         if made is not None and (made.segment.onset, made.segment.offset) == (onset, offset):
             if np.array_equal(made.bad, conditioner.taxels.bad):
                 return made
-        kept = list(self._kept)
+        segment, stack = self._segment(onset, offset)
+        inspection = conditioner.inspect(stack[segment.first : segment.last + 1])
+        self._made = Made(segment, float(segment.frames.max()), conditioner.taxels.bad, inspection)
+        return self._made
+
+    def _segment(self, onset: float, offset: float) -> tuple[Segment, NDArray[np.float64]]:
+        """The segment of all that is kept, and (T, N) counts above the baseline before bad taxels are bridged."""
+        kept, conditioner = list(self._kept), self._conditioner
         times = np.array([frame.t for frame in kept])
         stack = np.array([frame.above for frame in kept])
         first = int(np.searchsorted(times, onset))
@@ -132,6 +143,4 @@ class Cutter:
         touches = tuple(frame.touches for frame in kept) if any(frame.touches for frame in kept) else ()
         lost = sum(frame.lost for frame in kept[first + 1 : last + 1])
         segment = Segment(frames, times, first, last, conditioner.noise.level, lost, touches)
-        inspection = conditioner.inspect(stack[first : last + 1])
-        self._made = Made(segment, float(frames.max()), conditioner.taxels.bad, inspection)
-        return self._made
+        return segment, stack

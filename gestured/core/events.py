@@ -1,7 +1,8 @@
 """What comes out: small frozen facts in a plain union. Times are seconds on the stream's clock.
 
 An `id` numbers a sensor's segments: each `Onset` is followed by exactly one `Gesture`, `Unknown` or
-`Cancelled`, and by one `Release`.
+`Cancelled`, and by one `Release`. Where somebody asks, at most one `Provisional` comes between onset and answer; the
+answer's `provisional` says what became of it: "confirmed", "revoked", or None where nothing was said.
 """
 
 from collections.abc import Mapping
@@ -15,6 +16,18 @@ class Onset:
     sensor: str
     id: int
     onset: float  # s
+
+
+@dataclass(frozen=True, slots=True)
+class Provisional:
+    """What a contact that goes on will most probably be. It is no answer: that comes, and may revoke it."""
+
+    sensor: str
+    id: int
+    gesture: str
+    confidence: float  # 0..1
+    onset: float  # s
+    decided: float  # s, the frame that made it sure enough
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +47,7 @@ class Gesture:
     model: str
     degraded: bool
     scores: Mapping[str, float]  # one per gesture
+    provisional: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +65,8 @@ class Unknown:
     model: str
     degraded: bool
     scores: Mapping[str, float]
+    reason: str = "confidence"  # confidence, hole, rate
+    provisional: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +76,7 @@ class Cancelled:
     sensor: str
     id: int
     reason: str  # held, silence, restart, glitch, stuck, refractory, model, internal_error
+    provisional: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,4 +98,4 @@ class Status:
     time: float  # s since the Unix epoch
 
 
-Event = Onset | Gesture | Unknown | Cancelled | Release | Status
+Event = Onset | Provisional | Gesture | Unknown | Cancelled | Release | Status

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.facts import Arrived, Changed, Fact, Fault, Taken
+from gestured.core.foresight import Foresight
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.owner import Owner, Source
@@ -32,7 +33,8 @@ class Feed:
         self._stamper = Stamper(scene.clock_of(name))
         front_end = front_end_of(name, scene)
         sequence, front_end.segments = numbers
-        self._recognizer = _recognizer(front_end, scene, classifier, sequence)
+        self._foresight = Foresight(name, taps=scene.provisional_taps)
+        self._recognizer = _recognizer(front_end, scene, classifier, self._foresight, sequence)
         self._vitals = Vitals()
         self._fresh = True  # no frame was used since it came or restarted
         self._open: int | None = None  # id of the contact that was not released yet
@@ -113,7 +115,12 @@ class Feed:
             old = new
         if another_clock:
             self._stamper = Stamper(scene.clock_of(self.name))
-        self._recognizer = _recognizer(old, scene, classifier, self._recognizer.sequence)
+        old.previews, self._foresight.taps = self._recognizer.front_end.previews, scene.provisional_taps
+        self._recognizer = _recognizer(old, scene, classifier, self._foresight, self._recognizer.sequence)
+
+    def foresee(self, *, asked: bool) -> None:
+        """Say of contacts from now on, or no longer, what they will most probably be."""
+        self._recognizer.front_end.previews = asked
 
     def review(self) -> None:
         """Look at what is not looked at with each frame."""
@@ -180,7 +187,7 @@ class Feed:
         if self._open is not None:
             ended: list[Event | Decided] = [Release(self.name, self._open, t)]
             if not self._answered:
-                ended.insert(0, Cancelled(self.name, self._open, "internal_error"))
+                ended.insert(0, self._foresight.judged(Cancelled(self.name, self._open, "internal_error")))
             self._tell(ended, t, facts)
 
     def _tell(self, found: Sequence[Event | Decided], now: float, facts: list[Fact]) -> None:
@@ -206,12 +213,15 @@ def front_end_of(name: str, scene: Scene) -> FrontEnd:
     )
 
 
-def _recognizer(front_end: FrontEnd, scene: Scene, classifier: Classifier, sequence: int) -> Recognizer:
+def _recognizer(
+    front_end: FrontEnd, scene: Scene, classifier: Classifier, foresight: Foresight, sequence: int
+) -> Recognizer:
     return Recognizer(
         front_end,
         classifier,
         gestures=scene.gestures,
         thresholds=scene.thresholds,
         refractory=scene.refractory,
+        foresight=foresight,
         sequence=sequence,
     )

@@ -1,17 +1,21 @@
 """The one path from frames to events: conditioning, segmentation, classification, decision."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.errors import ModelError
-from gestured.core.events import Cancelled, Event, Gesture, Unknown
+from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
+from gestured.core.foresight import Certainty, Foresight
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, Draft, Found, FrontEnd
+from gestured.core.front_end import Cut, Draft, Found, FrontEnd, Preview
 from gestured.core.holes import HOLE_FRAMES, HOLE_S
+
+RATES_HZ = (4.9, 1020.0)  # frames a second that a sensor may send: 5 to 1000, known to some per cent
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +45,20 @@ class Classifier(Protocol):
         ...
 
 
+@runtime_checkable
+class Foreseer(Classifier, Protocol):
+    """A classifier that can be asked about contacts that are not over."""
+
+    @property
+    def certainty(self) -> Certainty | None:
+        """How sure it must be of them; None where it was not made for that."""
+        ...
+
+    def preview(self, segment: Segment) -> Scores | None:
+        """Score the beginning of a segment, None where that fails: no later answer may depend on it."""
+        ...
+
+
 class Decided(NamedTuple):
     """A segment that was classified, and whether that was enough for a gesture; it follows its event."""
 
@@ -66,6 +84,9 @@ class Recognizer:
 
     The classifier is asked while the segmenter still waits whether the finger stays off: once it is sure, the answer
     is there. Where the finger comes back, that answer is thrown away.
+
+    Where the front end shows contacts before they are over, the classifier is asked about them as well, and what it is
+    sure of is a provisional event. `foresight` remembers what was said, and changes nothing else.
     """
 
     def __init__(
@@ -76,6 +97,7 @@ class Recognizer:
         gestures: Sequence[str] | None = None,
         thresholds: Mapping[str, float] | None = None,
         refractory: Mapping[str, float] | None = None,
+        foresight: Foresight | None = None,
         sequence: int = 0,
     ) -> None:
         self.front_end = front_end
@@ -85,6 +107,7 @@ class Recognizer:
         self._thresholds = dict(thresholds or {})
         self._refractory = dict(refractory or {})
         self._last_offset: dict[str, float] = {}
+        self._foresight = foresight or Foresight(front_end.sensor, taps=True)
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # no scores where it failed
 
     def push(self, frame: Frame) -> list[Event | Decided]:
@@ -109,11 +132,30 @@ class Recognizer:
         for one in found:
             if isinstance(one, Draft):
                 self._ask(one.segment)
+            elif isinstance(one, Preview):
+                out += self._foresee(one)
             elif isinstance(one, Cut):
-                out += self._decide(one)
+                answer, *decided = self._decide(one)
+                out += [self._foresight.judged(answer), *decided]
             else:
-                out.append(one)
+                out.append(self._foresight.judged(one) if isinstance(one, Cancelled) else one)
         return out
+
+    def _foresee(self, preview: Preview) -> list[Provisional]:
+        """What can be said of a contact that is not over."""
+        classifier, foresight = self.classifier, self._foresight
+        if not isinstance(classifier, Foreseer) or (certainty := classifier.certainty) is None:
+            return []
+        in_use = classifier.gestures if self._gestures is None else self._gestures
+        if not self._whole(preview.hole_s) or not foresight.open(preview, certainty, in_use):
+            return []
+        answer = classifier.preview(preview.segment) if preview.down else self._ask(preview.segment)
+        if answer is None:
+            return []
+        _, best, confidence = self._best(answer)
+        least = math.inf if self._refractory_for(best, preview.segment) else self._threshold(best, answer)
+        said = foresight.see(preview, certainty, best, confidence, least)
+        return [] if said is None else [said]
 
     def _ask(self, segment: Segment) -> Scores | None:
         """The classifier is asked once for each segment."""
@@ -126,31 +168,55 @@ class Recognizer:
             self._asked = asked
         return asked[2]
 
-    def _decide(self, cut: Cut) -> list[Event | Decided]:
+    def _decide(self, cut: Cut) -> tuple[Gesture | Unknown | Cancelled, *tuple[Decided, ...]]:
+        """The answer, and what was decided, where a model could."""
         sensor, segment = self.front_end.sensor, cut.segment
         answer = self._ask(segment)
         self._asked = None
         if answer is None:
-            return [Cancelled(sensor, cut.id, "model")]
-        scores = {
-            gesture: float(value)
-            for gesture, value in zip(self.classifier.gestures, answer.values, strict=True)
-            if self._gestures is None or gesture in self._gestures
-        }
-        best = max(scores, key=scores.__getitem__)
-        confidence = scores[best] * (1.0 - answer.unknown)
-        whole = cut.hole_s <= max(HOLE_S, HOLE_FRAMES * self.front_end.interval_s)
-        known = whole and confidence >= self._thresholds.get(best, answer.threshold)
+            return (Cancelled(sensor, cut.id, "model"),)
+        scores, best, confidence = self._best(answer)
+        whole = self._whole(cut.hole_s)
+        known = whole and confidence >= self._threshold(best, answer)
         decided = Decided(sensor, segment, answer, known)
         what = (
             segment.onset, segment.offset, cut.decided, segment.last - segment.first + 1, segment.lost,
             answer.model, answer.degraded, scores,
         )  # fmt: skip
         if not known:
-            return [Unknown(sensor, cut.id, confidence, *what), decided]
-        since = segment.onset - self._last_offset.get(best, -np.inf)
-        if since < self._refractory.get(best, 0.0):
-            return [Cancelled(sensor, cut.id, "refractory"), decided]
+            return Unknown(sensor, cut.id, confidence, *what, reason=self._reason(whole)), decided
+        if self._refractory_for(best, segment):
+            return Cancelled(sensor, cut.id, "refractory"), decided
         self._last_offset[best] = segment.offset
         self.sequence += 1
-        return [Gesture(sensor, cut.id, best, confidence, self.sequence, *what), decided]
+        return Gesture(sensor, cut.id, best, confidence, self.sequence, *what), decided
+
+    def _best(self, answer: Scores) -> tuple[dict[str, float], str, float]:
+        """The scores of the gestures in use, the best of them, and how sure it is."""
+        scores = {
+            gesture: float(value)
+            for gesture, value in zip(self.classifier.gestures, answer.values, strict=True)
+            if self._gestures is None or gesture in self._gestures
+        }
+        best = max(scores, key=scores.__getitem__)
+        return scores, best, scores[best] * (1.0 - answer.unknown)
+
+    def _threshold(self, gesture: str, answer: Scores) -> float:
+        """The confidence from which an answer is that gesture."""
+        return self._thresholds.get(gesture, answer.threshold)
+
+    def _whole(self, hole_s: float) -> bool:
+        """Whether the longest time without a frame is too short for the finger to have moved unseen."""
+        return hole_s <= max(HOLE_S, HOLE_FRAMES * self.front_end.interval_s)
+
+    def _reason(self, whole: bool) -> str:
+        """Why a segment is unknown; a sensor that is too slow or too fast explains it first."""
+        rate = self.front_end.rate_hz
+        if rate and not RATES_HZ[0] <= rate <= RATES_HZ[1]:
+            return "rate"
+        return "confidence" if whole else "hole"
+
+    def _refractory_for(self, gesture: str, segment: Segment) -> bool:
+        """Whether it is too early to publish that gesture again."""
+        since = segment.onset - self._last_offset.get(gesture, -np.inf)
+        return bool(since < self._refractory.get(gesture, 0.0))

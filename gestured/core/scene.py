@@ -13,7 +13,8 @@ from gestured.core.mounting import Mounting
 from gestured.core.timing import Timing
 from gestured.core.wire import Addresses
 
-DOUBLE_TAP = "double_tap"
+ONE_TAP, DOUBLE_TAP = "one_tap", "double_tap"
+TAP_GAP_S = (0.2, 0.6)  # s: shorter no hand taps twice through 15 Hz, longer no two taps belong together
 SIDE = (2, 64)  # taxels of a grid's side, least and most
 
 Clock = Literal["arrival", "sensor"]
@@ -39,16 +40,20 @@ class Scene:
     addresses: Addresses = Addresses()
     clock: Clock = "arrival"
     stale_s: float = 1.0  # of silence, after which a sensor counts as gone
+    tap_gap_s: float = Timing().tap_gap_s  # how long a tap waits for a second one
     max_sensors: int = 64
     allow: tuple[Network, ...] = ()  # who may send; anybody where it is empty
     thresholds: Mapping[str, float] = field(default_factory=dict)  # confidences, where not the model's own holds
     refractory: Mapping[str, float] = field(default_factory=dict)  # s in which a gesture is not repeated
+    provisional_taps: bool = True  # whether one tap is said, where somebody asks, before a second one may come
     touches: bool = False  # whether finger positions are kept
     frames: bool = False  # whether the hub tells of each frame that it used
 
     def __post_init__(self) -> None:
         if not self.gestures:
             raise ValueError("gestures: expected at least one, found none")
+        if not TAP_GAP_S[0] <= self.tap_gap_s <= TAP_GAP_S[1]:
+            raise ValueError(f"tap_gap_s: expected {TAP_GAP_S[0]:g} to {TAP_GAP_S[1]:g} s, found {self.tap_gap_s!r}")
         for name in ("", *self.sensors):
             rows, columns = self.grid_of(name)
             if not (SIDE[0] <= rows <= SIDE[1] and SIDE[0] <= columns <= SIDE[1]):
@@ -76,7 +81,7 @@ class Scene:
     @property
     def timing(self) -> Timing:
         """Durations of the segmenter."""
-        return Timing(stale_s=self.stale_s)
+        return Timing(stale_s=self.stale_s, tap_gap_s=self.tap_gap_s)
 
     def may_send(self, host: str) -> bool:
         """Whether a host's address lies in one of the networks of `allow`; any does where there are none."""

@@ -53,6 +53,11 @@ class Segmenter:
         return self._memory.onset
 
     @property
+    def second(self) -> bool:
+        """Whether the segment's second contact has begun."""
+        return self._memory.first is not None
+
+    @property
     def last_touched(self) -> float:
         """When it was touched last, in s."""
         return self._memory.contact.touched

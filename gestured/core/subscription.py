@@ -1,10 +1,11 @@
 """What a client asks to hear: one JSON line. A bad one is a ProtocolError with the reason `subscription`."""
 
 import json
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from gestured.core.errors import ProtocolError
-from gestured.core.events import Event, Gesture, Status
+from gestured.core.events import Event, Gesture, Provisional, Status
 from gestured.core.messages import EVENT_TYPES, event_type
 from gestured.core.wire import is_sensor
 
@@ -19,17 +20,25 @@ class Subscription:
     sensors: frozenset[str] | None = None
     gestures: frozenset[str] | None = None
 
+    @property
+    def foresees(self) -> bool:
+        """Whether it asks for provisional events."""
+        return "provisional" in self.types
+
     def matches(self, event: Event) -> bool:
         """`sensors` filters what is one sensor's, `gestures` what has a gesture's name; the rest passes."""
         if event_type(event) not in self.types:
             return False
         if self.sensors is not None and not isinstance(event, Status) and event.sensor not in self.sensors:
             return False
-        return self.gestures is None or not isinstance(event, Gesture) or event.gesture in self.gestures
+        return self.gestures is None or not isinstance(event, Gesture | Provisional) or event.gesture in self.gestures
 
 
-def parse_subscription(line: bytes) -> Subscription:
-    """A client's request, `{"subscribe": {...}}`; raises ProtocolError whose text says what was expected."""
+def parse_subscription(line: bytes, gestures: Collection[str]) -> Subscription:
+    """A client's request, `{"subscribe": {...}}`; raises ProtocolError whose text says what was expected.
+
+    `gestures` are those that there are. A sensor may be named before it comes.
+    """
     if len(line) > MAX_LINE:
         raise _refused(f"a request has at most {MAX_LINE} bytes, found {len(line)}")
     try:
@@ -50,6 +59,8 @@ def parse_subscription(line: bytes) -> Subscription:
         for item in value:
             if key == "types" and item not in EVENT_TYPES:
                 raise _refused(f"subscribe.types: unknown {_short(item)}, expected any of {', '.join(EVENT_TYPES)}")
+            if key == "gestures" and item not in gestures:
+                raise _refused(f"subscribe.gestures: unknown {_short(item)}, expected any of {', '.join(gestures)}")
             if key == "sensors" and not is_sensor(item):
                 raise _refused(f"subscribe.sensors: {_short(item)} cannot be a sensor's name")
         given[key] = frozenset(value)

@@ -28,7 +28,9 @@ exit status:
 METAVARS = {
     "model": "MODEL", "fallback": "MODEL", "listen": "HOST:PORT", "publish": "osc://HOST:PORT",
     "socket": "PATH", "control": "PATH", "metrics": "HOST:PORT", "grid": "RxC", "gestures": "A,B",
-    "clock": "arrival|sensor", "stale_s": "SECONDS", "max_sensors": "N", "allow": "CIDR",
+    "clock": "arrival|sensor", "stale_s": "SECONDS", "tap_gap_s": "SECONDS", "provisional_taps": "true|false",
+    "publish_provisional": "true|false",
+    "max_sensors": "N", "allow": "CIDR",
     "flight_recorder": "MIB", "log_level": "LEVEL",
 }  # fmt: skip
 
@@ -48,7 +50,7 @@ def parser() -> argparse.ArgumentParser:
         if key in REPEATED:
             text += "; may be repeated"
         elif field.default is not None:
-            text += f" (default: {field.default})"
+            text += f" (default: {str(field.default).lower() if isinstance(field.default, bool) else field.default})"
         flags.add_argument(
             "--" + key.replace("_", "-"),
             action="append" if key in REPEATED else "store",

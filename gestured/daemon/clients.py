@@ -11,11 +11,11 @@ import select
 import socket
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from gestured.core import messages
 from gestured.core.errors import ProtocolError
-from gestured.core.events import Event
+from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.subscription import MAX_LINE, Subscription, parse_subscription
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
@@ -114,7 +114,7 @@ class Client:
         """Answer one line."""
         self.turns -= 1
         try:
-            self._server.subscribe(self, parse_subscription(self._asked.popleft()))
+            self._server.subscribe(self, parse_subscription(self._asked.popleft(), self._server.gestures()))
             self._rubbish = 0
         except ProtocolError as error:
             self.send(messages.error_json(str(error)))
@@ -164,14 +164,27 @@ class Client:
 
 
 class EventServer:
-    """Accepts clients on a listening Unix socket, greets them with `hello()` and sends them events."""
+    """Accepts clients on a listening Unix socket, greets them with `hello()` and sends them events.
 
-    def __init__(self, listener: socket.socket, hello: Callable[[], bytes], metrics: Metrics) -> None:
+    `gestures()` are those that a client may ask for; `changed()` is told when they ask for other provisional events.
+    """
+
+    def __init__(
+        self,
+        listener: socket.socket,
+        hello: Callable[[], bytes],
+        metrics: Metrics,
+        *,
+        gestures: Callable[[], Collection[str]],
+        changed: Callable[[], None],
+    ) -> None:
+        self.gestures, self._changed = gestures, changed
         self.loop = asyncio.get_running_loop()
         self.metrics = metrics
         self._listener, self._hello, self._throttle = listener, hello, Throttle()
         self._classes: dict[Subscription, set[Client]] = {}
         self._clients: set[Client] = set()
+        self._owed: dict[tuple[str, int], set[Client]] = {}  # who was sent a provisional event, until its answer
         self._queue: deque[Client] = deque()  # each once, with a line that waits for its answer
         self.loop.add_reader(listener, self._accept)
 
@@ -190,12 +203,22 @@ class EventServer:
 
         A test's events have one key more: `"test":true`.
         """
+        groups = [clients for asked, clients in self._classes.items() if asked.matches(event)]
+        if isinstance(event, Provisional):
+            self._owed[event.sensor, event.id] = set().union(*groups)
+        elif self._owed and isinstance(event, Gesture | Unknown | Cancelled):
+            owed = self._owed.pop((event.sensor, event.id), set()) & self._clients
+            groups.append({client for client in owed if not client.subscription.matches(event)})
         line = None
-        for subscription, clients in tuple(self._classes.items()):
-            if subscription.matches(event):
+        for clients in groups:
+            for client in tuple(clients):
                 line = line or messages.to_json(event, epoch)[: -len(END)] + (TEST if test else END)
-                for client in tuple(clients):
-                    client.send(line)
+                client.send(line)
+
+    def foresees(self) -> tuple[frozenset[str], bool]:
+        """The sensors whose provisional events somebody asks for by name, and whether somebody asks for all."""
+        named = [asked.sensors for asked in self._classes if asked.foresees]
+        return frozenset().union(*(names for names in named if names is not None)), None in named
 
     def subscribe(self, client: Client, subscription: Subscription) -> None:
         """Change what a client wants."""
@@ -204,6 +227,8 @@ class EventServer:
         self._leave_class(client)
         client.subscription = subscription
         self._classes.setdefault(subscription, set()).add(client)
+        if subscription.foresees:
+            self._changed()
 
     def remove(self, client: Client) -> None:
         """Forget a client that is gone."""
@@ -267,6 +292,8 @@ class EventServer:
             members.discard(client)
             if not members:
                 del self._classes[client.subscription]
+                if client.subscription.foresees:
+                    self._changed()
 
     def _accept(self) -> None:
         for _ in range(64):

@@ -12,6 +12,7 @@ from gestured.daemon.ladder import open_ladder
 from gestured.daemon.settings import TABLES, Settings, control_beside, default_socket
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
+from gestured.model.ladder import Ladder
 
 
 def explain(settings: Settings, sources: Mapping[str, str]) -> str:
@@ -24,7 +25,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     grid = settings.grid or f"{ladder.rows}x{ladder.columns}"
     rungs = [f"{rung.name}{'' if rung.model is None else ', in use'}" for rung in ladder.rungs[1:]]
     forest = model.metadata.features is not None
-    timing = Timing(stale_s=settings.stale_s)
+    timing = Timing(tap_gap_s=settings.tap_gap_s)
     waits = DOUBLE_TAP in used
 
     loads = [
@@ -50,9 +51,10 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     ]
     if settings.metrics:
         listens.append(f"http {settings.metrics} for /metrics, /healthz, /readyz")
+    what = "gestures and provisional events" if settings.publish_provisional else "gestures"
     publishes = [
         f"unix {path}, mode 0660, {clients.CLIENTS} clients, {clients.BACKLOG_BYTES >> 10} KiB waiting each",
-        *(f"osc://{destination}: gestures, and the status once a second" for destination in settings.publish),
+        *(f"osc://{destination}: {what}, and the status once a second" for destination in settings.publish),
     ]
     publishes.append(f"control: unix {settings.control or control_beside(path)}, mode 0660, for owner and group")
     computes = [
@@ -83,8 +85,8 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
         "falls back on": rungs or ["nothing"],
         "listens to": listens,
         "publishes on": publishes,
-        "computes per frame": computes,
-        "leaves out": leaves,
+        "computes per frame": [*computes, *_early(ladder)],
+        "leaves out": [*leaves, *_not_early(settings, ladder)],
         "set by": list(_keys(settings, sources)) or ["nothing, all defaults"],
     }
     lines = [f"gestured {__version__}"]
@@ -106,3 +108,17 @@ def _keys(settings: Settings, sources: Mapping[str, str]) -> Iterator[str]:
         else:
             beside = key == "gestures" and sources.get("per_gesture") == source
             yield f"{'gestures.use' if beside else key}: {source}"
+
+
+def _early(ladder: Ladder) -> list[str]:
+    """What is computed for provisional events."""
+    if ladder.certainty is None:
+        return []
+    return ["while touched, where somebody asks for provisional events: one inference a frame, at most 15 a second"]
+
+
+def _not_early(settings: Settings, ladder: Ladder) -> list[str]:
+    """Which provisional events there are not."""
+    if ladder.certainty is None:
+        return [f"provisional events: the model {ladder.active} was not made for them"]
+    return [] if settings.provisional_taps else ["one tap as a provisional event: provisional_taps is false"]

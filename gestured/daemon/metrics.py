@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gestured import __version__
-from gestured.core.events import Cancelled, Event, Gesture, Unknown
+from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.reading import STATES, Reading
 from gestured.daemon.snapshot import Snapshot
 
@@ -24,6 +24,7 @@ NAMED_GESTURES = 12
 OTHER = "other"
 INFERENCE_S = (0.0005, 0.001, 0.005, 0.025, 0.1)
 LATENCY_S = (0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0)
+LEAD_S = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0)
 CONFIDENCE_BUCKETS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 
 
@@ -77,6 +78,10 @@ class Metrics:
         self.gestures = Counter("gestured_gestures", "Recognised gestures", "gesture", most=NAMED_GESTURES)
         self.unknown = Counter("gestured_unknown", "Segments that are none of the gestures")
         self.cancelled = Counter("gestured_cancelled", "Segments that were not answered", "reason")
+        self.provisional = Counter("gestured_provisional", "Provisional events by what became of them", "result")
+        self.lead = Histogram(
+            "gestured_provisional_lead_seconds", "From a provisional event that was confirmed to its answer", LEAD_S
+        )
         self.internal_errors = Counter(
             "gestured_internal_errors", "Bugs caught; the sensor's recognizer was reset", dated=True
         )
@@ -97,6 +102,7 @@ class Metrics:
         self.confidence = Histogram("gestured_confidence", "Confidence of the published gestures", CONFIDENCE_BUCKETS)
         self.kernel_drops, self.kernel_dropped_at = 0, 0.0  # packets, and monotonic s when there were last more of them
         self._named: set[str] = set()
+        self._said: dict[str, float] = {}  # by sensor: when its provisional event was decided, s, until the answer
 
     def kernel(self, drops: int) -> None:
         """Remember when the kernel last dropped packets, of which there were so many by now."""
@@ -109,6 +115,14 @@ class Metrics:
             self.latency.observe(event.decided - event.offset)
             if event.degraded:
                 self.degraded.add()
+        if isinstance(event, Provisional):
+            self.provisional.add("given")
+            self._said[event.sensor] = event.decided
+        elif isinstance(event, Gesture | Unknown | Cancelled) and event.provisional:
+            self.provisional.add(event.provisional)
+            said = self._said.pop(event.sensor, None)
+            if isinstance(event, Gesture) and event.provisional == "confirmed" and said is not None:
+                self.lead.observe(event.decided - said)
         if isinstance(event, Gesture):
             self.gestures.add(event.gesture)
             self.confidence.observe(event.confidence)

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from itertools import chain
 
-from gestured.core.events import Gesture, Onset, Release
+from gestured.core.events import Gesture, Onset, Provisional, Release
 from gestured.core.hub import Hub
 from gestured.core.wire import is_sensor
 from gestured.daemon.control import Connection
@@ -105,12 +105,13 @@ class Operations:
         scores = {name: float(name == gesture) for name in snapshot.gestures}
         now, model = snapshot.now, snapshot.models.active
         onset = now - TEST_S
-        for event in (
-            Onset(sensor, number, onset),
-            Gesture(sensor, number, gesture, 1.0, sequence, onset, now, now, TEST_FRAMES, 0, model, False, scores),
-            Release(sensor, number, now),
-        ):
-            self.publisher.publish(event, test=True)
+        foreseen = self.hub.foreseen(sensor)
+        answer = (sequence, onset, now, now, TEST_FRAMES, 0, model, False, scores, "confirmed" if foreseen else None)
+        self.publisher.publish(Onset(sensor, number, onset), test=True)
+        if foreseen:
+            self.publisher.publish(Provisional(sensor, number, gesture, 1.0, onset, now), test=True)
+        self.publisher.publish(Gesture(sensor, number, gesture, 1.0, *answer), test=True)
+        self.publisher.publish(Release(sensor, number, now), test=True)
         return {"sensor": sensor, "gesture": gesture, "sequence": sequence}
 
     async def shadow(self, connection: Connection, model: str | None) -> Reply:

@@ -21,6 +21,8 @@ def scene_of(settings: Settings, ladder: Ladder) -> Scene:
         addresses=Addresses(settings.addresses.pressure, settings.addresses.trajectory),
         clock=settings.clock,
         stale_s=settings.stale_s,
+        tap_gap_s=settings.tap_gap_s,
+        provisional_taps=settings.provisional_taps,
         max_sensors=settings.max_sensors,
         allow=settings.allow,
         thresholds={name: part.threshold for name, part in parts.items() if part.threshold is not None},

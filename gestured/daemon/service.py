@@ -58,8 +58,15 @@ class Service:
             self._metrics.sensor_label(name)  # those in the file are named first
         self._hub = Hub(scene_of(settings, ladder), ladder)
         self._watch, self._taps = Watch(ladder), Taps(settings.flight_recorder << 20)
-        self._clients = EventServer(bound.events.sock, self._hello, self._metrics)
-        self._osc = [OscSink(address, self._metrics) for address in settings.publish]
+        self._clients = EventServer(
+            bound.events.sock,
+            self._hello,
+            self._metrics,
+            gestures=lambda: self._hub.scene.gestures,
+            changed=self._foresee,
+        )
+        self._osc = self._destinations(settings)
+        self._foresee()
         self._publisher = Publisher(self._metrics, (self._clients, self._taps, *self._osc))
         self._desk = Desk(self._metrics, self._publisher, self._watch)
         self._receiver = Receiver(bound.udp, self._hub, self._desk, self._taps)
@@ -105,6 +112,17 @@ class Service:
         """The first line to a client."""
         gestures, sequences = self._hub.scene.gestures, self._hub.sequences()
         return messages.hello_json(__version__, self._instance, self._ladder.active, gestures, sequences)
+
+    def _foresee(self) -> None:
+        """Have the hub give provisional events where somebody asks for them now."""
+        named, every = self._clients.foresees()
+        every = every or bool(self._settings.publish_provisional and self._osc)
+        self._hub.foresee(lambda sensor: every or sensor in named)
+
+    def _destinations(self, settings: Settings) -> list[OscSink]:
+        """Where OSC is sent."""
+        provisional = settings.publish_provisional
+        return [OscSink(address, self._metrics, provisional=provisional) for address in settings.publish]
 
     async def start(self) -> None:
         """Take what needs a loop that turns: the operators' connections."""
@@ -175,7 +193,7 @@ class Service:
 
     def _open(self, settings: Settings) -> tuple[Ladder, list[OscSink]]:
         """What may take long: models, and names of hosts."""
-        return open_ladder(settings, insist=True), [OscSink(address, self._metrics) for address in settings.publish]
+        return open_ladder(settings, insist=True), self._destinations(settings)
 
     async def reload(self) -> str | None:
         """Read everything anew, and only where all of it is valid, change anything; else the reason."""
@@ -208,5 +226,6 @@ class Service:
             sink.close()
         self._osc = osc
         self._publisher.sinks = (self._clients, self._taps, *osc)
+        self._foresee()
         self._metrics.reloads.add("done")
         log.info("reloaded", model=ladder.active)

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gestured.core.address import Address
+from gestured.core.scene import TAP_GAP_S
 from gestured.core.wire import Addresses
 from gestured.daemon.values import (
     AddressField,
@@ -104,6 +105,15 @@ class Settings(Part):
     )
     stale_s: float = Field(
         default=1.0, ge=0.2, le=60, description="seconds of silence after which a sensor counts as gone"
+    )
+    tap_gap_s: float = Field(
+        default=0.5, ge=TAP_GAP_S[0], le=TAP_GAP_S[1], description="seconds that a tap waits for a second one"
+    )
+    provisional_taps: bool = Field(
+        default=True, description="whether one tap is said provisionally before a second one may come"
+    )
+    publish_provisional: bool = Field(
+        default=False, description="whether provisional events, and that they are revoked, are sent to `publish`, too"
     )
     max_sensors: int = Field(
         default=64, ge=1, le=4096, description="sensors at a time; further ones are dropped and counted"

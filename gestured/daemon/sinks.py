@@ -4,7 +4,7 @@ import socket
 from typing import Protocol
 
 from gestured.core.address import Address
-from gestured.core.events import Event, Gesture, Status
+from gestured.core.events import Cancelled, Event, Gesture, Provisional, Status, Unknown
 from gestured.core.reading import SILENT
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
@@ -25,11 +25,13 @@ class Sink(Protocol):
 class OscSink:
     """OSC over UDP to one destination: gestures and the status; their times are seconds since the Unix epoch.
 
+    With `provisional` also what a contact will most probably be, and where it turns out otherwise that it is revoked.
+
     The socket is connected, so that a port where nobody listens is told to us (by the next call). A
     destination that cannot be reached costs a failed system call an event, nothing more.
     """
 
-    def __init__(self, destination: Address, metrics: Metrics) -> None:
+    def __init__(self, destination: Address, metrics: Metrics, *, provisional: bool = False) -> None:
         from gestured.client import osc_out  # python-osc: a daemon that publishes nothing does not load it
 
         self._out = osc_out
@@ -37,6 +39,8 @@ class OscSink:
         self._metrics, self._throttle = metrics, Throttle()
         self._socket: socket.socket | None = None
         self._connected = False
+        self._provisional = provisional
+        self._said: dict[str, Provisional] = {}  # by sensor, until its answer
         try:
             family, self._where = resolve(destination, socket.SOCK_DGRAM)  # once: a look-up may block for seconds
             self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
@@ -44,11 +48,17 @@ class OscSink:
             log.error("publish: no such destination", destination=str(destination), error=error.strerror)
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
-        """Send a gesture or the status; other events do not travel by OSC.
+        """Send a gesture or the status, where asked for a provisional event; others do not travel by OSC.
 
         A test's gesture stands in a bundle behind `/gestured/test ,s sensor`: its own arguments are the contract's.
         """
-        if isinstance(event, Gesture):
+        if isinstance(event, Gesture | Unknown | Cancelled):
+            self._judge(event)
+        if isinstance(event, Provisional) and self._provisional:
+            self._said[event.sensor] = event
+            said = (event.gesture, event.confidence, event.id)
+            self._send(self._out.message(f"/gestured/{event.sensor}/provisional", "sfi", said).dgram)
+        elif isinstance(event, Gesture):
             args = (event.gesture, event.confidence, event.sequence, event.onset + epoch, event.offset + epoch)
             gesture = self._out.message(f"/gestured/{event.sensor}/gesture", "sfidd", args)
             mark = self._out.message("/gestured/test", "s", (event.sensor,)) if test else None
@@ -61,6 +71,15 @@ class OscSink:
         """Close the socket."""
         if self._socket is not None:
             self._socket.close()
+
+    def _judge(self, answer: Gesture | Unknown | Cancelled) -> None:
+        """Take back what was sent of a contact that turns out to be something else."""
+        said = self._said.get(answer.sensor)
+        if said is not None and said.id == answer.id:
+            del self._said[answer.sensor]
+            if answer.provisional == "revoked":
+                args = (said.gesture, said.id)
+                self._send(self._out.message(f"/gestured/{said.sensor}/revoked", "si", args).dgram)
 
     def _send(self, packet: bytes) -> None:
         if self._socket is None:

@@ -47,6 +47,7 @@ def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
             "cancelled": _by_label(metrics.cancelled.values),
             "tests": metrics.tests.total(),
         },
+        "provisional": {"given": 0, "confirmed": 0, "revoked": 0} | _by_label(metrics.provisional.values),
         "shift": {
             "gestures": models.shift_count,
             "outside": {name: round(share, 3) for name, share in models.shift.items()},

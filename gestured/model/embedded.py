@@ -16,6 +16,7 @@ from gestured.core.frames import Frame, Touch
 from gestured.core.mounting import Mounting
 from gestured.core.recognizer import Recognizer, events_of
 from gestured.core.scene import Scene, Setup
+from gestured.core.timing import Timing
 from gestured.core.wire import is_sensor
 from gestured.model.ladder import gestures_in_use, ladder_for
 
@@ -72,13 +73,18 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     rotate: int = 0,
     mirror: bool = False,
     gestures: Sequence[str] | None = None,
+    tap_gap_s: float = Timing().tap_gap_s,
+    provisional: bool = False,
 ) -> Embedded:
     """The recogniser of one sensor with a model: the name of one that ships, or the path of an .onnx file.
 
     `sensor` is the name in its events; `grid` its rows and columns as it sends them, the model's unless told; `rotate`
     (degrees clockwise: 0, 90, 180, 270) and `mirror` say how it is mounted; `gestures` are those to use, all unless
-    told. Below a shipped model stand its fallbacks, as in the daemon: that one answers is logged as a warning of the
-    logger `gestured`. Raises ModelError for a model that cannot be used, SettingsError for another mistake.
+    told; `tap_gap_s` is how long a tap waits for a second one, 0.2 to 0.6 s. With `provisional` a contact's most
+    probable gesture is said before it is over, where the model was made for that.
+
+    Below a shipped model stand its fallbacks, as in the daemon: that one answers is logged as a warning of the logger
+    `gestured`. Raises ModelError for a model that cannot be used, SettingsError for another mistake.
     """
     if not is_sensor(sensor):
         raise SettingsError(f"sensor: expected 1 to 64 of A-Z, a-z, 0-9, _ and -, found {sensor!r}")
@@ -89,10 +95,13 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     except (TypeError, ValueError):
         raise SettingsError(f"grid: expected rows and columns, such as (9, 9), found {grid!r}") from None
     try:
-        scene = Scene(gestures=used, grid=(rows, columns), sensors={sensor: Setup(mounting=Mounting(rotate, mirror))})
-    except ValueError as error:
+        mounted = {sensor: Setup(mounting=Mounting(rotate, mirror))}
+        scene = Scene(gestures=used, grid=(rows, columns), sensors=mounted, tap_gap_s=tap_gap_s)
+    except (TypeError, ValueError) as error:
         raise SettingsError(str(error)) from None
-    return Embedded(Recognizer(front_end_of(sensor, scene), ladder, gestures=used), used)
+    front_end = front_end_of(sensor, scene)
+    front_end.previews = provisional
+    return Embedded(Recognizer(front_end, ladder, gestures=used), used)
 
 
 def _counts(values: ArrayLike) -> np.ndarray[tuple[int, ...], np.dtype[np.generic]]:

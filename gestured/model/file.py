@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.foresight import Certainty
 from gestured.core.window import Window
 
 MAX_MODEL_BYTES = 64 * 1024 * 1024
@@ -265,6 +266,7 @@ class Metadata:
     training_data: str  # sha256
     quantiles: Mapping[str, Any]  # what the training data looked like
     self_test: SelfTest
+    provisional: Certainty | None  # how sure it must be of a contact that is not over, where it was made for that
 
     @classmethod
     def parse(cls, properties: Mapping[str, str]) -> "Metadata":
@@ -286,6 +288,12 @@ class Metadata:
             window = Window.from_json(properties["window"])
         except ValueError as error:
             raise ValueError(f"metadata 'window': {error}") from error
+        provisional = None
+        if "provisional" in properties:
+            try:
+                provisional = Certainty.from_json(properties["provisional"], gestures)
+            except ValueError as error:
+                raise ValueError(f"metadata 'provisional': {error}") from error
         grid = {}
         for key in ("rows", "columns", "rate_hz"):
             try:
@@ -308,6 +316,7 @@ class Metadata:
             training_data=properties["training_data"],
             quantiles=_json(properties["quantiles"], "quantiles", dict),
             self_test=SelfTest.from_json(properties["self_test"]),
+            provisional=provisional,
         )
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gestured.core.errors import ModelError, SettingsError
+from gestured.core.foresight import Certainty
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Classifier, Scores
 from gestured.model.model import LADDER, look_at, open_model, shipped, shipped_name
@@ -94,6 +95,8 @@ class Ladder:
         self._clock = clock
         self._report = report or (lambda sentence: None)
         self.failures = 0  # how often a rung was put aside
+        self._faint = 0  # previews in a row that failed, or took too long
+        self._previews_from = -math.inf  # s of `clock`
         self._active, opened = self._first_open()
         self.gestures: tuple[str, ...] = tuple(opened.gestures)
         self.rows = int(getattr(opened, "rows", 0))
@@ -155,6 +158,31 @@ class Ladder:
                 self._active = rung
             return replace(scores, degraded=scores.degraded or self.degraded, took_s=took)
         raise ModelError(f"no model could classify: {', '.join(rung.name for rung in self.rungs)}")
+
+    @property
+    def certainty(self) -> Certainty | None:
+        """How sure the active rung must be of a contact that is not over; None where it was not made for that."""
+        found = getattr(self._active.model, "certainty", None)
+        return found if isinstance(found, Certainty) else None
+
+    def preview(self, segment: Segment) -> Scores | None:
+        """Scores of the beginning of a segment by the active rung, None where that fails.
+
+        No rung is put aside, tried again or reported for it. Where `slow_runs` previews in a row failed or were slow,
+        there are none for `retry_after` seconds.
+        """
+        model, start = self._active.model, self._clock()
+        if model is None or start < self._previews_from:
+            return None
+        try:
+            scores = model.classify(segment)
+        except Exception:  # whatever it dies of, it has nothing to say
+            scores = None
+        end = self._clock()
+        self._faint = self._faint + 1 if scores is None or end - start > self.slow_s else 0
+        if self._faint >= self.slow_runs:
+            self._faint, self._previews_from = 0, end + self.retry_after
+        return scores
 
     def _first_open(self) -> tuple[Rung, Classifier]:
         reasons = []

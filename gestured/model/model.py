@@ -46,6 +46,7 @@ class Model:
         self.rows = self.metadata.rows
         self.columns = self.metadata.columns
         self.threshold = _threshold(self.metadata.calibration)
+        self.certainty = self.metadata.provisional
         if self.metadata.features is not None:
             expected = feature_names(self.rows, self.columns)
             if self.metadata.features != expected:
@@ -76,6 +77,13 @@ class Model:
         except ValueError as error:
             raise ModelError(f"{self.name}: {error}") from error
         return Scores(scores[0], float(unknown[0]), self.name, threshold=self.threshold)
+
+    def preview(self, segment: Segment) -> Scores | None:
+        """Scores of the beginning of a segment, None where that fails."""
+        try:
+            return self.classify(segment)
+        except ModelError:
+            return None
 
     def run(
         self, batch: NDArray[np.float32], limit_s: float = BATCH_S
@@ -118,6 +126,7 @@ class Model:
             "gestures": list(self.gestures),
             "window": asdict(known.window),
             "calibration": dict(known.calibration),
+            "provisional": known.provisional is not None,
             "training_data": known.training_data,
             "self_test": {"largest_difference": self.self_test_error, "tolerance": TOLERANCE},
         }

@@ -17,11 +17,13 @@ from gestured.core.hub import Hub
 from gestured.core.mounting import Mounting
 from gestured.core.recognizer import Classifier, Decided, Scores
 from gestured.core.scene import Scene, Setup
+from gestured.core.timing import Timing
 from gestured.core.wire import Addresses
 from gestured.record.tape import Tape, read
 
 SENSORS = 4096  # that a daemon's settings allow, at most
 MAX_SENSORS = 64  # where a tape does not say
+TAP_GAP_S = Timing().tap_gap_s  # where a tape does not say
 STALE_S = 60  # that a daemon's settings allow, at most
 
 
@@ -65,6 +67,8 @@ def maker(told: Mapping[str, Any]) -> Maker:
             addresses=Addresses(settings["addresses"]["pressure"], settings["addresses"]["trajectory"]),
             clock=settings["clock"],
             stale_s=stale_s,
+            tap_gap_s=_finite(settings.get("tap_gap_s", TAP_GAP_S)),
+            provisional_taps=bool(settings.get("provisional_taps", True)),
             max_sensors=most,
             allow=tuple(ipaddress.ip_network(_text(network)) for network in settings.get("allow", ())),
             thresholds=thresholds,
@@ -139,12 +143,16 @@ class Played:
 class Replay:
     """Plays a tape with a classifier. The events' times count from its first packet, at `epoch` (s since 1970)."""
 
-    def __init__(self, tape: Tape, scene: Scene, classifier: Classifier) -> None:
-        """Raises RecordingError for a classifier that does not know the gestures that were in use."""
+    def __init__(self, tape: Tape, scene: Scene, classifier: Classifier, *, provisional: bool = False) -> None:
+        """`provisional`: whether provisional events are given, too.
+
+        Raises RecordingError for a classifier that does not know the gestures that were in use.
+        """
         try:
             self._hub = Hub(dataclasses.replace(scene, frames=True), classifier)
         except ValueError as error:
             raise RecordingError(str(error)) from None
+        self._hub.foresee(lambda sensor: provisional)
         self.played: dict[str, Played] = {}
         self._start = tape.packets[0].t_ns if tape.packets else 0
         self.epoch = self._start / 1e9

@@ -66,6 +66,44 @@ def test_every_type_has_its_line(start, fake, event, words):
     assert words in process.stdout.readline().decode()
 
 
+EARLY = {
+    "type": "provisional",
+    "sensor": "armrest",
+    "id": 4,
+    "gesture": "swipe_left",
+    "confidence": 0.97,
+    "onset": 1000.0,
+    "decided": 1000.375,
+}
+
+
+@pytest.mark.parametrize(
+    ("early", "answer", "words"),
+    [
+        (EARLY, GESTURE | {"provisional": "confirmed"}, "confirmed: swipe_left, 125 ms before the finger left"),
+        (
+            EARLY | {"decided": 1000.5625},
+            UNKNOWN | {"provisional": "revoked"},
+            "swipe_left, 62 ms after the finger",
+        ),
+        (
+            EARLY,
+            {"type": "cancelled", "sensor": "armrest", "id": 4, "reason": "held", "provisional": "revoked"},
+            "cancelled: held  revoked: swipe_left",
+        ),
+    ],
+)
+def test_what_was_said_before_is_told_with_the_answer(start, fake, early, answer, words):
+    process = start("listen", "--socket", fake.path, "--types", "gesture,provisional")
+    fake.accept()
+    fake.say(early | {"sensor": "seat", "gesture": "one_tap"})
+    fake.say(early)
+    fake.say(answer)
+    lines = [process.stdout.readline().decode() for _ in range(3)]
+    assert all(word in lines[1] for word in ("armrest", "swipe_left?", "0.97", "provisional"))
+    assert words in lines[2] and "one_tap" not in lines[2]
+
+
 def test_json_repeats_the_daemons_lines_to_the_letter(start, fake):
     line = b'{"type":"gesture",  "id":4, "new_key":[1.50]}\n'
     process = start("listen", "--socket", fake.path, "--json", "--count", 1)

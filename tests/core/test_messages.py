@@ -23,6 +23,7 @@ BY_TYPE: dict[object, st.SearchStrategy] = {
     int: st.integers(0, 2**31 - 1),
     float: number,
     bool: st.booleans(),
+    str | None: st.none() | word,
     Mapping[str, float]: st.dictionaries(word, number),
     Mapping[str, str]: st.dictionaries(word, word),
 }
@@ -56,7 +57,7 @@ def test_a_gesture_looks_as_the_contract_says() -> None:
     assert messages.to_json(GESTURE, 1000.0) == (
         b'{"type":"gesture","sensor":"armrest","id":41,"gesture":"swipe_up","confidence":0.98,"sequence":17,'
         b'"onset":1010.0,"offset":1010.5,"decided":1010.6,"frames":12,"lost":0,"model":"cnn_lstm",'
-        b'"degraded":false,"scores":{"swipe_up":0.5,"circle":0.5}}\n'
+        b'"degraded":false,"scores":{"swipe_up":0.5,"circle":0.5},"provisional":null}\n'
     )
     status = Status("ok", {"armrest": "ok"}, "cnn_lstm", 1234.5)
     assert messages.to_json(status, 1000.0) == (

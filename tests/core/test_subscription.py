@@ -13,27 +13,30 @@ from gestured.core.subscription import Subscription, parse_subscription
 
 GESTURE = Gesture("armrest", 41, "swipe_up", 0.98, 17, 10.0, 10.5, 10.6, 12, 0, "cnn_lstm", False, {"swipe_up": 1.0})
 
+KNOWN = ("swipe_up", "circle")
+
 
 def request(**wanted: object) -> bytes:
     return json.dumps({"subscribe": wanted}).encode()
 
 
 def test_what_is_left_out_is_no_filter() -> None:
-    default = parse_subscription(request())
+    default = parse_subscription(request(), KNOWN)
     assert default == Subscription()
     assert default.matches(GESTURE) and not default.matches(Onset("armrest", 1, 0.0))
 
 
 def test_subscriptions_filter() -> None:
     chosen = parse_subscription(
-        request(types=["gesture", "onset", "status"], sensors=["armrest"], gestures=["swipe_up"]) + b"\r\n"
+        request(types=["gesture", "onset", "status"], sensors=["armrest"], gestures=["swipe_up"]) + b"\r\n", KNOWN
     )
     assert chosen.matches(GESTURE) and chosen.matches(Onset("armrest", 1, 0.0))
+    assert not chosen.foresees and parse_subscription(request(types=["provisional"]), KNOWN).foresees
     assert chosen.matches(Status("ok", {}, "m", 1.0))
     assert not chosen.matches(Onset("door", 1, 0.0))
     assert not chosen.matches(Release("armrest", 1, 0.0))
-    assert not parse_subscription(request(gestures=["circle"])).matches(GESTURE)
-    assert not parse_subscription(request(types=[])).matches(GESTURE)
+    assert not parse_subscription(request(gestures=["circle"]), KNOWN).matches(GESTURE)
+    assert not parse_subscription(request(types=[]), KNOWN).matches(GESTURE)
 
 
 @pytest.mark.parametrize(
@@ -54,7 +57,8 @@ def test_subscriptions_filter() -> None:
         (request(types="gesture"), "subscribe.types: expected a list of strings"),
         (request(gestures=[1]), "subscribe.gestures: expected a list of strings"),
         (request(sensors=None), "subscribe.sensors: expected a list of strings"),
-        (request(types=["tap"]), '"tap", expected any of onset, gesture'),
+        (request(types=["tap"]), '"tap", expected any of onset, provisional, gesture'),
+        (request(gestures=["swipe_up", "zigzag"]), '"zigzag", expected any of swipe_up, circle'),
         (request(sensors=["a b"]), '"a b" cannot be a sensor'),
         (
             b'{"subscribe":{"types":' + b"[" * 300 + b"]" * 300 + b"}}",
@@ -64,7 +68,7 @@ def test_subscriptions_filter() -> None:
 )
 def test_requests_that_are_none_are_answered_with_what_was_expected(line: bytes, says: str) -> None:
     with pytest.raises(ProtocolError) as caught:
-        parse_subscription(line)
+        parse_subscription(line, KNOWN)
     assert caught.value.reason == "subscription" and says in str(caught.value)
     json.loads(error_json(str(caught.value)))
 
@@ -77,6 +81,6 @@ trees = st.recursive(leaves, lambda x: st.lists(x, max_size=3) | st.dictionaries
 @given(st.binary(max_size=60) | trees.map(lambda x: json.dumps(x).encode()))
 def test_any_line_is_a_subscription_or_a_protocol_error(line: bytes) -> None:
     try:
-        assert isinstance(parse_subscription(line), Subscription)
+        assert isinstance(parse_subscription(line, KNOWN), Subscription)
     except ProtocolError as error:
         assert error.reason == "subscription"

@@ -85,7 +85,7 @@ async def turn() -> None:
 def test_a_client_that_reads_nothing_for_long_is_cut_off(listener, monkeypatch) -> None:
     async def main() -> None:
         metrics = Metrics()
-        server = EventServer(listener, lambda: b"hello\n", metrics)
+        server = EventServer(listener, lambda: b"hello\n", metrics, gestures=tuple, changed=lambda: None)
         with connect(listener), connect(listener) as idle:
             await turn()
             stalled = min(server._clients, key=lambda client: client.sock.fileno())  # who came first
@@ -106,7 +106,7 @@ def test_a_client_that_reads_nothing_for_long_is_cut_off(listener, monkeypatch) 
 def test_the_backlog_is_bounded_and_drops_the_oldest(listener) -> None:
     async def main() -> None:
         metrics = Metrics()
-        server = EventServer(listener, lambda: b"", metrics)
+        server = EventServer(listener, lambda: b"", metrics, gestures=tuple, changed=lambda: None)
         with connect(listener) as sock:
             await turn()
             (client,) = server._clients
@@ -135,7 +135,7 @@ def test_more_clients_than_there_is_room_for_are_told_so(listener, monkeypatch) 
 
     async def main() -> None:
         metrics = Metrics()
-        server = EventServer(listener, lambda: b"hello\n", metrics)
+        server = EventServer(listener, lambda: b"hello\n", metrics, gestures=tuple, changed=lambda: None)
         with connect(listener) as a, connect(listener) as b, connect(listener) as c:
             await turn()
             assert (a.recv(99), b.recv(99)) == (b"hello\n", b"hello\n")
@@ -152,7 +152,7 @@ def test_an_event_is_encoded_once_for_all(listener, monkeypatch) -> None:
     monkeypatch.setattr(messages, "to_json", lambda event, epoch: calls.append(event) or encode(event, epoch))
 
     async def main() -> None:
-        server = EventServer(listener, lambda: b"", Metrics())
+        server = EventServer(listener, lambda: b"", Metrics(), gestures=tuple, changed=lambda: None)
         socks = [connect(listener) for _ in range(10)]
         await turn()
         server.publish(Onset("arm", 1, 2.0), 0.0)
@@ -177,7 +177,7 @@ def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> None:
     turn_of: list[int] = []  # in which turn of the loop each line was looked at
     now = 0
 
-    def parse(line: bytes) -> Subscription:
+    def parse(line: bytes, gestures: object) -> Subscription:
         turn_of.append(now)
         raise ProtocolError("subscription", "rubbish")
 
@@ -185,7 +185,7 @@ def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> None:
 
     async def main() -> None:
         nonlocal now
-        server = EventServer(listener, lambda: b"", Metrics())
+        server = EventServer(listener, lambda: b"", Metrics(), gestures=tuple, changed=lambda: None)
         socks = [connect(listener) for _ in range(40)]
         for sock in socks:
             sock.send(b"x\n" * 500)
@@ -212,7 +212,7 @@ def test_who_sends_nothing_but_rubbish_for_long_is_cut_off(listener, monkeypatch
 
     async def main() -> None:
         metrics = Metrics()
-        server = EventServer(listener, lambda: b"", metrics)
+        server = EventServer(listener, lambda: b"", metrics, gestures=tuple, changed=lambda: None)
         with connect(listener) as rude, connect(listener) as clumsy:
             while server.count < 2:
                 await asyncio.sleep(0)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gestured.core.events import Cancelled, Event, Gesture, Unknown
+from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.measures import MEASURES
@@ -41,6 +41,9 @@ def everything() -> Iterator[Event]:
     for number in range(100):
         for model in ("cnn_lstm", "lstm", "forest", "mine", "yours"):
             yield Gesture("s", 1, f"gesture_{number}", number / 100, 1, 0, 1, 2, 3, 0, model, True, {})
+    yield Provisional("s", 1, "left", 0.9, 0, 1)
+    yield Gesture("s", 1, "left", 0.9, 1, 0, 1, 2, 3, 0, "lstm", False, {}, "confirmed")
+    yield Cancelled("s", 1, "held", "revoked")
     yield Unknown("s", 1, 0.1, 0, 1, 2, 3, 0, "lstm", False, {})
     for reason in ("held", "silence", "restart", "glitch", "stuck", "refractory", "model", "internal_error"):
         yield Cancelled("s", 1, reason)

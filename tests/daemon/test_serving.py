@@ -33,8 +33,9 @@ def test_a_swipe_is_one_gesture_with_all_fields(shared: Daemon) -> None:
     (event,) = client.events("gesture", "fields")
     assert list(event) == [
         "type", "sensor", "id", "gesture", "confidence", "sequence", "onset", "offset", "decided", "frames",
-        "lost", "model", "degraded", "scores",
+        "lost", "model", "degraded", "scores", "provisional",
     ]  # fmt: skip
+    assert event["provisional"] is None
     assert (event["gesture"], event["sequence"], event["frames"], event["lost"]) == ("swipe_left", 1, 7, 0)
     assert 0.5 < event["confidence"] <= 1 and event["degraded"] is False and event["model"] == "tiny"
     assert set(event["scores"]) == set(client.hello["gestures"])

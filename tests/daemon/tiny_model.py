@@ -6,6 +6,7 @@ if it took long), and what takes very long is unknown.
 
 import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,22 @@ GESTURES = (
 ROWS = COLUMNS = 9
 
 
+PROVISIONAL = {"in_a_row": 1, "elapsed_s": [0.0, 0.1], "thresholds": [None, 0.9], "tap": 0.8}
+
+
 def make(
-    path: Path, *, gestures: tuple[str, ...] = GESTURES, version: str = "1", broken: str = "", quantiles: str = "{}"
+    path: Path,
+    *,
+    gestures: tuple[str, ...] = GESTURES,
+    version: str = "1",
+    broken: str = "",
+    quantiles: str = "{}",
+    provisional: Mapping[str, object] | None = None,
 ) -> Path:
-    """Write the model to `path`; `broken` = "self_test" stores other outputs than it gives."""
+    """Write the model to `path`; `broken` = "self_test" stores other outputs than it gives.
+
+    `provisional` says how sure it must be of a contact that is not over.
+    """
     import onnx
     from onnx import TensorProto, helper, numpy_helper
 
@@ -116,7 +129,8 @@ def make(
             "self_test": SelfTest(frames, scores, unknown).to_json(),
             "training_data": hashlib.sha256(b"").hexdigest(),
             "quantiles": quantiles,
-        },
+        }
+        | ({} if provisional is None else {"provisional": json.dumps(provisional)}),
     )
     path.write_bytes(onnx.load_from_string(model.SerializeToString()).SerializeToString())
     return path

@@ -22,7 +22,7 @@ from tests.documents.blocks import ROOT, Block, blocks
 
 WRAPPER = '#!/bin/sh\nPYTHONPATH={root} exec {python} -m gestured.{package} "$@"\n'
 # A phrase that only this example has, and so its name.
-SHELL = ("--count 2", "while read -r line")
+SHELL = ("--types gesture,unknown --count 2", "--json --count 1 | while", "show the next track")
 PHRASES = {
     *SHELL,
     "across its restarts",
@@ -33,7 +33,8 @@ PHRASES = {
     "HEADER",
     "np.load",
     "gestured.Hub",
-    "gestured.Subscriber",
+    'sensors=["armrest"]) as events',
+    "was_shown",
 }
 
 
@@ -153,8 +154,17 @@ def test_osc_subscriber(place: Place):
 
 def test_a_subscriber_that_connects_again(place: Place):
     with place.gestures():
-        line = place.first_line(sys.executable, "-c", place.here(example("gestured.Subscriber").text))
+        line = place.first_line(sys.executable, "-c", place.here(example('sensors=["armrest"]) as events').text))
     assert line == "swipe_left from armrest\n"
+
+
+def test_a_subscriber_that_does_something_before_the_answer(place: Place):
+    command = (sys.executable, "-c", place.here(example("was_shown").text))
+    with place.gestures(), place.running(*command) as process:
+        assert process.stdout is not None
+        lines = [process.stdout.readline() for _ in range(20)]
+    first = lines.index("show swipe_left\n")
+    assert lines[first : first + 4] == ["show swipe_left\n", "do swipe_left\n"] * 2
 
 
 def test_one_sensor_in_a_process_of_ones_own(place: Place):

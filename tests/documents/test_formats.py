@@ -1,5 +1,6 @@
 """docs/events.schema.json and what docs/wire.md shows, held against the daemon's own lines."""
 
+import inspect
 import json
 import subprocess
 import sys
@@ -10,14 +11,15 @@ from typing import Any, get_args
 import pytest
 
 from gestured.core import messages
-from gestured.core.events import Cancelled, Event, Gesture, Unknown
+from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.subscription import parse_subscription
 from gestured.model.model import shipped
 from tests.daemon.harness import Daemon, Sensor
 from tests.documents.blocks import ROOT, Block, blocks
 
 SCHEMA = json.loads((ROOT / "docs" / "events.schema.json").read_text())
-TYPES = ("onset", "gesture", "unknown", "cancelled", "release", "status")
+GESTURES = ("swipe_left",)
+TYPES = ("provisional", "onset", "gesture", "unknown", "cancelled", "release", "status")
 
 
 @pytest.fixture(scope="module")
@@ -40,12 +42,13 @@ def test_the_schema_has_each_key_of_each_event(event: type):
     assert set(part["properties"]) - {"test"} == keys
 
 
-def test_the_schema_has_each_reason():
+@pytest.mark.parametrize("event", [Unknown, Cancelled], ids=lambda event: event.__name__)
+def test_the_schema_has_each_reason(event: type):
     """The list beside the field of the event is the one that others keep true."""
-    text = (ROOT / "gestured" / "core" / "events.py").read_text()
+    text = inspect.getsource(event)
     (line,) = [line for line in text.splitlines() if line.strip().startswith("reason: str")]
     reasons = [word.strip() for word in line.partition("#")[2].split(",")]
-    assert SCHEMA["$defs"]["cancelled"]["properties"]["reason"]["enum"] == reasons
+    assert SCHEMA["$defs"][event.__name__.lower()]["properties"]["reason"]["enum"] == reasons
     for reason in reasons:
         assert f"| `{reason}` |" in (ROOT / "docs" / "wire.md").read_text()
 
@@ -55,7 +58,9 @@ def test_lines_of_every_kind_are_valid(valid: Any):
     for event in (
         Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores),
         Gesture("a", 1, "swipe_left", 1.0, 1, 0.1, 0.2, 0.4, 3, 0, "m", True, scores),
+        Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores, "hole", "revoked"),
         Cancelled("a", 1, "held"),
+        Provisional("a", 1, "swipe_left", 0.9, 0.1, 0.2),
     ):
         valid(json.loads(messages.to_json(event, 1.7e9)))
     valid(json.loads(messages.hello_json("1", "x", "m", ["one_tap"], {"a": 0})))
@@ -90,7 +95,7 @@ def test_the_lines_in_the_documents_are_valid(valid: Any, block: Block):
 @pytest.mark.parametrize("block", blocks("checked", "the daemon's own parser"), ids=str)
 def test_the_requests_in_the_documents_are_valid(block: Block):
     for line in block.text.splitlines():
-        parse_subscription(line.encode())
+        parse_subscription(line.encode(), GESTURES)
 
 
 @pytest.mark.parametrize("block", blocks("checked", "gestured --explain"), ids=str)

@@ -89,6 +89,9 @@ class _Socket:
         return 0
 
 
+GESTURES = ("swipe_left", "one_tap")
+
+
 class _Server:
     """Takes the place of EventServer: remembers what was asked for."""
 
@@ -102,6 +105,9 @@ class _Server:
 
     def remove_reader(self, sock: object) -> None:
         """The reads are done by hand."""
+
+    def gestures(self) -> tuple[str, ...]:
+        return GESTURES
 
     def subscribe(self, client: object, subscription: object) -> None:
         self.subscribed.append(subscription)
@@ -127,7 +133,7 @@ def request(data: bytes) -> None:
     for line in lines:
         try:
             if line.strip():
-                wanted.append(parse_subscription(line))
+                wanted.append(parse_subscription(line, GESTURES))
         except ProtocolError as error:
             assert error.reason == "subscription"
             refused.append(str(error))

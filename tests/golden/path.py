@@ -12,7 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from gestured.core.events import Event
+from gestured.core.events import Cancelled, Event, Gesture, Unknown
 from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
 from gestured.core.feed import front_end_of
 from gestured.core.frames import Frame, Segment
@@ -62,7 +62,7 @@ def play(tape: Tape, model: Ladder) -> list[Line]:
                 case Decided() | Taken() | Changed():
                     pass
                 case _:
-                    lines.append({"at": now} | _line(fact))
+                    lines.append({"at": now} | as_line(fact))
 
     for now, waiting in tape.steps():
         take(hub.tick(now) if waiting is None else hub.receive(waiting, now), now)
@@ -88,8 +88,14 @@ def _sensor(name: str, state: str, reading: Reading) -> Line:
     return line
 
 
-def _line(event: Event) -> Line:
-    return {"type": type(event).__name__} | asdict(event)
+def as_line(event: Event) -> Line:
+    """An event with the keys that the tapes know; nobody asks for provisional events here."""
+    line = {"type": type(event).__name__} | asdict(event)
+    if isinstance(event, Gesture | Unknown | Cancelled):
+        assert line.pop("provisional") is None
+    if isinstance(event, Unknown):
+        assert line.pop("reason") in ("confidence", "hole", "rate")
+    return line
 
 
 def replay(tape: Tape, model: Ladder) -> list[Line]:
@@ -102,7 +108,7 @@ def replay(tape: Tape, model: Ladder) -> list[Line]:
     }
     packets = tuple(mcap.Packet(p.t_ns, p.source, p.data) for p in tape.packets)
     player = Replay(mcap.Tape(told, packets, (), True), maker(told).scene, model)
-    return [_line(event) for event in player.events()]
+    return [as_line(event) for event in player.events()]
 
 
 def front_ends(tape: Tape) -> Iterator[tuple[FrontEnd, Stamp, list[Contact]]]:

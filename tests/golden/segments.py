@@ -57,14 +57,13 @@ def found(tape: Tape, model: Ladder) -> list[Line]:
 
 
 def _line(sensor: str, contact: Contact, model: Ladder) -> Line:
-    line: Line = {"type": type(contact).__name__}
     if not isinstance(contact, Cut):
-        return line | asdict(contact)
+        return path.as_line(contact)
     segment, window = contact.segment, path.window(contact.segment, model)
     touches = [[asdict(touch) for touch in frame] for frame in segment.touches]
     arrays = {"frames": segment.frames, "times": segment.times, "window": window}
-    return line | {
-        "sensor": sensor, "id": contact.id, "onset": segment.onset, "offset": segment.offset,
+    return {
+        "type": "Cut", "sensor": sensor, "id": contact.id, "onset": segment.onset, "offset": segment.offset,
         "decided": contact.decided, "hole_s": contact.hole_s, "first": segment.first, "last": segment.last,
         "lost": segment.lost, "noise": segment.noise, "touches": sum(map(len, touches)),
         "shapes": {name: list(array.shape) for name, array in arrays.items()},

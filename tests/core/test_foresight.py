@@ -1,0 +1,534 @@
+"""Provisional events: what is said of a contact before its answer, and that no answer depends on it."""
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gestured.core.errors import ModelError
+from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, Unknown
+from gestured.core.facts import Fault
+from gestured.core.foresight import Certainty, Foresight
+from gestured.core.frames import Frame, Segment
+from gestured.core.front_end import FrontEnd
+from gestured.core.hub import Hub
+from gestured.core.recognizer import Recognizer, Scores, events_of
+from gestured.core.scene import Scene
+from gestured.model.ladder import Ladder
+from tests.daemon.harness import Hand, floats
+from tests.hostile.grammar import violations
+from tests.scenario import Player, parse
+
+GESTURES = ("one_tap", "double_tap", "left", "right")
+CERTAINTY = Certainty(2, (0.0, 0.2), (0.9, 0.8), tap=0.7)
+TAP = "press 4,4 0.8 for 130ms"
+SWIPE = "move 4,1 to 4,7 0.8 in 600ms"
+IDLE, PAUSE, SHORT = "quiet for 1500ms", "quiet for 900ms", "quiet for 150ms"
+
+
+def frames(*lines: str) -> list[Frame]:
+    """What a sensor sends while the lines of a scenario last."""
+    player = Player(parse("stream", "\n".join(lines)), 0)
+    return [frame for step in player.scenario.steps for frame in player.frames(step)]
+
+
+def says(gesture: str, confidence: float = 0.95) -> Scores:
+    rest = (1.0 - confidence) / (len(GESTURES) - 1)
+    return Scores(np.array([confidence if g == gesture else rest for g in GESTURES], np.float32), 0.0, "seer")
+
+
+@dataclass
+class Seer:
+    """Says of a whole segment `answer`, of a beginning what `early` says of it; an exception is raised, or is None."""
+
+    answer: Callable[[Segment], Scores | Exception] = lambda segment: says("left")
+    early: Callable[[Segment], Scores | Exception] = lambda segment: says("left")
+    certainty: Certainty | None = CERTAINTY
+    gestures: tuple[str, ...] = GESTURES
+    asked: int = 0
+    looked: list[Segment] = field(default_factory=list)
+
+    def classify(self, segment: Segment) -> Scores:
+        self.asked += 1
+        found = self.answer(segment)
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    def preview(self, segment: Segment) -> Scores | None:
+        self.looked.append(segment)
+        found = self.early(segment)
+        return None if isinstance(found, Exception) else found
+
+
+def recognizer(seer: Any, *, asked: bool = True, taps: bool = True, **more: Any) -> Recognizer:
+    front_end = FrontEnd("arm", 9, 9, wait_for_double_tap="double_tap" in (more.get("gestures") or GESTURES))
+    front_end.previews = asked
+    return Recognizer(front_end, seer, foresight=Foresight("arm", taps=taps), **more)
+
+
+def run(subject: Recognizer, stream: Sequence[Frame]) -> list[Event]:
+    return events_of(event for frame in stream for event in subject.push(frame))
+
+
+def names(events: Sequence[Event]) -> list[str]:
+    """Each event in a word: its gesture, or what it is; and what became of what was said before."""
+    words = []
+    for event in events:
+        word = getattr(event, "gesture", type(event).__name__.lower())
+        early = "?" if isinstance(event, Provisional) else ""
+        verdict = getattr(event, "provisional", None)
+        words.append(f"{word}{early}{f' {verdict}' if verdict else ''}")
+    return words
+
+
+def lines(events: Sequence[Event]) -> list[dict[str, Any]]:
+    return [{"type": type(e).__name__.lower()} | {f.name: getattr(e, f.name) for f in fields(e)} for e in events]
+
+
+# --- when it is said
+
+
+def test_it_is_said_once_while_the_finger_is_down_and_confirmed() -> None:
+    seer = Seer()
+    events = run(recognizer(seer), frames(IDLE, SWIPE, PAUSE))
+    assert names(events) == ["onset", "left?", "left confirmed", "release"]
+    onset, early, answer, _ = events
+    assert isinstance(early, Provisional) and isinstance(answer, Gesture) and isinstance(onset, Onset)
+    assert (early.sensor, early.id, early.gesture, early.onset) == ("arm", answer.id, "left", onset.onset)
+    assert early.confidence == pytest.approx(0.95) and onset.onset < early.decided < answer.offset < answer.decided
+    assert len(seer.looked) == 2 and seer.asked == 1  # two frames in a row, and nothing once it is said
+
+
+def test_so_many_frames_in_a_row_must_be_sure_of_the_same() -> None:
+    script = [says("left", 0.5), says("left"), says("right"), says("left"), says("left"), says("right"), says("right")]
+    seer = Seer(early=lambda segment: script[len(seer.looked) - 1])
+    events = run(recognizer(seer), frames(IDLE, SWIPE, PAUSE))
+    assert names(events)[1] == "left?" and len(seer.looked) == 5
+
+
+def test_the_threshold_is_that_of_the_time_since_the_onset() -> None:
+    certainty = Certainty(1, (0.0, 0.2, 0.4), (None, 0.96, 0.9), {"right": (0.5, 0.5, 0.5)})
+    seer = Seer(certainty=certainty)
+    early = [event for event in run(recognizer(seer), frames(IDLE, SWIPE, PAUSE)) if isinstance(event, Provisional)]
+    assert [0.4 <= event.decided - event.onset < 0.48 for event in early] == [True]
+    seer = Seer(early=lambda segment: says("right", 0.6), certainty=certainty)
+    early = [event for event in run(recognizer(seer), frames(IDLE, SWIPE, PAUSE)) if isinstance(event, Provisional)]
+    assert [event.decided - event.onset for event in early] == [0.0]
+
+
+def test_where_nothing_can_be_said_the_model_is_not_asked() -> None:
+    seer = Seer(certainty=Certainty(1, (0.0, 0.3), (None, 0.99)))
+    run(recognizer(seer), frames(IDLE, SWIPE, PAUSE))
+    assert seer.looked and all(segment.offset - segment.onset >= 0.3 for segment in seer.looked)
+
+
+@pytest.mark.parametrize(
+    ("answer", "expected"),
+    [
+        (says("right"), "right revoked"),
+        (says("left", 0.3), "unknown revoked"),
+        (ModelError("broken"), "cancelled revoked"),
+    ],
+)
+def test_another_answer_revokes_it(answer: Scores | Exception, expected: str) -> None:
+    events = run(recognizer(Seer(answer=lambda segment: answer)), frames(IDLE, SWIPE, PAUSE))
+    assert names(events) == ["onset", "left?", expected, "release"]
+
+
+@pytest.mark.parametrize("line", ["press 4,4 0.8 for 6s", SWIPE + "\nsilence for 3s", SWIPE + "\nend"])
+def test_a_contact_that_is_cancelled_revokes_it(line: str) -> None:
+    subject = recognizer(Seer())
+    stream = frames(IDLE, *line.removesuffix("\nend").split("\n"), *(() if line.endswith("end") else (PAUSE,)))
+    events = run(subject, stream) + events_of(subject.reset())
+    assert names(events) == ["onset", "left?", "cancelled revoked", "release"]
+
+
+def test_a_look_that_fails_says_nothing_and_changes_nothing_else() -> None:
+    stream = frames(IDLE, SWIPE, PAUSE)
+    events = run(recognizer(Seer(early=lambda segment: ModelError("broken"))), stream)
+    assert events == run(recognizer(Seer(), asked=False), stream) and len(events) == 3
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_without_thresholds_or_without_anybody_who_asks_the_model_is_not_asked(asked: bool) -> None:
+    seer = Seer(certainty=None if asked else CERTAINTY)
+    assert names(run(recognizer(seer, asked=asked), frames(IDLE, SWIPE, PAUSE, TAP, PAUSE)))[:3] == [
+        "onset", "left", "release",
+    ]  # fmt: skip
+    assert seer.looked == [] and seer.asked == 2
+
+
+def test_what_the_configuration_asks_for_holds_where_it_is_more() -> None:
+    stream = frames(IDLE, SWIPE, PAUSE)
+    assert "left?" in names(run(recognizer(Seer(), thresholds={"left": 0.2}), stream))
+    assert names(run(recognizer(Seer(), thresholds={"left": 0.97}), stream)) == ["onset", "unknown", "release"]
+    low = Certainty(1, (0.0,), (0.3,))
+    unsure = Seer(early=lambda segment: says("left", 0.45), certainty=low)  # the model's own threshold is 0.5
+    assert "left?" not in names(run(recognizer(unsure), stream))
+
+
+def test_only_gestures_in_use_are_said() -> None:
+    seer = Seer(early=lambda segment: says("right"), answer=lambda segment: says("right"))
+    events = run(recognizer(seer, gestures=["left", "one_tap"]), frames(IDLE, SWIPE, PAUSE))
+    assert names(events) == ["onset", "unknown", "release"]
+
+
+def test_what_would_not_be_repeated_is_not_said() -> None:
+    events = run(recognizer(Seer(), refractory={"left": 9.0}), frames(IDLE, SWIPE, PAUSE, SWIPE, PAUSE))
+    assert names(events) == ["onset", "left?", "left confirmed", "release", "onset", "cancelled", "release"]
+
+
+def test_a_contact_with_a_hole_is_not_named() -> None:
+    stream = frames(IDLE, SWIPE, PAUSE)
+    first = next(n for n, frame in enumerate(stream) if frame.values.max() > 500)
+    events = run(recognizer(Seer()), stream[: first + 1] + stream[first + 6 :])
+    assert names(events) == ["onset", "unknown", "release"]
+    assert [event.reason for event in events if isinstance(event, Unknown)] == ["hole"]
+
+
+# --- taps
+
+
+def taps_and_others(segment: Segment) -> Scores:
+    """One tap where all that was touched is short, two where it is longer and stays; a swipe where it moves."""
+    touched = segment.frames[segment.first : segment.last + 1]
+    columns = np.arange(9) @ touched.sum(axis=1).T / np.maximum(touched.sum(axis=(1, 2)), 1e-9)
+    if np.ptp(columns[touched.max(axis=(1, 2)) > 100]) > 1.5:
+        return says("left")
+    return says("one_tap" if segment.offset - segment.onset < 0.25 else "double_tap")
+
+
+def hand() -> Seer:
+    return Seer(answer=taps_and_others, early=taps_and_others)
+
+
+def test_a_tap_is_said_once_the_finger_has_left_without_a_further_run() -> None:
+    seer = hand()
+    events = run(recognizer(seer), frames(IDLE, TAP, PAUSE))
+    assert names(events) == ["onset", "one_tap?", "one_tap confirmed", "release"]
+    early, answer = events[1], events[2]
+    assert isinstance(early, Provisional) and isinstance(answer, Gesture)
+    assert 0.085 <= early.decided - answer.offset < 0.15 and answer.decided - answer.offset > 0.5
+    quiet = hand()
+    run(recognizer(quiet, asked=False), frames(IDLE, TAP, PAUSE))
+    assert seer.asked == quiet.asked == 1
+
+
+def test_a_second_tap_revokes_it() -> None:
+    events = run(recognizer(hand()), frames(IDLE, TAP, SHORT, TAP, PAUSE))
+    assert names(events) == ["onset", "one_tap?", "double_tap revoked", "release"]
+
+
+def test_two_taps_are_said_where_one_was_not() -> None:
+    stream = frames(IDLE, TAP, SHORT, TAP, PAUSE)
+    assert names(run(recognizer(hand(), taps=False), stream)) == [
+        "onset", "double_tap?", "double_tap confirmed", "release",
+    ]  # fmt: skip
+    assert names(run(recognizer(hand(), taps=False), frames(IDLE, TAP, PAUSE))) == ["onset", "one_tap", "release"]
+    never = Seer(taps_and_others, taps_and_others, replace(CERTAINTY, tap=None))
+    assert names(run(recognizer(never), stream))[1] == "double_tap?"
+
+
+def test_a_tap_and_a_swipe_are_two_contacts_each_with_its_own() -> None:
+    stream = frames(IDLE, TAP, SHORT, SWIPE, PAUSE)
+    for taps in (True, False):
+        events = run(recognizer(hand(), taps=taps), stream)
+        one = ["one_tap?", "one_tap confirmed"] if taps else ["one_tap"]
+        assert names(events) == ["onset", *one, "release", "onset", "left?", "left confirmed", "release"]
+        assert violations(lines(events)) == []
+
+
+def test_without_double_tap_a_tap_is_said_before_its_answer_too() -> None:
+    events = run(recognizer(hand(), gestures=["one_tap", "left"]), frames(IDLE, TAP, PAUSE))
+    assert names(events) == ["onset", "one_tap?", "one_tap confirmed", "release"]
+
+
+# --- what the model is shown, and how often
+
+
+def test_the_model_is_shown_what_has_come_so_far_and_nothing_else() -> None:
+    """Two hands that begin alike and go on differently: as long as they are alike, the model sees the same."""
+    begin = "move 4,1 to 4,4 0.8 in 400ms"
+    one, other = Seer(early=lambda s: says("left", 0.5)), Seer(early=lambda s: says("left", 0.5))
+    first = frames(IDLE, begin, "move 4,4 to 4,7 0.8 in 400ms", PAUSE)
+    second = frames(IDLE, begin, "move 4,4 to 8,4 1.0 in 400ms", PAUSE)
+    run(recognizer(one), first)
+    run(recognizer(other), second)
+    alike = next(n for n, (a, b) in enumerate(zip(first, second, strict=True)) if (a.values != b.values).any())
+    before = [segment for segment in one.looked if segment.times[-1] < first[alike].t]
+    assert len(before) >= 4
+    for shown, also in zip(before, other.looked, strict=False):
+        assert np.array_equal(shown.frames, also.frames) and shown.offset == shown.times[-1] == also.times[-1]
+
+
+@pytest.mark.parametrize("rate", [5, 14, 15, 16, 20, 25, 30, 60, 100, 250, 1000])
+def test_the_model_looks_at_most_fifteen_times_a_second(rate: float) -> None:
+    seer = Seer(early=lambda segment: says("left", 0.5))
+    stream = frames(f"sensor rate {rate}", IDLE, "move 4,1 to 4,7 0.8 in 3s", PAUSE)
+    run(recognizer(seer), stream)
+    looked = [segment.offset for segment in seer.looked]
+    assert len(looked) == len(set(looked)) <= 3 * min(15, rate) + 2
+    assert len(looked) >= 3 * min(7.5, rate) - 2
+    if rate <= 15:
+        assert np.diff(looked) == pytest.approx(1 / rate, abs=1e-5)  # each frame
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_jitter_skips_no_frame_at_the_nominal_rate(seed: int) -> None:
+    seer = Seer(early=lambda segment: says("left", 0.5))
+    stream = frames("sensor rate 15 jitter 8ms", "quiet for 4s", "move 4,1 to 4,7 0.8 in 3s", PAUSE)
+    run(recognizer(seer), stream)
+    times = [frame.t for frame in stream]
+    assert [s.offset for s in seer.looked] == [t for t in times if seer.looked[0].offset <= t <= seer.looked[-1].offset]
+
+
+# --- no answer depends on it
+
+
+def oracle(segment: Segment, salt: bytes = b"") -> Scores:
+    """Scores by the last bit of all that a segment holds: whatever is different is answered differently."""
+    digest = hashlib.sha256(
+        segment.frames.tobytes() + segment.times.tobytes() + repr((segment.first, segment.last, segment.noise)).encode()
+        + salt
+    ).digest()  # fmt: skip
+    values = np.frombuffer(digest[:4], np.uint8).astype(np.float32) ** 4 + 1
+    return Scores((values / values.sum()).astype(np.float32), digest[4] / 1024, "oracle", threshold=0.4)
+
+
+@dataclass
+class Clock:
+    """Frames set it; a run of a rung takes its time."""
+
+    now: float = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@dataclass
+class Rung:
+    """Fails or dawdles with some segments, by what they hold."""
+
+    name: str
+    clock: Clock
+    certainty: Certainty | None
+    gestures: tuple[str, ...] = GESTURES
+
+    def classify(self, segment: Segment) -> Scores:
+        scores = oracle(segment, self.name.encode())
+        mood = int(scores.values[0] * 1e6) % 8
+        if mood == 0:
+            raise RuntimeError("broken")
+        self.clock.now += 0.2 if mood % 2 else 0.0
+        values = np.full(4, np.nan, np.float32) if mood == 2 else scores.values
+        return Scores(values, scores.unknown, self.name, threshold=0.4)
+
+
+EAGER = Certainty(1, (0.0, 0.1), (0.3, 0.3), {"right": (0.2, None)}, tap=0.2)
+STEPS = st.sampled_from(
+    [TAP, SWIPE, SHORT, PAUSE, "quiet for 400ms", "move 7,4 to 1,4 0.4 in 250ms", "press 2,2 0.3 for 400ms",
+     "press 4,4 0.9 for 5600ms", "silence for 300ms", "silence for 2s", "lose 4", "dead 4,4", "shift 900",
+     "circle 4,4 radius 2 0.7 in 800ms", "press 4,4 0.8 for 1 frame"]
+)  # fmt: skip
+
+
+def answers_of(make: Callable[[], tuple[Any, Clock]], stream: Sequence[Frame], *, asked: bool) -> list[Event]:
+    classifier, clock = make()
+    subject = recognizer(classifier, asked=asked, thresholds={"left": 0.5}, refractory={"one_tap": 2.0})
+    events: list[Event] = []
+    for frame in stream:
+        clock.now = frame.t
+        events += events_of(subject.push(frame))
+    return events + events_of(subject.flush(stream[-1].t + 0.2))
+
+
+def bare(events: Sequence[Event]) -> list[Event]:
+    """Without what is there only because somebody asked."""
+    return [
+        replace(event, provisional=None) if isinstance(event, Gesture | Unknown | Cancelled) else event
+        for event in events
+        if not isinstance(event, Provisional)
+    ]
+
+
+def an_oracle() -> tuple[Any, Clock]:
+    return Seer(answer=oracle, early=lambda segment: oracle(segment, b"early"), certainty=EAGER), Clock()
+
+
+def a_ladder() -> tuple[Any, Clock]:
+    clock = Clock()
+    rungs = [Rung("best", clock, EAGER), Rung("second", clock, None), Rung("third", clock, EAGER)]
+    return Ladder(rungs, clock=clock, slow_runs=2, retry_after=3.0), clock
+
+
+@pytest.mark.parametrize("make", [an_oracle, a_ladder])
+@settings(max_examples=40, deadline=None)
+@given(st.sampled_from(["15", "15 jitter 15ms", "60"]), st.lists(STEPS, min_size=2, max_size=12))
+def test_answers_are_the_same_whether_or_not_anybody_asks(
+    make: Callable[[], tuple[Any, Clock]], rate: str, steps: list[str]
+) -> None:
+    stream = frames(f"sensor rate {rate}", IDLE, *steps, PAUSE)
+    asked, unasked = (answers_of(make, stream, asked=asked) for asked in (True, False))
+    assert bare(asked) == unasked
+    assert violations(lines(asked)) == [] == violations(lines(unasked))
+
+
+def test_the_property_above_sees_provisional_events_and_all_rungs() -> None:
+    stream = frames(IDLE, *[SWIPE, PAUSE, TAP, PAUSE, TAP, SHORT, SWIPE, PAUSE] * 12)
+    for make, models in ((an_oracle, {"oracle"}), (a_ladder, {"best", "second", "third"})):
+        events = answers_of(make, stream, asked=True)
+        assert {getattr(event, "provisional", None) for event in events} == {None, "confirmed", "revoked"}
+        assert {event.model for event in events if isinstance(event, Gesture | Unknown)} == models
+
+
+# --- the ladder
+
+
+def test_a_ladder_that_is_asked_early_keeps_its_books() -> None:
+    clock, said = Clock(), []
+    ladder = Ladder([Rung("best", clock, CERTAINTY), Rung("second", clock, None)], clock=clock, report=said.append)
+    assert ladder.certainty is CERTAINTY
+    stream = frames(IDLE, *[SWIPE, PAUSE] * 20)
+    cut = Seer(certainty=Certainty(1, (0.0,), (1.0,)))
+    run(recognizer(cut), stream)
+    for segment in cut.looked:
+        ladder.preview(segment)
+    assert len(cut.looked) > 100 and (ladder.active, ladder.failures, said) == ("best", 0, [])
+
+
+def test_a_ladder_that_is_slow_is_not_asked_early_for_a_while() -> None:
+    clock, calls = Clock(), []
+
+    class Slow(Rung):
+        def classify(self, segment: Segment) -> Scores:
+            calls.append(segment)
+            clock.now += 0.2
+            return says("left")
+
+    ladder = Ladder([Slow("slow", clock, CERTAINTY)], clock=clock, slow_s=0.05, slow_runs=3, retry_after=30.0)
+    one = Segment(np.zeros((2, 9, 9), np.float32), np.array([0.0, 0.1]), 0, 1, 1.0)
+    assert [ladder.preview(one) is None for _ in range(5)] == [False, False, False, True, True] and len(calls) == 3
+    clock.now += 31.0
+    assert ladder.preview(one) is not None
+
+
+# --- the hub
+
+
+SCENE = Scene(("one_tap", "double_tap", "left", "right"), (9, 9))
+
+
+def packets(hand: Hand, *parts: Sequence[Any]) -> list[Any]:
+    return [frame for part in parts for frame in part]
+
+
+def feed(hub: Hub, name: str, stream: Sequence[Any], t: float) -> list[Any]:
+    facts = []
+    for n, frame in enumerate(stream, start=1):
+        facts += hub.receive([(floats(f"/{name}/pressure", frame, 0), ("10.0.0.1", 1))], t + n / 15)
+    return facts
+
+
+def test_only_sensors_that_somebody_asks_for_cost_a_run() -> None:
+    seer = Seer()
+    hub = Hub(SCENE, seer)
+    for name in ("before", "other"):
+        feed(hub, name, Hand().idle(2.0), 0.0)
+    hub.foresee(lambda sensor: sensor in ("before", "after"))
+    assert hub.foreseen("after") and not hub.foreseen("other")
+    for name in ("before", "after", "other"):
+        hand = Hand()
+        facts = feed(hub, name, [*hand.idle(2.0), *hand.swipe("left"), *hand.idle(1.0)], 10.0)
+        assert any(isinstance(fact, Provisional) for fact in facts) == (name != "other")
+    looked = len(seer.looked)
+    hub.foresee(lambda sensor: False)
+    assert not any(isinstance(fact, Provisional) for fact in feed(hub, "before", hand.swipe("left"), 20.0))
+    assert len(seer.looked) == looked > 0
+
+
+@pytest.mark.parametrize("how", ["reload", "no longer asked", "bug"])
+def test_what_was_said_is_judged_whatever_happens_meanwhile(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    hub, hand = Hub(SCENE, Seer()), Hand()
+    hub.foresee(lambda sensor: True)
+    swipe = hand.swipe("left")
+    facts = feed(hub, "arm", [*hand.idle(2.0), *swipe[:-2]], 0.0)
+    assert names([fact for fact in facts if isinstance(fact, Event)]) == ["onset", "left?"]
+    now = (len(swipe) + 28) / 15
+    if how == "reload":
+        hub.change(replace(SCENE, thresholds={"left": 0.1}), Seer(), now)
+    elif how == "no longer asked":
+        hub.foresee(lambda sensor: False)
+    else:
+        monkeypatch.setattr("gestured.core.front_end.FrontEnd.push", lambda *_: 1 / 0)
+    facts = feed(hub, "arm", [*swipe[-2:], *hand.idle(1.0)], now)
+    expected = ["cancelled revoked", "release"] if how == "bug" else ["left confirmed", "release"]
+    assert names([fact for fact in facts if isinstance(fact, Event)]) == expected
+    assert any(isinstance(fact, Fault) for fact in facts) == (how == "bug")
+
+
+# --- what a model says of itself
+
+
+GOOD: dict[str, Any] = {
+    "in_a_row": 2,
+    "elapsed_s": [0.0, 0.2, 0.5],
+    "thresholds": [0.98, None, 0.9],
+    "gestures": {"left": [None, 0.9, 0.8]},
+    "tap": 0.9,
+}
+
+
+def test_thresholds_by_elapsed_time_and_gesture() -> None:
+    found = Certainty.from_json(json.dumps(GOOD), GESTURES)
+    assert [found.needed("right", t) for t in (0.0, 0.19, 0.2, 0.49, 0.5, 9.0)] == [0.98, 0.98, None, None, 0.9, 0.9]
+    assert [found.needed("left", t) for t in (0.0, 0.3, 0.7)] == [None, 0.9, 0.8]
+    assert (found.in_a_row, found.tap) == (2, 0.9)
+    without = Certainty.from_json(json.dumps({k: v for k, v in GOOD.items() if k != "gestures"} | {"tap": None}), ())
+    assert without.needed("left", 0.1) == 0.98 and without.tap is None
+
+
+BAD: list[tuple[Any, str]] = [
+    ([], "expected a JSON object"),
+    ({}, "expected a JSON object with"),
+    (GOOD | {"more": 1}, "expected a JSON object with"),
+    ({k: v for k, v in GOOD.items() if k != "tap"}, "expected a JSON object with"),
+    *[(GOOD | {"in_a_row": value}, "in_a_row: ") for value in (0, -1, 1.5, True, "2", None, 10**9)],
+    *[
+        (GOOD | {"elapsed_s": value}, "elapsed_s: ")
+        for value in ([], None, [0.1, 0.2, 0.5], [0, 0.5, 0.5], [0, 0.5, 0.2], ["0", 1, 2], [0, True, 2], [0, 1, 1e300])
+    ],
+    *[
+        (GOOD | {"thresholds": value}, "thresholds: ")
+        for value in ([], [0.9], [0.9] * 4, [1.1, 0.5, 0.5], [-0.1, None, None], ["0.5", 1, 1], {}, [False, 0.5, 0.5])
+    ],
+    (GOOD | {"gestures": {"zigzag": [0.9, 0.9, 0.9]}}, "gestures: .*zigzag"),
+    (GOOD | {"gestures": {"left": [0.9]}}, "gestures: left: "),
+    (GOOD | {"gestures": [1]}, "gestures: "),
+    *[(GOOD | {"tap": value}, "tap: ") for value in (2, -1, "0.5", [], True)],
+]
+
+
+@pytest.mark.parametrize(("found", "says"), BAD)
+def test_metadata_that_do_not_fit_are_refused(found: Any, says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        Certainty.from_json(json.dumps(found), GESTURES)
+
+
+@pytest.mark.parametrize("text", ["", "x", "NaN", "[" * 5000, '{"in_a_row":2'])
+def test_what_is_no_json_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="expected a JSON object"):
+        Certainty.from_json(text, GESTURES)
+
+
+def test_nan_is_no_threshold() -> None:
+    text = json.dumps(GOOD | {"tap": math.nan})
+    with pytest.raises(ValueError, match="tap"):
+        Certainty.from_json(text, GESTURES)

@@ -1,0 +1,258 @@
+"""Provisional events of a real daemon: who is told what, before the answer and with it."""
+
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pythonosc.osc_message import OscMessage
+
+from gestured.client.control import Control
+from tests.daemon import tiny_model
+from tests.daemon.harness import Client, Daemon, Sensor
+from tests.hostile.grammar import TYPES, violations
+
+ALL = (*TYPES, "provisional")
+
+
+@pytest.fixture(scope="module")
+def early(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small model, with thresholds for contacts that are not over."""
+    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+    return tiny_model.make(tmp_path_factory.mktemp("early") / "early.onnx", provisional=tiny_model.PROVISIONAL)
+
+
+@pytest.fixture(scope="module")
+def daemon(early: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    daemon = Daemon.start(
+        tmp_path_factory.mktemp("daemon"), early, "--clock", "sensor", "--metrics", "127.0.0.1:0", "--max-sensors", 500
+    )
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+    assert "Traceback" not in daemon.stderr()
+
+
+def said(client: Client, sensor: str, last: int = 1) -> list[str]:
+    """What a client is told of a sensor, each line in a word, until the release of contact `last`."""
+    lines = client.until(lambda line: (line["type"], line.get("sensor"), line.get("id")) == ("release", sensor, last))
+    return words(lines, sensor)
+
+
+def words(lines: list[dict[str, Any]], sensor: str) -> list[str]:
+    found = []
+    for line in lines:
+        if line.get("sensor") == sensor:
+            mark = "?" if line["type"] == "provisional" else ""
+            verdict = f" {line['provisional']}" if line.get("provisional") else ""
+            found.append(f"{line.get('gesture', line['type'])}{mark}{verdict}")
+    return found
+
+
+def two_taps(sensor: Sensor) -> None:
+    sensor.send(sensor.hand.tap(), sensor.hand.idle(0.2), sensor.hand.tap(), sensor.hand.idle(1.0))
+
+
+def test_it_comes_before_the_answer_which_confirms_it(daemon: Daemon) -> None:
+    client = daemon.client().subscribe(*ALL, sensors=["confirmed"])
+    plain = daemon.client().subscribe("gesture", sensors=["confirmed"])
+    Sensor(daemon, "confirmed").begin().perform("left", "tap")
+    lines = client.until(lambda line: line["type"] == "release" and line["id"] == 2)
+    assert words(lines, "confirmed") == [
+        "onset", "swipe_left?", "swipe_left confirmed", "release", "onset", "one_tap?", "one_tap confirmed", "release",
+    ]  # fmt: skip
+    assert violations(lines) == []
+    early, answer = lines[1], lines[2]
+    assert list(early) == ["type", "sensor", "id", "gesture", "confidence", "onset", "decided"]
+    assert early["id"] == answer["id"] and early["onset"] == pytest.approx(answer["onset"], abs=1e-4)
+    assert early["onset"] + 0.1 < early["decided"] < answer["offset"] + 1e-4
+    first, second = plain.events("gesture", "confirmed", 2)  # that somebody asked is all that others see of it
+    assert (first, second) == (answer, lines[6]) and first["provisional"] == "confirmed"
+
+
+def test_what_turns_out_otherwise_is_revoked(daemon: Daemon) -> None:
+    client = daemon.client().subscribe(*ALL, sensors=["revoked"])
+    sensor = Sensor(daemon, "revoked").begin()
+    two_taps(sensor)
+    assert said(client, "revoked") == ["onset", "one_tap?", "double_tap revoked", "release"]
+    sensor.send(sensor.hand.swipe("left"), [sensor.hand.frame(1.0) for _ in range(90)], sensor.hand.idle(1.0))
+    assert said(client, "revoked", 2) == ["onset", "swipe_left?", "cancelled revoked", "release"]
+
+
+def test_whoever_was_sent_it_is_sent_the_answer(daemon: Daemon) -> None:
+    only = daemon.client().subscribe("provisional", sensors=["owed"])
+    taps = daemon.client().subscribe("provisional", gestures=["one_tap"])
+    changed = daemon.client().subscribe("provisional", sensors=["owed"])
+    sensor = Sensor(daemon, "owed").begin()
+    sensor.perform("left")
+    two_taps(sensor)
+    sensor.perform("up")
+    expected = ["swipe_left?", "swipe_left confirmed", "one_tap?", "double_tap revoked", "swipe_up?"]
+    lines = only.until(lambda line: line.get("gesture") == "swipe_up")
+    assert words(lines, "owed") == expected
+    lines = taps.until(lambda line: line["type"] == "gesture")
+    assert words(lines, "owed") == ["one_tap?", "double_tap revoked"]
+    hand = sensor.hand
+    sensor.send(hand.swipe("left"))
+    changed.until(lambda line: (line["type"], line.get("id")) == ("provisional", 4))
+    changed.subscribe("status")  # what it asks for now changes nothing of what it was told
+    sensor.send(hand.idle(1.0))
+    (answer,) = changed.events("gesture", "owed")
+    assert (answer["id"], answer["provisional"]) == (4, "confirmed")
+
+
+def test_nobody_asks_and_nothing_is_said(daemon: Daemon) -> None:
+    before = daemon.metric("gestured_provisional_total", result="given")
+    client = daemon.client().subscribe("gesture", "release")
+    gone = daemon.client().subscribe("provisional")
+    gone.close()
+    other = daemon.client().subscribe("provisional", sensors=["another"])
+    client.subscribe("gesture", "release")  # by now the daemon knows who went
+    Sensor(daemon, "unasked").begin().perform("left")
+    (answer,) = client.events("gesture", "unasked")
+    assert answer["provisional"] is None
+    assert daemon.metric("gestured_provisional_total", result="given") == before
+    other.close()
+
+
+def test_answers_are_the_same_whether_or_not_anybody_asks(early: Path, tmp_path: Path) -> None:
+    told = []
+    for types in (TYPES, ALL):
+        folder = tmp_path / str(len(types))
+        folder.mkdir()
+        daemon = Daemon.start(folder, early, "--clock", "sensor")
+        client = daemon.client().subscribe(*types)
+        sensor = Sensor(daemon, "arm").begin().perform("left", "tap", "up")
+        two_taps(sensor)
+        sensor.send([sensor.hand.frame(4.0) for _ in range(30)], sensor.hand.idle(1.0)).perform("down")
+        lines = client.until(lambda line: line["type"] == "release" and line["id"] == 6)
+        assert daemon.stop() == 0
+        assert violations(lines) == [] and (words(lines, "arm").count("one_tap?") == 2) == (types == ALL)
+        zero = lines[0]["onset"]
+        told.append(
+            [
+                {
+                    k: v - zero if k in ("onset", "offset", "decided") else v
+                    for k, v in line.items()
+                    if k != "provisional"
+                }
+                for line in lines
+                if line["type"] != "provisional"
+            ]
+        )
+    times = [
+        [line.pop(key) for line in lines for key in ("onset", "offset", "decided") if key in line] for lines in told
+    ]
+    assert told[0] == told[1] and times[0] == pytest.approx(times[1], abs=1e-5)
+
+
+def test_a_request_that_names_what_there_is_not_changes_nothing(daemon: Daemon) -> None:
+    client = daemon.client().subscribe("gesture", sensors=["asked"], gestures=["swipe_left"])
+    for request, what in (
+        (
+            {"types": ["provisional", "gestures"]},
+            'subscribe.types: unknown "gestures", expected any of onset, provisional',
+        ),
+        (
+            {"gestures": ["swipe_left", "zigzag"]},
+            'subscribe.gestures: unknown "zigzag", expected any of one_tap, double',
+        ),
+    ):
+        (error,) = client.ask({"subscribe": request}).until(lambda line: True)
+        assert error["type"] == "error" and error["reason"].startswith(what)
+    Sensor(daemon, "asked").begin().perform("up", "left")
+    (first,) = client.until(lambda line: True)
+    assert first["gesture"] == "swipe_left"
+
+
+def test_it_is_counted(daemon: Daemon) -> None:
+    def counts() -> list[float]:
+        return [daemon.metric("gestured_provisional_total", result=r) for r in ("given", "confirmed", "revoked")]
+
+    before, lead = counts(), daemon.metric("gestured_provisional_lead_seconds_count")
+    client = daemon.client().subscribe(*ALL, sensors=["counted"])
+    sensor = Sensor(daemon, "counted").begin().perform("left")
+    two_taps(sensor)
+    said(client, "counted", 2)
+    assert [new - old for new, old in zip(counts(), before, strict=True)] == [2, 1, 1]
+    assert daemon.metric("gestured_provisional_lead_seconds_count") == lead + 1
+    with Control(daemon.socket.with_suffix(".ctl")) as control:
+        told = control.ask("status")["provisional"]
+    assert [told[key] for key in ("given", "confirmed", "revoked")] == counts()
+
+
+def test_a_made_up_gesture_is_said_before_too(daemon: Daemon) -> None:
+    client = daemon.client().subscribe(*ALL, sensors=["made_up"])
+    with Control(daemon.socket.with_suffix(".ctl")) as control:
+        control.ask("emit", gesture="swipe_left", sensor="made_up")
+        lines = client.until(lambda line: line["type"] == "release")
+        assert words(lines, "made_up") == ["onset", "swipe_left?", "swipe_left confirmed", "release"]
+        assert all(line["test"] is True for line in lines) and violations(lines) == []
+        plain = daemon.client().subscribe("gesture", sensors=["made_up_2"])
+        control.ask("emit", gesture="swipe_left", sensor="made_up_2")
+        assert plain.line()["provisional"] is None
+
+
+@pytest.mark.parametrize("taps", ["true", "false"])
+def test_over_osc(early: Path, tmp_path: Path, taps: str) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        out.bind(("127.0.0.1", 0))
+        out.settimeout(30)
+        daemon = Daemon.start(
+            tmp_path, early, "--clock", "sensor", "--publish", f"osc://127.0.0.1:{out.getsockname()[1]}",
+            "--publish-provisional", "true", "--provisional-taps", taps,
+        )  # fmt: skip
+        try:
+            sensor = Sensor(daemon, "arm").begin().perform("left")
+            two_taps(sensor)
+            found: list[tuple[str, str, list[Any]]] = []
+            while len([one for one in found if one[0].endswith("gesture")]) < 2:
+                message = OscMessage(out.recv(9999))
+                if message.address != "/gestured/status":
+                    types = message.dgram[message.dgram.index(b",") :].split(b"\0")[0].decode()
+                    found.append((message.address.removeprefix("/gestured/arm/"), types, message.params))
+        finally:
+            assert daemon.stop() == 0
+    before = [("provisional", "one_tap"), ("revoked", "one_tap")] if taps == "true" else [("provisional", "double_tap")]
+    assert [(what, params[0]) for what, _, params in found] == [
+        ("provisional", "swipe_left"), ("gesture", "swipe_left"), *before, ("gesture", "double_tap"),
+    ]  # fmt: skip
+    assert {what: types for what, types, _ in found}["provisional"] == ",sfi"
+    assert found[0][2][2] == 1 and 0.9 <= found[0][2][1] <= 1
+    if taps == "true":
+        assert found[3][1:] == (",si", ["one_tap", 2]) and found[2][2][2] == 2
+
+
+def test_without_the_setting_osc_says_only_what_it_said_before(early: Path, tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        out.bind(("127.0.0.1", 0))
+        out.settimeout(30)
+        daemon = Daemon.start(
+            tmp_path, early, "--clock", "sensor", "--publish", f"osc://127.0.0.1:{out.getsockname()[1]}"
+        )
+        client = daemon.client().subscribe(*ALL)
+        two_taps(Sensor(daemon, "arm").begin())
+        assert "one_tap?" in said(client, "arm")
+        addresses = set()
+        while "/gestured/arm/gesture" not in addresses:
+            addresses.add(OscMessage(out.recv(9999)).address)
+        assert daemon.stop() == 0
+        assert addresses <= {"/gestured/arm/gesture", "/gestured/status"}
+
+
+def test_a_tap_waits_as_long_as_it_is_set(early: Path, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text("tap_gap_s = 0.25\n")
+    daemon = Daemon.start(tmp_path, early, "--clock", "sensor", "--config", config)
+    try:
+        client = daemon.client().subscribe("gesture")
+        sensor = Sensor(daemon, "arm").begin().perform("tap")
+        waited = [line["decided"] - line["offset"] for line in client.events("gesture", "arm")]
+        config.write_text("tap_gap_s = 0.55\n")
+        with Control(daemon.socket.with_suffix(".ctl")) as control:
+            control.ask("reload")
+        sensor.begin().perform("tap")
+        waited += [line["decided"] - line["offset"] for line in client.events("gesture", "arm")]
+    finally:
+        assert daemon.stop() == 0
+    assert waited == [pytest.approx(0.333, abs=0.01), pytest.approx(0.667, abs=0.01)]
