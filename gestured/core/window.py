@@ -54,7 +54,8 @@ class Window:
 
     def apply(self, segment: Segment) -> NDArray[np.float32]:
         """(T, R, C) segment -> (T', rows, columns) float32, 0..1 of the segment's own peak."""
-        frames, times = self._span(segment)
+        start, end = self.span(segment)
+        frames, times = segment.frames[start:end].astype(np.float64), segment.times[start:end]
         frames = self._regrid(frames, segment)
         frames = self._retime(frames, times, float(median(np.diff(segment.times))) if len(times) > 1 else 0.0)
         if self.smooth_frames > 1:
@@ -63,13 +64,11 @@ class Window:
         peak = max(float(frames.max()), self.floor * segment.noise, 1e-37)
         return (frames / peak).astype(np.float32)
 
-    def _span(self, segment: Segment) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The frames from `lead_s` before the first touched one to `tail_s` after the last."""
-        times = segment.times
+    def span(self, segment: Segment) -> tuple[int, int]:
+        """Which frames are taken in: from `lead_s` before the first touched one to `tail_s` after the last."""
         slack = 0.25 / self.rate_hz  # jitter must not decide whether a frame is in
-        start = int(np.searchsorted(times, segment.onset - self.lead_s - slack))
-        end = int(np.searchsorted(times, segment.offset + self.tail_s + slack))
-        return segment.frames[start:end].astype(np.float64), times[start:end]
+        start = int(np.searchsorted(segment.times, segment.onset - self.lead_s - slack))
+        return start, int(np.searchsorted(segment.times, segment.offset + self.tail_s + slack))
 
     def _regrid(self, frames: NDArray[np.float64], segment: Segment) -> NDArray[np.float64]:
         """Area average (or bilinear, where the sensor is coarser) of a square around the touched place.

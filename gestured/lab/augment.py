@@ -44,7 +44,7 @@ def varied(x: Tensor, generator: torch.Generator) -> Tensor:
     """(B, T, R, C) windows -> windows as another sensor, hand or network would have given them.
 
     Small rotation, scale and shift; gain of single taxels; response curve; crosstalk along rows and columns;
-    blur; noise; a lost frame bridged from its neighbours, as `Window` does. The peak is 1 again at the end.
+    blur; noise; a lost frame bridged from its neighbours, as `Window` does. The peak is what it was at the end.
     """
     batch, time = x.shape[:2]
 
@@ -86,7 +86,7 @@ def varied(x: Tensor, generator: torch.Generator) -> Tensor:
     noise = torch.randn(x.shape, generator=generator) * (0.08 * draw(batch, 1, 1, 1) ** 2) * some(0.5)
     covered = (torch.arange(time)[None, :] <= _last(x)[:, None]).float()[:, :, None, None]  # padding stays silent
     x = (x + noise * covered).clamp(min=0)
-    return x / x.amax((1, 2, 3), keepdim=True).clamp(min=1e-3)
+    return x / x.amax((1, 2, 3), keepdim=True).clamp(min=1e-3) * peak
 
 
 def _last(x: Tensor) -> Tensor:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,8 @@ class Samples:
     kinds: NDArray[np.str_]  # (G,) the finer name
     people: NDArray[np.int64]  # (G,) participant or subject
     strength: NDArray[np.float64]  # (G,) peak in units of the sensor's noise
+    first: NDArray[np.int64]  # (G,) index of the first touched frame in its window
+    last: NDArray[np.int64]  # (G,) and of the last one
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -79,6 +81,7 @@ class Samples:
             np.concatenate(parts) if parts else self.frames[:0],
             np.concatenate([[0], np.cumsum([len(p) for p in parts], dtype=np.int64)]).astype(np.int64),
             self.labels[index], self.kinds[index], self.people[index], self.strength[index],
+            self.first[index], self.last[index],
         )  # fmt: skip
 
     def digest(self) -> str:
@@ -106,7 +109,25 @@ class Truth:
     offset: float
 
 
-Sample = tuple[NDArray[np.float16], str, str, int, float]
+class Sample(NamedTuple):
+    """One window, with what `Samples` holds of each."""
+
+    window: NDArray[np.float16]
+    label: str
+    kind: str
+    person: int
+    strength: float
+    first: int
+    last: int
+
+
+def sample(segment: Segment, label: str, kind: str, person: int, window: Window = WINDOW) -> Sample:
+    """What was cut, through a window."""
+    frames = window.apply(segment).astype(np.float16)
+    strength = float(segment.frames[segment.first : segment.last + 1].max()) / max(segment.noise, 1e-30)
+    begin = segment.times[window.span(segment)[0]]
+    first, last = (min(round((t - begin) * window.rate_hz), len(frames) - 1) for t in (segment.onset, segment.offset))
+    return Sample(frames, label, kind, person, strength, first, last)
 
 
 def collect(samples: Iterable[Sample]) -> Samples:
@@ -120,6 +141,8 @@ def collect(samples: Iterable[Sample]) -> Samples:
         np.array([s[2] for s in found], dtype="U40"),
         np.array([s[3] for s in found], dtype=np.int64),
         np.array([s[4] for s in found], dtype=np.float64),
+        np.array([s[5] for s in found], dtype=np.int64),
+        np.array([s[6] for s in found], dtype=np.int64),
     )
 
 
@@ -134,6 +157,8 @@ def join(parts: Sequence[Samples]) -> Samples:
         np.concatenate([p.kinds for p in parts]),
         np.concatenate([p.people for p in parts]),
         np.concatenate([p.strength for p in parts]),
+        np.concatenate([p.first for p in parts]),
+        np.concatenate([p.last for p in parts]),
     )
 
 
@@ -160,8 +185,7 @@ def matched(segments: Iterable[Segment], performed: Sequence[Truth]) -> Iterator
                 best, share = event, covered
         if best is None or (best.label != NONE and share < OVERLAP):
             continue
-        strength = float(segment.frames[segment.first : segment.last + 1].max()) / max(segment.noise, 1e-30)
-        yield WINDOW.apply(segment).astype(np.float16), best.label, best.kind, best.person, strength
+        yield sample(segment, best.label, best.kind, best.person)
 
 
 def truths(take: Take) -> list[Truth]:

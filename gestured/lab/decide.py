@@ -12,7 +12,9 @@ from torch import Tensor
 
 from gestured.lab.nets import Decision
 
-LOST = 0.03  # share of the validation gestures that the threshold may cost
+THRESHOLDS = tuple(round(0.05 + 0.01 * k, 2) for k in range(91))
+WRONG = 2.5  # a gesture that is taken for another one counts as much as so many lost ones
+ACCEPTED = 0.3  # and a point of non-gestures that are taken for one as much as so many points of lost gestures
 
 
 def fit_decision(first: Tensor, second: Tensor, labels: NDArray[np.int64], gestures: int) -> Decision:
@@ -61,9 +63,41 @@ def _minimise(parameters: list[Tensor], loss: Callable[[], Tensor]) -> None:
     optimiser.step(closure)  # type: ignore[no-untyped-call]
 
 
+def curve(scores: NDArray[np.float32], unknown: NDArray[np.float32], labels: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(len(THRESHOLDS), 3): right, wrong and accepted at each threshold, for classes (N,); from G on they are none.
+
+    Right and wrong are shares of the gestures, accepted is one of the non-gestures; NaN where there are none.
+    """
+    confidence, known = scores.max(axis=1) * (1 - unknown), labels < scores.shape[1]
+    right = scores.argmax(axis=1) == labels
+    published = confidence[None, :] >= np.array(THRESHOLDS)[:, None]
+    with np.errstate(invalid="ignore"):
+        gestures, others = np.float64(known.sum()), np.float64((~known).sum())
+        return np.stack(
+            [
+                (published & known & right).sum(1) / gestures,
+                (published & known & ~right).sum(1) / gestures,
+                (published & ~known).sum(1) / others,
+            ],
+            1,
+        )
+
+
 def threshold(
-    scores: NDArray[np.float32], unknown: NDArray[np.float32], known: NDArray[np.bool_], lost: float = LOST
+    scores: NDArray[np.float32],
+    unknown: NDArray[np.float32],
+    labels: NDArray[np.int64],
+    sets: NDArray[np.int64] | None = None,
 ) -> float:
-    """The confidence that `lost` of the known gestures do not reach."""
-    confidence = scores.max(axis=1) * (1 - unknown)
-    return float(np.clip(np.quantile(confidence[known], lost), 0.05, 0.95))
+    """The confidence from which on answers are published: where right ones are worth most against wrong and accepted.
+
+    `sets` (N,) says to which set each belongs (simulated, real ...): every set counts the same, however large.
+    """
+    of = np.zeros(len(labels), np.int64) if sets is None else sets
+    worth = [_worth(curve(scores[of == k], unknown[of == k], labels[of == k])) for k in np.unique(of)]
+    return THRESHOLDS[int(np.mean(worth, axis=0).argmax())]
+
+
+def _worth(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    right, wrong, accepted = np.nan_to_num(points).T
+    return np.asarray(right - WRONG * wrong - ACCEPTED * accepted)

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from gestured.lab.augment import varied
 from gestured.lab.dataset import Samples
 from gestured.lab.decide import fit_decision, threshold
-from gestured.lab.fit import CLASSES, padded, targets
+from gestured.lab.fit import CLASSES, lengths_of, padded, targets
 from gestured.lab.nets import Perceptron, Recurrent
 from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan, folds, judged
 from gestured.lab.trajectory import trajectory_features
@@ -77,10 +77,13 @@ def model_answers(model: Model, samples: Samples) -> Answers:
     """Scores (N, G) and unknown (N,) of a model for all samples, in their order."""
     if model.metadata.features is not None:
         return model.run(samples.features())
-    order = np.argsort(samples.lengths(), kind="stable")
-    parts = [model.run(padded(samples, order[i : i + 200], 100).numpy()) for i in range(0, len(order), 200)]
-    back = np.argsort(order, kind="stable")
-    return np.concatenate([p[0] for p in parts])[back], np.concatenate([p[1] for p in parts])[back]
+    scores = np.zeros((len(samples), len(model.gestures)), np.float32)
+    unknown = np.zeros(len(samples), np.float32)
+    for length in np.unique(samples.lengths()):  # a window that is padded would seem to be over
+        same = np.flatnonzero(samples.lengths() == length)
+        for index in np.array_split(same, -(-len(same) // 200)):
+            scores[index], unknown[index] = model.run(padded(samples, index, 100).numpy())
+    return scores, unknown
 
 
 def simulated_figures(models: Mapping[str, Path], data: TrainingData) -> dict[str, dict[str, Any]]:
@@ -121,7 +124,9 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
         for held in folds(real):
             keep = np.concatenate([np.ones(simulated_rows, bool), ~held[labels >= 0]])
             part = Calibrated(
-                {n: x[torch.from_numpy(keep)] for n, x in calibrated.logits.items()}, calibrated.labels[keep]
+                {n: x[torch.from_numpy(keep)] for n, x in calibrated.logits.items()},
+                calibrated.labels[keep],
+                calibrated.sets[keep],
             )
             module, calibration, _ = judged(trained, name, part)
             with torch.no_grad():
@@ -157,7 +162,7 @@ def held_out_kinds(trained: Trained, data: TrainingData, plan: TrainingPlan, nam
         )
         with torch.no_grad():
             scores, unknown = decision(first(calibrate[0][seen]), second(calibrate[1][seen]))
-            least = threshold(scores.numpy(), unknown.numpy(), calibrate[2][seen] < len(GESTURES))
+            least = threshold(scores.numpy(), unknown.numpy(), calibrate[2][seen])
             for embedded, features, labels in tests.values():
                 chosen = np.isin(labels, hidden)
                 scores, unknown = decision(first(embedded[chosen]), second(features[chosen]))
@@ -189,9 +194,10 @@ def _cues(net: Recurrent, samples: Samples, plan: TrainingPlan, *, vary: bool = 
         for start in range(0, len(index), 256):
             chosen = index[start : start + 256]
             x = padded(samples, chosen, plan.fit.longest)
+            lengths = lengths_of(samples, chosen, plan.fit.longest)
             for y in (x, varied(x, generator)) if vary else (x,):
-                embedded.append(net.embed(y))
-                features.append(trajectory_features(y))
+                embedded.append(net.embed(y, lengths))
+                features.append(trajectory_features(y, lengths))
                 found.append(labels[chosen])
     return torch.cat(embedded), torch.cat(features), np.concatenate(found)
 

@@ -45,39 +45,49 @@ class Facts:
     calibration: Mapping[str, Any]
     training_data: str  # sha256
     quantiles: Mapping[str, Any]
+    classes: Sequence[str] | None = None  # all that the nets tell apart, gestures first
+    provisional: Mapping[str, Any] | None = None  # when an answer may be given before the end (`early`)
     learned_from: Sequence[Mapping[str, Any]] | None = None  # `origins`; None where nobody knows
 
     def metadata(self) -> dict[str, str]:
         """As it stands in the file."""
         people = {} if self.learned_from is None else {origin.KEY: json.dumps([dict(one) for one in self.learned_from])}
-        return people | {
-            "gestures": json.dumps(list(self.gestures)),
-            "kind": self.kind,
-            "version": self.version,
-            "rows": str(self.window.rows),
-            "columns": str(self.window.columns),
-            "rate_hz": repr(self.window.rate_hz),
-            "window": self.window.to_json(),
-            "calibration": json.dumps(dict(self.calibration), allow_nan=False),
-            "training_data": self.training_data,
-            "quantiles": json.dumps(dict(self.quantiles), allow_nan=False),
-        }
+        more: dict[str, Any] = {"classes": self.classes, "provisional": self.provisional}
+        known = {key: json.dumps(value, allow_nan=False) for key, value in more.items() if value is not None}
+        return (
+            people
+            | known
+            | {
+                "gestures": json.dumps(list(self.gestures)),
+                "kind": self.kind,
+                "version": self.version,
+                "rows": str(self.window.rows),
+                "columns": str(self.window.columns),
+                "rate_hz": repr(self.window.rate_hz),
+                "window": self.window.to_json(),
+                "calibration": json.dumps(dict(self.calibration), allow_nan=False),
+                "training_data": self.training_data,
+                "quantiles": json.dumps(dict(self.quantiles), allow_nan=False),
+            }
+        )
 
 
 def export_net(module: torch.nn.Module, path: str | Path, facts: Facts) -> dict[str, float]:
     """Write a torch module whose `forward` takes frames (B, T, R, C) and gives calibrated outputs.
 
-    `forward` returns (scores (B, G), unknown (B,)). B and T stay open. Gives the file's size in bytes and the largest
-    difference from torch; raises ModelError where it is above `PARITY` or a check fails.
+    `forward` returns (scores (B, G), unknown (B,)), and perhaps an embedding (B, E). B and T stay open.
+    Gives the file's size in bytes and the largest difference from torch; raises ModelError where it is above `PARITY`
+    or a check fails.
     """
     module = module.eval()
     rows, columns = facts.window.rows, facts.window.columns
 
     def truth(frames: NDArray[np.float32]) -> Outputs:
         with torch.no_grad():
-            scores, unknown = module(torch.from_numpy(frames))
-        return scores.numpy(), unknown.numpy()
+            return tuple(output.numpy() for output in module(torch.from_numpy(frames)))
 
+    example = np.round(_windows(2, 12, rows, columns), 3)
+    names = ["scores", "unknown", "embedding"][: len(truth(example))]
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as directory:
         traced = Path(directory) / "traced.onnx"
         # The tracer warns of whatever could be frozen into the graph; `_compare` finds what is.
@@ -91,11 +101,10 @@ def export_net(module: torch.nn.Module, path: str | Path, facts: Facts) -> dict[
             dynamo=False,
             opset_version=OPSET,
             input_names=["frames"],
-            output_names=["scores", "unknown"],
-            dynamic_axes={"frames": {0: "B", 1: "T"}, "scores": {0: "B"}, "unknown": {0: "B"}},
+            output_names=names,
+            dynamic_axes={"frames": {0: "B", 1: "T"}} | {name: {0: "B"} for name in names},
         )
         proto = onnx.load(traced)
-    example = np.round(_windows(2, 12, rows, columns), 3)
     inputs = [_windows(b, t, rows, columns) for b in BATCHES for t in CHECKED_LENGTHS]
     return _finish(proto, Path(path), facts.metadata(), example, truth, inputs)
 
@@ -169,7 +178,7 @@ def _finish(
     proto.graph.name, proto.graph.doc_string = metadata["kind"], ""
     for node in proto.graph.node:
         node.doc_string = ""  # may hold paths of the machine that trained it
-    scores, unknown = truth(example)
+    scores, unknown = truth(example)[:2]
     helper.set_model_props(proto, metadata | {"self_test": SelfTest(example, scores, unknown).to_json()})
     try:
         onnx.checker.check_model(proto, full_check=True)
@@ -185,13 +194,17 @@ def _compare(
     model: Model, truth: Callable[[NDArray[np.float32]], Outputs], inputs: Sequence[NDArray[np.float32]]
 ) -> float:
     """The largest difference between the file and the trained model, and between a batch and its members."""
+
+    def outputs(batch: NDArray[np.float32]) -> Outputs:
+        return (*model.run(batch), model.embed(batch)) if model.embeds else model.run(batch)
+
     largest = 0.0
     for batch in inputs:
-        found, expected = model.run(batch), truth(batch)
-        alone = [model.run(batch[k : k + 1]) for k in range(min(len(batch), 7))]
+        found, expected = outputs(batch), truth(batch)
+        alone = [outputs(batch[k : k + 1]) for k in range(min(len(batch), 7))]
         for one, other in (
             *zip(found, expected, strict=True),
-            *((found[n][: len(alone)], np.concatenate([a[n] for a in alone])) for n in (0, 1)),
+            *((found[n][: len(alone)], np.concatenate([a[n] for a in alone])) for n in range(len(found))),
         ):
             difference = float(np.abs(one - other).max()) if one.shape == other.shape else math.inf
             largest = max(largest, difference)

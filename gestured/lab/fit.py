@@ -2,7 +2,8 @@
 
 Stage one learns everything that is simulated, once. Stage two goes on from there with real recordings among the
 simulated ones; it is short, so that folds over real subjects can each have their own. Every batch is varied after
-the split (`augment`). Nothing is padded with meaning: answers are read at the last active frame.
+the split (`augment`), and some of its windows are cut short (`prefixes`). Nothing is padded with meaning: the
+networks are told how long each window is.
 """
 
 import warnings
@@ -18,6 +19,7 @@ from torch import Tensor, nn
 from gestured.lab.augment import symmetry_table, turned, varied
 from gestured.lab.dataset import WINDOW, Samples
 from gestured.lab.nets import CnnLstm, Lstm
+from gestured.lab.prefixes import askable, drawn, floors, shortened
 from gestured.lab.progress import progress
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features
 from gestured.record.files import PUBLIC, atomic_write
@@ -31,13 +33,14 @@ CLASSES: list[str] = [*GESTURES, *NON_GESTURES]  # non-gestures are classes of t
 class FitConfig:
     """Every number that shapes a training run, with its reason."""
 
-    epochs: int = 20
+    epochs: int = 30
     batch: int = 64  # half as many steps with 128 learned far less
     rates: tuple[float, float, float] = (4e-3, 8e-3, 3e-3)  # of each of NETS; they fall to 0 with a cosine
     decay: float = 1e-2
     smoothing: float = 0.03  # of labels: keeps the scores calibrated
     clip: float = 1.0
     longest: int = 80  # frames: five seconds and their context
+    unfinished: float = 0.4  # share of the windows that are cut short
     real_epochs: int = 3
     real_rate: float = 0.15  # of the rates above
     real_share: float = 0.3  # of stage two's samples that are real
@@ -71,6 +74,11 @@ def padded(samples: Samples, index: NDArray[np.int64], longest: int) -> Tensor:
     return torch.from_numpy(out)
 
 
+def lengths_of(samples: Samples, index: NDArray[np.int64], longest: int) -> Tensor:
+    """(B,) frames of each window as `padded` gives it."""
+    return torch.from_numpy(np.minimum(samples.lengths()[index], longest))
+
+
 def one_epoch(
     nets: nn.ModuleDict,
     optimiser: torch.optim.Optimizer,
@@ -89,13 +97,19 @@ def one_epoch(
     nets.train()
     streams = [list(_plan(s, y, config, rng, chosen)) for s, y, chosen in sets]
     plan = [item for stream in streams for item in stream]
+    known = {id(samples): (askable(samples), floors(samples)) for samples, _, _ in sets}
     total = 0.0
     for k in progress(rng.permutation(len(plan)), len(plan), title):
         samples, labels, index = plan[k]
         symmetry = int(rng.integers(8))
-        x = varied(turned(padded(samples, index, config.longest), symmetry), generator)
+        asked, least = known[id(samples)]
+        x, lengths = padded(samples, index, config.longest), lengths_of(samples, index, config.longest)
+        cut = torch.from_numpy(np.minimum(drawn(index, samples, asked, config.unfinished, rng), config.longest))
+        lengths = torch.where(cut > 0, cut, lengths)
+        x = torch.where((cut > 0)[:, None, None, None], shortened(x, lengths, torch.from_numpy(least[index])), x)
+        x = varied(turned(x, symmetry), generator)
         y = table[symmetry][torch.from_numpy(labels[index])]
-        loss = torch.stack([criterion(net(x), y) for net in nets.values()]).sum()
+        loss = torch.stack([criterion(net(x, lengths), y) for net in nets.values()]).sum()
         optimiser.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         nn.utils.clip_grad_norm_(nets.parameters(), config.clip)
@@ -130,7 +144,10 @@ def pretrain(samples: Samples, config: FitConfig, checkpoint: Path) -> nn.Module
         net.perceptron.fit_scale(
             torch.cat(
                 [
-                    trajectory_features(padded(samples, some[i : i + 256], config.longest))
+                    trajectory_features(
+                        padded(samples, some[i : i + 256], config.longest),
+                        lengths_of(samples, some[i : i + 256], config.longest),
+                    )
                     for i in range(0, len(some), 256)
                 ]
             )
@@ -196,8 +213,9 @@ def logits(nets: nn.ModuleDict, samples: Samples, config: FitConfig) -> dict[str
     with torch.no_grad():
         for i in range(0, len(order), 256):
             x = padded(samples, order[i : i + 256], config.longest)
+            lengths = lengths_of(samples, order[i : i + 256], config.longest)
             for name, net in nets.items():
-                found[name].append(net(x))
+                found[name].append(net(x, lengths))
     back = torch.from_numpy(np.argsort(order, kind="stable"))
     return {name: torch.cat(parts)[back] for name, parts in found.items()}
 

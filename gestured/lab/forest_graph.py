@@ -19,7 +19,7 @@ from gestured.core.errors import ModelError
 OPSET = 17
 LEAST_CHANCE = 1e-3  # a forest's probabilities are not trusted below this, nor above 1 - this
 
-Outputs = tuple[NDArray[np.float32], NDArray[np.float32]]  # scores (B, G), unknown (B,)
+Outputs = tuple[NDArray[np.float32], ...]  # scores (B, G), unknown (B,), perhaps an embedding (B, E)
 
 
 def forest_outputs(probabilities: NDArray[Any], gestures: int, calibration: Mapping[str, Any]) -> Outputs:

@@ -1,7 +1,9 @@
 """The networks: CNN-LSTM and LSTM of the paper, the trajectory net that checks them, and how they decide together.
 
-All take windows (B, T, R, C) float32, 0..1, at the model's grid and rate. Padding and idle frames at the end
-change nothing by construction: every answer is taken at the last active frame.
+All take windows (B, T, R, C) float32, 0..1, at the model's grid and rate. Every answer is taken one frame after the
+last active one: an idle frame there says that the gesture is over, and more of them change nothing by construction. A
+window that ends in an active frame is one of a gesture that goes on, and is answered as such.
+In a batch that is padded, `lengths` (B,) are the true numbers of frames; without them all windows are as long.
 """
 
 import torch
@@ -23,8 +25,30 @@ def last_active(x: Tensor) -> Tensor:
     return (active_frames(x) * index).amax(1).to(torch.int64)
 
 
-class Recurrent(nn.Module):
-    """An LSTM of 32 units over per-frame features, read at the last active frame, and a linear head."""
+def read_at(x: Tensor, lengths: Tensor | None = None) -> Tensor:
+    """(B, T, R, C) -> (B,) int64 index of the frame after the last active one, or of the last frame."""
+    end = torch.full_like(last_active(x), x.shape[1]) if lengths is None else lengths
+    return torch.minimum(last_active(x) + 1, end - 1)
+
+
+class Opinion(nn.Module):
+    """A network: windows -> a state -> logits. Without `lengths` all windows of a batch are as long as it."""
+
+    def embed(self, x: Tensor, lengths: Tensor | None = None) -> Tensor:
+        """(B, T, R, C) -> (B, units): the state that the head sees."""
+        raise NotImplementedError
+
+    def judge(self, state: Tensor) -> Tensor:
+        """(B, units) -> (B, classes) logits."""
+        raise NotImplementedError
+
+    def forward(self, x: Tensor, lengths: Tensor | None = None) -> Tensor:
+        """(B, T, R, C) -> (B, classes) logits."""
+        return self.judge(self.embed(x, lengths))
+
+
+class Recurrent(Opinion):
+    """An LSTM of 32 units over per-frame features, read at `read_at`, and a linear head."""
 
     def __init__(self, inputs: int, classes: int, units: int = 32) -> None:
         super().__init__()
@@ -37,15 +61,15 @@ class Recurrent(nn.Module):
         """(B, T, R, C) -> (B, T, inputs); the whole frame, flattened."""
         return SCALE * x.flatten(2)
 
-    def embed(self, x: Tensor) -> Tensor:
-        """(B, T, R, C) -> (B, units): the state at the last active frame."""
+    def embed(self, x: Tensor, lengths: Tensor | None = None) -> Tensor:
+        """(B, T, R, C) -> (B, units): the state at `read_at`."""
         states: Tensor = self.lstm(self.features(x))[0]
-        index = last_active(x)[:, None, None].expand(-1, 1, states.shape[2])
+        index = read_at(x, lengths)[:, None, None].expand(-1, 1, states.shape[2])
         return states.gather(1, index)[:, 0]
 
-    def forward(self, x: Tensor) -> Tensor:
-        """(B, T, R, C) -> (B, classes) logits."""
-        logits: Tensor = self.head(self.embed(x))
+    def judge(self, state: Tensor) -> Tensor:
+        """(B, units) -> (B, classes) logits."""
+        logits: Tensor = self.head(state)
         return logits
 
 
@@ -103,9 +127,14 @@ class Perceptron(nn.Module):
         self.mean.copy_(features.mean(0))
         self.scale.copy_(features.std(0).clamp(min=1e-3))
 
+    def embed(self, features: Tensor) -> Tensor:
+        """(B, inputs) -> (B, units): the last hidden layer."""
+        hidden: Tensor = self.layers[:-1](((features - self.mean) / self.scale).clamp(-6, 6))
+        return hidden
+
     def forward(self, features: Tensor) -> Tensor:
         """(B, inputs) -> (B, classes) logits."""
-        logits: Tensor = self.layers(((features - self.mean) / self.scale).clamp(-6, 6))
+        logits: Tensor = self.layers[-1](self.embed(features))
         return logits
 
 
@@ -157,13 +186,17 @@ class Decision(nn.Module):
 class Judged(nn.Module):
     """What is exported: a recurrent net, the trajectory net as its second opinion, and the decision."""
 
-    def __init__(self, net: nn.Module, trajectory: nn.Module, decision: Decision) -> None:
+    def __init__(self, net: Opinion, trajectory: Opinion, decision: Decision) -> None:
         super().__init__()
         self.net = net
         self.trajectory = trajectory
         self.decision = decision
 
-    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor]:
-        """(B, T, R, C) -> scores (B, G) given that it is a gesture, unknown (B,)."""
-        scores, unknown = self.decision(self.net(frames), self.trajectory(frames))
-        return scores, unknown
+    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """(B, T, R, C) -> scores (B, G) given that it is a gesture, unknown (B,), embedding (B, E).
+
+        The embedding is what the two heads see: the recurrent net's state, then the trajectory net's hidden layer.
+        """
+        state, hidden = self.net.embed(frames), self.trajectory.embed(frames)
+        scores, unknown = self.decision(self.net.judge(state), self.trajectory.judge(hidden))
+        return scores, unknown, torch.cat([state, hidden], 1)

@@ -26,13 +26,15 @@ from gestured.lab.digest import code_digest
 from gestured.lab.export import Facts, export_forest, export_net, write_manifest
 from gestured.lab.fit import CLASSES, FitConfig, finetune, load_nets, logits, pretrain, save_nets, targets
 from gestured.lab.forest_graph import forest_outputs
-from gestured.lab.nets import Judged
+from gestured.lab.foretold import Foretold
+from gestured.lab.nets import Judged, Opinion
 from gestured.lab.recordings.origin import origins
 from gestured.record.arrays import read
 from gestured.simulator import GESTURES, NONE, wide
 
 REAL_FILES = ("capfingerid_gestures_dev.npz", "capfingerid_sessions_dev.npz")
 FOLDS = 3
+COHORT = 1_000_000  # the wide stream's people have larger numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +42,8 @@ class TrainingPlan:
     """How much is simulated; the numbers behind the shipped models are the defaults."""
 
     wide: int = 60_000
-    wide_check: int = 4_000  # takes to calibrate, and as many to test
+    wide_calibrate: int = 12_000  # takes to calibrate: thresholds by gesture and time need many people
+    wide_check: int = 4_000  # takes to test
     cohort: int = len(TRIALS)
     others: int = len(OTHER_TRIALS)
     forest: int = 20_000  # simulated samples for the forest
@@ -49,9 +52,8 @@ class TrainingPlan:
     @classmethod
     def quick(cls) -> "TrainingPlan":
         """A run of some minutes, to try the pipeline; its models are worth nothing."""
-        return cls(
-            1_500, 400, len(TRIALS), len(OTHER_TRIALS), 2_000, FitConfig(epochs=3, real_epochs=1, real_samples=1_000)
-        )
+        fit = FitConfig(epochs=3, real_epochs=1, real_samples=1_000)
+        return cls(wide=1_500, wide_calibrate=400, wide_check=400, forest=2_000, fit=fit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +72,7 @@ def load_data(plan: TrainingPlan, cache: Path, real: Path | None, jobs: int) -> 
     """Simulate, or take from the cache, and read the real recordings where they are."""
     teach, check, test = (
         simulated(cache, "wide", seed, count, jobs)
-        for seed, count in ((1, plan.wide), (2, plan.wide_check), (3, plan.wide_check))
+        for seed, count in ((1, plan.wide), (2, plan.wide_calibrate), (3, plan.wide_check))
     )
     cohort = simulated(cache, "cohort", 0, plan.cohort, jobs)
     others = simulated(cache, "others", 0, plan.others, jobs)
@@ -114,6 +116,7 @@ class Trained:
 
     nets: nn.ModuleDict
     held_out: dict[str, Tensor] | None  # (G, K) logits of each net over the real samples, None without any
+    folds: list[nn.ModuleDict] = field(default_factory=list)  # those that had not seen the subjects of `folds`
 
 
 def learn(plan: TrainingPlan, data: TrainingData, cache: Path) -> Trained:
@@ -128,11 +131,13 @@ def learn(plan: TrainingPlan, data: TrainingData, cache: Path) -> Trained:
         return Trained(start, None)
     key += data.real.digest()[:6]
     held_out = {name: torch.zeros(len(data.real), len(CLASSES)) for name in start}
+    apart: list[nn.ModuleDict] = []
     for k, held in enumerate(folds(data.real)):
-        nets = _kept(cache / f"fold{k}-{key}.npz", start, data, data.real.take(~held), plan, f"fold {k + 1}/{FOLDS}")
-        for name, found in logits(nets, data.real.take(held), plan.fit).items():
+        seen, path = data.real.take(~held), cache / f"fold{k}-{key}.npz"
+        apart.append(_kept(path, start, data, seen, plan, f"fold {k + 1}/{FOLDS}"))
+        for name, found in logits(apart[-1], data.real.take(held), plan.fit).items():
             held_out[name][torch.from_numpy(held)] = found
-    return Trained(_kept(cache / f"final-{key}.npz", start, data, data.real, plan, "final"), held_out)
+    return Trained(_kept(cache / f"final-{key}.npz", start, data, data.real, plan, "final"), held_out, apart)
 
 
 def _kept(
@@ -149,16 +154,27 @@ class Calibrated:
 
     logits: dict[str, Tensor]
     labels: NDArray[np.int64]
+    sets: NDArray[np.int64]  # 0: anybody on any sensor, 1: the cohort, 2: real people
 
 
 def calibration_set(trained: Trained, data: TrainingData, plan: TrainingPlan) -> Calibrated:
     """People that no network has seen: simulated ones, and each real subject by the fold that left it out."""
     found, labels = logits(trained.nets, data.calibrate, plan.fit), targets(data.calibrate)
+    sets = (data.calibrate.people < COHORT).astype(np.int64)
     if data.real is not None and trained.held_out is not None:
         found = {name: torch.cat([found[name], trained.held_out[name]]) for name in found}
         labels = np.concatenate([labels, targets(data.real)])
+        sets = np.concatenate([sets, np.full(len(data.real), 2)])
     usable = labels >= 0
-    return Calibrated({name: x[torch.from_numpy(usable)] for name, x in found.items()}, labels[usable])
+    return Calibrated({name: x[torch.from_numpy(usable)] for name, x in found.items()}, labels[usable], sets[usable])
+
+
+def foretold(trained: Trained, data: TrainingData, plan: TrainingPlan) -> Foretold:
+    """What networks that have not seen them say of the calibration people before their gestures are over."""
+    parts = [(trained.nets, data.calibrate)]
+    if data.real is not None:
+        parts += [(nets, data.real.take(held)) for nets, held in zip(trained.folds, folds(data.real), strict=True)]
+    return Foretold.of(parts, plan.fit)
 
 
 def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged, dict[str, Any], dict[str, Any]]:
@@ -168,14 +184,17 @@ def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged,
     with torch.no_grad():
         scores, unknown = decision(first, second)
     known = calibrated.labels < len(GESTURES)
-    least = threshold(scores.numpy(), unknown.numpy(), known)
+    least = threshold(scores.numpy(), unknown.numpy(), calibrated.labels, calibrated.sets)
     calibration = {
         "temperature": (1 / decision.share.clamp(min=1e-6)).tolist(),  # of the network and of the trajectory net
         "unknown_weight": decision.weight.tolist(),
         "unknown_bias": float(decision.bias),
         "threshold": least,
     }
-    module = Judged(trained.nets[name], trained.nets["trajectory"], decision).eval()
+    net, trajectory = trained.nets[name], trained.nets["trajectory"]
+    assert isinstance(net, Opinion)
+    assert isinstance(trajectory, Opinion)
+    module = Judged(net, trajectory, decision).eval()
     return module, calibration, answer_figures(scores.numpy().max(axis=1) * (1 - unknown.numpy()), known, least)
 
 
@@ -268,10 +287,12 @@ def train(plan: TrainingPlan, out: Path, cache: Path, real: Path | None, jobs: i
     }  # fmt: skip
     seen = quantiles(data.teach)
     out.mkdir(parents=True, exist_ok=True)
+    contacts = foretold(trained, data, plan)
     for name in ("cnn_lstm", "lstm"):
         module, calibration, answered = judged(trained, name, calibrated)
         common |= {"kind": name, "calibration": calibration, "quantiles": seen | answered}
-        export_net(module, out / f"{name}.onnx", Facts(**common))
+        rule = contacts.rule(name, module.decision, calibration["threshold"])
+        export_net(module, out / f"{name}.onnx", Facts(**common, classes=CLASSES, provisional=rule))
     forest, calibration, answered = grow_forest(data, plan, jobs)
     common |= {"kind": "touch_pattern_rf", "calibration": calibration, "quantiles": seen | answered}
     path = out / "touch_pattern_rf.onnx"

@@ -8,9 +8,9 @@ things: a second opinion.
 
 import torch
 import torch.nn.functional as F
-from torch import Tensor, nn
+from torch import Tensor
 
-from gestured.lab.nets import Perceptron, active_frames, last_active
+from gestured.lab.nets import Opinion, Perceptron, active_frames, last_active, read_at
 
 PATH_POINTS = 8  # of the path
 PATCH = 7  # taxels across the mean contact
@@ -75,14 +75,20 @@ def mean_blob(x: Tensor, s: dict[str, Tensor], weight: Tensor) -> Tensor:
     return (blob / (blob.amax((1, 2), keepdim=True) + 0.05)).flatten(1)
 
 
-def trajectory_features(x: Tensor) -> Tensor:
-    """(B, T, R, C) windows -> (B, F) features; idle frames at the end change nothing."""
+def trajectory_features(x: Tensor, lengths: Tensor | None = None) -> Tensor:
+    """(B, T, R, C) windows -> (B, F) features; of the idle frames at the end only the first counts.
+
+    `lengths` (B,) as in `nets`.
+    """
     time = x.shape[1]
     index = torch.arange(time, dtype=x.dtype)
     active = active_frames(x)
     last = last_active(x).to(x.dtype)[:, None]
     span = (index[None, :] <= last).to(x.dtype)
     s = per_frame(x)
+    end = read_at(x, lengths)
+    after = s["peak"].gather(1, end[:, None])[:, 0]  # what is still pressed there: little where the gesture is over
+    over = (end.to(x.dtype) > last[:, 0]).to(x.dtype)
     blob = mean_blob(x, s, active * s["peak"])
     n = active.sum(1) + EPS
     first = (active * (time - index)).amax(1)
@@ -162,7 +168,7 @@ def trajectory_features(x: Tensor) -> Tensor:
         _mean(s["peak"], active), _spread(s["peak"], active), _mean(s["total"], active) / 10,
         _spread(s["total"], active) / 10, _top(s["total"], active) / 10,
         _mean(s["x"], two) - _mean(s["x"], one), _mean(s["y"], two) - _mean(s["y"], one),
-        _top(s["peak"], one) - _top(s["peak"], two),
+        _top(s["peak"], one) - _top(s["peak"], two), over, after,
     ]  # fmt: skip
     return torch.cat([torch.stack(single, 1), path_x / size, path_y / size, path_x, path_y, *by_slot, blob], 1)
 
@@ -184,7 +190,7 @@ def _ends(v: Tensor, weight: Tensor, index: Tensor, at: Tensor) -> Tensor:
     return _mean(v, near)
 
 
-class TrajectoryNet(nn.Module):
+class TrajectoryNet(Opinion):
     """Windows -> logits, by trajectory features alone."""
 
     def __init__(self, rows: int, columns: int, classes: int) -> None:
@@ -192,7 +198,11 @@ class TrajectoryNet(nn.Module):
         features = trajectory_features(torch.zeros(1, 3, rows, columns)).shape[1]
         self.perceptron = Perceptron(features, classes)
 
-    def forward(self, x: Tensor) -> Tensor:
-        """(B, T, R, C) -> (B, classes) logits."""
-        logits: Tensor = self.perceptron(trajectory_features(x))
+    def embed(self, x: Tensor, lengths: Tensor | None = None) -> Tensor:
+        """(B, T, R, C) -> (B, units): the last hidden layer."""
+        return self.perceptron.embed(trajectory_features(x, lengths))
+
+    def judge(self, state: Tensor) -> Tensor:
+        """(B, units) -> (B, classes) logits."""
+        logits: Tensor = self.perceptron.layers[-1](state)
         return logits

@@ -56,6 +56,7 @@ class Model:
                 )
         self._session = _open_session(data)
         self._input = self._check_shapes()
+        self.embeds = any(output.name == "embedding" for output in self._session.get_outputs())
         self.self_test_error = self._self_test()
 
     def classify(self, segment: Segment) -> Scores:
@@ -92,17 +93,7 @@ class Model:
 
         ValueError where the model fails, takes longer than `limit_s`, or what it gives are no probabilities.
         """
-        import onnxruntime
-
-        options = onnxruntime.RunOptions()
-        options.log_severity_level = 4
-        try:
-            with limited(options, limit_s):
-                scores, unknown = self._session.run(("scores", "unknown"), {self._input: batch}, options)
-        except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
-            if options.terminate:
-                raise ValueError(f"was ended after {limit_s:g} s, in which it did not answer") from error
-            raise ValueError(f"onnxruntime cannot run it: {_brief(error)}") from error
+        scores, unknown = self._outputs(("scores", "unknown"), batch, limit_s)
         expected = (len(batch), len(self.gestures))
         if scores.shape != expected or unknown.shape != expected[:1]:
             found = f"{scores.shape} and {unknown.shape}"
@@ -113,6 +104,28 @@ class Model:
         if not (both.min() >= -1e-4 and both.max() <= 1.0 + 1e-4 and np.abs(sums - 1.0).max() <= 1e-3):
             raise ValueError("outputs are not probabilities: expected 0 to 1, scores that add up to 1")
         return np.clip(scores, 0.0, 1.0), np.clip(unknown, 0.0, 1.0)
+
+    def embed(self, batch: NDArray[np.float32], limit_s: float = BATCH_S) -> NDArray[np.float32]:
+        """(B, T, R, C) windows -> (B, E) embedding, of a model that has one (`embeds`). ValueError as for `run`."""
+        (embedding,) = self._outputs(("embedding",), batch, limit_s)
+        if embedding.ndim != 2 or len(embedding) != len(batch) or not np.isfinite(embedding).all():
+            raise ValueError(f"embedding has the shape {embedding.shape}, expected ({len(batch)}, E), all finite")
+        return embedding
+
+    def _outputs(self, names: Sequence[str], batch: NDArray[np.float32], limit_s: float) -> list[NDArray[np.float32]]:
+        """The graph's outputs of these names for a batch; ValueError where it fails or takes too long."""
+        import onnxruntime
+
+        options = onnxruntime.RunOptions()
+        options.log_severity_level = 4
+        try:
+            with limited(options, limit_s):
+                found: list[NDArray[np.float32]] = self._session.run(names, {self._input: batch}, options)
+        except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
+            if options.terminate:
+                raise ValueError(f"was ended after {limit_s:g} s, in which it did not answer") from error
+            raise ValueError(f"onnxruntime cannot run it: {_brief(error)}") from error
+        return found
 
     def report(self) -> dict[str, Any]:
         """What is known of it, as JSON values."""
@@ -138,14 +151,15 @@ class Model:
         takes = "frames" if self.metadata.features is None else "features"
         if names != [takes]:
             raise ValueError(f"has inputs {names}, expected ['{takes}'] as its metadata say")
-        if sorted(o.name for o in outputs) != ["scores", "unknown"]:
-            raise ValueError(f"has outputs {[o.name for o in outputs]}, expected 'scores' and 'unknown'")
+        if [o.name for o in outputs] not in (["scores", "unknown"], ["scores", "unknown", "embedding"]):
+            found_names = [o.name for o in outputs]
+            raise ValueError(f"has outputs {found_names}, expected 'scores', 'unknown' and perhaps 'embedding'")
         count = len(self.gestures)
         own: tuple[int, ...] = (self.rows, self.columns)
         if self.metadata.features is not None:
             own = (len(self.metadata.features),)
         free = 1 if takes == "features" else 2  # the dimensions that must be open: B, or B and T
-        shapes = {takes: (None,) * free + own, "scores": (None, count), "unknown": (None,)}
+        shapes = {takes: (None,) * free + own, "scores": (None, count), "unknown": (None,), "embedding": (None, None)}
         for value in (*inputs, *outputs):
             expected = shapes[value.name]
             if value.type != "tensor(float)":

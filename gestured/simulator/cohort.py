@@ -20,6 +20,7 @@ GESTURES: tuple[str, ...] = tuple(TEN)
 SEQUENCES = ("tap_then_swipe", "tap_then_hold", "triple_tap")
 NON_GESTURES: tuple[str, ...] = tuple(kind for kind in OTHERS if kind not in SEQUENCES)
 NONE = "none"
+FLICKS = 0.25  # share of the hardest takes in which strokes are hurried, down to two to four frames
 
 
 def perform(
@@ -29,9 +30,11 @@ def perform(
     speed: str = "normal",
     inclination: int = 1,
     extent: tuple[float, float] = (72.0, 72.0),
+    hurry: float = 1.0,
 ) -> Performance:
     """One performance of a gesture or non-gesture on a pad of `extent` millimetres (width, height).
 
+    `hurry` is a factor on the speed of strokes beyond `speed`: with 2 a swipe lasts two to four frames.
     Raises ValueError for an unknown kind, speed or inclination.
     """
     if kind not in TEN and kind not in OTHERS:
@@ -47,7 +50,7 @@ def perform(
         extent[0],
         extent[1],
         speed,
-        participant.rate(rng, speed),
+        participant.rate(rng, speed) * hurry,
         turn + participant.bias,
         grow,
         press,
@@ -69,9 +72,10 @@ def gesture_take(
     inclination: int = 1,
     lead_s: float = 1.3,
     tail_s: float = 0.8,
+    hurry: float = 1.0,
 ) -> Take:
     """One performance with an idle pad before (lead_s, plus up to one frame) and after it."""
-    performance = perform(kind, participant, rng, speed, inclination, sensor.extent)
+    performance = perform(kind, participant, rng, speed, inclination, sensor.extent, hurry)
     start = lead_s + float(rng.random()) / sensor.rate_hz
     return sensor.record([(start, performance)], start + performance.duration_s + tail_s, rng)
 
@@ -163,7 +167,8 @@ def wide(
     pool = kinds if kinds is not None else NON_GESTURES if rng.random() < non_gesture_share else GESTURES
     kind = pool[int(rng.integers(len(pool)))]
     speed = ("slow", "normal", "fast")[int(rng.integers(3))]
-    return gesture_take(kind, person, sensor, rng, speed, int(rng.integers(3)))
+    hurry = float(rng.uniform(1.3, 2.5)) if rng.random() < FLICKS * hard else 1.0
+    return gesture_take(kind, person, sensor, rng, speed, int(rng.integers(3)), hurry=hurry)
 
 
 def _person(seed: int, number: int) -> int:

@@ -45,8 +45,11 @@ class Nature:
     dead: int = 0
     stuck: int = 0
     bursts_per_minute: float = 0.0
+    line_bursts_per_minute: float = 0.0  # that hit a whole row or column for one frame
     jitter_s: float = 0.003
-    loss: float = 0.0  # probability of a frame, as the next two
+    loss: float = 0.0  # probability of a frame, as `duplicates` and `late`
+    loss_run: int = 4  # frames that are lost in a row at most
+    loss_every: int = 0  # each so manieth frame is lost, as by another sender on the same channel; 0 = none
     duplicates: float = 0.0
     late: float = 0.0
     touch_noise: float = 0.1  # taxels; NaN where the sensor reports no fingers

@@ -58,6 +58,10 @@ def disturb(
         form = str(rng.choice(["all", "row", "column", "taxel", "taxels"]))
         todo.append((float(start), Artefact(0.0, float(rng.uniform(0.01, 0.15)), form, float(rng.normal(0.0, 0.4)))))
     dt = 1.0 / sensor.rate_hz
+    if sensor.line_bursts_per_minute > 0.0:
+        for start in rng.uniform(0.0, times[-1], int(rng.poisson(sensor.line_bursts_per_minute * times[-1] / 60.0))):
+            form = str(rng.choice(["row", "column"]))
+            todo.append((float(start), Artefact(0.0, 1e-3, form, float(rng.normal(0.0, 0.6)))))
     for start, artefact in todo:
         first = int(np.searchsorted(times, start + artefact.start))
         last = max(int(np.searchsorted(times, start + artefact.stop + dt * rng.random())), first + 1)
@@ -111,7 +115,9 @@ def transmit(sensor: Nature, times: Array, rng: np.random.Generator) -> tuple[ND
     n = times.size
     keep = rng.random(n) >= sensor.loss
     for k in np.flatnonzero(rng.random(n) < sensor.loss / 4.0):
-        keep[k : k + int(rng.integers(2, 5))] = False
+        keep[k : k + int(rng.integers(2, sensor.loss_run + 1))] = False
+    if sensor.loss_every > 0:
+        keep[int(rng.integers(sensor.loss_every)) :: sensor.loss_every] = False
     if not keep.any():
         keep[0] = True
     copies = np.where(rng.random(n) < sensor.duplicates, 2, 1) * keep

@@ -6,6 +6,11 @@ import numpy as np
 
 from gestured.simulator.sensor import SimulatedSensor
 
+# Shares of the hardest sensors.
+FAINT = 0.3  # touches of 8 to 25 times the noise
+LINE_BURSTS = 0.15  # interference that hits whole rows or columns for a frame
+LOSS_IN_STEP = 0.15  # frames that are lost at regular distances
+
 
 def _log(rng: np.random.Generator, low: float, high: float) -> float:
     """A number between low and high, even on a logarithmic scale."""
@@ -56,6 +61,8 @@ def any_sensor(rng: np.random.Generator, hardness: float) -> SimulatedSensor:
 
     gain = float(rng.uniform(90.0, 220.0)) if screen else _log(rng, 40.0, 30000.0)
     snr = _log(rng, 300.0 * (8.0 / 300.0) ** hard if hard > 0 else 299.0, 300.0)
+    if trouble(FAINT):
+        snr = _log(rng, 8.0, 25.0)  # a thin or a thickly covered textile: touches barely stand out
     noise = 1.0 / snr
     lines = noise * float(rng.uniform(0.0, 0.8)) * hard
     relaxation, taus = _lags(rng, hard)
@@ -101,8 +108,11 @@ def any_sensor(rng: np.random.Generator, hardness: float) -> SimulatedSensor:
         dead=int(rng.integers(1, 4)) if trouble(0.25) else 0,
         stuck=int(rng.integers(1, 3)) if trouble(0.15) else 0,
         bursts_per_minute=float(rng.exponential(6.0)) if trouble(0.2) else 0.0,
+        line_bursts_per_minute=float(rng.exponential(40.0)) if trouble(LINE_BURSTS) else 0.0,
         jitter_s=float(rng.uniform(0.0, 0.012)) * hard,
         loss=float(rng.exponential(0.03)) if trouble(0.4) else 0.0,
+        loss_run=int(rng.integers(2, 7)),
+        loss_every=int(rng.integers(4, 12)) if trouble(LOSS_IN_STEP) else 0,
         duplicates=float(rng.uniform(0.0, 0.03)) if trouble(0.2) else 0.0,
         late=float(rng.uniform(0.0, 0.04)) if trouble(0.25) else 0.0,
         touch_noise=float(rng.uniform(0.03, 0.3)) if rng.random() < 0.6 else math.nan,

@@ -254,7 +254,9 @@ def test_what_is_measured_is_what_the_lab_measures_of_its_training_data() -> Non
     offsets = np.cumsum([0, *map(len, windows)], dtype=np.int64)
     labels, people = np.array(["one_tap"] * len(windows)), np.zeros(len(windows), np.int64)
     strength = np.array([s["strength"] for s in seen])
-    ours = train.quantiles(Samples(np.concatenate(windows), offsets, labels, labels, people, strength))
+    ends = np.array([len(w) - 1 for w in windows], np.int64)
+    samples = Samples(np.concatenate(windows), offsets, labels, labels, people, strength, people, ends)
+    ours = train.quantiles(samples)
     for name in ("strength", *MEASURES):
         expected = np.quantile([s[name] for s in seen], train.QUANTILES)
         assert ours[name] == pytest.approx(expected, rel=0.02, abs=2e-3), name

@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -136,7 +137,7 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     def real(cache: Path, folder: Path | None) -> Samples:
         taken = collect(s for i in range(120) for s in STREAMS["wide"](4, i))
         subjects = np.arange(len(taken)) % 6
-        return Samples(taken.frames, taken.offsets, taken.labels, taken.kinds, subjects, taken.strength)
+        return replace(taken, people=subjects)
 
     plan = train.TrainingPlan(80, 80, len(TRIALS), 300, 200, FitConfig(epochs=2, real_epochs=1, real_samples=64))
     monkeypatch.setattr(train, "simulated", simulated)

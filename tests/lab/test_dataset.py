@@ -110,8 +110,8 @@ def test_a_segment_is_named_after_what_it_holds() -> None:
     assert named(segment(10.0, 10.2), swipe) == []  # a piece of a gesture is no example of it
     assert named(segment(20.0, 21.0), swipe, palm) == []  # nobody knows what that was
     assert named(segment(12.0, 12.1), palm) == ["none"]  # a piece of a non-gesture is none as well
-    ((*_, strength),) = matched([segment(10.0, 11.0)], [swipe])
-    assert strength == pytest.approx(50)
+    (found,) = matched([segment(10.0, 11.0)], [swipe])
+    assert found.strength == pytest.approx(50)
 
 
 # --- the streams ---
@@ -122,7 +122,7 @@ def test_a_sample_carries_the_participant_of_its_plan(stream: str, plan: tuple[A
     for index in range(0, len(plan), 331):
         trial = plan[index]
         number, kind = (trial.participant, trial.gesture) if stream == "cohort" else trial[:2]
-        for _, label, found, person, _ in STREAMS[stream](0, index):
+        for _, label, found, person, *_ in STREAMS[stream](0, index):
             assert (person % 1000, found) == (number, kind)
             assert label == (kind if kind in GESTURES else "none")
 

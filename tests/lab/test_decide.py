@@ -7,7 +7,7 @@ torch = pytest.importorskip("torch", reason="needs the extra [lab]")
 
 from torch import Tensor
 
-from gestured.lab.decide import fit_decision, threshold
+from gestured.lab.decide import ACCEPTED, THRESHOLDS, WRONG, curve, fit_decision, threshold
 from gestured.lab.nets import Decision
 
 GESTURES, KINDS = 5, 4  # of gestures, and of non-gestures
@@ -148,21 +148,52 @@ def test_fitting_is_the_same_every_time() -> None:
     assert all(torch.equal(first[name], again[name]) for name in first)
 
 
-@pytest.mark.parametrize("count", [40, 999, 5000])
-@pytest.mark.parametrize("lost", [0.0, 0.01, 0.025, 0.2])
-def test_the_threshold_costs_the_share_it_was_given(count: int, lost: float) -> None:
-    rng = np.random.default_rng(count)
-    scores = rng.dirichlet(np.ones(4) * 0.6, count).astype(np.float32)
-    unknown = (0.3 * rng.random(count)).astype(np.float32)
-    known = rng.random(count) < 0.8
-    unknown[~known] = 0.99  # what is none at all must not count
-    least = threshold(scores, unknown, known, lost)
-    share = ((scores.max(axis=1) * (1 - unknown))[known] < least - 1e-6).mean()
-    assert abs(share - lost) <= 1 / known.sum()
+def answers(count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Scores, unknown and classes of 4 gestures and none; what has a confidence c is right with probability c."""
+    rng = np.random.default_rng(seed)
+    confidence = rng.random(count).astype(np.float32)
+    best = rng.integers(0, 4, count)
+    labels = np.where(rng.random(count) < confidence, best, (best + 1) % 4)
+    labels[rng.random(count) < 0.3] = 4
+    scores = np.full((count, 4), 0.1 / 3, np.float32)
+    scores[np.arange(count), best] = 0.9
+    return scores, 1 - confidence / np.float32(0.9), labels
+
+
+def worth(scores: np.ndarray, unknown: np.ndarray, labels: np.ndarray, least: float) -> float:
+    said, known = scores.max(axis=1) * (1 - unknown) >= least, labels < 4
+    right = scores.argmax(axis=1) == labels
+    return float((said & right)[known].mean() - WRONG * (said & ~right)[known].mean() - ACCEPTED * said[~known].mean())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_other_threshold_is_worth_more(seed: int) -> None:
+    made = answers(3000, seed)
+    best = threshold(*made)
+    assert worth(*made, best) >= max(worth(*made, least) for least in np.linspace(0.05, 0.95, 91)) - 1e-3
+
+
+def test_every_set_counts_the_same_however_large() -> None:
+    small, large = answers(300, 1), answers(30_000, 2)
+    scores, unknown, labels = (np.concatenate([a, b]) for a, b in zip(small, large, strict=True))
+    unknown[:300] = unknown[:300] * 0.1
+    sets = np.repeat([0, 1], [300, 30_000])
+    again = np.concatenate([np.tile(np.arange(300), 50), np.arange(300, 30_300)])
+    assert threshold(scores, unknown, labels, sets) == threshold(
+        scores[again], unknown[again], labels[again], sets[again]
+    )
+
+
+def test_the_curve_counts_what_a_user_sees() -> None:
+    scores = np.float32([[0.9, 0.1], [0.9, 0.1], [0.2, 0.8], [0.6, 0.4]])
+    points = curve(scores, np.zeros(4, np.float32), np.array([0, 1, 1, 2]))
+    at = dict(zip(THRESHOLDS, points.tolist(), strict=True))
+    assert at[0.5] == pytest.approx([2 / 3, 1 / 3, 1])
+    assert at[0.7] == pytest.approx([2 / 3, 1 / 3, 0])
+    assert at[0.85] == pytest.approx([1 / 3, 1 / 3, 0])
 
 
 def test_the_threshold_stays_within_its_bounds() -> None:
     sure = np.tile(np.float32([1, 0, 0]), (50, 1))
-    all_known, nothing = np.ones(50, bool), np.zeros(50, np.float32)
-    assert threshold(sure, nothing, all_known) == pytest.approx(0.95)
-    assert threshold(sure, nothing + 1, all_known) == pytest.approx(0.05)
+    for label in (0, 1):
+        assert 0.05 <= threshold(sure, np.zeros(50, np.float32), np.full(50, label)) <= 0.95

@@ -216,7 +216,7 @@ def test_the_plan_counts_what_was_performed(tmp_path: Path) -> None:
 
 
 def named_people(samples: Samples, people: np.ndarray) -> Samples:
-    return Samples(samples.frames, samples.offsets, samples.labels, samples.kinds, people, samples.strength)
+    return replace(samples, people=people)
 
 
 @pytest.mark.usefixtures("few")

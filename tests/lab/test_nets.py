@@ -94,7 +94,7 @@ def test_what_is_exported_gives_probabilities(nets: nn.ModuleDict) -> None:
     decision.weight.copy_(torch.tensor([0.4, 0.3, 0.1, 0.1, 0.2, 0.5]))
     x = nn.utils.rnn.pad_sequence([torch.from_numpy(f) for f in MADE.values()], batch_first=True)
     with torch.no_grad():
-        scores, unknown = Judged(nets["cnn_lstm"], nets["trajectory"], decision).eval()(x)
+        scores, unknown, _ = Judged(nets["cnn_lstm"], nets["trajectory"], decision).eval()(x)
     assert scores.shape == (len(MADE), 10)
     np.testing.assert_allclose(scores.sum(1), 1.0, atol=1e-5)
     assert float(scores.min()) >= 0

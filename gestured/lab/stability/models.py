@@ -17,7 +17,7 @@ from onnx.reference import ReferenceEvaluator
 from onnx.reference.op_run import OpRun
 
 from gestured.core.features import touch_pattern
-from gestured.lab.nets import CnnLstm, Decision, Judged, Lstm, last_active
+from gestured.lab.nets import CnnLstm, Decision, Judged, Lstm, read_at
 from gestured.lab.stability.table import Table, Value
 from gestured.lab.trajectory import TrajectoryNet
 from gestured.model.model import LADDER, Model, shipped
@@ -129,7 +129,7 @@ def by_torch(module: Judged, dtype: torch.dtype = torch.float32, threads: int = 
 
     def run(values: NDArray[np.float32]) -> ScoreTable:
         with torch.no_grad():
-            scores, unknown = module.to(dtype)(torch.from_numpy(values).to(dtype))
+            scores, unknown, _ = module.to(dtype)(torch.from_numpy(values).to(dtype))
         return _joined(scores.numpy(), unknown.numpy())
 
     limited = _on_threads(threads, run)
@@ -143,7 +143,7 @@ def by_frames(module: Judged) -> Way:
     def run(values: NDArray[np.float32]) -> ScoreTable:
         with torch.no_grad():
             frames = torch.from_numpy(values)
-            state, last = None, int(last_active(frames))
+            state, last = None, int(read_at(frames))
             kept = torch.zeros(1, net.head.in_features)
             for k in range(last + 1):
                 kept, state = net.lstm(net.features(frames[:, k : k + 1]), state)

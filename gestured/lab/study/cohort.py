@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gestured.core.frames import Segment
 from gestured.core.window import Window
-from gestured.lab.dataset import TRIALS, WINDOW, Samples, collect, cuts, matched, truths
+from gestured.lab.dataset import TRIALS, WINDOW, Samples, collect, cuts, matched, sample, truths
 from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.record.files import PUBLIC, atomic_write
@@ -64,13 +64,9 @@ class Cohort:
         """The gestures through another window."""
         plan = self.trials()
         return collect(
-            (window.apply(segment).astype(np.float16), trial.gesture, trial.gesture, trial.participant, _peak(segment))
+            sample(segment, trial.gesture, trial.gesture, trial.participant, window)
             for trial, segment in zip(plan, map(self.segment, range(len(self))), strict=True)
         )
-
-
-def _peak(segment: Segment) -> float:
-    return float(segment.frames[segment.first : segment.last + 1].max()) / max(segment.noise, 1e-30)
 
 
 def _cut(seed: int, index: int) -> Segment | None:

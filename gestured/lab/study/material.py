@@ -1,6 +1,6 @@
 """What a cell learns from: gestures, Algorithm 1's copies of them, and strangers on random sensors."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -52,10 +52,9 @@ def equal_length(samples: Samples, frames: int) -> Samples:
     for i in range(len(samples)):
         window = samples.frames[samples.offsets[i] : samples.offsets[i + 1]][:frames]
         out[i, : len(window)] = window
-    return Samples(
-        out.reshape(-1, *out.shape[2:]), np.arange(len(samples) + 1, dtype=np.int64) * frames,
-        samples.labels, samples.kinds, samples.people, samples.strength,
-    )  # fmt: skip
+    return replace(
+        samples, frames=out.reshape(-1, *out.shape[2:]), offsets=np.arange(len(samples) + 1, dtype=np.int64) * frames
+    )
 
 
 @lru_cache(maxsize=4)

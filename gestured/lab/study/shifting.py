@@ -78,5 +78,7 @@ def copies(samples: Samples, threshold: float = THRESHOLD) -> Copies:
         np.tile(samples.kinds, edges),
         np.tile(samples.people, edges),
         np.tile(samples.strength, edges),
+        np.tile(samples.first, edges),
+        np.tile(samples.last, edges),
     )
     return Copies(made, np.tile(np.arange(count), edges), same.ravel())

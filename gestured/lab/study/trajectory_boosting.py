@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from gestured.lab.dataset import Samples
-from gestured.lab.fit import padded
+from gestured.lab.fit import lengths_of, padded
 from gestured.lab.study.training import LONGEST
 from gestured.lab.trajectory import trajectory_features
 
@@ -17,12 +17,12 @@ BATCH_WINDOWS = 256
 
 
 def trajectory_matrix(samples: Samples) -> NDArray[np.float32]:
-    """(G, F) of all samples; idle frames at the end change nothing, so batches may be padded."""
+    """(G, F) of all samples."""
     order = np.argsort(samples.lengths(), kind="stable")
+    batches = [order[i : i + BATCH_WINDOWS] for i in range(0, len(order), BATCH_WINDOWS)]
     with torch.no_grad():
         parts = [
-            trajectory_features(padded(samples, order[i : i + BATCH_WINDOWS], LONGEST)).numpy()
-            for i in range(0, len(order), BATCH_WINDOWS)
+            trajectory_features(padded(samples, b, LONGEST), lengths_of(samples, b, LONGEST)).numpy() for b in batches
         ]
     found = np.concatenate(parts)
     return np.asarray(found[np.argsort(order, kind="stable")], np.float32)

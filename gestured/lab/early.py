@@ -1,0 +1,178 @@
+"""When a provisional event may be given: thresholds by elapsed time, learned from people held out.
+
+Learn-then-Test (Angelopoulos and others, arXiv 2110.01052; for early decisions Ringel and others, ICML 2024, arXiv
+2402.00857, written anew from the papers): in each stretch of time since the onset the thresholds are tried from the
+safest one on, as long as a binomial test over people says that enough of the events they give are confirmed. Stretches
+follow one another: what was given in an earlier one is out of the later ones.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.measures import ACTIVE
+from gestured.lab.dataset import Samples
+from gestured.lab.prefixes import floors
+
+CONFIRMED = 0.97  # share of the events that the answer must confirm, in every stretch
+DOUBT = 0.1  # probability that a threshold is let through although it does not
+IN_A_ROW = 2  # frames that must agree: one alone may be noise
+# Beginnings of the stretches in s, half-way between frames at 15 Hz.
+STRETCHES = (0.0, 0.1, 0.167, 0.233, 0.3, 0.433, 0.633, 0.9, 1.3)
+LADDER = (
+    0.999, 0.998, 0.997, 0.996, 0.995, 0.993, 0.99, 0.987, 0.983, 0.98, 0.975, 0.97, 0.96, 0.95, 0.94, 0.92, 0.9, 0.87,
+    0.84, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.5,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a model said at every frame of G contacts, and what it answered in the end; N questions in all."""
+
+    contact: NDArray[np.int64]  # (N,) 0 .. G-1, in order
+    elapsed_s: NDArray[np.float64]  # (N,) since the contact's onset, increasing within it
+    best: NDArray[np.int64]  # (N,) gesture
+    confidence: NDArray[np.float64]  # (N,)
+    answer: NDArray[np.int64]  # (G,) gesture that was published, or -1
+    person: NDArray[np.int64]  # (G,)
+
+    def sure(self, in_a_row: int) -> NDArray[np.float64]:
+        """(N,) the least confidence of so many questions in a row of the same best gesture; 0 where they differ."""
+        sure = self.confidence.copy()
+        for back in range(1, in_a_row):
+            same = np.zeros(len(sure), bool)
+            same[back:] = (self.contact[back:] == self.contact[:-back]) & (self.best[back:] == self.best[:-back])
+            before = np.concatenate([np.zeros(min(back, len(sure))), self.confidence[:-back]])[: len(sure)]
+            sure = np.where(same, np.minimum(sure, before), 0.0)
+        return sure
+
+
+def enough(events: int, share: float = CONFIRMED, doubt: float = DOUBT) -> bool:
+    """Whether so many events could pass the test at all, were they all confirmed."""
+    return bool(share**events <= doubt)
+
+
+def passes(
+    people: NDArray[np.int64], revoked: NDArray[np.bool_], share: float = CONFIRMED, doubt: float = DOUBT
+) -> bool:
+    """Whether events of these people show that at least `share` is confirmed: a binomial test over people.
+
+    A person counts once, with the share of that person's events that were revoked.
+    """
+    _, who = np.unique(people, return_inverse=True)
+    if not len(who):
+        return False
+    each = np.bincount(who, revoked) / np.bincount(who)
+    return at_most(math.ceil(each.sum() - 1e-9), len(each), 1 - share) <= doubt
+
+
+def at_most(most: int, of: int, chance: float) -> float:
+    """The probability that at most so many of `of` events come, each with that chance (binomial)."""
+    logs = (math.lgamma(of + 1) - math.lgamma(k + 1) - math.lgamma(of - k + 1)
+            + k * math.log(chance) + (of - k) * math.log1p(-chance) for k in range(most + 1))  # fmt: skip
+    return math.fsum(map(math.exp, logs))
+
+
+def safe_from(
+    sure: NDArray[np.float64], contact: NDArray[np.int64], wrong: NDArray[np.bool_], person: NDArray[np.int64]
+) -> tuple[float | None, bool]:
+    """The lowest threshold that passes among the questions of one stretch, None for none; and whether data sufficed.
+
+    `wrong` (N,) says of each question whether an event given there would be revoked; `person` (N,) whose it is.
+    """
+    found: float | None = None
+    tested = False
+    for threshold in LADDER:
+        reached = np.flatnonzero(sure >= threshold)
+        _, first = np.unique(contact[reached], return_index=True)
+        events = reached[first]
+        if not tested and not enough(len(np.unique(person[events]))):
+            continue
+        tested = True
+        if not passes(person[events], wrong[events]):
+            break
+        found = threshold
+    return found, tested
+
+
+def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None, in_a_row: int = IN_A_ROW) -> dict[str, Any]:
+    """The metadata `provisional`: for each stretch, and for each gesture with enough data, the threshold."""
+    sure, wrong = asked.sure(in_a_row), asked.answer[asked.contact] != asked.best
+    person = asked.person[asked.contact]
+    stretch = np.searchsorted(STRETCHES, asked.elapsed_s + 1e-9, side="right") - 1
+    given = np.zeros(len(asked.answer), bool)
+    general: list[float | None] = []
+    rows: dict[str, list[float | None]] = {name: [] for name in gestures}
+
+    def lowest(chosen: NDArray[np.bool_]) -> tuple[float | None, bool]:
+        return safe_from(sure[chosen], asked.contact[chosen], wrong[chosen], person[chosen])
+
+    for k in range(len(STRETCHES)):
+        now = (stretch == k) & ~given[asked.contact]
+        own = {g: lowest(now & (asked.best == g)) for g in range(len(gestures))}
+        rest = [g for g, (_, tested) in own.items() if not tested]
+        general.append(lowest(now & np.isin(asked.best, rest))[0])
+        for g, name in enumerate(gestures):
+            rows[name].append(own[g][0] if own[g][1] else general[-1])
+        level = np.array([row[-1] if row[-1] is not None else np.inf for row in rows.values()])
+        given[asked.contact[now & (sure >= level[asked.best])]] = True
+    return {
+        "in_a_row": in_a_row,
+        "elapsed_s": list(STRETCHES),
+        "thresholds": general,
+        "gestures": {name: row for name, row in rows.items() if row != general},
+        "tap": tap,
+    }
+
+
+def events(asked: Asked, provisional: dict[str, Any], gestures: Sequence[str]) -> NDArray[np.int64]:
+    """(G,) the question at which each contact's provisional event is given, -1 for none."""
+    sure = asked.sure(provisional["in_a_row"])
+    rows = [provisional["gestures"].get(name, provisional["thresholds"]) for name in gestures]
+    level = np.array([[np.inf if value is None else value for value in row] for row in rows])
+    stretch = np.searchsorted(provisional["elapsed_s"], asked.elapsed_s + 1e-9, side="right") - 1
+    reached = np.flatnonzero(sure >= level[asked.best, stretch])
+    found = np.full(len(asked.answer), -1, np.int64)
+    who, first = np.unique(asked.contact[reached], return_index=True)
+    found[who] = reached[first]
+    return found
+
+
+Answers = tuple[NDArray[np.float32], NDArray[np.float32]]  # scores (N, G), unknown (N,)
+
+
+def published(answers: Answers, least: float) -> NDArray[np.int64]:
+    """(N,) the gesture that is published from a confidence of `least` on, -1 for none."""
+    scores, unknown = answers
+    best = scores.argmax(axis=1)
+    return np.where(scores.max(axis=1) * (1 - unknown) >= least, best, -1)
+
+
+def at_release(samples: Samples) -> Samples:
+    """The samples as they are when the finger has left for the first time: of two contacts the first one alone."""
+    least, windows = floors(samples), []
+    for i in range(len(samples)):
+        window = samples.window(i)
+        first, last = int(samples.first[i]), int(samples.last[i])
+        quiet = np.flatnonzero(window[first : last + 1].max(axis=(1, 2)) < ACTIVE * window.max())
+        if len(quiet):
+            part = window[: first + int(quiet[0]) + 1]
+            window = part / max(float(part.max()), float(least[i]))
+        windows.append(window.astype(np.float16))
+    ends = np.cumsum([0, *map(len, windows)]).astype(np.int64)
+    return replace(samples, frames=np.concatenate(windows), offsets=ends)
+
+
+def tap_threshold(answers: Answers, answer: NDArray[np.int64], person: NDArray[np.int64], tap: int) -> float | None:
+    """The confidence for a tap at the release, by what a model says of G contacts then and publishes in the end.
+
+    Contacts that a second tap follows are to be left out: nobody can know of it.
+    """
+    scores, unknown = answers
+    confidence = scores.max(axis=1).astype(np.float64) * (1 - unknown)
+    sure = np.where(scores.argmax(axis=1) == tap, confidence, 0.0)
+    return safe_from(sure, np.arange(len(person)), answer != tap, person)[0]

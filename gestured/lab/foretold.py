@@ -1,0 +1,76 @@
+"""What networks say of contacts before they are over, for the thresholds of provisional events to be learned from."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from gestured.lab.dataset import WINDOW, Samples, join
+from gestured.lab.early import Answers, Asked, at_release, calibrated, published, tap_threshold
+from gestured.lab.fit import FitConfig, logits
+from gestured.lab.nets import Decision
+from gestured.lab.prefixes import prefixes
+from gestured.simulator import GESTURES
+
+Logits = Mapping[str, Tensor]  # (N, K) of each network
+TAP, DOUBLE = "one_tap", "double_tap"
+
+
+@dataclass(frozen=True, slots=True)
+class Foretold:
+    """Samples of people who were held out, with the logits of each network over them."""
+
+    samples: Samples
+    whole: Logits
+    released: Logits  # when the finger has left for the first time
+    prefixes: Logits  # at every touched frame
+    contact: NDArray[np.int64]  # (N,) whose prefix each is
+    since: NDArray[np.int64]  # (N,) frames since its onset
+
+    @classmethod
+    def of(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]], config: FitConfig) -> "Foretold":
+        """Ask each part's networks about its samples."""
+        whole: list[Logits] = []
+        released: list[Logits] = []
+        early: list[Logits] = []
+        contact, since, before = [], [], 0
+        for nets, samples in parts:
+            cut, of, frames = prefixes(samples, np.arange(len(samples)))
+            whole.append(logits(nets, samples, config))
+            released.append(logits(nets, at_release(samples), config))
+            early.append(logits(nets, cut, config))
+            contact.append(of + before)
+            since.append(frames)
+            before += len(samples)
+        together = join([samples for _, samples in parts])
+        contacts = np.concatenate(contact), np.concatenate(since)
+        return cls(together, _joined(whole), _joined(released), _joined(early), *contacts)
+
+    def rule(self, name: str, decision: Decision, least: float) -> dict[str, Any]:
+        """The metadata `provisional` of a network with its decision, that publishes from `least` on."""
+
+        def answers(of: Logits) -> Answers:
+            with torch.no_grad():
+                scores, unknown = decision(of[name], of["trajectory"])
+            return scores.numpy(), unknown.numpy()
+
+        scores, unknown = answers(self.prefixes)
+        final = published(answers(self.whole), least)
+        asked = Asked(
+            self.contact, self.since / WINDOW.rate_hz, scores.argmax(axis=1),
+            scores.max(axis=1).astype(np.float64) * (1 - unknown), final, self.samples.people,
+        )  # fmt: skip
+        single = self.samples.labels != DOUBLE
+        scores, unknown = answers(self.released)
+        tap = tap_threshold(
+            (scores[single], unknown[single]), final[single], self.samples.people[single], GESTURES.index(TAP)
+        )
+        return calibrated(asked, GESTURES, tap)
+
+
+def _joined(parts: Sequence[Logits]) -> Logits:
+    return {name: torch.cat([part[name] for part in parts]) for name in parts[0]}

@@ -1,0 +1,83 @@
+"""Unfinished gestures: windows that end while the finger is still down, as the run time sees them.
+
+A prefix ends in a touched frame, and its peak is that of what came so far: nothing in it knows what follows.
+"""
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from gestured.core.measures import ACTIVE
+from gestured.lab.dataset import WINDOW, Samples
+
+
+def askable(samples: Samples) -> NDArray[np.bool_]:
+    """(N,) whether each of the samples' frames is a touched one, at which the run time may ask what it will be.
+
+    It lies between the first and the last touched frame, and is active by the peak so far.
+    """
+    peaks = samples.frames.max(axis=(1, 2)).astype(np.float32) if len(samples.frames) else np.zeros(0, np.float32)
+    found = np.zeros(len(peaks), bool)
+    for i in range(len(samples)):
+        begin = int(samples.offsets[i])
+        touched = slice(begin + int(samples.first[i]), begin + int(samples.last[i]) + 1)
+        found[touched] = peaks[touched] >= ACTIVE * np.maximum.accumulate(peaks[touched])
+    return found
+
+
+def floors(samples: Samples) -> NDArray[np.float32]:
+    """(G,) the least peak by which each sample's prefixes are divided, in units of its window's values."""
+    return (WINDOW.floor / np.maximum(samples.strength, WINDOW.floor)).astype(np.float32)
+
+
+def shortened(x: Tensor, lengths: Tensor, least: Tensor) -> Tensor:
+    """(B, T, R, C) windows, cut to `lengths` (B,) and scaled by their peak so far, at least by `least` (B,)."""
+    kept = (torch.arange(x.shape[1])[None, :] < lengths[:, None]).to(x.dtype)
+    x = x * kept[:, :, None, None]
+    peak = torch.maximum(x.amax((1, 2, 3)), least)
+    return x / peak[:, None, None, None]
+
+
+def drawn(
+    index: NDArray[np.int64], samples: Samples, asked: NDArray[np.bool_], share: float, rng: np.random.Generator
+) -> NDArray[np.int64]:
+    """(B,) for each sample of `index` the length of a random prefix, or 0 where it stays whole.
+
+    `asked` is what `askable` gave. All lengths from the second touched frame on are as likely.
+    """
+    lengths = np.zeros(len(index), np.int64)
+    for row in np.flatnonzero(rng.random(len(index)) < share):
+        i = index[row]
+        ends = np.flatnonzero(asked[samples.offsets[i] : samples.offsets[i + 1]])[1:]
+        if len(ends):
+            lengths[row] = rng.choice(ends) + 1
+    return lengths
+
+
+def prefixes(samples: Samples, chosen: NDArray[np.int64]) -> tuple[Samples, NDArray[np.int64], NDArray[np.int64]]:
+    """All prefixes of the chosen samples, in order; of which sample each is, and how many frames since its onset."""
+    asked, least = askable(samples), floors(samples)
+    windows: list[NDArray[np.float16]] = []
+    of: list[int] = []
+    since: list[int] = []
+    for i in chosen:
+        begin, stop = int(samples.offsets[i]), int(samples.offsets[i + 1])
+        whole = samples.frames[begin:stop].astype(np.float32)
+        for end in np.flatnonzero(asked[begin:stop]):
+            part = whole[: end + 1]
+            windows.append((part / max(float(part.max()), float(least[i]))).astype(np.float16))
+            of.append(int(i))
+            since.append(int(end) - int(samples.first[i]))
+    index = np.array(of, np.int64)
+    lengths = [len(w) for w in windows]
+    return (
+        Samples(
+            np.concatenate(windows) if windows else samples.frames[:0],
+            np.concatenate([[0], np.cumsum(lengths, dtype=np.int64)]).astype(np.int64),
+            samples.labels[index], samples.kinds[index], samples.people[index], samples.strength[index],
+            samples.first[index], np.array(lengths, np.int64) - 1,
+        ),
+        index,
+        np.array(since, np.int64),
+    )  # fmt: skip
