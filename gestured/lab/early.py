@@ -40,15 +40,17 @@ class Asked:
     answer: NDArray[np.int64]  # (G,) gesture that was published, or -1
     person: NDArray[np.int64]  # (G,)
 
-    def sure(self, in_a_row: int) -> NDArray[np.float64]:
-        """(N,) the least confidence of so many questions in a row of the same best gesture; 0 where they differ."""
-        sure = self.confidence.copy()
-        for back in range(1, in_a_row):
-            same = np.zeros(len(sure), bool)
-            same[back:] = (self.contact[back:] == self.contact[:-back]) & (self.best[back:] == self.best[:-back])
-            before = np.concatenate([np.zeros(min(back, len(sure))), self.confidence[:-back]])[: len(sure)]
-            sure = np.where(same, np.minimum(sure, before), 0.0)
-        return sure
+    @property
+    def again(self) -> NDArray[np.bool_]:
+        """(N,) whether the question before was about the same contact, with the same best gesture."""
+        same = np.zeros(len(self.best), bool)
+        same[1:] = (self.contact[1:] == self.contact[:-1]) & (self.best[1:] == self.best[:-1])
+        return same
+
+    @property
+    def stretch(self) -> NDArray[np.int64]:
+        """(N,) index into `STRETCHES` of each question."""
+        return np.searchsorted(STRETCHES, self.elapsed_s + 1e-9, side="right") - 1
 
 
 def enough(events: int, share: float = CONFIRMED, doubt: float = DOUBT) -> bool:
@@ -99,29 +101,35 @@ def safe_from(
     return found, tested
 
 
-def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None, in_a_row: int = IN_A_ROW) -> dict[str, Any]:
+def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None) -> dict[str, Any]:
     """The metadata `provisional`: for each stretch, and for each gesture with enough data, the threshold."""
-    sure, wrong = asked.sure(in_a_row), asked.answer[asked.contact] != asked.best
+    stretch, again, wrong = asked.stretch, asked.again, asked.answer[asked.contact] != asked.best
     person = asked.person[asked.contact]
-    stretch = np.searchsorted(STRETCHES, asked.elapsed_s + 1e-9, side="right") - 1
-    given = np.zeros(len(asked.answer), bool)
+    before = np.concatenate([[-1], stretch[:-1]])[: len(stretch)]
+    given, reached = np.zeros(len(asked.answer), bool), np.zeros(len(stretch), bool)
     general: list[float | None] = []
     rows: dict[str, list[float | None]] = {name: [] for name in gestures}
 
-    def lowest(chosen: NDArray[np.bool_]) -> tuple[float | None, bool]:
-        return safe_from(sure[chosen], asked.contact[chosen], wrong[chosen], person[chosen])
-
     for k in range(len(STRETCHES)):
+        # The question before counts by its confidence, or where it lies in another stretch by that one's threshold.
+        earlier = np.where(before[1:] == k, asked.confidence[:-1], reached[:-1])
+        earlier = np.concatenate([[0.0], earlier])[: len(stretch)]
+        sure = np.where(again, np.minimum(asked.confidence, earlier), 0.0)
         now = (stretch == k) & ~given[asked.contact]
+
+        def lowest(chosen: NDArray[np.bool_], sure: NDArray[np.float64] = sure) -> tuple[float | None, bool]:
+            return safe_from(sure[chosen], asked.contact[chosen], wrong[chosen], person[chosen])
+
         own = {g: lowest(now & (asked.best == g)) for g in range(len(gestures))}
         rest = [g for g, (_, tested) in own.items() if not tested]
         general.append(lowest(now & np.isin(asked.best, rest))[0])
         for g, name in enumerate(gestures):
             rows[name].append(own[g][0] if own[g][1] else general[-1])
-        level = np.array([row[-1] if row[-1] is not None else np.inf for row in rows.values()])
-        given[asked.contact[now & (sure >= level[asked.best])]] = True
+        level = np.array([row[-1] if row[-1] is not None else np.inf for row in rows.values()])[asked.best]
+        reached |= (stretch == k) & (asked.confidence >= level)
+        given[asked.contact[now & (sure >= level)]] = True
     return {
-        "in_a_row": in_a_row,
+        "in_a_row": IN_A_ROW,
         "elapsed_s": list(STRETCHES),
         "thresholds": general,
         "gestures": {name: row for name, row in rows.items() if row != general},
@@ -131,14 +139,13 @@ def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None, in_a_ro
 
 def events(asked: Asked, provisional: dict[str, Any], gestures: Sequence[str]) -> NDArray[np.int64]:
     """(G,) the question at which each contact's provisional event is given, -1 for none."""
-    sure = asked.sure(provisional["in_a_row"])
     rows = [provisional["gestures"].get(name, provisional["thresholds"]) for name in gestures]
     level = np.array([[np.inf if value is None else value for value in row] for row in rows])
-    stretch = np.searchsorted(provisional["elapsed_s"], asked.elapsed_s + 1e-9, side="right") - 1
-    reached = np.flatnonzero(sure >= level[asked.best, stretch])
+    reached = asked.confidence >= level[asked.best, asked.stretch]
+    fired = np.flatnonzero(reached & asked.again & np.concatenate([[False], reached[:-1]])[: len(reached)])
     found = np.full(len(asked.answer), -1, np.int64)
-    who, first = np.unique(asked.contact[reached], return_index=True)
-    found[who] = reached[first]
+    who, first = np.unique(asked.contact[fired], return_index=True)
+    found[who] = fired[first]
     return found
 
 

@@ -30,6 +30,7 @@ class Foretold:
     prefixes: Logits  # at every touched frame
     contact: NDArray[np.int64]  # (N,) whose prefix each is
     since: NDArray[np.int64]  # (N,) frames since its onset
+    second: NDArray[np.bool_]  # (N,) whether the finger had left and come back
 
     @classmethod
     def of(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]], config: FitConfig) -> "Foretold":
@@ -37,7 +38,7 @@ class Foretold:
         whole: list[Logits] = []
         released: list[Logits] = []
         early: list[Logits] = []
-        contact, since, before = [], [], 0
+        contact, since, second, before = [], [], [], 0
         for nets, samples in parts:
             cut, of, frames = prefixes(samples, np.arange(len(samples)))
             whole.append(logits(nets, samples, config))
@@ -45,9 +46,11 @@ class Foretold:
             early.append(logits(nets, cut, config))
             contact.append(of + before)
             since.append(frames)
+            asked_before = np.arange(len(of)) - np.searchsorted(of, of)
+            second.append(frames > asked_before)  # at some frame it was not touched
             before += len(samples)
         together = join([samples for _, samples in parts])
-        contacts = np.concatenate(contact), np.concatenate(since)
+        contacts = np.concatenate(contact), np.concatenate(since), np.concatenate(second)
         return cls(together, _joined(whole), _joined(released), _joined(early), *contacts)
 
     def rule(self, name: str, decision: Decision, least: float) -> dict[str, Any]:
@@ -60,10 +63,11 @@ class Foretold:
 
         scores, unknown = answers(self.prefixes)
         final = published(answers(self.whole), least)
-        asked = Asked(
-            self.contact, self.since / WINDOW.rate_hz, scores.argmax(axis=1),
-            scores.max(axis=1).astype(np.float64) * (1 - unknown), final, self.samples.people,
-        )  # fmt: skip
+        best, confidence = scores.argmax(axis=1), scores.max(axis=1).astype(np.float64) * (1 - unknown)
+        # As the run time has it: no tap while the finger is down, and in a second contact two taps or nothing.
+        possible = np.where(self.second, best == GESTURES.index(DOUBLE), best != GESTURES.index(DOUBLE))
+        confidence[~possible | (best == GESTURES.index(TAP))] = 0.0
+        asked = Asked(self.contact, self.since / WINDOW.rate_hz, best, confidence, final, self.samples.people)
         single = self.samples.labels != DOUBLE
         scores, unknown = answers(self.released)
         tap = tap_threshold(

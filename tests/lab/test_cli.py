@@ -139,7 +139,8 @@ def test_train_makes_three_models_and_evaluate_their_figures(
         subjects = np.arange(len(taken)) % 6
         return replace(taken, people=subjects)
 
-    plan = train.TrainingPlan(80, 80, len(TRIALS), 300, 200, FitConfig(epochs=2, real_epochs=1, real_samples=64))
+    fit = FitConfig(epochs=2, real_epochs=1, real_samples=64)
+    plan = train.TrainingPlan(80, 80, 80, others=300, forest=200, fit=fit)
     monkeypatch.setattr(train, "simulated", simulated)
     monkeypatch.setattr(train, "_real", real)
     monkeypatch.setattr(train.TrainingPlan, "quick", classmethod(lambda cls: plan))

@@ -91,8 +91,6 @@ def test_what_one_frame_says_alone_is_not_enough() -> None:
         np.array([0, 0, 0, 1, 1, 1]), np.array([0, 0.067, 0.133] * 2), np.array([0, 1, 1, 0, 0, 1]),
         np.array([0.99, 0.9, 0.8, 0.7, 0.6, 0.99]), np.array([1, 0]), np.arange(2),
     )  # fmt: skip
-    assert asked.sure(2).tolist() == [0, 0, 0.8, 0, 0.6, 0]
-    assert asked.sure(1).tolist() == asked.confidence.tolist()
     rule = {"in_a_row": 2, "elapsed_s": list(STRETCHES), "thresholds": [0.5] * len(STRETCHES), "gestures": {}}
     assert events(asked, rule, GESTURES).tolist() == [2, 4]
     assert events(asked, {**rule, "gestures": {"swipe_up": [None] * len(STRETCHES)}}, GESTURES).tolist() == [2, -1]

@@ -1,7 +1,7 @@
 """How early a network knows: asked in the middle of a gesture, at its end, and while the finger is gone.
 
 The networks are those of the participants protocol, trained on whole gestures. Asked after a share of the gesture,
-they see its frames up to there. After its end they see what the sensor shows when nobody touches it: frames drawn
+they see its frames up to there, scaled by their own peak: nobody knows yet how hard the finger will press. After its end they see what the sensor shows when nobody touches it: frames drawn
 from the window's own quiet ones before the first touch.
 """
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gestured.core.measures import ACTIVE
 from gestured.lab.dataset import WINDOW, Samples
+from gestured.lab.prefixes import floors
 from gestured.lab.study.training import Indices, Net
 
 SHARES = (0.25, 0.5, 0.75, 1.0)
@@ -32,7 +33,7 @@ def moments(window: NDArray[np.floating]) -> tuple[int, list[int]]:
 
 def answers_over_time(model: Net, samples: Samples, chosen: Indices, seed: int) -> NDArray[np.int64]:
     """(n, points) class that the network names for each chosen gesture at each of `POINTS`."""
-    out = np.zeros((len(chosen), len(POINTS)), np.int64)
+    out, least = np.zeros((len(chosen), len(POINTS)), np.int64), floors(samples)
     for row, i in enumerate(chosen):
         window = samples.window(int(i))
         first, at = moments(window)
@@ -40,7 +41,10 @@ def answers_over_time(model: Net, samples: Samples, chosen: Indices, seed: int) 
         quiet = window[:first] if first else np.zeros_like(window[:1])
         idle = quiet[np.random.default_rng([seed, int(i)]).integers(0, len(quiet), AFTER[-1])]
         x = torch.from_numpy(np.concatenate([window[: last + 1], idle]))[None]
-        places = torch.tensor([*at, *(last + k for k in AFTER)])
+        places = torch.tensor([last + k for k in AFTER])
         with torch.no_grad():
-            out[row] = model.module(x.expand(len(places), -1, -1, -1), places).argmax(1).numpy()
+            for k, end in enumerate(at):
+                so_far = window[: end + 1] / max(float(window[: end + 1].max()), float(least[i]))
+                out[row, k] = model.module(torch.from_numpy(so_far)[None], torch.tensor([end])).argmax(1)[0]
+            out[row, len(at) :] = model.module(x.expand(len(places), -1, -1, -1), places).argmax(1).numpy()
     return out
