@@ -1,8 +1,9 @@
 """How early a network knows: asked in the middle of a gesture, at its end, and while the finger is gone.
 
 The networks are those of the participants protocol, trained on whole gestures. Asked after a share of the gesture,
-they see its frames up to there, scaled by their own peak: nobody knows yet how hard the finger will press. After its end they see what the sensor shows when nobody touches it: frames drawn
-from the window's own quiet ones before the first touch.
+they see its frames up to there, scaled by their own peak: nobody knows yet how hard the finger will press. After its
+end they see what the sensor shows when nobody touches it: frames drawn from the window's own quiet ones before the
+first touch.
 """
 
 import math
