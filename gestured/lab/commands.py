@@ -11,7 +11,7 @@ import torch
 from gestured.core.errors import GesturedError
 from gestured.lab.cards import write_block, write_cards
 from gestured.lab.cli import REAL_FOLDER
-from gestured.lab.evaluate import Evaluation, held_out_kinds, real_figures, simulated_figures
+from gestured.lab.evaluate import Evaluation, held_out_kinds, print_curve, real_figures, simulated_figures
 from gestured.lab.export import write_manifest
 from gestured.lab.train import TrainingPlan, calibration_set, learn, load_data, train
 from gestured.model.model import LADDER, open_model
@@ -36,7 +36,7 @@ def train_models(args: argparse.Namespace) -> int:
         f"trained in {(time.monotonic() - start) / 60:.1f} minutes (finished steps are taken from {args.cache})",
         flush=True,
     )
-    args.models, args.readme = args.out, None
+    args.models, args.readme, args.curve = args.out, None, False
     return evaluate_models(args)
 
 
@@ -51,6 +51,9 @@ def evaluate_models(args: argparse.Namespace) -> int:
     figures: dict[str, dict[str, Any]] = {
         name: {"simulated": found} for name, found in simulated_figures(paths, data).items()
     }
+    if args.curve:
+        for name, path in paths.items():
+            print_curve(name, path, data)
     trained = learn(plan, data, args.cache)
     for name, found in real_figures(trained, calibration_set(trained, data, plan), data).items():
         figures[name]["real"] = found
