@@ -33,7 +33,7 @@ CLASSES: list[str] = [*GESTURES, *NON_GESTURES]  # non-gestures are classes of t
 class FitConfig:
     """Every number that shapes a training run, with its reason."""
 
-    epochs: int = 22
+    epochs: int = 20
     batch: int = 64  # half as many steps with 128 learned far less
     rates: tuple[float, float, float] = (4e-3, 8e-3, 3e-3)  # of each of NETS; they fall to 0 with a cosine
     decay: float = 1e-2

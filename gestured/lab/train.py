@@ -41,7 +41,7 @@ COHORT = 1_000_000  # the wide stream's people have larger numbers
 class TrainingPlan:
     """How much is simulated; the numbers behind the shipped models are the defaults."""
 
-    wide: int = 80_000
+    wide: int = 60_000
     wide_calibrate: int = 12_000  # takes to calibrate: thresholds by gesture and time need many people
     wide_check: int = 4_000  # takes to test
     cohort: int = len(TRIALS)

@@ -28,6 +28,7 @@ from gestured.core.window import Window
 from gestured.lab.export import Facts, export_forest, export_net, write_manifest
 from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.recordings.origin import Origin, said
+from gestured.model.file import inspect
 from gestured.model.model import open_model
 
 GESTURES = ("one_tap", "swipe_up", "swipe_left")
@@ -159,7 +160,40 @@ class Logits(Net):
         return torch.log(scores), unknown
 
 
-@pytest.mark.parametrize("module", [Frozen(), Mixing(), Logits()], ids=lambda m: type(m).__name__)
+class Embedding(Net):
+    """Gives what its head sees, too."""
+
+    def forward(self, frames: Tensor) -> tuple[Tensor, ...]:
+        return (*super().forward(frames), frames.flatten(2).amax(1))
+
+
+class MixedEmbedding(Embedding):
+    """One window's embedding depends on the others in its batch."""
+
+    def forward(self, frames: Tensor) -> tuple[Tensor, ...]:
+        scores, unknown, embedding = super().forward(frames)
+        return scores, unknown, embedding - embedding.mean(0)
+
+
+def test_a_file_holds_the_embedding_and_older_ones_have_none(
+    net: tuple[Net, Path, dict[str, float]], tmp_path: Path
+) -> None:
+    rule = {"in_a_row": 2, "elapsed_s": [0.0, 0.3], "thresholds": [None, 0.9], "gestures": {}, "tap": None}
+    more = {"classes": [*GESTURES, "palm"], "provisional": rule}
+    export_net(Embedding(), tmp_path / "new.onnx", Facts(**CARD, **more))
+    model, old = open_model(tmp_path / "new.onnx"), open_model(net[1])
+    frames = np.random.default_rng(2).random((3, 21, 9, 9), np.float32)
+    np.testing.assert_allclose(model.embed(frames), frames.reshape(3, 21, -1).max(axis=1), atol=1e-5)
+    for one, other in zip(model.run(frames), old.run(frames), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-5)
+    assert (model.embeds, old.embeds) == (True, False)
+    said = inspect((tmp_path / "new.onnx").read_bytes())
+    assert {key: json.loads(said[key]) for key in more} == more
+    with pytest.raises(ValueError, match="cannot run"):
+        old.embed(frames)
+
+
+@pytest.mark.parametrize("module", [Frozen(), Mixing(), Logits(), MixedEmbedding()], ids=lambda m: type(m).__name__)
 def test_net_that_the_file_cannot_stand_for_is_not_written(module: Net, tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"wrong\.onnx: not written"):
         export_net(module, tmp_path / "wrong.onnx", Facts(**CARD))

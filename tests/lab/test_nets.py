@@ -49,6 +49,26 @@ def test_a_window_is_answered_alike_alone_and_among_others(nets: nn.ModuleDict, 
 
 
 @pytest.mark.parametrize("name", NETS)
+def test_a_gesture_that_goes_on_is_told_from_one_that_is_over(nets: nn.ModuleDict, name: str) -> None:
+    with torch.no_grad():
+        for frames in map(torch.from_numpy, MADE.values()):
+            over, on = nets[name](frames[None]), nets[name](frames[None, :-1])
+            assert not torch.allclose(over, on, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", NETS)
+def test_padding_is_no_end_where_the_length_is_known(nets: nn.ModuleDict, name: str) -> None:
+    cut = [torch.from_numpy(f[:-1]) for f in MADE.values()]  # they end in a touched frame
+    x = nn.utils.rnn.pad_sequence([*cut, torch.zeros(99, 9, 9)], batch_first=True)[: len(cut)]
+    lengths = torch.tensor([len(f) for f in cut])
+    with torch.no_grad():
+        together = nets[name](x, lengths)
+        alone = torch.cat([nets[name](f[None]) for f in cut])
+        assert not torch.allclose(nets[name](x), alone, atol=1e-3)
+    torch.testing.assert_close(together, alone, atol=1e-5, rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", NETS)
 def test_what_comes_before_the_last_contact_counts(nets: nn.ModuleDict, name: str) -> None:
     """A net that looked at nothing would pass everything above."""
     with torch.no_grad():
