@@ -49,6 +49,7 @@ def parser() -> argparse.ArgumentParser:
     evaluate = add("evaluate", "print what the models are worth on people never seen; writes cards and manifest",
                    "gestured-lab evaluate --models models")  # fmt: skip
     evaluate.add_argument("--models", type=Path, default=MODELS, help=f"folder of the models ({MODELS})")
+    evaluate.add_argument("--networks", action="store_true", help="also compare each network alone and with a second")
     evaluate.add_argument("--curve", action="store_true", help="also print right, wrong and accepted by threshold")
     evaluate.add_argument("--readme", type=Path, help="a README whose table of figures is renewed")
     add_data(evaluate)

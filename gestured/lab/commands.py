@@ -13,6 +13,7 @@ from gestured.lab.cards import write_block, write_cards
 from gestured.lab.cli import REAL_FOLDER
 from gestured.lab.evaluate import Evaluation, held_out_kinds, print_curve, real_figures, simulated_figures
 from gestured.lab.export import write_manifest
+from gestured.lab.networks import compare
 from gestured.lab.train import TrainingPlan, calibration_set, learn, load_data, train
 from gestured.model.model import LADDER, open_model
 
@@ -36,7 +37,7 @@ def train_models(args: argparse.Namespace) -> int:
         f"trained in {(time.monotonic() - start) / 60:.1f} minutes (finished steps are taken from {args.cache})",
         flush=True,
     )
-    args.models, args.readme, args.curve = args.out, None, False
+    args.models, args.readme, args.curve, args.networks = args.out, None, False, False
     return evaluate_models(args)
 
 
@@ -55,7 +56,10 @@ def evaluate_models(args: argparse.Namespace) -> int:
         for name, path in paths.items():
             print_curve(name, path, data)
     trained = learn(plan, data, args.cache)
-    for name, found in real_figures(trained, calibration_set(trained, data, plan), data).items():
+    calibrated = calibration_set(trained, data, plan)
+    if args.networks:
+        compare(trained, calibrated, data, plan)
+    for name, found in real_figures(trained, calibrated, data).items():
         figures[name]["real"] = found
     figures["cnn_lstm"]["held_out_kinds"] = held_out_kinds(trained, data, plan)
     write_manifest(args.models, figures)

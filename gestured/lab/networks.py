@@ -1,0 +1,85 @@
+"""Which network: each alone and with its second opinion, on the same data, with rejection, error against run time."""
+
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+import gestured
+from gestured.lab.dataset import WINDOW
+from gestured.lab.decide import fit_decision, threshold
+from gestured.lab.evaluate import Evaluation, outcome
+from gestured.lab.export import Facts, export_net
+from gestured.lab.fit import logits, targets
+from gestured.lab.nets import Decision, Judged, Opinion
+from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan
+from gestured.model.model import Model, open_model
+from gestured.simulator import GESTURES
+
+SECOND = "trajectory"
+PAUSE_S = 1 / 15  # between two runs: caches are cold, as in a daemon that waits for frames
+RUNS = 40
+FRAMES = 15  # of the window that is run
+
+
+class Alone(nn.Module):
+    """A network without a second opinion, and its decision."""
+
+    def __init__(self, net: Opinion, decision: Decision) -> None:
+        super().__init__()
+        self.net = net
+        self.decision = decision
+
+    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, T, R, C) -> scores (B, G), unknown (B,)."""
+        found = self.net(frames)
+        scores, unknown = self.decision(found, found)
+        return scores, unknown
+
+
+def cold_ms(model: Model) -> float:
+    """Milliseconds of one run after a pause, the median."""
+    window = np.random.default_rng(1).random((1, FRAMES, WINDOW.rows, WINDOW.columns), np.float32)
+    took = []
+    for _ in range(RUNS):
+        time.sleep(PAUSE_S)
+        start = time.perf_counter()
+        model.run(window)
+        took.append(time.perf_counter() - start)
+    return 1e3 * median(took)
+
+
+def compare(trained: Trained, calibrated: Calibrated, data: TrainingData, plan: TrainingPlan) -> dict[str, Any]:
+    """Print a row for each network and test set, with wrong and lost together and the time of a cold run."""
+    tests = {test: (logits(trained.nets, samples, plan.fit), targets(samples)) for test, samples in data.tests.items()}
+    figures: dict[str, Any] = {}
+    print(f"{Evaluation.HEAD}{'error':>8}{'cold ms':>9}", flush=True)
+    for first, second in ((name, other) for name in trained.nets for other in (name, SECOND)):
+        if first == second == SECOND and f"{SECOND} alone" in figures:
+            continue
+        title = f"{first} alone" if first == second else f"{first} and {second}"
+        decision = fit_decision(calibrated.logits[first], calibrated.logits[second], calibrated.labels, len(GESTURES))
+        one, two = trained.nets[first], trained.nets[second]
+        assert isinstance(one, Opinion)
+        assert isinstance(two, Opinion)
+        module = Alone(one, decision) if first == second else Judged(one, two, decision)
+        with torch.no_grad():
+            scores, unknown = decision(calibrated.logits[first], calibrated.logits[second])
+            least = threshold(scores.numpy(), unknown.numpy(), calibrated.labels, calibrated.sets)
+            facts = Facts("candidate", gestured.__version__, GESTURES, WINDOW, {"threshold": least}, "0" * 64, {})
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / "candidate.onnx"
+                export_net(module, path, facts)
+                took = cold_ms(open_model(path))
+            figures[title] = {"cold_ms": took}
+            for test, (found, labels) in tests.items():
+                scores, unknown = decision(found[first], found[second])
+                result = outcome((scores.numpy(), unknown.numpy()), labels, least, data.performed[test])
+                figures[title][test] = result.wrong + result.lost
+                print(f"{result.row(f'{title}, {test}')}{result.wrong + result.lost:>8.3f}{took:>9.2f}", flush=True)
+    return figures
