@@ -17,6 +17,7 @@ SHOWN: dict[str, Any] = {
     "grid": "9x9",
     "gestures": ["one_tap", "double_tap", "swipe_left", "swipe_right"],
     "allow": ["127.0.0.1", "192.168.7.0/24"],
+    "own_gestures": "/var/lib/gestured/own-gestures.json",
     "sensors.grid": "27x15",
     "sensors.rotate": 90,
     "sensors.mirror": True,

@@ -14,8 +14,11 @@ from gestured.control import (
     demo,
     doctor,
     emit,
+    enrol,
     export,
     flag,
+    forget,
+    gestures,
     listen,
     names,
     recalibrate,
@@ -32,6 +35,7 @@ from gestured.core.errors import GesturedError
 SUBCOMMANDS = (
     *(status, listen, doctor, sniff),
     *(reload, recalibrate, shadow, emit),
+    *(enrol, gestures, forget),
     *(record, flag, replay, export),
     *(simulate, check, names, demo),
 )

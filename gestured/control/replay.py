@@ -22,6 +22,7 @@ from gestured.core.scene import Scene
 from gestured.core.wire import is_sensor
 from gestured.model.ladder import Ladder, ladder_for
 from gestured.model.model import shipped
+from gestured.model.own import Own
 from gestured.record.replay import Maker, Mute, Replay
 
 DEFAULT_MODEL = "cnn_lstm"  # for a file that names none
@@ -118,6 +119,7 @@ def _opened(source: Playable, model: str | None) -> tuple[Scene, Ladder]:
         ladder = ladder_for(model)
     if model is None and getattr(ladder.model, "sha256", None) != maker.sha256:
         say(f"{ladder.name} is not the file that it was when this was recorded", to=sys.stderr)
+    ladder.own = Own(maker.own)
     return maker.scene, ladder
 
 

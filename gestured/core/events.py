@@ -46,8 +46,9 @@ class Gesture:
     lost: int
     model: str
     degraded: bool
-    scores: Mapping[str, float]  # one per gesture
+    scores: Mapping[str, float]  # one per gesture of the model's
     provisional: str | None = None
+    own: bool = False  # whether it is a gesture of the user's own
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,8 @@ def to_json(event: Event, epoch: float) -> bytes:
     line: dict[str, Any] = {"type": event_type(event)}
     for field in fields(event):
         value = getattr(event, field.name)
+        if value is False and field.name == "own":
+            continue  # said of the user's own gestures alone
         line[field.name] = value + epoch if field.name in _STREAM_TIMES else value
     return _line(line)
 
@@ -42,6 +44,11 @@ def hello_json(version: str, instance: str, model: str, gestures: Sequence[str],
             "sensors": dict(sensors),
         }
     )
+
+
+def gestures_json(gestures: Sequence[str]) -> bytes:
+    """Tells every client which gestures there are from now on, the user's own after the model's."""
+    return _line({"type": "gestures", "gestures": list(gestures)})
 
 
 def lost_json(count: int) -> bytes:

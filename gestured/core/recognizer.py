@@ -14,6 +14,7 @@ from gestured.core.foresight import Certainty, Foresight
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Draft, Found, FrontEnd, Preview
 from gestured.core.holes import HOLE_FRAMES, HOLE_S
+from gestured.core.prototypes import NEAR, Match
 
 RATES_HZ = (4.9, 1020.0)  # frames a second that a sensor may send: 5 to 1000, known to some per cent
 
@@ -28,6 +29,7 @@ class Scores:
     degraded: bool = False  # a fallback answered
     threshold: float = 0.5  # confidence from which the model's calibration has it published
     took_s: float = 0.0  # s that the model ran
+    own: Match | None = None  # the nearest gesture of the user's own, where there are any
 
     @property
     def confidence(self) -> float:
@@ -60,7 +62,7 @@ class Foreseer(Classifier, Protocol):
 
 
 class Decided(NamedTuple):
-    """A segment that was classified, and whether that was enough for a gesture; it follows its event."""
+    """A segment that was classified, and whether the model's answer was enough for a gesture; it follows its event."""
 
     sensor: str
     segment: Segment
@@ -80,7 +82,8 @@ class Recognizer:
     `thresholds` are the confidences below which a gesture is unknown, where not the model's own is to hold.
     `refractory` are the seconds in which the same gesture is not published again.
 
-    What is not sure enough, or has a hole in which the finger may have moved unseen, is unknown.
+    What is not sure enough, or has a hole in which the finger may have moved unseen, is unknown. A gesture of the
+    user's own may take what the model does not know, and what is much nearer to it than to the model's gestures.
 
     The classifier is asked while the segmenter still waits whether the finger stays off: once it is sure, the answer
     is there. Where the finger comes back, that answer is thrown away.
@@ -179,17 +182,20 @@ class Recognizer:
         whole = self._whole(cut.hole_s)
         known = whole and confidence >= self._threshold(best, answer)
         decided = Decided(sensor, segment, answer, known)
+        own = answer.own if whole and self._is_own(answer.own, known) else None
+        if own is not None:
+            best, confidence = own.name, own.confidence
         what = (
             segment.onset, segment.offset, cut.decided, segment.last - segment.first + 1, segment.lost,
             answer.model, answer.degraded, scores,
         )  # fmt: skip
-        if not known:
+        if not known and own is None:
             return Unknown(sensor, cut.id, confidence, *what, reason=self._reason(whole)), decided
         if self._refractory_for(best, segment):
             return Cancelled(sensor, cut.id, "refractory"), decided
         self._last_offset[best] = segment.offset
         self.sequence += 1
-        return Gesture(sensor, cut.id, best, confidence, self.sequence, *what), decided
+        return Gesture(sensor, cut.id, best, confidence, self.sequence, *what, own=own is not None), decided
 
     def _best(self, answer: Scores) -> tuple[dict[str, float], str, float]:
         """The scores of the gestures in use, the best of them, and how sure it is."""
@@ -220,3 +226,9 @@ class Recognizer:
         """Whether it is too early to publish that gesture again."""
         since = segment.onset - self._last_offset.get(gesture, -np.inf)
         return bool(since < self._refractory.get(gesture, 0.0))
+
+    def _is_own(self, match: Match | None, known: bool) -> bool:
+        """Whether a gesture of the user's own may have a segment; `known`: the model would have it, too."""
+        if match is None or (known and not match.nearer):
+            return False
+        return match.confidence >= self._thresholds.get(match.name, NEAR)

@@ -31,7 +31,7 @@ METAVARS = {
     "clock": "arrival|sensor", "stale_s": "SECONDS", "tap_gap_s": "SECONDS", "provisional_taps": "true|false",
     "publish_provisional": "true|false",
     "max_sensors": "N", "allow": "CIDR",
-    "flight_recorder": "MIB", "log_level": "LEVEL",
+    "flight_recorder": "MIB", "own_gestures": "FILE", "log_level": "LEVEL",
 }  # fmt: skip
 
 

@@ -220,6 +220,11 @@ class EventServer:
         named = [asked.sensors for asked in self._classes if asked.foresees]
         return frozenset().union(*(names for names in named if names is not None)), None in named
 
+    def tell(self, line: bytes) -> None:
+        """Send a line that is no event to every client, whatever it asks for."""
+        for client in tuple(self._clients):
+            client.send(line)
+
     def subscribe(self, client: Client, subscription: Subscription) -> None:
         """Change what a client wants."""
         if client not in self._clients:

@@ -7,6 +7,7 @@ from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
 from gestured.core.recognizer import Decided
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
+from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.watch import Watch
 
@@ -16,8 +17,8 @@ CHANGES = {"silent": "sensor is silent", "restarted": "sensor restarted"}
 class Desk:
     """Takes facts, and the complaints of those who read packets."""
 
-    def __init__(self, metrics: Metrics, publisher: Publisher, watch: Watch) -> None:
-        self._metrics, self._publisher, self._watch = metrics, publisher, watch
+    def __init__(self, metrics: Metrics, publisher: Publisher, watch: Watch, own: OwnGestures) -> None:
+        self._metrics, self._publisher, self._watch, self._own = metrics, publisher, watch, own
         self._throttle = Throttle()
 
     def take(self, facts: Sequence[Fact]) -> None:
@@ -39,6 +40,8 @@ class Desk:
                 self._publisher.publish(fact)
         for one in decided:
             self._watch.see(one)
+        if self._own.enrolling:
+            self._enrol(facts)
 
     def drop(self, reason: str, count: int = 1, **fields: object) -> None:
         """Count what was dropped; say so at a bounded rate."""
@@ -54,6 +57,14 @@ class Desk:
         """Count a bug that was caught; log its traceback at a bounded rate."""
         self._metrics.internal_errors.add()
         self._throttle.error("a bug, caught", what, exc_info=error or True, **fields)
+
+    def _enrol(self, facts: Sequence[Fact]) -> None:
+        """Have what was performed judged as an example; a bug there is not the others' business."""
+        try:
+            for fact in facts:
+                self._own.see(fact)
+        except Exception as error:
+            self.bug("in what judges an example", error)
 
     def _count(self, arrived: Arrived) -> None:
         frames, label = self._metrics.frames, self._metrics.sensor_label(arrived.sensor)

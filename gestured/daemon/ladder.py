@@ -1,9 +1,23 @@
 """The models that a configuration asks for."""
 
+import os
+
 from gestured.core.errors import ModelError
+from gestured.core.own import is_name
+from gestured.daemon import own_file
 from gestured.daemon.log import log
 from gestured.daemon.settings import Settings
 from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, require_gestures
+
+SLIP = 0.8  # of difflib's ratio: a name so near to one of the model's gestures was meant to be that
+
+
+def _may_be_own(name: str, settings: Settings, ladder: Ladder) -> bool:
+    """Whether a table may be for a gesture of the user's own, enrolled or not: it may come, and go, at any time."""
+    from difflib import get_close_matches
+
+    possible = name not in ladder.gestures and own_file.where(settings.own_gestures, os.environ) is not None
+    return possible and is_name(name) and not get_close_matches(name, ladder.gestures, 1, SLIP)
 
 
 def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
@@ -27,5 +41,5 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
     for sentence in early:
         report(sentence)
     gestures_in_use(ladder, settings.gestures)
-    require_gestures(ladder, settings.per_gesture)
+    require_gestures(ladder, (name for name in settings.per_gesture if not _may_be_own(name, settings, ladder)))
     return ladder

@@ -13,6 +13,7 @@ from gestured.core.wire import is_sensor
 from gestured.daemon.control import Connection
 from gestured.daemon.desk import Desk
 from gestured.daemon.metrics import Metrics
+from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.request import Parameter, Refusal, Reply, ReplyStream, Verb
 from gestured.daemon.snapshot import Snapshot
@@ -30,8 +31,9 @@ TEST_FRAMES = 6  # of it, at 15 Hz
 SENSOR = Parameter(
     (str, type(None)), "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", check=lambda name: name is None or is_sensor(name)
 )
-VIEWED = Parameter(str, "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", required=True, check=is_sensor)
+NAMED = Parameter(str, "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", required=True, check=is_sensor)
 RAW = Parameter(bool, "true or false")
+COUNT = Parameter(int, "a number of examples")
 LABEL = Parameter(str, "a gesture's name", required=True)
 MODEL = Parameter((str, type(None)), "a model's path or name, or null to end it", required=True)
 
@@ -46,6 +48,7 @@ class Operations:
     watch: Watch
     taps: Taps
     metrics: Metrics
+    own: OwnGestures
     snapshot: Callable[[], Snapshot]
     reload_all: Callable[[], Awaitable[str | None]]  # None, or why nothing has changed
     _views: dict[tuple[str, bool], tuple[float, Reply]] = field(default_factory=dict)  # s, and the answer
@@ -59,7 +62,10 @@ class Operations:
             "recalibrate": Verb(self.recalibrate, {"sensor": SENSOR}),
             "emit": Verb(self.emit, {"gesture": LABEL, "sensor": SENSOR}),
             "shadow": Verb(self.shadow, {"model": MODEL}, slow=True),
-            "view": Verb(self.view, {"sensor": VIEWED, "raw": RAW}, changes=False),
+            "view": Verb(self.view, {"sensor": NAMED, "raw": RAW}, changes=False),
+            "enrol": Verb(self.enrol, {"name": LABEL, "sensor": NAMED, "examples": COUNT}),
+            "gestures": Verb(self.gestures, changes=False),
+            "forget": Verb(self.forget, {"name": LABEL}, slow=True),
             "tap": Verb(self.tap),
             "flight": Verb(self.flight),
         }
@@ -92,8 +98,8 @@ class Operations:
     async def emit(self, connection: Connection, gesture: str, sensor: str | None = None) -> Reply:
         """A made-up gesture through every output, marked as a test; it takes the sensor's next numbers."""
         snapshot, sensor = self.snapshot(), sensor or "test"
-        if gesture not in snapshot.gestures:
-            raise Refusal(f"no gesture {gesture!r} is in use, expected one of {', '.join(snapshot.gestures)}")
+        if gesture not in snapshot.every_gesture:
+            raise Refusal(f"no gesture {gesture!r} is in use, expected one of {', '.join(snapshot.every_gesture)}")
         reading = snapshot.sensors.get(sensor)
         if reading is None or reading.source is None:
             if sensor not in self._tested and len(self._tested) >= TEST_SENSORS:
@@ -103,14 +109,15 @@ class Operations:
             raise Refusal(f"{sensor} is touched; a test would mix with what is being done there")
         sequence, number = self.hub.number(sensor)
         scores = {name: float(name == gesture) for name in snapshot.gestures}
-        now, model = snapshot.now, snapshot.models.active
+        now, model, own = snapshot.now, snapshot.models.active, gesture not in snapshot.gestures
         onset = now - TEST_S
         foreseen = self.hub.foreseen(sensor)
-        answer = (sequence, onset, now, now, TEST_FRAMES, 0, model, False, scores, "confirmed" if foreseen else None)
+        answer = (sequence, onset, now, now, TEST_FRAMES, 0, model, False, scores)
+        verdict = "confirmed" if foreseen else None
         self.publisher.publish(Onset(sensor, number, onset), test=True)
         if foreseen:
             self.publisher.publish(Provisional(sensor, number, gesture, 1.0, onset, now), test=True)
-        self.publisher.publish(Gesture(sensor, number, gesture, 1.0, *answer), test=True)
+        self.publisher.publish(Gesture(sensor, number, gesture, 1.0, *answer, verdict, own), test=True)
         self.publisher.publish(Release(sensor, number, now), test=True)
         return {"sensor": sensor, "gesture": gesture, "sequence": sequence}
 
@@ -137,6 +144,28 @@ class Operations:
         self._views[sensor, raw] = now, answer
         return answer
 
+    async def enrol(self, connection: Connection, name: str, sensor: str, examples: int = 3) -> Reply:
+        """Learn a gesture from what is performed on a sensor; a line follows for each example, and one at the end."""
+        snapshot = self.snapshot()
+        reading = snapshot.sensors.get(sensor)
+        if reading is None or reading.source is None:
+            heard = [known for known, one in snapshot.sensors.items() if one.source is not None]
+            raise Refusal(f"no sensor {sensor!r}, expected one of {', '.join(heard) or 'none: no sensor was heard'}")
+        if connection.tap:
+            raise Refusal("this connection is a tap already")
+        self.own.begin(connection, name, sensor, examples, snapshot.gestures)
+        return {"name": name, "sensor": sensor, "examples": examples}
+
+    async def gestures(self, connection: Connection) -> Reply:
+        """The model's gestures that are in use, and the user's own."""
+        snapshot = self.snapshot()
+        return {"model": snapshot.models.active, "gestures": list(snapshot.gestures), "own": dict(snapshot.own)}
+
+    async def forget(self, connection: Connection, name: str) -> Reply:
+        """Have a gesture of the user's own no longer; its examples are gone from the file."""
+        await self.own.forget(name)
+        return {"forgotten": name}
+
     async def tap(self, connection: Connection) -> Reply:
         """Stream packets and events over this connection from now on."""
         if connection.tap:
@@ -152,4 +181,4 @@ class Operations:
         return ReplyStream(self._scene() | {"lines": len(held)}, chain(as_lines(held), (b'{"type":"end"}\n',)))
 
     def _scene(self) -> Reply:
-        return scene(self.snapshot(), time.time_ns() - time.monotonic_ns())
+        return scene(self.snapshot(), time.time_ns() - time.monotonic_ns(), self.own.gestures)

@@ -1,9 +1,11 @@
 """One daemon: it puts the parts together, and runs timers and reloads from start to end."""
 
 import asyncio
+import os
 import secrets
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from gestured import __version__
@@ -11,8 +13,9 @@ from gestured.core import messages
 from gestured.core.errors import GesturedError
 from gestured.core.events import Status
 from gestured.core.hub import Hub
+from gestured.core.own import Examples
 from gestured.daemon import log as logging
-from gestured.daemon import systemd
+from gestured.daemon import own_file, systemd
 from gestured.daemon.bound import Bound
 from gestured.daemon.canary import Canary
 from gestured.daemon.clients import EventServer
@@ -23,6 +26,7 @@ from gestured.daemon.ladder import open_ladder
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.operations import Operations
+from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.scene import scene_of
 from gestured.daemon.settings import Settings
@@ -40,6 +44,7 @@ SHOWN = 4  # sensors in systemd's status line
 AT_A_RESTART = ("listen", "socket", "control", "metrics", "flight_recorder")  # settings that a reload cannot change
 
 Loader = Callable[[], Settings]
+OwnFile = tuple[Path | None, tuple[Examples, str | None]]  # where it is, what is in it, and what is wrong with it
 
 
 class Service:
@@ -56,23 +61,27 @@ class Service:
         self._pulse, self._metrics = Pulse(), Metrics()
         for name in settings.sensors:
             self._metrics.sensor_label(name)  # those in the file are named first
+        self._own = OwnGestures(self._own_changed)
+        path = own_file.where(settings.own_gestures, os.environ)
+        self._own.follow(ladder, path, own_file.load(path))
         self._hub = Hub(scene_of(settings, ladder), ladder)
         self._watch, self._taps = Watch(ladder), Taps(settings.flight_recorder << 20)
         self._clients = EventServer(
             bound.events.sock,
             self._hello,
             self._metrics,
-            gestures=lambda: self._hub.scene.gestures,
+            gestures=self._gestures,
             changed=self._foresee,
         )
         self._osc = self._destinations(settings)
         self._foresee()
         self._publisher = Publisher(self._metrics, (self._clients, self._taps, *self._osc))
-        self._desk = Desk(self._metrics, self._publisher, self._watch)
+        self._desk = Desk(self._metrics, self._publisher, self._watch, self._own)
         self._receiver = Receiver(bound.udp, self._hub, self._desk, self._taps)
         operations = Operations(
-            self._hub, self._desk, self._publisher, self._watch, self._taps, self._metrics, self.snapshot, self.reload
-        )
+            self._hub, self._desk, self._publisher, self._watch, self._taps, self._metrics, self._own,
+            self.snapshot, self.reload,
+        )  # fmt: skip
         self._control = ControlServer(bound.control.sock, operations.verbs())
         self._http: Any = None
         if bound.http is not None:
@@ -95,6 +104,7 @@ class Service:
             loop_lag_s=self._pulse.lag_s,
             models=Models.of(self._ladder, self._watch.shift, self._publisher.models_failed),
             gestures=self._hub.scene.gestures,
+            own=self._own.report(),
             sensors=self._hub.readings(self._receiver.served(now)),
             recent=self._publisher.recent(),
             shadow=shadow.report() if shadow else None,
@@ -110,8 +120,17 @@ class Service:
 
     def _hello(self) -> bytes:
         """The first line to a client."""
-        gestures, sequences = self._hub.scene.gestures, self._hub.sequences()
-        return messages.hello_json(__version__, self._instance, self._ladder.active, gestures, sequences)
+        sequences = self._hub.sequences()
+        return messages.hello_json(__version__, self._instance, self._ladder.active, self._gestures(), sequences)
+
+    def _gestures(self) -> tuple[str, ...]:
+        """Those that a client may hear of: the model's in use, and the user's own."""
+        return (*self._hub.scene.gestures, *self._own.gestures)
+
+    def _own_changed(self) -> None:
+        """One of the user's own gestures came or went: whatever was asked about a contact is asked again."""
+        self._desk.take(self._hub.change(self._hub.scene, self._ladder, time.monotonic()))
+        self._clients.tell(messages.gestures_json(self._gestures()))
 
     def _foresee(self) -> None:
         """Have the hub give provisional events where somebody asks for them now."""
@@ -167,6 +186,7 @@ class Service:
     def _every_second(self, now: float) -> None:
         self._clients.tick()
         self._taps.tick()
+        self._own.tick()
         snapshot = self.snapshot()
         self._metrics.kernel(snapshot.kernel_drops)
         self._publisher.publish(Status(snapshot.state, snapshot.states, snapshot.models.active, snapshot.time))
@@ -191,9 +211,10 @@ class Service:
             self._http.close()
         log.info("ended")
 
-    def _open(self, settings: Settings) -> tuple[Ladder, list[OscSink]]:
-        """What may take long: models, and names of hosts."""
-        return open_ladder(settings, insist=True), self._destinations(settings)
+    def _open(self, settings: Settings) -> tuple[Ladder, list[OscSink], OwnFile]:
+        """What may take long: models, names of hosts, and the file of own gestures."""
+        path = own_file.where(settings.own_gestures, os.environ)
+        return open_ladder(settings, insist=True), self._destinations(settings), (path, own_file.load(path))
 
     async def reload(self) -> str | None:
         """Read everything anew, and only where all of it is valid, change anything; else the reason."""
@@ -201,7 +222,7 @@ class Service:
             systemd.notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
             try:
                 settings = await asyncio.to_thread(self._load)  # a long file, or a slow disk
-                ladder, osc = await asyncio.to_thread(self._open, settings)  # frames are served meanwhile
+                ladder, osc, own = await asyncio.to_thread(self._open, settings)  # frames are served meanwhile
             except Exception as error:
                 bug = not isinstance(error, GesturedError)
                 said = log.exception if bug else log.error
@@ -209,19 +230,23 @@ class Service:
                 self._metrics.reloads.add("refused")
                 return f"a bug: {error!r}" if bug else str(error)
             else:
-                self._swap(settings, ladder, osc)
+                self._swap(settings, ladder, osc, own)
                 return None
             finally:
                 systemd.notify("READY=1")
 
-    def _swap(self, settings: Settings, ladder: Ladder, osc: list[OscSink]) -> None:
+    def _swap(self, settings: Settings, ladder: Ladder, osc: list[OscSink], own: OwnFile) -> None:
         for key in AT_A_RESTART:
             if getattr(settings, key) != getattr(self._settings, key):
                 log.warning("this setting changes at a restart only", key=key)
         logging.configure(settings.log_level)
         self._settings, self._ladder = settings, ladder
         self._watch.follow(ladder)
+        before = self._gestures()
+        self._own.follow(ladder, *own)
         self._desk.take(self._hub.change(scene_of(settings, ladder), ladder, time.monotonic()))
+        if self._gestures() != before:
+            self._clients.tell(messages.gestures_json(self._gestures()))
         for sink in self._osc:
             sink.close()
         self._osc = osc

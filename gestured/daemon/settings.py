@@ -124,6 +124,11 @@ class Settings(Part):
     flight_recorder: int = Field(
         default=0, ge=0, le=1024, description="MiB that the last 30 s of packets may take in memory; 0: none are kept"
     )
+    own_gestures: Path | None = Field(
+        default=None,
+        description="file of the user's own gestures, which the daemon writes; by default "
+        "$STATE_DIRECTORY/own-gestures.json, else none can be enrolled",
+    )
     log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="how much is logged")
     sensors: dict[Annotated[str, Field(pattern=SENSOR_NAME)], SensorSettings] = Field(
         default={}, description="tables `[sensors.NAME]`, in the file only"

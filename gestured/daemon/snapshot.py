@@ -53,7 +53,8 @@ class Snapshot:
     loop_age_s: float  # since the loop last came round
     loop_lag_s: float  # how late it is
     models: Models
-    gestures: tuple[str, ...]  # in use
+    gestures: tuple[str, ...]  # of the model's, in use
+    own: Mapping[str, Any]  # the user's own; see `OwnGestures.report`
     sensors: Mapping[str, Reading]
     recent: tuple[Mapping[str, Any], ...]  # answers
     shadow: Mapping[str, Any] | None
@@ -65,6 +66,11 @@ class Snapshot:
     flight_held_bytes: int
     addresses: Mapping[str, str | None]  # where it can be reached
     settings: Mapping[str, Any]
+
+    @property
+    def every_gesture(self) -> tuple[str, ...]:
+        """The model's gestures in use, and the user's own."""
+        return (*self.gestures, *self.own["gestures"])
 
     @property
     def states(self) -> dict[str, str]:

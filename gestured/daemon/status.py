@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gestured import __version__
 from gestured.core.address import Address
+from gestured.core.own import Examples, to_dict
 from gestured.core.reading import Reading
 from gestured.core.view import View
 from gestured.daemon.metrics import Counter, Metrics
@@ -39,6 +40,7 @@ def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
             "sha256": models.sha256,
             "gestures": list(snapshot.gestures),
         },
+        "own": dict(snapshot.own),
         "sensors": {name: _sensor(reading, snapshot.now) for name, reading in snapshot.sensors.items()},
         "recent": list(snapshot.recent),
         "answers": {
@@ -79,7 +81,7 @@ def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
     }
 
 
-def scene(snapshot: Snapshot, epoch_ns: int) -> dict[str, Any]:
+def scene(snapshot: Snapshot, epoch_ns: int, own: Examples) -> dict[str, Any]:
     """What a recording must know to be understood without this daemon; `epoch_ns`: from the loop's clock to 1970."""
     models = snapshot.models
     return {
@@ -93,6 +95,7 @@ def scene(snapshot: Snapshot, epoch_ns: int) -> dict[str, Any]:
             "columns": models.grid[1],
         },
         "gestures": list(snapshot.gestures),
+        "own": to_dict(own),
         "settings": snapshot.settings,
     }
 

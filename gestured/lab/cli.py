@@ -31,16 +31,19 @@ def parser() -> argparse.ArgumentParser:
         command.add_argument("--json", action="store_true", help="print the figures as JSON")
         return command
 
-    def add_data(command: argparse.ArgumentParser) -> None:
+    def add_work(command: argparse.ArgumentParser) -> None:
         command.add_argument("--cache", type=Path, default=CACHE, help=f"where finished steps are kept ({CACHE})")
+        command.add_argument("--jobs", type=int, default=2, help="processes and threads (2)")
+        command.add_argument("--quick", action="store_true", help="a small run to try it; its models are worth nothing")
+
+    def add_data(command: argparse.ArgumentParser) -> None:
+        add_work(command)
         command.add_argument(
             "--real",
             type=Path,
             default=REAL_FOLDER,
             help=f"folder of the real recordings; left out where it is not ({REAL_FOLDER})",
         )
-        command.add_argument("--jobs", type=int, default=2, help="processes and threads (2)")
-        command.add_argument("--quick", action="store_true", help="a small run to try it; its models are worth nothing")
 
     train = add("train", "make the three models again from nothing; goes on where it was interrupted",
                 "gestured-lab train --out models --jobs 2")  # fmt: skip
@@ -72,6 +75,11 @@ def parser() -> argparse.ArgumentParser:
     study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")
     study.add_argument("--seed", type=int, default=0, help="of splits and training: same seed, same numbers (0)")
     add_data(study)
+    own = add("own", "learn what a model needs for gestures of its user's own, and write it into its file; "
+              "prints what enrolment is worth", "gestured-lab own models/cnn_lstm.onnx")  # fmt: skip
+    own.add_argument("models", type=Path, nargs="+", metavar="MODEL", help="an .onnx file that has an embedding")
+    own.add_argument("--compare", action="store_true", help="also judge dynamic time warping")
+    add_work(own)
     recordings.add(add)
     return top
 
@@ -88,6 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return recordings.run(args)
         try:
             from gestured.lab import commands
+            from gestured.lab.own import command as own
             from gestured.lab.stability import command as stability
             from gestured.lab.study import study
         except ModuleNotFoundError as error:
@@ -95,8 +104,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if package not in LAB_PACKAGES:
                 raise
             raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from error
-        if args.command == "stability":
-            return stability.run(args)
+        if args.command in ("own", "stability"):
+            return own.run(args) if args.command == "own" else stability.run(args)
         if args.command == "study":
             args.words = " ".join(["gestured-lab", *(sys.argv[1:] if arguments is None else arguments)])
             return study.run(args)

@@ -14,6 +14,8 @@ from gestured.lab.cli import REAL_FOLDER
 from gestured.lab.evaluate import Evaluation, held_out_kinds, print_curve, real_figures, simulated_figures
 from gestured.lab.export import write_manifest
 from gestured.lab.networks import compare
+from gestured.lab.own import command as own
+from gestured.lab.own.command import open_file, teach
 from gestured.lab.train import TrainingPlan, calibration_set, learn, load_data, train
 from gestured.model.model import LADDER, open_model
 
@@ -37,6 +39,10 @@ def train_models(args: argparse.Namespace) -> int:
         f"trained in {(time.monotonic() - start) / 60:.1f} minutes (finished steps are taken from {args.cache})",
         flush=True,
     )
+    for name in LADDER:
+        path = args.out / f"{name}.onnx"
+        if open_file(path).embeds:
+            teach(path, args.cache, own.QUICK_PEOPLE if args.quick else own.PEOPLE, args.jobs)
     args.models, args.readme, args.curve, args.networks = args.out, None, False, False
     return evaluate_models(args)
 

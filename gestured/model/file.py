@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.foresight import Certainty
+from gestured.core.prototypes import Space
 from gestured.core.window import Window
 
 MAX_MODEL_BYTES = 64 * 1024 * 1024
@@ -267,6 +268,7 @@ class Metadata:
     quantiles: Mapping[str, Any]  # what the training data looked like
     self_test: SelfTest
     provisional: Certainty | None  # how sure it must be of a contact that is not over, where it was made for that
+    own: Space | None  # where gestures of the user's own are compared; None for a model that cannot
 
     @classmethod
     def parse(cls, properties: Mapping[str, str]) -> "Metadata":
@@ -317,7 +319,15 @@ class Metadata:
             quantiles=_json(properties["quantiles"], "quantiles", dict),
             self_test=SelfTest.from_json(properties["self_test"]),
             provisional=provisional,
+            own=_space(properties["own"], len(gestures)) if "own" in properties else None,
         )
+
+
+def _space(text: str, gestures: int) -> Space:
+    try:
+        return Space.from_json(_json(text, "own", dict), gestures)
+    except ValueError as error:
+        raise ValueError(f"metadata 'own': {error}") from None
 
 
 def _check_extent(key: str, text: str) -> None:

@@ -14,6 +14,7 @@ from gestured.core.foresight import Certainty
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Classifier, Scores
 from gestured.model.model import LADDER, look_at, open_model, shipped, shipped_name
+from gestured.model.own import Own
 
 
 class Rung:
@@ -71,7 +72,7 @@ class Ladder:
     A rung that cannot be opened, raises or gives scores that are not finite is put aside for `retry_after`
     seconds of `clock`, as is one that took more than `slow_s` seconds `slow_runs` times in a row; then it is
     tried again. Rungs that are aside still come last, before giving up. What another rung than the
-    first says is `degraded`.
+    first says is `degraded`. Gestures of the user's own are compared by the rung that answers.
     """
 
     def __init__(
@@ -97,6 +98,7 @@ class Ladder:
         self.failures = 0  # how often a rung was put aside
         self._faint = 0  # previews in a row that failed, or took too long
         self._previews_from = -math.inf  # s of `clock`
+        self.own = Own({})  # gestures of the user's own; may be replaced between two segments
         self._active, opened = self._first_open()
         self.gestures: tuple[str, ...] = tuple(opened.gestures)
         self.rows = int(getattr(opened, "rows", 0))
@@ -156,7 +158,8 @@ class Ladder:
             if rung is not self._active:
                 self._report(f"{rung.name} answers now")
                 self._active = rung
-            return replace(scores, degraded=scores.degraded or self.degraded, took_s=took)
+            own = self.own.match(model, segment) if self.own.gestures else None
+            return replace(scores, degraded=scores.degraded or self.degraded, took_s=took, own=own)
         raise ModelError(f"no model could classify: {', '.join(rung.name for rung in self.rungs)}")
 
     @property

@@ -57,6 +57,7 @@ class Model:
         self._session = _open_session(data)
         self._input = self._check_shapes()
         self.embeds = any(output.name == "embedding" for output in self._session.get_outputs())
+        self.space = self.metadata.own if self.embeds else None
         self.self_test_error = self._self_test()
 
     def classify(self, segment: Segment) -> Scores:

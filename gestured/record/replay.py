@@ -15,6 +15,7 @@ from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
 from gestured.core.frames import Segment
 from gestured.core.hub import Hub
 from gestured.core.mounting import Mounting
+from gestured.core.own import Examples, from_dict
 from gestured.core.recognizer import Classifier, Decided, Scores
 from gestured.core.scene import Scene, Setup
 from gestured.core.timing import Timing
@@ -34,6 +35,7 @@ class Maker:
     scene: Scene
     models: list[str]  # as its settings name them, best first
     sha256: str  # of the one that answered
+    own: Examples = field(default_factory=dict)  # the user's own gestures
 
 
 def opened(path: str | Path) -> tuple[Tape, Maker]:
@@ -75,7 +77,7 @@ def maker(told: Mapping[str, Any]) -> Maker:
             refractory={n: _finite(p["refractory_s"]) for n, p in parts.items()},
         )
         models = [_text(name) for name in (settings["model"], *settings["fallback"])]
-        return Maker(scene, models, str(model.get("sha256")))
+        return Maker(scene, models, str(model.get("sha256")), from_dict(told.get("own", {})))
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise RecordingError(
             f"scene: expected gestures and settings as the daemon writes them: {repr(error)[:200]}"

@@ -29,7 +29,7 @@ from gestured.record.files import create, open_regular
 from gestured.record.mcap import CHANNEL, MESSAGE, METADATA, Budget, CutOff, Damaged, Fields, TooLarge, records
 
 PACKETS, EVENTS, SCENE = "/gestured/packets", "/gestured/events", "scene"
-TEXT_BYTES = 1 << 20  # of one channel or metadata record that is read; settings have some kilobytes
+TEXT_BYTES = 8 << 20  # of one channel or metadata record that is read; a scene may hold a user's own gestures
 ITEM_COSTS = 250  # bytes of memory for a packet or an event, besides what it holds
 EVENT_COSTS = 24  # bytes of memory for a byte of JSON, where it is all empty lists
 NOBODY = Address("", 0)  # the source of a channel that holds no packets

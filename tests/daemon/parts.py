@@ -8,6 +8,7 @@ from gestured.core.reading import Reading
 from gestured.daemon.desk import Desk
 from gestured.daemon.merge import load_settings
 from gestured.daemon.metrics import Metrics
+from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.scene import scene_of
 from gestured.daemon.snapshot import Models, Snapshot
@@ -20,8 +21,8 @@ SOURCE = ("10.0.0.1", 1)
 SNAPSHOT = Snapshot(
     instance="i", time=1.7e9, now=10.0, started=1.7e9, uptime_s=10.0, stopping=False, loop_age_s=0.1, loop_lag_s=0.0,
     models=Models("m", "m", 0, False, 0, "m.onnx", "1", "", (9, 9), False, 0, {}, ()), gestures=("one_tap",),
-    sensors={"arm": Reading("ok", (9, 9))}, recent=(), shadow=None, clients=0, backlog_bytes=0, kernel_drops=0, taps=0,
-    flight_limit_bytes=0, flight_held_bytes=0, addresses={}, settings={},
+    own={"gestures": {}}, sensors={"arm": Reading("ok", (9, 9))}, recent=(), shadow=None, clients=0, backlog_bytes=0,
+    kernel_drops=0, taps=0, flight_limit_bytes=0, flight_held_bytes=0, addresses={}, settings={},
 )  # fmt: skip
 
 
@@ -43,7 +44,7 @@ class Parts:
         ladder = ladder_for(model)
         self.metrics, self.watch, self.taps, kept = Metrics(), Watch(ladder), Taps(0), Kept()
         self.events = kept.events
-        self.desk = Desk(self.metrics, Publisher(self.metrics, (kept,)), self.watch)
+        self.desk = Desk(self.metrics, Publisher(self.metrics, (kept,)), self.watch, OwnGestures(lambda: None))
         self.hub = Hub(scene_of(load_settings({"model": str(model), **given}, {})[0], ladder), ladder)
 
     def feed(self, name: str, frames: list[Frame], t: float) -> float:

@@ -21,6 +21,22 @@ ROWS = COLUMNS = 9
 PROVISIONAL = {"in_a_row": 1, "elapsed_s": [0.0, 0.1], "thresholds": [None, 0.9], "tap": 0.8}
 
 
+def own() -> str:
+    """The metadata `own` of this model: as if it had been learned that movements spread by 0.1, and durations by 1."""
+    from gestured.core.prototypes import Space
+
+    far = 100.0  # where nothing is performed: what it cannot see
+    places = np.full((len(GESTURES), 3), far)
+    for name, place in {
+        "one_tap": (0, 0, -4), "double_tap": (0, 0, 4), "swipe_down": (0, 17, 0), "swipe_up": (0, -17, 0),
+        "swipe_right": (17, 0, 0), "swipe_left": (-17, 0, 0),
+    }.items():  # fmt: skip
+        places[GESTURES.index(name)] = place
+    directions, between = np.diag([10.0, 10.0, 1.0]), np.full(3, 100.0)
+    built_in = np.stack([places, np.ones_like(places)])
+    return Space(np.array([0.0, 0.0, 4.0]), directions, between, built_in, (0.0,) * 5, 1.0, 5.0).to_json()
+
+
 def make(
     path: Path,
     *,
@@ -29,10 +45,12 @@ def make(
     broken: str = "",
     quantiles: str = "{}",
     provisional: Mapping[str, object] | None = None,
+    own: str = "",
 ) -> Path:
     """Write the model to `path`; `broken` = "self_test" stores other outputs than it gives.
 
     `provisional` says how sure it must be of a contact that is not over.
+    With `own`, the metadata of that name, it has an embedding: movement across, movement down, spread in time.
     """
     import onnx
     from onnx import TensorProto, helper, numpy_helper
@@ -102,11 +120,15 @@ def make(
         n("Reshape", ["u", "flat1"], ["unknown"]),
     ]
     value = helper.make_tensor_value_info
+    outputs = [value("scores", TensorProto.FLOAT, ["B", count]), value("unknown", TensorProto.FLOAT, ["B"])]
+    if own:
+        nodes.append(n("Concat", ["kx2", "ky2", "vt2"], ["embedding"], axis=1))
+        outputs.append(value("embedding", TensorProto.FLOAT, ["B", 3]))
     graph = helper.make_graph(
         nodes,
         "tiny",
         [value("frames", TensorProto.FLOAT, ["B", "T", ROWS, COLUMNS])],
-        [value("scores", TensorProto.FLOAT, ["B", count]), value("unknown", TensorProto.FLOAT, ["B"])],
+        outputs,
         [numpy_helper.from_array(array, name) for name, array in constants.items()],
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
@@ -130,7 +152,8 @@ def make(
             "training_data": hashlib.sha256(b"").hexdigest(),
             "quantiles": quantiles,
         }
-        | ({} if provisional is None else {"provisional": json.dumps(provisional)}),
+        | ({} if provisional is None else {"provisional": json.dumps(provisional)})
+        | ({"own": own} if own else {}),
     )
     path.write_bytes(onnx.load_from_string(model.SerializeToString()).SerializeToString())
     return path

@@ -1,0 +1,76 @@
+"""`gesturectl enrol`: a gesture of one's own, performed a few times."""
+
+import argparse
+from typing import Any
+
+from gestured.client.control import Control
+from gestured.client.lines import Unreachable
+from gestured.client.say import say, say_json
+from gestured.control.address import add_sockets, connect
+from gestured.core.own import is_name
+
+EXAMPLES = 3
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the subcommand to gesturectl's command line."""
+    parser = commands.add_parser(
+        "enrol",
+        help="teach a gesture of your own",
+        description="Teach the daemon a gesture of your own: perform it a few times on a sensor. Each example is\n"
+        "judged at once; one that is not kept is done again. From then on it is recognised on every sensor,\n"
+        "without a restart. Ctrl-C gives it up, and nothing has changed. What is performed meanwhile is still\n"
+        "published as whatever it is taken for.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="examples:\n  gesturectl enrol knock --sensor armrest\n"
+        "  gesturectl enrol wave --sensor armrest --examples 5",
+    )
+    parser.add_argument("name", metavar="NAME", type=_name, help="a-z first, then a-z, 0-9 and _; at most 32")
+    parser.add_argument("--sensor", metavar="SENSOR", required=True, help="where it is performed")
+    parser.add_argument(
+        "--examples", type=int, default=EXAMPLES, metavar="N", help=f"how often, 1 to 5 (default: {EXAMPLES})"
+    )
+    add_sockets(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object a line")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Enrol it; 1 where it was given up."""
+    with connect(args) as control:
+        control.ask("enrol", name=args.name, sensor=args.sensor, examples=args.examples)
+        if not args.json:
+            say(f"perform {args.name} on {args.sensor} {args.examples} times, a second apart; Ctrl-C gives up")
+        try:
+            return _follow(control, args)
+        except KeyboardInterrupt:
+            return 1
+
+
+def _follow(control: Control, args: argparse.Namespace) -> int:
+    for line in control.lines():
+        if args.json:
+            say_json(line)
+        else:
+            say(_words(line, args))
+        if "enrolled" in line:
+            return 0
+        if "given_up" in line:
+            return 1
+    raise Unreachable(f"the daemon on {control.path} closed the connection; nothing has changed")
+
+
+def _words(line: dict[str, Any], args: argparse.Namespace) -> str:
+    if "enrolled" in line:
+        return f"enrolled {line['enrolled']} with {line['examples']} examples; it is recognised from now on"
+    if "given_up" in line:
+        return f"given up: {line.get('reason')}; nothing has changed"
+    if line.get("kept") is True:
+        return f"{line.get('example')} of {args.examples}: kept"
+    return f"{line.get('example')} of {args.examples}: not kept, {line.get('reason')}"
+
+
+def _name(text: str) -> str:
+    if not is_name(text):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a-z, then a-z, 0-9 and _, at most 32, and not `use`")
+    return text

@@ -1,0 +1,84 @@
+"""An enrolment: somebody performs a new gesture a few times, and each example is judged at once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from gestured.core.events import Cancelled
+from gestured.core.frames import Segment
+from gestured.core.holes import HOLE_FRAMES, HOLE_S
+from gestured.core.own import Example
+from gestured.core.prototypes import EXAMPLES
+
+SHORTEST_S = 0.15  # of an example: what is shorter is a tap, whatever was meant
+FEWEST = 3  # touched frames: fewer show no movement
+
+
+class Judge(Protocol):
+    """A model that can compare examples; each method gives None where there is nothing to say against one."""
+
+    def example(self, segment: Segment) -> Example | None:
+        """A segment as it is kept; None for one that is too long."""
+        ...
+
+    def same_as(self, example: Example) -> str | None:
+        """The gesture that there is already, and how near, in words."""
+        ...
+
+    def unlike(self, example: Example, kept: Sequence[Example]) -> str | None:
+        """How near it is to those that were kept, in words."""
+        ...
+
+
+@dataclass
+class Enrolment:
+    """One gesture that is being learned. `see` gives what to tell the user of each attempt."""
+
+    name: str
+    sensor: str
+    wanted: int
+    judge: Judge
+    kept: list[Example] = field(default_factory=list)
+
+    @property
+    def complete(self) -> bool:
+        """Whether there are as many examples as were asked for."""
+        return len(self.kept) >= self.wanted
+
+    def see(self, what: Segment | Cancelled) -> dict[str, Any]:
+        """Judge what was performed on the sensor: an example is kept, or there is a reason."""
+        reason = self._fault(what)
+        return {"example": len(self.kept) + (reason is not None), "kept": reason is None, "reason": reason}
+
+    def _fault(self, what: Segment | Cancelled) -> str | None:
+        if isinstance(what, Cancelled):
+            return CANCELLED.get(what.reason, f"the contact was cancelled ({what.reason}); do it again")
+        if what.last - what.first + 1 < FEWEST or what.offset - what.onset < SHORTEST_S:
+            return f"too short: a gesture of your own takes {SHORTEST_S:g} s and {FEWEST} frames at least"
+        steps = np.diff(what.times[what.first : what.last + 1])
+        if steps.max() > max(HOLE_S, HOLE_FRAMES * float(np.median(steps))):
+            return "frames were lost in the middle of it; do it again"
+        example = self.judge.example(what)
+        if example is None:
+            return "too long: make it shorter"
+        if (same := self.judge.same_as(example)) is not None:
+            return f"the same as {same}: change its shape, its direction, or the number of fingers"
+        if self.kept and (unlike := self.judge.unlike(example, self.kept)) is not None:
+            return f"not like the others ({unlike}): do it as you did it first"
+        self.kept.append(example)
+        return None
+
+
+CANCELLED = {
+    "held": "the contact was not over: lift the finger at the end of the gesture",
+    "silence": "the sensor fell silent during the contact; do it again",
+    "glitch": "too short: that was no finger",
+    "stuck": "the contact did not look like a finger; do it again",
+}
+
+
+def allowed(examples: int) -> bool:
+    """Whether a gesture can be learned from so many examples."""
+    return 1 <= examples <= EXAMPLES

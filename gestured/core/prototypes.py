@@ -1,0 +1,164 @@
+"""Prototypes: what a few examples say of a gesture of the user's own, in the space of a model's embedding.
+
+What differs between two performances of one person, and how far apart two gestures lie, is learned in the lab from
+many people (`Space`, a model's metadata `own`). A prototype is the mean of its examples, as sure as they are many; how
+near a segment is to it is a likelihood ratio: that gesture against any movement at all.
+"""
+
+import base64
+import binascii
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+EXAMPLES = 5  # of one gesture, at most
+NEAR = 0.5  # confidence from which a segment is a gesture of the user's own, where nothing else is set
+DIMENSIONS = 512  # of a space or an embedding, at most
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Space:
+    """Where embeddings of one model are compared: K directions, in which one person's repetitions spread by 1."""
+
+    mean: Array  # (E,) of embeddings
+    directions: Array  # (K, E)
+    between: Array  # (K,) variance of gestures, in units of the variance within one
+    built_in: Array  # (2, G, K) mean and variance of each of the model's gestures, over people
+    thresholds: tuple[float, ...]  # nearness that 1, 2 ... EXAMPLES examples ask for
+    slope: float  # of the confidence over the nearness
+    margin: float  # by how much nearer than the model's gestures a segment must be to be taken from the model
+
+    def place(self, embedding: NDArray[np.floating[Any]]) -> Array:
+        """(E,) -> (K,), or many at once."""
+        return np.asarray((embedding - self.mean) @ self.directions.T)
+
+    def built_in_nearness(self, place: Array) -> Array:
+        """How near a place (..., K) is to the nearest of the model's gestures, on the scale of `Prototype.nearness`."""
+        mean, variance = self.built_in
+        return np.asarray(_ratio(place[..., np.newaxis, :], mean, variance, self.between).max(axis=-1))
+
+    def claimed(self, place: Array) -> bool:
+        """Whether a gesture that is performed there lies too near to the model's gestures to be taken from them."""
+        alone = Prototype.of(self, place[np.newaxis])
+        usual = alone.nearness(alone.mean) - len(self.between) / 2  # a performance is 1 away in each direction
+        return bool(usual - self.built_in_nearness(place) < self.margin)
+
+    def to_json(self) -> str:
+        """For a model's metadata."""
+        return json.dumps(
+            {
+                "mean": _packed(self.mean),
+                "directions": _packed(self.directions),
+                "between": _packed(self.between),
+                "built_in": _packed(self.built_in),
+                "thresholds": [round(value, 4) for value in self.thresholds],
+                "slope": round(self.slope, 4),
+                "margin": round(self.margin, 4),
+            }
+        )
+
+    @classmethod
+    def from_json(cls, told: Mapping[str, Any], gestures: int) -> "Space":
+        """What `to_json` wrote, of a model with so many gestures; ValueError says what is wrong."""
+        try:
+            mean, between = _unpacked(told["mean"]), _unpacked(told["between"])
+            inner, outer = len(between), len(mean)
+            if not (0 < inner <= DIMENSIONS and 0 < outer <= DIMENSIONS):
+                raise ValueError
+            directions = _unpacked(told["directions"]).reshape(inner, outer)
+            built_in = _unpacked(told["built_in"]).reshape(2, gestures, inner)
+            thresholds = tuple(float(value) for value in told["thresholds"])
+            slope, margin = float(told["slope"]), float(told["margin"])
+        except (KeyError, TypeError, ValueError):
+            raise ValueError("expected mean, directions, between, built_in, thresholds, slope and margin") from None
+        if len(thresholds) != EXAMPLES or not all(map(math.isfinite, (*thresholds, slope, margin))) or slope <= 0:
+            raise ValueError(f"expected {EXAMPLES} thresholds, a margin and a slope above 0, all finite")
+        if between.min() < 0 or built_in[1].min() <= 0:
+            raise ValueError("expected variances above 0")
+        return cls(mean, directions, between, built_in, thresholds, slope, margin)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prototype:
+    """One gesture of the user's own in a space."""
+
+    space: Space
+    mean: Array  # (K,) where it is expected
+    variance: Array  # (K,) of a performance around that
+    threshold: float  # nearness
+
+    @classmethod
+    def of(cls, space: Space, places: Array) -> "Prototype":
+        """From (n, K) places of 1 to EXAMPLES examples."""
+        n = len(places)
+        sure = space.between * n / (space.between * n + 1.0)  # how far the examples are believed, 0 to 1
+        mean = sure * places.mean(axis=0)
+        return cls(space, mean, 1.0 + sure / n, space.thresholds[n - 1])
+
+    def nearness(self, place: Array) -> Array:
+        """Log likelihood of a place (..., K), given this gesture, over that given any movement."""
+        return _ratio(place, self.mean, self.variance, self.space.between)
+
+    def confidence(self, place: Array) -> float:
+        """0 to 1 of a place (K,); NEAR at the threshold."""
+        ahead = self.space.slope * (self.nearness(place) - self.threshold)
+        return float(1.0 / (1.0 + np.exp(-np.clip(ahead, -40, 40))))
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """The gesture of the user's own that a segment is nearest to."""
+
+    name: str
+    confidence: float
+    nearer: bool  # than any of the model's gestures, by so much that it may take a segment from them
+
+
+def nearest(space: Space, prototypes: Mapping[str, Prototype], place: Array) -> Match | None:
+    """The best match of a place (K,), None where there are no prototypes."""
+    if not prototypes:
+        return None
+    name = max(prototypes, key=lambda one: prototypes[one].confidence(place))
+    ahead = prototypes[name].nearness(place) - space.built_in_nearness(place)
+    return Match(name, prototypes[name].confidence(place), bool(ahead >= space.margin))
+
+
+def _ratio(place: Array, mean: Array, variance: Array, between: Array) -> Array:
+    """Log of N(place; mean, variance) over N(place; 0, 1 + between), summed over the last axis."""
+    whole = 1.0 + between
+    terms = place**2 / whole - (place - mean) ** 2 / variance + np.log(whole / variance)
+    return np.asarray(0.5 * terms.sum(axis=-1))
+
+
+def _packed(values: Array) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()
+
+
+def _unpacked(text: object) -> Array:
+    if not isinstance(text, str):
+        raise TypeError("expected base64")
+    try:
+        values = np.frombuffer(base64.b64decode(text, validate=True), "<f4").astype(np.float64)
+    except binascii.Error as error:
+        raise ValueError(str(error)) from None
+    if not np.isfinite(values).all():
+        raise ValueError("expected finite numbers")
+    return values
+
+
+def clashes(space: Space, examples: Mapping[str, Array]) -> list[tuple[str, str]]:
+    """Pairs of gestures of which one of the (n, K) examples of the first would be taken for the second."""
+    prototypes = {name: Prototype.of(space, places) for name, places in examples.items()}
+    return [
+        (name, other)
+        for name, places in examples.items()
+        for other in prototypes
+        if other != name and any(prototypes[other].confidence(place) >= NEAR for place in places)
+    ]

@@ -1,0 +1,66 @@
+"""The file of the user's own gestures, the one file that the daemon writes: JSON, mode 0600, all of it or nothing."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from gestured.core.errors import GesturedError
+from gestured.core.own import Examples, from_dict, to_dict
+from gestured.record.files import PRIVATE, atomic_write, open_regular
+
+FORMAT = 1
+MAX_BYTES = 8 << 20  # the longest examples of as many gestures as there may be take some 5 MiB
+NAME = "own-gestures.json"
+REMEDY = "set own_gestures = FILE (--own-gestures FILE), or start it with systemd's StateDirectory="
+
+
+class OwnFileError(GesturedError):
+    """The file of own gestures cannot be read or written; the text names it."""
+
+
+def where(chosen: Path | None, environ: Mapping[str, str]) -> Path | None:
+    """The file that was set, else the one in systemd's state directory, else None."""
+    if chosen is not None:
+        return chosen
+    directory = environ.get("STATE_DIRECTORY")
+    return Path(directory.split(":")[0]) / NAME if directory else None
+
+
+def read(path: Path | None) -> Examples:
+    """The gestures; none where there is no file. Raises OwnFileError for one that cannot be read."""
+    if path is None:
+        return {}
+    try:
+        with open_regular(path) as file:
+            data = file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        raise OwnFileError(f"{path}: cannot be read: {error.strerror or error}") from error
+    if len(data) > MAX_BYTES:
+        raise OwnFileError(f"{path}: expected at most {MAX_BYTES} bytes")
+    try:
+        told = json.loads(data)
+        if not isinstance(told, dict) or told.get("format") != FORMAT:
+            raise ValueError(f"expected a JSON object with format {FORMAT}")
+        return from_dict(told.get("gestures"))
+    except (ValueError, RecursionError) as error:
+        raise OwnFileError(f"{path}: is no file of own gestures: {error}") from error
+
+
+def load(path: Path | None) -> tuple[Examples, str | None]:
+    """The gestures, and why there are none where the file cannot be read: the model's gestures go on without it."""
+    try:
+        return read(path), None
+    except OwnFileError as error:
+        return {}, str(error)
+
+
+def write(path: Path, gestures: Examples, sha256: str) -> None:
+    """Put them there, with the digest of the model that they were enrolled with. Raises OwnFileError."""
+    told = {"format": FORMAT, "model": sha256, "gestures": to_dict(gestures)}
+    try:
+        with atomic_write(path, PRIVATE) as file:
+            file.write(json.dumps(told, indent=1, allow_nan=False).encode() + b"\n")
+    except OSError as error:
+        raise OwnFileError(f"{path}: cannot be written: {error.strerror}; nothing has changed") from error

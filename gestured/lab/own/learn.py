@@ -1,0 +1,211 @@
+"""The space in which a model compares examples, learned by playing enrolments through.
+
+Each kind that somebody could perform is in turn the new gesture, of a person whom the space was not learned from, and
+with kinds that it was not learned from either; everything else that this person does must not be taken for it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.linear_model import LogisticRegression
+
+from gestured.core.prototypes import EXAMPLES, Array, Prototype, Space
+from gestured.lab.dataset import Samples
+from gestured.lab.own.play import PLAN, REPETITIONS
+from gestured.lab.own.signs import SIGNS
+from gestured.model.model import Model
+
+ACCEPTED = 0.01  # of other non-gestures that a threshold lets through in simulation: half of what is promised
+TAKEN = 0.001  # of the model's gestures that one gesture of the user's own may take from it in simulation
+DIRECTIONS = 64  # that are kept, at most
+TELLING = 0.05  # variance between gestures over that within one, below which a direction tells nothing
+DIAGONAL, EVEN = 0.1, 0.1  # shares of the diagonal and of a multiple of one in the pooled covariance: shrinkage
+FOLDS = 5  # of kinds
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a model makes of what was played."""
+
+    embedding: NDArray[np.float64]  # (N, E)
+    best: NDArray[np.int64]  # (N,) the model's gesture
+    known: NDArray[np.bool_]  # (N,) whether it would be published
+    labels: NDArray[np.str_]
+    kinds: NDArray[np.str_]
+    people: NDArray[np.int64]
+    gestures: tuple[str, ...]
+
+    @classmethod
+    def by(cls, model: Model, samples: Samples) -> "Seen":
+        """Everything that was played, in batches of one length."""
+        lengths = samples.lengths()
+        embedding: list[NDArray[np.float64]] = [np.zeros(0)] * len(samples)
+        best, known = np.zeros(len(samples), np.int64), np.zeros(len(samples), bool)
+        for length in np.unique(lengths):
+            index = np.flatnonzero(lengths == length)
+            batch = np.stack([samples.window(int(i)) for i in index])
+            scores, unknown = model.run(batch)
+            best[index] = scores.argmax(axis=1)
+            known[index] = scores.max(axis=1) * (1 - unknown) >= model.threshold
+            for i, row in zip(index, model.embed(batch), strict=True):
+                embedding[int(i)] = row.astype(np.float64)
+        return cls(np.stack(embedding), best, known, samples.labels, samples.kinds, samples.people, model.gestures)
+
+    def plans(self) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        """(N,) which are repetitions, and (N,) of which plan: one person's one kind."""
+        names = np.char.add(np.char.add(self.people.astype("U20"), "/"), self.kinds)
+        return self.labels == PLAN, np.unique(names, return_inverse=True)[1]
+
+
+def learn(seen: Seen) -> Space:
+    """The space, its thresholds, slope and margin."""
+    everybody = np.ones(len(seen.labels), bool)
+    space = _without_thresholds(seen, everybody)
+    # Signs are what the network has not learned, as the user's own gestures are: other kinds look easier than they are.
+    trials = [trial for trial in played_through(seen) if trial.fits and trial.kind in SIGNS]
+    by_count = [[trial for trial in trials if trial.examples == count] for count in range(1, EXAMPLES + 1)]
+    thresholds = tuple(
+        float(np.quantile(np.concatenate([trial.others.own for trial in some]), 1.0 - ACCEPTED)) for some in by_count
+    )
+    ahead = [
+        np.where(trial.gestures.own >= least, trial.gestures.own - trial.gestures.built_in, -np.inf)
+        for some, least in zip(by_count, thresholds, strict=True)
+        for trial in some
+    ]
+    margin = float(np.quantile(np.concatenate(ahead), 1.0 - TAKEN, method="higher"))
+    return replace(space, thresholds=thresholds, slope=_slope(by_count, thresholds), margin=max(margin, 0.0))
+
+
+def _slope(by_count: list[list["Trial"]], thresholds: tuple[float, ...]) -> float:
+    """Of the confidence: how surely what lies so far above its threshold is the gesture, as likely as all else."""
+    ahead = [
+        np.concatenate([getattr(trial, part).own - least for trial in some])
+        for part in ("others", "again")
+        for some, least in zip(by_count, thresholds, strict=True)
+    ]
+    labels = np.repeat([0, 1], [sum(map(len, ahead[:EXAMPLES])), sum(map(len, ahead[EXAMPLES:]))])
+    fitted = LogisticRegression(fit_intercept=False, class_weight="balanced", C=1e6)
+    fitted.fit(np.concatenate(ahead)[:, np.newaxis], labels)
+    return max(float(fitted.coef_[0, 0]), 1e-3)
+
+
+@dataclass(frozen=True, slots=True)
+class Near:
+    """How near some things that one person does are to his new gesture."""
+
+    own: Array  # (n,) nearness to it
+    built_in: Array  # (n,) to the nearest of the model's gestures
+    known: NDArray[np.bool_]  # (n,) whether the model would publish one
+
+    def taken(self, threshold: float, margin: float) -> NDArray[np.bool_]:
+        """(n,) which are answered with the new gesture."""
+        return (self.own >= threshold) & (~self.known | (self.own - self.built_in >= margin))
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One person's new gesture after so many examples."""
+
+    kind: str
+    examples: int
+    fits: bool  # whether it would be enrolled
+    again: Near  # further repetitions
+    others: Near  # other non-gestures
+    gestures: Near  # the model's gestures
+
+
+def played_through(seen: Seen, final: Space | None = None) -> Iterator[Trial]:
+    """Every enrolment. Without `final` in spaces learned from other people and other kinds, five times two."""
+    plan, _ = seen.plans()
+    people, kinds = np.unique(seen.people), np.unique(seen.kinds[plan])
+    folds = np.array_split(np.random.default_rng(0).permutation(kinds), FOLDS)
+    for fold in folds:
+        for side in (0, 1):
+            if final is None:
+                space = _without_thresholds(seen, np.isin(seen.people, people[side::2]) & ~np.isin(seen.kinds, fold))
+            else:
+                space = final
+            places = space.place(seen.embedding)
+            built_in = space.built_in_nearness(places)
+            for person in people[1 - side :: 2]:
+                yield from _trials(seen, space, places, built_in, int(person), fold)
+
+
+def _trials(
+    seen: Seen, space: Space, places: Array, built_in: Array, person: int, kinds: NDArray[np.str_]
+) -> Iterator[Trial]:
+    his, plan = seen.people == person, seen.labels == PLAN
+    gestures = his & np.isin(seen.labels, seen.gestures)
+    for kind in kinds:
+        mine = np.flatnonzero(his & plan & (seen.kinds == kind))
+        if len(mine) < REPETITIONS - 2:  # it falls to pieces on this sensor
+            continue
+        others = his & ~gestures & (seen.kinds != kind)
+        for count in range(1, EXAMPLES + 1):
+            prototype = Prototype.of(space, places[mine[:count]])
+            near = prototype.nearness(places)
+            again = mine[EXAMPLES:]
+            fits = not any(seen.known[i] and space.claimed(places[i]) for i in mine[:count])
+            again_others_gestures = (
+                Near(near[some], built_in[some], seen.known[some]) for some in (again, others, gestures)
+            )
+            yield Trial(str(kind), count, fits, *again_others_gestures)
+
+
+def _without_thresholds(seen: Seen, chosen: NDArray[np.bool_]) -> Space:
+    """Mean, directions and variances of what was chosen."""
+    plan, of = seen.plans()
+    repeated = plan & chosen
+    x, _, inverse = seen.embedding[repeated], *np.unique(of[repeated], return_inverse=True)
+    count = np.bincount(inverse)
+    means = np.stack([np.bincount(inverse, column) for column in x.T], 1) / count[:, np.newaxis]
+    apart = x - means[inverse]
+    within = apart.T @ apart / max(len(x) - len(count), 1)
+    within = _shrunk(within)
+    middle = means.mean(axis=0)
+    between = np.cov(means.T) - within / count.mean()
+    whiten = np.linalg.inv(np.linalg.cholesky(within))
+    values, vectors = np.linalg.eigh(whiten @ between @ whiten.T)
+    kept = np.argsort(-values)[: min(DIRECTIONS, max(int((values > TELLING).sum()), 1))]
+    directions = vectors[:, kept].T @ whiten
+    places = (seen.embedding - middle) @ directions.T
+    built_in = []
+    for gesture in seen.gestures:
+        own = places[chosen & (seen.labels == gesture)]
+        built_in.append((own.mean(axis=0), own.var(axis=0) + 1.0 / len(own)))
+    return Space(middle, directions, np.maximum(values[kept], 0.0), np.stack(built_in, 1), (0.0,) * EXAMPLES, 1.0, 0.0)
+
+
+def _shrunk(covariance: Array) -> Array:
+    """Pooled from few people it says too much: towards its diagonal, and towards equal variances."""
+    size = len(covariance)
+    even = np.trace(covariance) / size * np.eye(size)
+    return np.asarray((1.0 - DIAGONAL) * covariance + DIAGONAL * np.diag(np.diag(covariance)) + EVEN * even)
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What enrolment is worth after so many examples; shares."""
+
+    examples: int
+    enrolled: float  # of the gestures: the others are refused as too near to one of the model's
+    recall: float  # further repetitions that are recognised
+    accepted: float  # other non-gestures that are taken for it
+    taken: float  # the model's gestures that are taken for it
+
+
+def figures(space: Space, trials: Iterator[Trial]) -> list[Figures]:
+    """For each number of examples, with the thresholds and the margin of a space."""
+    every = list(trials)
+    found = []
+    for count in range(1, EXAMPLES + 1):
+        some = [trial for trial in every if trial.examples == count]
+        fit = [trial for trial in some if trial.fits]
+
+        def share(of: str, fit: list[Trial] = fit, least: float = space.thresholds[count - 1]) -> float:
+            return float(np.concatenate([getattr(trial, of).taken(least, space.margin) for trial in fit]).mean())
+
+        found.append(Figures(count, len(fit) / len(some), share("again"), share("others"), share("gestures")))
+    return found

@@ -1,0 +1,125 @@
+"""People who do something of their own again and again, simulated.
+
+One performance is the plan; a repetition is the same path with what a hand changes from time to time: where, how large,
+how turned, how fast and how firmly, and a slow sway.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from gestured.lab.dataset import STREAMS, Sample, Samples, cuts, matched, simulated, truths
+from gestured.lab.digest import code_digest
+from gestured.lab.own.signs import JUDGED, LEARNED, SIGNS, sign
+from gestured.simulator import (
+    GESTURES,
+    NON_GESTURES,
+    SPEEDS,
+    Participant,
+    Performance,
+    SimulatedSensor,
+    generator,
+    perform,
+)  # fmt: skip
+from gestured.simulator.kinematics import wander
+
+PLAN = "plan"  # label of a repetition; anything else that is done is labelled as everywhere
+REPETITIONS = 9  # of a plan: five examples, and four to try them on
+# What lies or rubs on the sensor, and faults: nobody performs these on purpose.
+NOT_PERFORMED = (
+    "palm", "heel_rest", "forearm", "wipe", "object_put_down", "sleeve_brush", "wrinkle", "electrical_burst", "spike",
+)  # fmt: skip
+PERFORMED = tuple(kind for kind in NON_GESTURES if kind not in NOT_PERFORMED)
+HARD = 3  # every third person's sensor is any at all, at half the hardness there is
+FIRST_PERSON = 500_000  # nobody else in the lab has these numbers
+GESTURE_TRIALS, OTHER_TRIALS = 4, 2  # of each kind, done in any way
+
+
+def played(cache: Path, people: int, jobs: int = 2, *, judge: bool = False) -> Samples:
+    """What so many people do: repetitions of plans, the model's gestures, and everything else, person by person.
+
+    The plans are the kinds of non-gestures that somebody could perform, and signs that no network has learned; with
+    `judge` other people and other signs. From `cache` where it was made before.
+    """
+    digest = code_digest(__name__)[:8]
+    for name, stream in (("learn", _to_learn), ("judge", _to_judge)):
+        STREAMS[f"own-{name}-{digest}"] = stream
+    signs, name = (JUDGED, "judge") if judge else (LEARNED, "learn")
+    parts = len(PERFORMED + signs + GESTURES + NON_GESTURES)
+    return simulated(cache, f"own-{name}-{digest}", 0, people * parts, jobs)
+
+
+def _to_learn(seed: int, index: int) -> list[Sample]:
+    return list(_part(2 * seed, index, PERFORMED + LEARNED))
+
+
+def _to_judge(seed: int, index: int) -> list[Sample]:
+    return list(_part(2 * seed + 1, index, PERFORMED + JUDGED))
+
+
+def _part(seed: int, index: int, plans: tuple[str, ...]) -> Iterator[Sample]:
+    """One person's repetitions of one plan, or what else he does of one kind."""
+    kinds = plans + GESTURES + NON_GESTURES
+    nth, part = divmod(index, len(kinds))
+    kind, number = kinds[part], FIRST_PERSON + 10_000 * seed + nth
+    person, rng = Participant(number), generator(number, 0x5E)
+    sensor = SimulatedSensor.wide(rng, 0.5) if nth % HARD == 0 else SimulatedSensor.nominal(day=number)
+    if part < len(plans):
+        rng = generator(number, part)
+        plan = (sign if kind in SIGNS else perform)(kind, person, rng, _speed(rng), 1, sensor.extent)
+        for trial in range(REPETITIONS):
+            rng = generator(number, part, trial)
+            yield from _recorded(repeated(plan, rng, sensor.extent), sensor, rng, PLAN)
+        return
+    for trial in range(GESTURE_TRIALS if kind in GESTURES else OTHER_TRIALS):
+        rng = generator(number, part, trial)
+        done = perform(kind, person, rng, _speed(rng), int(rng.integers(3)), sensor.extent)
+        yield from _recorded(done, sensor, rng, done.label)
+
+
+def _speed(rng: np.random.Generator) -> str:
+    return tuple(SPEEDS)[int(rng.integers(len(SPEEDS)))]
+
+
+def _recorded(
+    performance: Performance, sensor: SimulatedSensor, rng: np.random.Generator, label: str
+) -> Iterator[Sample]:
+    """The one segment that is cut out of it; nothing where it falls into several, or is missed."""
+    start = 1.3 + float(rng.random()) / sensor.rate_hz
+    take = sensor.record([(start, performance)], start + performance.duration_s + 0.8, rng)
+    found = list(matched(cuts(take.frames, take.times), truths(take)))
+    if len(found) == 1:
+        yield found[0]._replace(label=label)
+
+
+def repeated(plan: Performance, rng: np.random.Generator, extent: tuple[float, float]) -> Performance:
+    """The same once more, by a hand that is no machine, on a pad of `extent` millimetres."""
+    xs, ys = (np.concatenate([getattr(contact, axis) for contact in plan.contacts]) for axis in "xy")
+    middle_x, middle_y, size = xs.mean(), ys.mean(), math.hypot(np.ptp(xs), np.ptp(ys))
+    turn, tempo, force = rng.normal(0.0, math.radians(6.0)), rng.lognormal(0.0, 0.12), rng.lognormal(0.0, 0.2)
+    scale_x, scale_y = rng.lognormal(0.0, 0.1) * rng.lognormal(0.0, 0.05, 2)
+    at_x, at_y = np.array([middle_x, middle_y]) + rng.normal(0.0, 0.05, 2) * np.array(extent)
+    c, s = math.cos(turn), math.sin(turn)
+    contacts = []
+    for contact in plan.contacts:
+        dx, dy, t = (contact.x - middle_x) * scale_x, (contact.y - middle_y) * scale_y, contact.t * tempo
+        off_x, off_y = rng.normal(0.0, 0.02, 2) * size
+        x = at_x + c * dx - s * dy + off_x + 0.03 * size * wander(t - t[0], rng, 0.3, 1.5, 3)
+        y = at_y + s * dx + c * dy + off_y + 0.03 * size * wander(t - t[0], rng, 0.3, 1.5, 3)
+        broad = rng.lognormal(0.0, 0.08)
+        contacts.append(
+            replace(
+                contact,
+                t=t,
+                x=np.clip(x, 0.0, extent[0]),
+                y=np.clip(y, 0.0, extent[1]),
+                force=contact.force * force * rng.lognormal(0.0, 0.05),
+                length=contact.length * broad,
+                width=contact.width * broad,
+                angle=contact.angle + float(rng.normal(0.0, 0.15)),
+            )
+        )
+    return replace(plan, contacts=tuple(contacts), duration_s=plan.duration_s * tempo)

@@ -1,0 +1,120 @@
+"""gesturectl enrol, gestures and forget, and a tape of own gestures that is played again."""
+
+import json
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+from gestured.control.cli import main
+from tests.daemon import tiny_model
+from tests.daemon.harness import Daemon
+from tests.daemon.test_own import Performer, ask, ready
+
+pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A real daemon that knows how to learn."""
+    folder = tmp_path_factory.mktemp("own")
+    model = tiny_model.make(folder / "tiny.onnx", own=tiny_model.own())
+    flags = ("--clock", "sensor", "--stale-s", 30, "--own-gestures", folder / "mine.json")
+    daemon = Daemon.start(folder, model, *flags)
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+    assert "Traceback" not in daemon.stderr()
+
+
+@pytest.fixture(scope="module")
+def sensor(daemon: Daemon) -> Performer:
+    return ready(daemon)
+
+
+def begun(start, daemon: Daemon, *flags: object):
+    """`gesturectl enrol slash`, once the daemon waits for examples."""
+    process = start("enrol", "slash", "--sensor", "armrest", *flags, "--control", daemon.ready["control"])
+    status = daemon.client().subscribe("status")
+    while ask(daemon, "gestures")["own"]["enrolling"] is None:
+        status.line()
+    return process
+
+
+def test_a_gesture_is_enrolled_listed_and_forgotten(start, ctl, daemon: Daemon, sensor: Performer) -> None:
+    process = begun(start, daemon, "--examples", 1, "--json")
+    sensor.perform("left").slash()
+    first, *others = [json.loads(line) for line in process.communicate(timeout=30)[0].splitlines()]
+    assert process.returncode == 0
+    assert (first["example"], first["kept"]) == (1, False)
+    assert "the same as swipe_left" in first["reason"]
+    assert others == [{"example": 1, "kept": True, "reason": None}, {"enrolled": "slash", "examples": 1}]
+    status, out, _ = ctl("gestures")
+    assert status == 0
+    assert "swipe_left " in out and "slash " in out and "your own, 1 examples" in out
+    assert json.loads(ctl("gestures", "--json")[1])["own"]["gestures"] == {"slash": 1}
+    assert "slash" in json.loads(ctl("status", "--json")[1])["own"]["gestures"]
+    status, _, err = ctl("enrol", "slash", "--sensor", "armrest")
+    assert (status, "enrolled already" in err) == (1, True)
+    assert ctl("forget", "slash")[:2] == (0, "forgot slash\n")
+    status, _, err = ctl("forget", "slash")
+    assert (status, err.count("\n"), "is no gesture of your own" in err) == (1, 1, True)
+
+
+def test_a_person_reads_what_becomes_of_each_example(start, ctl, daemon: Daemon, sensor: Performer) -> None:
+    process = begun(start, daemon, "--examples", 2)
+    sensor.slash().backslash().slash()
+    out = process.communicate(timeout=30)[0].decode()
+    assert process.returncode == 0
+    assert "1 of 2: kept" in out and "2 of 2: not kept, not like the others" in out and "enrolled slash" in out
+    assert max(map(len, out.splitlines())) <= 120
+    assert ctl("forget", "slash")[0] == 0
+
+
+def test_ctrl_c_gives_up_and_nothing_has_changed(start, ctl, daemon: Daemon, sensor: Performer) -> None:
+    process = begun(start, daemon)
+    sensor.slash()
+    while b"1 of 3: kept" not in process.stdout.readline():
+        pass
+    process.send_signal(signal.SIGINT)
+    assert process.wait(30) == 1
+    assert json.loads(ctl("gestures", "--json")[1])["own"]["gestures"] == {}
+
+
+@pytest.mark.parametrize("name", ["use", "Slash", "a" * 33])
+def test_a_name_that_cannot_be_is_a_mistake_of_usage(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["enrol", name, "--sensor", "armrest"])
+    assert ended.value.code == 2
+    assert "expected a-z" in capsys.readouterr().err
+
+
+def test_a_sensor_that_is_not_there_is_named(ctl, sensor: Performer) -> None:
+    status, _, err = ctl("enrol", "slash", "--sensor", "roof")
+    assert (status, "no sensor 'roof', expected one of armrest" in err) == (1, True)
+
+
+def test_a_tape_holds_the_own_gestures_and_replays_to_the_same_events(
+    start, ctl, daemon: Daemon, recorded, capsys: pytest.CaptureFixture[str]
+) -> None:
+    teacher = ready(daemon, "teacher")
+    process = start("enrol", "slash", "--sensor", "teacher", "--examples", 1, "--control", daemon.ready["control"])
+    status = daemon.client().subscribe("status")
+    while ask(daemon, "gestures")["own"]["enrolling"] is None:
+        status.line()
+    teacher.slash()
+    assert process.wait(30) == 0
+
+    def perform() -> None:
+        client = daemon.client().subscribe("release", sensors=["seat"])
+        Performer(daemon, "seat", seed=7).begin().slash().backslash().perform("up").slash()
+        client.events("release", "seat", 4)
+
+    path, _ = recorded(perform)
+    capsys.readouterr()
+    model = next(daemon.folder.glob("*.onnx"))
+    assert main(["replay", str(path), "--model", str(model), "--json"]) == 0
+    events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    answers = [one.get("gesture", "unknown") for one in events if one["type"] in ("gesture", "unknown")]
+    assert answers == ["slash", "unknown", "swipe_up", "slash"]
+    assert main(["replay", str(path), "--model", str(model), "--diff"]) == 0
+    assert ctl("forget", "slash")[0] == 0

@@ -1,0 +1,322 @@
+"""Gestures of the user's own: enrolled, recognised, forgotten, by a real daemon that a simulated hand plays to."""
+
+import json
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gestured.client.control import Control
+from gestured.client.lines import Refused
+from tests.daemon import tiny_model
+from tests.daemon.harness import Client, Daemon, Frame, Hand, Sensor, lines_of
+
+pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+Point = tuple[float, float]
+Begin = Callable[..., Daemon]
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Path:
+    return tiny_model.make(tmp_path / "tiny.onnx", own=tiny_model.own())
+
+
+@pytest.fixture
+def begin(tmp_path: Path, model: Path) -> Iterator[Begin]:
+    """Starts daemons with a file for own gestures; no sensor falls silent soon."""
+    running: list[Daemon] = []
+
+    def start(*flags: object, **more: Any) -> Daemon:
+        more = {"env": {"STATE_DIRECTORY": str(tmp_path)}} | more
+        running.append(Daemon.start(tmp_path, model, "--clock", "sensor", "--stale-s", 30, *flags, **more))
+        return running[-1]
+
+    yield start
+    for daemon in running:
+        assert daemon.stop() == 0, daemon.stderr()
+        assert "Traceback" not in daemon.stderr()
+
+
+def stroke(hand: Hand, start: Point, end: Point, frames: int = 7) -> list[Frame]:
+    """A straight line from (row, column) to another."""
+    parts = [k / (frames - 1) for k in range(frames)]
+    return [hand.frame(*(a + part * (b - a) for a, b in zip(start, end, strict=True))) for part in parts]
+
+
+class Performer(Sensor):
+    """A sensor with somebody who knows strokes that are no gestures of the model's."""
+
+    def slash(self, frames: int = 7) -> "Performer":
+        """From the top left to the bottom right, and a quiet second."""
+        return self._done(stroke(self.hand, (1, 1), (7, 7), frames))
+
+    def backslash(self) -> "Performer":
+        """From the bottom left to the top right."""
+        return self._done(stroke(self.hand, (7, 1), (1, 7)))
+
+    def hold(self) -> "Performer":
+        """A finger that stays for longer than any gesture lasts."""
+        return self._done([self.hand.frame(4.0, 4.0 + 0.02 * k) for k in range(120)])
+
+    def _done(self, frames: list[Frame]) -> "Performer":
+        self.send(frames, self.hand.idle(1.0))
+        return self
+
+
+class Enrolment:
+    """A client that enrols."""
+
+    def __init__(self, daemon: Daemon, name: str, sensor: str = "armrest", examples: int = 2) -> None:
+        self.control = Control(Path(daemon.ready["control"]))
+        self.control.ask("enrol", name=name, sensor=sensor, examples=examples)
+        self._lines = self.control.lines()
+
+    def line(self) -> dict[str, Any]:
+        return next(self._lines)
+
+
+def ready(daemon: Daemon, name: str = "armrest", seed: int = 0) -> Performer:
+    """A sensor that the daemon has learned."""
+    client = daemon.client().subscribe("gesture", sensors=[name])
+    sensor = Performer(daemon, name, seed=seed)
+    sensor.begin().perform("left")
+    client.events("gesture", name)
+    client.close()
+    return sensor
+
+
+def enrol(daemon: Daemon, sensor: Performer, name: str = "slash", examples: int = 2) -> None:
+    """Teach it a stroke."""
+    enrolment = Enrolment(daemon, name, sensor.name, examples)
+    for _ in range(examples):
+        sensor.slash()
+        assert enrolment.line()["kept"] is True
+    assert enrolment.line() == {"enrolled": name, "examples": examples}
+    enrolment.control.close()
+
+
+def ask(daemon: Daemon, verb: str, **parameters: object) -> dict[str, Any]:
+    with Control(Path(daemon.ready["control"])) as control:
+        return control.ask(verb, **parameters)
+
+
+def answer(client: Client, sensor: Performer, perform: Callable[[], object]) -> dict[str, Any]:
+    """What becomes of one performance."""
+    perform()
+    return client.until(lambda line: line["type"] in ("gesture", "unknown", "cancelled"))[-1]
+
+
+def test_what_was_enrolled_is_recognised_on_every_sensor_without_a_restart(begin: Begin) -> None:
+    daemon = begin()
+    sensor, other = ready(daemon), ready(daemon, "seat", seed=5)
+    client = daemon.client().subscribe("gesture", "unknown", "cancelled")
+    before = answer(client, sensor, sensor.slash)
+    assert before["type"] == "unknown"
+    enrol(daemon, sensor)
+    told = client.until(lambda line: line["type"] == "gestures")[-1]
+    assert told == {"type": "gestures", "gestures": [*tiny_model.GESTURES, "slash"]}
+    for one in (sensor, other):
+        event = answer(client, one, one.slash)
+        assert (event["type"], event["gesture"], event["own"], event["sensor"]) == ("gesture", "slash", True, one.name)
+        assert 0.5 <= event["confidence"] <= 1
+        assert list(event["scores"]) == list(tiny_model.GESTURES)
+        assert sum(event["scores"].values()) == pytest.approx(1, abs=1e-3)
+    assert answer(client, sensor, sensor.backslash)["type"] == "unknown"
+    built_in = answer(client, sensor, lambda: sensor.perform("left"))
+    assert (built_in["gesture"], "own" in built_in) == ("swipe_left", False)
+    assert daemon.client().hello["gestures"] == [*tiny_model.GESTURES, "slash"]
+
+
+def test_one_may_be_taken_from_the_model_only_where_it_is_much_nearer(begin: Begin) -> None:
+    """Slowly drawn, the model is sure that it is a double tap; nothing like it was among those."""
+    daemon = begin()
+    sensor = ready(daemon)
+    client = daemon.client().subscribe("gesture", "unknown", "cancelled")
+    assert answer(client, sensor, lambda: sensor.slash(14))["gesture"] == "double_tap"
+    enrolment = Enrolment(daemon, "slow", examples=1)
+    assert answer(client, sensor, lambda: sensor.slash(14))["gesture"] == "double_tap"
+    assert enrolment.line()["kept"] is True
+    assert enrolment.line() == {"enrolled": "slow", "examples": 1}
+    client.until(lambda line: line["type"] == "gestures")
+    assert answer(client, sensor, lambda: sensor.slash(14))["gesture"] == "slow"
+    assert answer(client, sensor, lambda: sensor.perform("right"))["gesture"] == "swipe_right"
+
+
+def test_each_example_is_judged_at_once(begin: Begin) -> None:
+    daemon = begin()
+    sensor = ready(daemon)
+    enrolment = Enrolment(daemon, "slash")
+    for perform, words in (
+        (lambda: sensor.perform("tap"), "too short"),
+        (lambda: sensor.perform("left"), "the same as swipe_left (0.9"),
+        (sensor.hold, "was not over"),
+    ):
+        perform()
+        line = enrolment.line()
+        assert (line["example"], line["kept"]) == (1, False)
+        assert words in line["reason"]
+    sensor.slash()
+    assert enrolment.line() == {"example": 1, "kept": True, "reason": None}
+    sensor.backslash()
+    line = enrolment.line()
+    assert (line["example"], line["kept"]) == (2, False)
+    assert "not like the others" in line["reason"]
+    sensor.slash()
+    assert enrolment.line() == {"example": 2, "kept": True, "reason": None}
+    assert enrolment.line() == {"enrolled": "slash", "examples": 2}
+    again = Enrolment(daemon, "cut", examples=1)
+    sensor.slash()
+    line = again.line()
+    assert (line["kept"], "the same as slash" in line["reason"]) == (False, True)
+
+
+def test_one_enrolment_at_a_time_and_none_outlives_its_client(begin: Begin, tmp_path: Path) -> None:
+    daemon = begin()
+    sensor = ready(daemon)
+    first = Enrolment(daemon, "slash")
+    sensor.slash()
+    assert first.line()["kept"] is True
+    with pytest.raises(Refused, match="'slash' is being enrolled on armrest"):
+        Enrolment(daemon, "cut")
+    first.control.close()
+    while ask(daemon, "gestures")["own"]["enrolling"] is not None:
+        daemon.client().subscribe("status").until(lambda line: line["type"] == "status")
+    assert not (tmp_path / "own-gestures.json").exists()
+    enrol(daemon, sensor, "cut")
+    assert ask(daemon, "gestures")["own"]["gestures"] == {"cut": 2}
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("swipe_left", "is a gesture of tiny"),
+        ("use", "is no gesture's name"),
+        ("Slash", "is no gesture's name"),
+        ("a" * 33, "is no gesture's name"),
+    ],
+)
+def test_names_that_cannot_be(begin: Begin, name: str, words: str) -> None:
+    daemon = begin()
+    ready(daemon)
+    with pytest.raises(Refused, match=words):
+        Enrolment(daemon, name)
+
+
+def test_the_file_is_private_and_outlives_the_daemon_until_it_is_forgotten(begin: Begin, tmp_path: Path) -> None:
+    daemon = begin()
+    sensor = ready(daemon)
+    enrol(daemon, sensor)
+    path = tmp_path / "own-gestures.json"
+    assert path.stat().st_mode & 0o777 == 0o600
+    kept = json.loads(path.read_text())
+    assert kept["model"] == ask(daemon, "status")["model"]["sha256"]
+    assert len(kept["gestures"]["slash"]) == 2
+    assert daemon.stop() == 0
+    daemon = begin()
+    sensor = ready(daemon)
+    client = daemon.client().subscribe("gesture", "unknown", "cancelled")
+    assert answer(client, sensor, sensor.slash)["gesture"] == "slash"
+    assert ask(daemon, "forget", name="slash")["forgotten"] == "slash"
+    assert client.until(lambda line: line["type"] == "gestures")[-1]["gestures"] == list(tiny_model.GESTURES)
+    assert answer(client, sensor, sensor.slash)["type"] == "unknown"
+    assert json.loads(path.read_text())["gestures"] == {}
+    with pytest.raises(Refused, match="'slash' is no gesture of your own"):
+        ask(daemon, "forget", name="slash")
+
+
+def test_without_a_file_enrolling_is_refused_with_the_remedy(begin: Begin) -> None:
+    daemon = begin(env={"STATE_DIRECTORY": ""})
+    ready(daemon)
+    with pytest.raises(Refused, match="--own-gestures FILE"):
+        Enrolment(daemon, "slash")
+
+
+def test_a_broken_file_is_said_left_alone_and_the_models_gestures_go_on(begin: Begin, tmp_path: Path) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text('{"format": 1, "gestures": {"slash": [{"shape": [3]}]}}')
+    daemon = begin("--own-gestures", path)
+    ready(daemon)  # which performs a swipe
+    fault = ask(daemon, "gestures")["own"]["fault"]
+    assert str(path) in fault
+    assert "gestures.slash[0]" in fault
+    with pytest.raises(Refused, match="is no file of own gestures"):
+        Enrolment(daemon, "cut")
+    assert any(line.get("what") == fault for line in lines_of(daemon.stderr()))
+    assert '"shape": [3]' in path.read_text()
+
+
+def test_where_it_cannot_be_written_nothing_changes(begin: Begin) -> None:
+    daemon = begin("--own-gestures", "/proc/own-gestures.json")
+    sensor = ready(daemon)
+    enrolment = Enrolment(daemon, "slash", examples=1)
+    sensor.slash()
+    assert enrolment.line()["kept"] is True
+    line = enrolment.line()
+    assert (line["given_up"], "/proc/own-gestures.json: cannot be written" in line["reason"]) == ("slash", True)
+    assert ask(daemon, "gestures")["own"]["gestures"] == {}
+
+
+def test_another_model_takes_the_examples_over_or_says_that_they_are_off(
+    begin: Begin, tmp_path: Path, model: Path
+) -> None:
+    daemon = begin()
+    sensor = ready(daemon)
+    enrol(daemon, sensor)
+    client = daemon.client().subscribe("gesture", "unknown", "cancelled")
+    tiny_model.make(model, version="2")
+    ask(daemon, "reload")
+    assert ask(daemon, "gestures")["own"]["off"] == "tiny has no embedding"
+    assert answer(client, sensor, sensor.slash)["type"] == "unknown"
+    with pytest.raises(Refused, match="own gestures are off"):
+        Enrolment(daemon, "cut")
+    tiny_model.make(model, version="3", own=tiny_model.own())
+    ask(daemon, "reload")
+    own = ask(daemon, "status")["own"]
+    assert (own["off"], own["gestures"]) == (None, {"slash": 2})
+    assert answer(client, sensor, sensor.slash)["gesture"] == "slash"
+
+
+def test_thresholds_refractory_times_tests_and_filters_take_own_names(begin: Begin, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text("[gestures.slash]\nrefractory_s = 60\n")
+    daemon = begin("--config", config)
+    sensor = ready(daemon)
+    enrol(daemon, sensor)
+    client = daemon.client().subscribe("gesture", "unknown", "cancelled", gestures=["slash"])
+    assert answer(client, sensor, sensor.slash)["gesture"] == "slash"
+    assert answer(client, sensor, sensor.slash)["reason"] == "refractory"
+    ask(daemon, "emit", gesture="slash")
+    line = client.line()
+    assert (line["gesture"], line["own"], line["test"]) == ("slash", True, True)
+    config.write_text("[gestures.slash]\nthreshold = 1.0\n")
+    ask(daemon, "reload")
+    assert answer(client, sensor, sensor.slash)["type"] == "unknown"
+    config.write_text("[gestures.swipe_lefft]\nthreshold = 1.0\n")
+    with pytest.raises(Refused, match="swipe_lefft"):
+        ask(daemon, "reload")
+
+
+def test_an_enrolment_is_given_up_at_a_reload(begin: Begin) -> None:
+    daemon = begin()
+    ready(daemon)
+    enrolment = Enrolment(daemon, "slash")
+    ask(daemon, "reload")
+    assert enrolment.line()["given_up"] == "slash"
+    assert ask(daemon, "gestures")["own"]["enrolling"] is None
+
+
+def test_a_client_that_enrols_without_end_leaves_room_for_others(begin: Begin) -> None:
+    """Whoever hangs up in the middle of a line, or asks twice on one connection, disturbs nobody."""
+    daemon = begin()
+    sensor = ready(daemon)
+    with socket.socket(socket.AF_UNIX) as raw:
+        raw.connect(daemon.ready["control"])
+        raw.sendall(b'{"verb":"enrol","name":"slash","sensor":"armrest","examples":6}\n')
+        assert json.loads(raw.makefile().readline())["reason"] == "expected 1 to 5 examples, found 6"
+    enrolment = Enrolment(daemon, "slash")
+    with pytest.raises(Refused, match="a tap already"):
+        enrolment.control.ask("enrol", name="cut", sensor="armrest")
+    sensor.slash()
+    assert enrolment.line()["kept"] is True
