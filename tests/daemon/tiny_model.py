@@ -6,7 +6,6 @@ if it took long), and what takes very long is unknown.
 
 import hashlib
 import json
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ GESTURES = (
 ROWS = COLUMNS = 9
 
 
-PROVISIONAL = {"in_a_row": 1, "elapsed_s": [0.0, 0.1], "thresholds": [None, 0.9], "tap": 0.8}
+PROVISIONAL = '{"in_a_row": 1, "elapsed_s": [0.0, 0.1], "thresholds": [null, 0.9], "tap": 0.8}'
 
 
 def own() -> str:
@@ -38,19 +37,12 @@ def own() -> str:
 
 
 def make(
-    path: Path,
-    *,
-    gestures: tuple[str, ...] = GESTURES,
-    version: str = "1",
-    broken: str = "",
-    quantiles: str = "{}",
-    provisional: Mapping[str, object] | None = None,
-    own: str = "",
+    path: Path, *, gestures: tuple[str, ...] = GESTURES, version: str = "1", broken: str = "", **metadata: str
 ) -> Path:
     """Write the model to `path`; `broken` = "self_test" stores other outputs than it gives.
 
-    `provisional` says how sure it must be of a contact that is not over.
-    With `own`, the metadata of that name, it has an embedding: movement across, movement down, spread in time.
+    `metadata` are further ones: `quantiles`; `provisional`, how sure it must be of a contact that is not over;
+    `own`, with which it has an embedding: movement across, movement down, spread in time.
     """
     import onnx
     from onnx import TensorProto, helper, numpy_helper
@@ -121,7 +113,7 @@ def make(
     ]
     value = helper.make_tensor_value_info
     outputs = [value("scores", TensorProto.FLOAT, ["B", count]), value("unknown", TensorProto.FLOAT, ["B"])]
-    if own:
+    if "own" in metadata:
         nodes.append(n("Concat", ["kx2", "ky2", "vt2"], ["embedding"], axis=1))
         outputs.append(value("embedding", TensorProto.FLOAT, ["B", 3]))
     graph = helper.make_graph(
@@ -150,10 +142,9 @@ def make(
             "calibration": "{}",
             "self_test": SelfTest(frames, scores, unknown).to_json(),
             "training_data": hashlib.sha256(b"").hexdigest(),
-            "quantiles": quantiles,
+            "quantiles": "{}",
         }
-        | ({} if provisional is None else {"provisional": json.dumps(provisional)})
-        | ({"own": own} if own else {}),
+        | metadata,
     )
     path.write_bytes(onnx.load_from_string(model.SerializeToString()).SerializeToString())
     return path

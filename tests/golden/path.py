@@ -16,7 +16,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Unknown
 from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
 from gestured.core.feed import front_end_of
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Contact, Draft, FrontEnd
+from gestured.core.front_end import Contact, Draft, FrontEnd, Preview
 from gestured.core.hub import Hub
 from gestured.core.reading import Reading
 from gestured.core.recognizer import Decided
@@ -136,7 +136,7 @@ def front_ends(tape: Tape) -> Iterator[tuple[FrontEnd, Stamp, list[Contact]]]:
                     if stamp.restarted:
                         found += front_end.reset()
                     frame = Frame(stamp.t, arrival.values, arrival.touches, stamp.lost)
-                    found += [one for one in front_end.push(frame) if not isinstance(one, Draft)]
+                    found += [one for one in front_end.push(frame) if not isinstance(one, Draft | Preview)]
                 yield front_end, stamp, found
 
 
