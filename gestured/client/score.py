@@ -34,6 +34,7 @@ class Outcome:
     performed: Performed | None
     event: Mapping[str, Any] | None = None
     latency_s: float | None = None  # the event's arrival minus the performed end
+    early: Mapping[str, Any] | None = None  # the provisional event before it
 
 
 @dataclass
@@ -45,14 +46,23 @@ class Tally:
         default_factory=lambda: dict.fromkeys(("right", "wrong", "missed", "rejected", "false"), 0)
     )
     latencies: list[float] = field(default_factory=list)
+    given: int = 0  # provisional events
+    leads: list[float] = field(default_factory=list)  # s from each that was confirmed to the last touched frame
+    _early: Mapping[str, Any] | None = None  # the last one
 
     def begin(self, performed: Performed) -> None:
         """Something is being performed; its end may still lie ahead."""
         self.waiting.append(performed)
 
     def hear(self, event: Mapping[str, Any], arrived: float) -> Outcome | None:
-        """An event of type gesture or unknown; an unknown decides nothing yet, a gesture may still follow."""
+        """A gesture, unknown or provisional event; the last two decide nothing yet, a gesture may still follow."""
+        if event["type"] == "provisional":
+            self.given, self._early = self.given + 1, event
+            return None
         performed = self._match(event["onset"], event["offset"])
+        early = self._early if event.get("provisional") else None
+        if early is not None and event["provisional"] == "confirmed":
+            self.leads.append(event["offset"] - early["decided"])
         if event["type"] == "unknown":
             if performed:
                 performed.unknown = True
@@ -60,12 +70,12 @@ class Tally:
         if performed is None or performed.answered or performed.label == NONE:
             if performed:
                 performed.answered = True
-            return self._count(Outcome("false", performed, event))
+            return self._count(Outcome("false", performed, event, early=early))
         performed.answered = True
         verdict = "right" if event["gesture"] == performed.label else "wrong"
         latency = arrived - performed.offset
         self.latencies.append(latency)
-        return self._count(Outcome(verdict, performed, event, latency))
+        return self._count(Outcome(verdict, performed, event, latency, early))
 
     def settle(self, now: float) -> list[Outcome]:
         """What nothing can come for any more."""
@@ -75,11 +85,14 @@ class Tally:
         return [self._count(Outcome("rejected" if p.label == NONE else "missed", p)) for p in silent]
 
     def summary(self) -> dict[str, Any]:
-        """The counts, and the latency in milliseconds (None where there is none)."""
+        """The counts, latency and lead in milliseconds (None where there is none); one sensor's provisional events."""
         ordered = sorted(self.latencies)
         return self.counts | {
             "latency_ms_median": round(1000 * median(ordered)) if ordered else None,
             "latency_ms_p95": round(1000 * ordered[int(0.95 * len(ordered))]) if ordered else None,
+            "provisional": self.given,
+            "confirmed": len(self.leads),
+            "lead_ms_median": round(1000 * median(self.leads)) if self.leads else None,
         }
 
     def _match(self, onset: float, offset: float) -> Performed | None:

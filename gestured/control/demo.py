@@ -26,6 +26,7 @@ DEMO_SENSOR = "demo"
 SLACK_S = 0.3  # idle frames shown before what was performed, and waited for at the end
 DRAWN_AFTER_S = 0.1
 POLL_S = 0.05
+HEARD = ("gesture", "unknown", "provisional")  # events that the daemon is asked for
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -59,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     with Engine(args.model, play.rows, play.columns) as engine:
         try:
             with (
-                closing(Stream(engine.socket, {"types": ["gesture", "unknown"]})) as stream,
+                closing(Stream(engine.socket, {"types": HEARD})) as stream,
                 closing(Sensor(engine.listen, Form(DEMO_SENSOR))) as sensor,
             ):
                 show.say(
@@ -120,7 +121,7 @@ class Show:
             if item is None:
                 raise GesturedError("the daemon closed the connection")
             arrived, message = item
-            if message["type"] in ("gesture", "unknown") and (decided := self.tally.hear(message, arrived)):
+            if message["type"] in HEARD and (decided := self.tally.hear(message, arrived)):
                 self._show(decided, sensor)
         for outcome in self.tally.settle(math.inf):
             self._show(outcome, sensor)

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 from gestured.client.address import host_port
 from gestured.client.say import say, say_drawn, say_json, tell
@@ -60,6 +61,9 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         metavar="MODEL",
         help="without --to: the model (default: the recorded one, if it is a shipped one)",
     )
+    parser.add_argument(
+        "--provisional", action="store_true", help="without --to: also print what was said before the answers"
+    )
     parser.add_argument("--sensor", default="recording", metavar="NAME", help="the sensor's name, for an .npz")
     parser.add_argument("--json", action="store_true", help="print events, or differences, as JSON lines")
     parser.set_defaults(run=run)
@@ -88,6 +92,8 @@ def _check(args: argparse.Namespace) -> None:
         raise GesturedError(f"--sensor {args.sensor!r}: expected 1 to 64 of A-Z a-z 0-9 _ -")
     if args.to is None and (args.speed != 1 or args.socket is not None):
         raise GesturedError("--speed and --socket are for a daemon: name it with --to HOST:PORT")
+    if args.to is not None and args.provisional:
+        raise GesturedError("--provisional is for a replay here; listen --types provisional asks a daemon for them")
     if args.to is not None and args.model is not None:
         raise GesturedError("--model is for a replay here; the daemon of --to has its own")
 
@@ -96,14 +102,17 @@ def _here(args: argparse.Namespace, source: Playable) -> int:
     """Without a daemon."""
     scene, ladder = _opened(source, args.model)
     try:
-        replay = Replay(source.tape, scene, ladder)
+        replay = Replay(source.tape, scene, ladder, provisional=args.provisional)
     except RecordingError as error:
         raise RecordingError(f"{args.file}: {error}") from error
     lines = (json.loads(messages.to_json(event, replay.epoch)) for event in replay.events())
     if args.diff:
         return _compare(args, source, list(lines), _knew(replay))
+    early: dict[str, dict[str, Any]] = {}  # by sensor: what was said of a touch that has no answer yet
     for line in lines:
-        tell(args.json, line, readable(line))
+        tell(args.json, line, readable(line, early.pop(line["sensor"], None)))
+        if line["type"] == "provisional":
+            early[line["sensor"]] = line
     return 0
 
 

@@ -42,13 +42,16 @@ def block(outcome: Outcome, picture: NDArray[np.float32], colour: bool) -> str:
         answer = "unknown" if performed and performed.unknown else "-"
     when = f"{1000 * outcome.latency_s:.0f} ms after its end" if outcome.latency_s is not None else ""
     verdict = paint(outcome.verdict.upper(), VERDICT_COLOURS[outcome.verdict], colour)
+    early = outcome.early
+    said = shown(f"{early['gesture']}, {said_when(early['decided'], event['offset'])}") if early and event else ""
     words = [
-        "",
         f"performed   {name(performed)}",
+        *([f"said early  {said}"] if said else []),
         f"recognised  {paint(answer, BOLD, colour)}",
         f"            {verdict}  {paint(when, DIM, colour)}".rstrip(),
         "",
     ]
+    words = words if said else ["", *words]
     lines = [f"  {row}   {text}".rstrip() for row, text in zip(draw(picture, colour), words, strict=True)]
     return "\n".join([*lines, ""])
 
@@ -63,6 +66,8 @@ def as_dict(outcome: Outcome) -> dict[str, Any]:
         "kind": performed.kind if performed else None,
         "recognised": event["gesture"] if event else "unknown" if performed and performed.unknown else None,
         "confidence": event["confidence"] if event else None,
+        "provisional": outcome.early["gesture"] if outcome.early else None,
+        "lead_ms": round(1000 * (event["offset"] - outcome.early["decided"])) if event and outcome.early else None,
         "latency_ms": None if outcome.latency_s is None else round(1000 * outcome.latency_s, 1),
     }
 
@@ -82,4 +87,8 @@ def in_words(figures: Mapping[str, Any], colour: bool) -> str:
             f"  latency (end of the gesture to the event):  median {figures['latency_ms_median']} ms, "
             f"95th percentile {figures['latency_ms_p95']} ms"
         )
+    if figures["provisional"]:
+        lead = figures["lead_ms_median"]
+        when = "" if lead is None else f":  median {said_when(0.0, lead / 1000)}"
+        lines.append(f"  said early     {figures['provisional']:3d}:  {figures['confirmed']} confirmed{when}")
     return "\n".join(lines)

@@ -63,6 +63,11 @@ def parser() -> argparse.ArgumentParser:
     online.add_argument("--idle-minutes", type=float, default=5, help="minutes of an untouched sensor (5)")
     online.add_argument("--speed", type=float, default=100, help="times real time (100)")
     online.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (900)")
+    taps = add("taps", "print what each wait for a second tap costs in double taps and saves in time, simulated",
+               "gestured-lab taps --people 20")  # fmt: skip
+    taps.add_argument("--model", default="cnn_lstm", help="a path, or a shipped model's name (cnn_lstm)")
+    taps.add_argument("--people", type=int, default=20, help="participants, two minutes of taps of each (20)")
+    taps.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (900)")
     stability = add("stability", "measure filters, extreme inputs, models and symmetries of the whole path",
                     "gestured-lab stability --quick")  # fmt: skip
     stability.add_argument("--quick", action="store_true", help="some seconds instead of some minutes")
@@ -88,10 +93,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = parser().parse_args(arguments)
     try:
-        if args.command == "online":
-            from gestured.lab import online
+        if args.command in ("online", "taps"):
+            from gestured.lab import online, taps
 
-            return online.run(args)
+            return online.run(args) if args.command == "online" else taps.run(args)
         if args.command in recordings.COMMANDS:
             return recordings.run(args)
         try:

@@ -58,6 +58,7 @@ FORMS: dict[str, str] = {key: form["type"] for key, form in EVENT_SCHEMA["proper
 # What an event of a type says at least.
 NEEDED = {
     "onset": ("sensor", "id", "onset"),
+    "provisional": ("sensor", "id", "gesture", "confidence", "onset", "decided"),
     "gesture": ("sensor", "id", "gesture", "confidence", "onset", "offset"),
     "unknown": ("sensor", "id", "confidence", "onset", "offset"),
     "cancelled": ("sensor", "id", "reason"),

@@ -1,6 +1,7 @@
 """`gesturectl replay`: to a daemon and here, held against what was recorded or labelled."""
 
 import json
+import signal
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -10,10 +11,12 @@ import pytest
 
 from gestured.control.cli import main
 from gestured.record import arrays as recording
+from gestured.record import tape
 from gestured.record.recordings import Recordings
 from tests.control.conftest import gestures
 from tests.daemon import tiny_model
 from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor
+from tests.hostile.grammar import violations
 
 LEAD_S = 1.6  # untouched; 24 frames
 
@@ -192,3 +195,35 @@ def test_a_sensor_that_is_there_already_is_left_alone(replay, daemon: Daemon, wr
 def test_flags_that_do_not_go_together_are_one_sentence(replay, wrongly: Path, flags: tuple[str, ...], words) -> None:
     status, out, err = replay(wrongly, *flags)
     assert (status, out) == (1, "") and words in err and err.count("\n") == 1
+
+
+def test_what_was_said_before_an_answer_is_on_the_tape_and_can_be_said_again(start, replay, tmp_path: Path) -> None:
+    pytest.importorskip("mcap", reason="recordings need the extra [record]")
+    model = tiny_model.make(tmp_path / "tiny.onnx", provisional=tiny_model.PROVISIONAL)
+    daemon, path = Daemon.start(tmp_path, model, "--clock", "sensor"), tmp_path / "a.mcap"
+    recorder = start("record", path, "--control", daemon.ready["control"])
+    assert b"recording into" in recorder.stderr.readline()
+    asking, sensor = daemon.client().subscribe("provisional"), Sensor(daemon, "arm").begin().perform("left")
+    asking.events("gesture", "arm")
+    asking.close()
+    plain = daemon.client().subscribe("release")
+    sensor.perform("up", "tap")
+    plain.events("release", "arm", 2)
+    recorder.send_signal(signal.SIGINT)
+    assert recorder.wait(30) == daemon.stop() == 0
+    events = tape.read(path).events
+    assert [event["id"] for event in events if event["type"] == "provisional"] == [1]
+    answers = [event["provisional"] for event in events if event["type"] == "gesture"]
+    assert answers == ["confirmed", None, None]
+    for more in ((), ("--provisional",)):
+        status, out, _ = replay(path, "--model", model, "--json", *more)
+        again = [json.loads(line) for line in out.splitlines()]
+        said = [event["gesture"] for event in again if event["type"] == "provisional"]
+        assert status == 0 and said == (["swipe_left", "swipe_up", "one_tap"] if more else [])
+        assert violations(again) == []
+        status, _, err = replay(path, "--model", model, "--diff", *more)
+        assert status == 0 and "3 recorded answers, 0 differences" in err
+    _, out, _ = replay(path, "--model", model, "--provisional")
+    assert "swipe_left?" in out and "confirmed: swipe_left, 0 ms before the finger left" in out
+    status, _, err = replay(path, "--provisional", "--to", "127.0.0.1:9")
+    assert status == 1 and "--provisional is for a replay here" in err

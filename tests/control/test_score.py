@@ -94,3 +94,16 @@ def test_everything_is_counted_once(performances, events):
     assert counts["right"] + counts["wrong"] + counts["false"] == len(events)
     assert counts["rejected"] <= len(performances) - gestures
     assert len(tally.latencies) == counts["right"] + counts["wrong"]
+
+
+def test_what_was_said_early_is_counted_with_its_lead():
+    tally = Tally()
+    for name, verdict, decided in (("one_tap", "confirmed", 10.1), ("swipe_up", "revoked", 20.1)):
+        tally.begin(Performed(name, name, decided - 0.1, decided + 0.2))
+        early = {"type": "provisional", "gesture": "one_tap", "decided": decided}
+        assert tally.hear(early, decided) is None
+        found = gesture(name, decided - 0.1, decided + 0.15) | {"provisional": verdict}
+        assert tally.hear(found, decided + 0.4).early is early
+    tally.begin(Performed("one_tap", "one_tap", 30.0, 30.2))
+    assert tally.hear(gesture("one_tap", 30.0, 30.2) | {"provisional": None}, 30.4).early is None
+    assert {"provisional": 2, "confirmed": 1, "lead_ms_median": 150}.items() <= tally.summary().items()

@@ -16,7 +16,7 @@ from gestured.core.activity import BLOB, BLOB_GAIN, COMMON, Activity
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment, Touch
-from gestured.core.front_end import Contact, Cut, Draft, FrontEnd
+from gestured.core.front_end import Contact, Cut, Draft, FrontEnd, Preview
 from gestured.core.mounting import Mounting
 from gestured.core.window import Window
 
@@ -75,7 +75,7 @@ def stream(
 
 
 def contacts(front_end: FrontEnd, frame: Frame) -> list[Contact]:
-    return [found for found in front_end.push(frame) if not isinstance(found, Draft)]
+    return [found for found in front_end.push(frame) if not isinstance(found, Draft | Preview)]
 
 
 def play(front_end: FrontEnd, times: Array, frames: NDArray[np.generic]) -> list[Contact]:

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Contact, Cut, Draft, FrontEnd
+from gestured.core.front_end import Contact, Cut, Draft, FrontEnd, Preview
 from gestured.core.recognizer import Decided, Recognizer, Scores, events_of
 from gestured.core.timing import Timing
 from gestured.core.window import Window
@@ -198,7 +198,7 @@ def cut_out(stream: Sequence[Frame]) -> list[Contact]:
 
 
 def contacts(front_end: FrontEnd, frame: Frame) -> list[Contact]:
-    return [found for found in front_end.push(frame) if not isinstance(found, Draft)]
+    return [found for found in front_end.push(frame) if not isinstance(found, Draft | Preview)]
 
 
 @pytest.mark.parametrize("where", [-4, 0, 1, 9, 11])  # frames from the onset; the last touched one is the eleventh
@@ -227,6 +227,7 @@ def test_a_hole_on_a_clear_path_hides_nothing(lines: tuple[str, ...], lost: int,
     at = (sum(touched(stream)) - lost + 1) // 2
     (answer,) = answers(run(recognizer(Fake()), stream[:at] + stream[at + lost :]))
     assert isinstance(answer, kind)
+    assert getattr(answer, "reason", "hole") == "hole"
 
 
 def test_a_hole_while_a_second_tap_is_waited_for() -> None:
@@ -283,6 +284,13 @@ def test_a_sensor_that_says_no_more_once_the_finger_is_off_is_answered() -> None
     subject = recognizer(Fake())
     events = run(subject, stream[:end]) + subject.flush(stream[end - 1].t + 5.0)
     assert [type(event) for event in answers(events)] == [Gesture]
+
+
+@pytest.mark.parametrize(("rate", "reason"), [(3, "rate"), (5, "confidence"), (15, "confidence"), (1000, "confidence")])
+def test_a_rate_that_the_models_do_not_know_is_the_reason(rate: int, reason: str) -> None:
+    stream = frames(f"sensor rate {rate}", "quiet for 3s", "move 4,1 to 4,7 0.8 in 1500ms", "quiet for 2s")
+    (answer,) = answers(run(recognizer(Fake([says(0.2, 0.2, 0.2)])), stream))
+    assert isinstance(answer, Unknown) and answer.reason == reason
 
 
 # --- what is decided

@@ -1,0 +1,87 @@
+"""What it costs and what it saves to wait for a second tap: simulated taps, read with one wait after the other."""
+
+import argparse
+import json
+from collections import Counter
+from dataclasses import asdict
+from statistics import median
+from typing import Any
+
+import gestured
+from gestured.core.events import Gesture
+from gestured.core.scene import DOUBLE_TAP, ONE_TAP
+from gestured.lab.online import tallied
+from gestured.lab.progress import progress
+from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
+
+WAITS_S = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
+SESSION_S = 120.0  # of one participant; long enough for some dozens of taps
+TAPS = 100  # single and double ones in turn that a session has no time for
+
+
+def takes(people: int, seed: int) -> list[Take]:
+    """A session of single and double taps of each new participant, on the nominal sensor."""
+    kinds = [ONE_TAP, DOUBLE_TAP] * TAPS
+    return [
+        session(Participant(n), SimulatedSensor.nominal(day=n), generator(n, 0x7A), SESSION_S, 0.0, kinds=kinds)
+        for n in range(seed, seed + people)
+    ]
+
+
+def read(model: str, take: Take, wait_s: float) -> tuple[Counter[str], list[float]]:
+    """What was done and what it was taken for, with counts; how long right single taps waited for their answer, s."""
+    recognizer = gestured.open(model, grid=take.frames.shape[1:], tap_gap_s=wait_s)
+    found = [event for t, frame in zip(take.times, take.frames, strict=True) for event in recognizer.push(t, frame)]
+    found += recognizer.flush(float(take.times[-1]))
+    events = [{"type": "gesture"} | asdict(event) for event in found if isinstance(event, Gesture)]
+    tally, outcomes = tallied(take, 0.0, events)
+    counts = Counter({"missed": tally.counts["missed"]})
+    waited = []
+    for one in outcomes:
+        if one.event is not None and one.performed is not None and one.verdict in ("right", "wrong"):
+            counts[f"{one.performed.label} {one.event['gesture']}"] += 1
+            if one.performed.label == one.event["gesture"] == ONE_TAP:
+                waited.append(one.event["decided"] - one.event["offset"])
+    counts.update(act.label for act in take.events)
+    return counts, waited
+
+
+def figures(model: str, people: int, seed: int) -> list[dict[str, Any]]:
+    """A row for each wait: shares of what was done, and the median single tap's wait in seconds."""
+    sessions = takes(people, seed)
+    rows = []
+    for wait_s in progress(WAITS_S, len(WAITS_S), "waits"):
+        counts: Counter[str] = Counter()
+        waited: list[float] = []
+        for take in sessions:
+            more, also = read(model, take, wait_s)
+            counts, waited = counts + more, waited + also
+        single, double = max(counts[ONE_TAP], 1), max(counts[DOUBLE_TAP], 1)
+        rows.append(
+            {
+                "tap_gap_s": wait_s,
+                "double_taps": counts[DOUBLE_TAP],
+                "double_taps_right": round(counts[f"{DOUBLE_TAP} {DOUBLE_TAP}"] / double, 3),
+                "double_taps_read_as_taps": round(counts[f"{DOUBLE_TAP} {ONE_TAP}"] / double, 3),
+                "taps": counts[ONE_TAP],
+                "taps_right": round(counts[f"{ONE_TAP} {ONE_TAP}"] / single, 3),
+                "tap_answered_after_s": round(median(waited), 3) if waited else None,
+            }
+        )
+    return rows
+
+
+def run(args: argparse.Namespace) -> int:
+    """`gestured-lab taps`."""
+    rows = figures(args.model, args.people, args.seed)
+    if args.json:
+        print(json.dumps(rows, indent=2))
+        return 0
+    print("| `tap_gap_s` | double taps right | read as two taps | single taps right | a single tap's answer after |")
+    print("|---|---|---|---|---|")
+    for row in rows:
+        print(
+            f"| {row['tap_gap_s']:.2f} | {row['double_taps_right']:.3f} | {row['double_taps_read_as_taps']:.3f} "
+            f"| {row['taps_right']:.3f} | {row['tap_answered_after_s']} s |"
+        )
+    return 0
