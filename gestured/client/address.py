@@ -14,3 +14,11 @@ def host_port(text: str) -> Address:
     except ValueError:
         pass  # said below, with an example
     raise argparse.ArgumentTypeError(f"{text!r}: expected HOST:PORT, such as 127.0.0.1:9000")
+
+
+def bind_address(text: str) -> Address:
+    """An address of our own, where port 0 means any free one; for argparse."""
+    try:
+        return Address.parse(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected {error}") from None

@@ -29,11 +29,12 @@ from gestured.control import (
     simulate,
     sniff,
     status,
+    view,
 )
 from gestured.core.errors import GesturedError
 
 SUBCOMMANDS = (
-    *(status, listen, doctor, sniff),
+    *(status, listen, view, doctor, sniff),
     *(reload, recalibrate, shadow, emit),
     *(enrol, gestures, forget),
     *(record, flag, replay, export),

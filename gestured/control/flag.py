@@ -1,9 +1,12 @@
 """`gesturectl flag`: "that was wrong" - what the flight recorder holds, kept as a recording."""
 
 import argparse
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
+from gestured.client.control import Control
 from gestured.client.lines import Unreachable
 from gestured.client.say import tell
 from gestured.control.address import add_sockets, connect
@@ -32,19 +35,39 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
 
 def run(args: argparse.Namespace) -> int:
     """Fetch it and write it."""
-    path = args.file or Path(f"flag-{datetime.now():%Y%m%d-%H%M%S}.mcap")
-    library()
+    path = args.file or flag_path(Path())
     with connect(args) as control:
-        scene = control.ask("flight")
-        with Writer(path, scene | {"note": args.note}, LIMIT_BYTES) as tape:
-            keeper = Keeper(tape, scene)
-            for line in control.lines():
-                if line["type"] == "end":
-                    break
-                keeper.keep(line)
-            else:
-                raise Unreachable(f"the daemon closed the connection; {path} is not complete")
-    kept = {"file": str(path), "packets": keeper.packets, "events": keeper.events, "model": scene["model"]}
+        keeper = flag(control, path, args.note)
+    kept = {"file": str(path), "packets": keeper.packets, "events": keeper.events, "model": keeper.scene["model"]}
     words = f"{path}: {keeper.packets} packets, {keeper.events} events"
     tell(args.json, kept, words)
     return 0
+
+
+def flag_path(folder: Path) -> Path:
+    """A name for what is flagged now."""
+    return folder / f"flag-{datetime.now():%Y%m%d-%H%M%S}.mcap"
+
+
+def flag(control: Control, path: Path, note: str) -> Keeper:
+    """Fetch what the flight recorder holds, and write it. Raises Refused where it is off, and Unreachable."""
+    library()
+    scene = control.ask("flight")
+
+    def lines() -> Iterator[dict[str, Any]]:
+        for line in control.lines():
+            if line["type"] == "end":
+                return
+            yield line
+        raise Unreachable(f"the daemon closed the connection; {path} is not complete")
+
+    return flag_lines(scene, lines(), path, note)
+
+
+def flag_lines(scene: Mapping[str, Any], lines: Iterable[Mapping[str, Any]], path: Path, note: str) -> Keeper:
+    """Write the lines of a tap as a recording with a note."""
+    with Writer(path, dict(scene) | {"note": note}, LIMIT_BYTES) as tape:
+        keeper = Keeper(tape, scene)
+        for line in lines:
+            keeper.keep(line)
+    return keeper

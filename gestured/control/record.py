@@ -83,6 +83,7 @@ class Keeper:
 
     def __init__(self, tape: Writer, scene: Mapping[str, Any]) -> None:
         """`scene` is what the daemon said of itself."""
+        self.scene = scene
         self._tape, self._epoch_ns = tape, scene["epoch_ns"]
         known = maker(scene).scene
         self._hub = Hub(dataclasses.replace(known, frames=True), Mute(known.gestures))  # which frames the daemon uses

@@ -99,8 +99,9 @@ class ControlServer:
                     await self._answer_all(reader, writer, who)
                 finally:
                     self._served -= 1
-            writer.transport.set_write_buffer_limits(0)
-            await _drain(writer)
+            if not writer.is_closing():  # uvloop knows no limits of what is closed
+                writer.transport.set_write_buffer_limits(0)
+                await _drain(writer)
         except (OSError, asyncio.CancelledError):
             pass  # gone, or we end
         finally:
@@ -138,6 +139,8 @@ class ControlServer:
                 user = {"verb": name, "uid": who.uid, "pid": who.pid}
                 self._journal.info("control", f"{name} by {who.uid}", **user, **parameters)
         async with self._turn(self._slow if verb.slow else self._quick):
+            if connection.closed:  # while it waited for its turn; or the daemon ends
+                return
             found = await self._run(connection, verb, parameters)
             # On its way before what the verb streams after it.
             writer.write(_line(found.answer if isinstance(found, ReplyStream) else found))

@@ -1,0 +1,65 @@
+"""`gesturectl view`: a running daemon as one page in a browser on this machine."""
+
+import argparse
+import ipaddress
+import signal
+from pathlib import Path
+
+from gestured.client.address import bind_address
+from gestured.client.say import tell
+from gestured.control.address import add_sockets, connect, control_path
+from gestured.core.address import Address
+from gestured.core.errors import GesturedError
+
+DEFAULT = Address("127.0.0.1", 9109)
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the subcommand to gesturectl's command line."""
+    parser = commands.add_parser(
+        "view",
+        help="a live picture in a browser",
+        description="Serve one page on this machine that shows the matrix as it is felt, the activity and its\n"
+        "thresholds, and every answer with its scores. Prints the page's address: it works once, for the\n"
+        "browser that opens it. Nothing is opened by itself.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="examples:\n  gesturectl view\n  gesturectl view --listen 127.0.0.1:0 --folder flagged",
+    )
+    text = f"where the page is served, a loopback address (default: {DEFAULT}; port 0: any)"
+    parser.add_argument("--listen", type=bind_address, default=DEFAULT, metavar="HOST:PORT", help=text)
+    parser.add_argument(
+        "--folder", type=Path, default=Path(), metavar="FOLDER", help="for what is flagged (default: .)"
+    )
+    add_sockets(parser)
+    parser.add_argument("--json", action="store_true", help="print the address as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until Ctrl-C or SIGTERM."""
+    from gestured.control.view.door import Door
+    from gestured.control.view.server import Server
+    from gestured.control.view.source import Source
+
+    for signalled in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(signalled, signal.default_int_handler)
+    if not _loopback(args.listen.host):
+        raise GesturedError(f"--listen {args.listen}: expected a loopback address, such as {DEFAULT}")
+    connect(args).close()  # who has no daemon, is told so at once
+    source = Source(control_path(args), args.folder)
+    door = Door()
+    with Server(args.listen, source, door) as server:
+        address = f"http://{server.address}/?token={door.token}"
+        tell(args.json, {"type": "view", "address": address}, address)
+        try:
+            server.serve_forever()
+        finally:
+            source.close()
+    return 0
+
+
+def _loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

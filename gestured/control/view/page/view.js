@@ -1,0 +1,281 @@
+"use strict";
+// The page of `gesturectl view`. What comes from the daemon is written by textContent alone: a name is never markup.
+const KEPT_S = 30, PATH_S = 3, CHART_S = 10, ROWS = 100;
+const STOPS = ["#00204d", "#31446b", "#666970", "#958f78", "#cab969", "#ffea46"].map(c => [1, 3, 5].map(i => parseInt(c.slice(i, i + 2), 16)));
+const STEPS = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000, 50000, 100000, 1e6, 1e7, 1e9];
+const PHASES = { IDLE: "idle", CONTACT: "contact", RELEASING: "releasing", GAP: "waiting for a second tap", SPENT: "held too long" };
+const SHADES = { IDLE: "#8a94a0", CONTACT: "#e69f00", RELEASING: "#56b4e9", GAP: "#009e73", SPENT: "#cc79a7" }; // Okabe and Ito
+const at = id => document.getElementById(id);
+const state = { token: "", stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0 };
+
+history.replaceState(null, "", "/"); // the address's token has done its work
+for (const step of STEPS.slice(0, -2)) at("scale").append(new Option(`0 to ${step}`, step));
+
+function words(name) { return String(name).replaceAll("_", " "); }
+function percent(share) { return `${Math.round(100 * share)} %`; }
+function clock(s) { return new Date(1000 * s).toLocaleTimeString("en-GB") + "." + String(Math.floor(s % 1 * 10)); }
+
+function open(sensor) {
+  if (state.stream) state.stream.close();
+  state.frames = []; state.full = 0; state.sensor = sensor;
+  const query = new URLSearchParams({ sensor, raw: at("raw").checked ? "1" : "0" });
+  const stream = state.stream = new EventSource("stream?" + query);
+  const on = (kind, act) => stream.addEventListener(kind, message => act(JSON.parse(message.data)));
+  on("hello", hello => { state.token = hello.token; });
+  on("sensors", sensors);
+  on("frame", frame);
+  on("event", event);
+  on("gone", gone => { daemon(gone.reason, true); });
+  stream.onerror = () => daemon("the viewer does not answer: is gesturectl view still running?", true);
+}
+
+function daemon(text, gone) {
+  at("daemon").textContent = text;
+  at("daemon").classList.toggle("gone", gone);
+}
+
+function sensors(told) {
+  daemon(`gestured ${told.version}, ${told.state}, model ${told.model}`, false);
+  const names = Object.keys(told.sensors), select = at("sensor");
+  if (names.join("\n") !== [...select.options].map(o => o.value).join("\n")) {
+    select.replaceChildren(...names.map(name => new Option(name, name, false, name === state.sensor)));
+    if (!names.includes(state.sensor) && names.length) { select.value = names[0]; open(names[0]); return; }
+  }
+  at("sensors").tBodies[0].replaceChildren(...names.map(name => {
+    const s = told.sensors[name];
+    const tr = row([name, s.state + (s.touched ? ", touched" : ""), s.rate_hz.toFixed(1), `${Math.round(1000 * s.jitter_s)} ms`, s.lost ?? 0, s.bad_taxels]);
+    if (name === state.sensor) tr.className = "now";
+    return tr;
+  }));
+}
+
+function row(cells) {
+  const tr = document.createElement("tr");
+  for (const cell of cells) tr.insertCell().textContent = cell;
+  return tr;
+}
+
+function frame(told) {
+  const frames = state.frames;
+  frames.push(told);
+  while (frames.length && frames[0].time < told.time - KEPT_S) frames.shift();
+  if (told.values) {
+    const seen = Math.max(...told.values, 20 * told.noise);
+    if (seen > state.full) state.full = STEPS.find(step => step >= seen) ?? seen;
+  }
+  if (!state.paused) plan();
+}
+
+function event(told) {
+  if (told.type === "lost") return;
+  const mine = told.sensor === state.sensor;
+  const latency = "decided" in told && "offset" in told ? `${Math.round(1000 * (told.decided - told.offset))} ms` : "";
+  let what = told.type;
+  if (told.type === "gesture") what = words(told.gesture);
+  if (told.type === "provisional") what = `probably ${words(told.gesture)}`;
+  if (told.type === "unknown") what = told.reason ? `unknown: ${told.reason}` : "unknown";
+  if (told.type === "cancelled") what = `cancelled: ${told.reason}`;
+  const time = told.decided ?? told.offset ?? told.onset ?? Date.now() / 1000;
+  const body = at("events").tBodies[0];
+  body.prepend(row([clock(time), told.sensor, what + (told.test ? " (test)" : ""), told.confidence === undefined ? "" : percent(told.confidence), latency]));
+  while (body.rows.length > ROWS) body.deleteRow(-1);
+  if (!mine) return;
+  if (told.type === "onset") { at("provisional").textContent = "-"; at("answer").textContent = "..."; }
+  if (told.type === "provisional") at("provisional").textContent = `${words(told.gesture)}, ${percent(told.confidence)}`;
+  if (told.type === "cancelled") at("answer").textContent = what;
+  if (told.type === "gesture" || told.type === "unknown") {
+    at("answer").textContent = `${what}, ${percent(told.confidence)}`;
+    at("said").textContent = `${what}, ${percent(told.confidence)}, after ${latency}`;
+    scores(told.scores, told.type === "gesture" ? told.gesture : "");
+  }
+}
+
+function scores(found, answer) {
+  const names = Object.keys(found).sort((a, b) => found[b] - found[a]);
+  at("scores").tBodies[0].replaceChildren(...names.map(name => {
+    const tr = row([words(name), ""]), meter = document.createElement("meter");
+    meter.value = found[name];
+    meter.setAttribute("aria-label", `score of ${words(name)}`);
+    tr.cells[1].append(meter, ` ${percent(found[name])}`);
+    if (name === answer) tr.className = "best";
+    return tr;
+  }));
+}
+
+// Drawing: once for each picture of the screen at the most, and always the newest, whatever has come meanwhile.
+
+function plan() {
+  if (!state.dirty) { state.dirty = true; requestAnimationFrame(draw); }
+}
+
+function shown() {
+  const frames = state.frames, last = frames[frames.length - 1];
+  if (!last || !state.paused) return frames.length - 1;
+  let i = frames.length - 1;
+  while (i > 0 && frames[i].time > state.moment) i--;
+  return i;
+}
+
+function draw() {
+  state.dirty = false;
+  const i = shown(), now = state.frames[i];
+  if (!now) return;
+  at("phase").textContent = PHASES[now.phase] ?? now.phase;
+  const full = Number(at("scale").value) || state.full || 100;
+  at("full").textContent = `${full} counts`;
+  matrix(now, i, full);
+  chart(i);
+  const last = state.frames[state.frames.length - 1].time;
+  if (state.paused) at("when").value = now.time - last;
+  at("ago").textContent = state.paused ? `${(last - now.time).toFixed(2)} s ago` : "now";
+  state.drawn++;
+}
+
+function fit(canvas, ratio) {
+  const width = Math.round(canvas.clientWidth * devicePixelRatio);
+  const height = Math.round((ratio ? canvas.clientWidth * ratio : canvas.clientHeight) * devicePixelRatio);
+  if (canvas.width !== width || canvas.height !== height) {
+    canvas.width = width; canvas.height = height;
+    if (ratio) canvas.style.height = `${canvas.clientWidth * ratio}px`;
+  }
+  const g = canvas.getContext("2d");
+  g.clearRect(0, 0, width, height);
+  return [g, width, height];
+}
+
+function colour(share) {
+  const place = Math.min(Math.max(share, 0), 1) * (STOPS.length - 1), i = Math.min(Math.floor(place), STOPS.length - 2);
+  return STOPS[i].map((low, c) => Math.round(low + (STOPS[i + 1][c] - low) * (place - i)));
+}
+
+function matrix(now, i, full) {
+  const sent = at("raw").checked && now.raw;
+  const [rows, columns] = sent ? now.raw_grid : now.grid;
+  const canvas = at("matrix"), [g, width] = fit(canvas, Math.min(rows / columns, 1.6));
+  const values = sent ? now.raw : now.values, side = Math.min(width / columns, canvas.height / rows), left = (width - side * columns) / 2;
+  const label = at("counts").checked && side > 16 * devicePixelRatio;
+  if (!values) { canvas.setAttribute("aria-label", "the idle sensor is being learned"); return; }
+  // Counts as they were sent have a scale of their own: from the least of this frame.
+  const least = sent ? Math.min(...values) : 0, bad = new Set(sent ? [] : now.bad);
+  let best = 0;
+  values.forEach((value, n) => {
+    if (value > values[best]) best = n;
+    const x = left + side * (n % columns), y = side * Math.floor(n / columns), [r, green, b] = colour((value - least) / full);
+    g.fillStyle = `rgb(${r} ${green} ${b})`;
+    g.fillRect(x, y, side - 1, side - 1);
+    if (bad.has(n)) {
+      g.strokeStyle = "#ff6e6e"; g.lineWidth = 2 * devicePixelRatio;
+      g.strokeRect(x + 2, y + 2, side - 5, side - 5);
+      g.beginPath(); g.moveTo(x + 2, y + 2); g.lineTo(x + side - 3, y + side - 3); g.moveTo(x + side - 3, y + 2); g.lineTo(x + 2, y + side - 3); g.stroke();
+    }
+    if (label) {
+      g.fillStyle = r + green + b > 380 ? "#000" : "#fff";
+      g.font = `${Math.max(9 * devicePixelRatio, side / 4)}px ui-monospace, monospace`;
+      g.textAlign = "center"; g.textBaseline = "middle";
+      g.fillText(String(Math.round(value)), x + side / 2, y + side / 2);
+    }
+  });
+  if (!sent) path(g, now, i, side, left);
+  const place = `row ${Math.floor(best / columns) + 1}, column ${best % columns + 1}`;
+  canvas.setAttribute("aria-label", `${rows} by ${columns} taxels; strongest ${Math.round(values[best])} counts at ${place}; ${bad.size} bad taxels; ${now.centroid ? "touched" : "not touched"}`);
+}
+
+function path(g, now, i, side, left) {
+  const spots = [];
+  for (let n = i; n >= 0 && state.frames[n].time > now.time - PATH_S; n--) spots.push(state.frames[n]);
+  g.lineWidth = 3 * devicePixelRatio; g.lineCap = "round";
+  for (let n = spots.length - 1; n > 0; n--) {
+    const a = spots[n].centroid, b = spots[n - 1].centroid;
+    if (!a || !b) continue;
+    g.strokeStyle = `rgb(255 255 255 / ${1 - (now.time - spots[n - 1].time) / PATH_S})`;
+    g.beginPath(); g.moveTo(left + side * (a[1] + .5), side * (a[0] + .5)); g.lineTo(left + side * (b[1] + .5), side * (b[0] + .5)); g.stroke();
+  }
+  if (now.centroid) {
+    g.strokeStyle = "#fff"; g.beginPath();
+    g.arc(left + side * (now.centroid[1] + .5), side * (now.centroid[0] + .5), side / 3, 0, 7); g.stroke();
+  }
+}
+
+function chart(i) {
+  const canvas = at("activity"), [g, width, height] = fit(canvas, 0), style = getComputedStyle(document.body);
+  const now = state.frames[i], strip = 14 * devicePixelRatio, low = Math.log10(.5), high = Math.log10(1000);
+  const x = time => width * (1 - (now.time - time) / CHART_S);
+  const y = value => (height - strip - 4) * (1 - (Math.log10(Math.max(value, .5)) - low) / (high - low));
+  let first = i;
+  while (first > 0 && state.frames[first - 1].time > now.time - CHART_S) first--;
+  const part = state.frames.slice(first, i + 1);
+  g.font = `${11 * devicePixelRatio}px system-ui`; g.fillStyle = style.getPropertyValue("--faint");
+  for (const mark of [1, 10, 100, 1000]) { g.fillRect(0, y(mark), width, 1); g.fillText(String(mark), 2, y(mark) + (mark > 500 ? 12 : -2) * devicePixelRatio); }
+  const line = (key, ink, dash, wide) => {
+    g.strokeStyle = ink; g.setLineDash(dash.map(d => d * devicePixelRatio)); g.lineWidth = wide * devicePixelRatio; g.beginPath();
+    part.forEach((f, n) => g[n ? "lineTo" : "moveTo"](x(f.time), y(f[key]))); g.stroke();
+  };
+  line("on", style.getPropertyValue("--bad"), [6, 4], 1.5);
+  line("off", style.getPropertyValue("--bad"), [2, 3], 1.5);
+  line("activity", style.getPropertyValue("--mark"), [], 2);
+  g.setLineDash([]);
+  part.forEach((f, n) => {
+    const from = x(f.time), to = n + 1 < part.length ? x(part[n + 1].time) : width;
+    g.fillStyle = SHADES[f.phase] ?? "#888";
+    g.fillRect(from, height - strip, Math.max(to - from, 1), strip);
+  });
+  g.fillStyle = "#000"; g.textBaseline = "alphabetic"; g.textAlign = "left";
+  let free = 0; // where the last word ends
+  part.forEach((f, n) => {
+    if (n && part[n - 1].phase === f.phase || f.phase === "IDLE" || x(f.time) < free) return;
+    const word = f.phase.toLowerCase();
+    g.fillText(word, x(f.time) + 2, height - 3 * devicePixelRatio);
+    free = x(f.time) + g.measureText(word).width + 4;
+  });
+  canvas.setAttribute("aria-label", `activity ${now.activity.toFixed(1)}; a contact begins at ${now.on.toFixed(1)}, ends below ${now.off.toFixed(1)}; phase ${PHASES[now.phase] ?? now.phase}`);
+}
+
+// What the reader does.
+
+function pause(on) {
+  const last = state.frames[state.frames.length - 1];
+  state.paused = on;
+  state.moment = last ? last.time : 0;
+  at("pause").setAttribute("aria-pressed", String(on));
+  if (!on) at("when").value = 0;
+  plan();
+}
+
+function step(frames) {
+  if (!state.frames.length) return;
+  if (!state.paused) pause(true);
+  const i = Math.min(Math.max(shown() + frames, 0), state.frames.length - 1);
+  state.moment = state.frames[i].time;
+  plan();
+}
+
+async function act(path, what) {
+  at("done").textContent = "...";
+  const answer = await fetch(path, { method: "POST", headers: { "Content-Type": "application/json", "X-Gestured-Token": state.token }, body: JSON.stringify(what) }).then(r => r.json(), error => ({ error: String(error) }));
+  at("done").textContent = answer.error ?? answer.done;
+}
+
+at("sensor").onchange = () => open(at("sensor").value);
+at("raw").onchange = () => open(state.sensor);
+at("counts").onchange = at("scale").onchange = plan;
+at("pause").onclick = () => pause(!state.paused);
+at("back").onclick = () => step(-1);
+at("on").onclick = () => step(1);
+at("when").oninput = () => {
+  const last = state.frames[state.frames.length - 1];
+  if (!last) return;
+  const ago = Number(at("when").value);
+  if (!state.paused) pause(true);
+  state.moment = last.time + ago;
+  plan();
+};
+at("flag").onclick = () => act("flag", { note: at("note").value });
+at("recalibrate").onclick = () => act("recalibrate", { sensor: state.sensor });
+addEventListener("resize", plan);
+addEventListener("keydown", e => {
+  if (e.ctrlKey || e.altKey || e.metaKey || /^(INPUT|SELECT|BUTTON)$/.test(e.target.tagName) && e.target.type !== "checkbox") return;
+  const keys = { " ": () => pause(!state.paused), ArrowLeft: () => step(-1), ArrowRight: () => step(1), c: () => at("counts").click(), m: () => at("raw").click(), f: () => at("flag").click(), r: () => at("recalibrate").click() };
+  const wanted = keys[e.key.length === 1 ? e.key.toLowerCase() : e.key];
+  if (wanted && !(e.key === " " && e.target.type === "checkbox")) { e.preventDefault(); wanted(); }
+});
+open("");

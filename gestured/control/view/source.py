@@ -1,0 +1,167 @@
+"""What the page shows, as the daemon tells it: sensors each second, frames that somebody looks at, events."""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from gestured.client.control import Control
+from gestured.client.subscriber import Subscriber
+from gestured.control.flag import flag, flag_lines, flag_path
+from gestured.control.view.outbox import Outbox
+from gestured.core.errors import GesturedError
+from gestured.core.messages import EVENT_TYPES
+
+SENSORS_S = 1.0
+LOOK_S = 1 / 30  # the daemon makes no more
+AGAIN_S = 0.5  # before a daemon that has gone is asked again
+KEPT_S = 30.0  # of packets, where the daemon has no flight recorder
+KEPT_LINES = 100_000  # of them at the most: 30 s of 1000 Hz, three times over
+
+
+class Source:
+    """One daemon, for any number of browsers. Its threads ask for nothing as long as nobody looks."""
+
+    def __init__(self, control: Path, folder: Path) -> None:
+        """What is flagged is put into `folder`."""
+        self._control, self._folder = control, folder
+        self._open: list[Outbox] = []
+        self._changed = threading.Condition()
+        self._closed = threading.Event()
+        self._status: dict[str, Any] = {}
+        self._subscriber: Subscriber | None = None
+        self._tap: Control | None = None  # where there is no flight recorder: the view keeps packets itself
+        self._scene: dict[str, Any] = {}
+        self._kept: deque[tuple[float, dict[str, Any]]] = deque(maxlen=KEPT_LINES)  # s, a tap's line
+        for work in (self._tell_sensors, self._tell_frames):
+            threading.Thread(target=self._again_and_again, args=(work,), daemon=True).start()
+
+    def join(self, outbox: Outbox) -> None:
+        """Somebody looks."""
+        if self._status:
+            outbox.put("sensors", self._sensors())
+        with self._changed:
+            self._open.append(outbox)
+            self._changed.notify_all()
+
+    def leave(self, outbox: Outbox) -> None:
+        """And looks no more."""
+        with self._changed:
+            self._open.remove(outbox)
+
+    def recalibrate(self, sensor: str) -> str:
+        """Have the daemon learn a sensor anew; what was done, in words. Raises GesturedError."""
+        with Control(self._control) as control:
+            return (
+                f"{', '.join(control.ask('recalibrate', sensor=sensor)['sensors'])}: learned anew, leave it untouched"
+            )
+
+    def flag(self, note: str) -> str:
+        """Keep the last 30 s as a recording; what was done, in words. Raises GesturedError."""
+        path = flag_path(self._folder)
+        if self._status["flight_recorder"]["limit_bytes"]:
+            with Control(self._control) as control:
+                keeper = flag(control, path, note)
+        elif not self._scene:
+            raise GesturedError("nothing was kept so far; try again in a moment")
+        else:
+            self._forget()
+            keeper = flag_lines(self._scene, (line for _, line in list(self._kept)), path, note)
+        return f"{path}: {keeper.packets} packets, {keeper.events} events"
+
+    def close(self) -> None:
+        """Ask for nothing more."""
+        self._closed.set()
+        for outbox in list(self._open):
+            outbox.close()
+        with self._changed:
+            self._changed.notify_all()
+        for one in (self._subscriber, self._tap):
+            if one is not None:
+                one.close()
+
+    def _again_and_again(self, work: Callable[[Control], None]) -> None:
+        """Work on a connection to the daemon, and on the next one once it is back."""
+        while not self._closed.is_set():
+            try:
+                self._wait_for_somebody()
+                with Control(self._control) as control:
+                    work(control)
+            except (GesturedError, OSError) as error:
+                self._tell("gone", {"reason": str(error)})
+                self._closed.wait(AGAIN_S)
+
+    def _wait_for_somebody(self) -> None:
+        with self._changed:
+            self._changed.wait_for(lambda: self._open or self._closed.is_set())
+
+    def _tell_sensors(self, control: Control) -> None:
+        while not self._closed.is_set():
+            self._wait_for_somebody()
+            self._status = control.ask("status")
+            if self._subscriber is None:
+                self._subscriber = Subscriber(self._status["addresses"]["socket"], types=EVENT_TYPES)
+                threading.Thread(target=self._tell_events, args=(self._subscriber,), daemon=True).start()
+            if self._tap is None and not self._status["flight_recorder"]["limit_bytes"]:
+                self._tap = Control(self._control)
+                threading.Thread(target=self._keep, args=(self._tap,), daemon=True).start()
+            self._tell("sensors", self._sensors())
+            self._closed.wait(SENSORS_S)
+
+    def _sensors(self) -> dict[str, Any]:
+        status = self._status
+        told = {key: status[key] for key in ("version", "state", "sensors")}
+        return told | {"model": status["model"]["active"], "gestures": status["model"]["gestures"]}
+
+    def _tell_frames(self, control: Control) -> None:
+        """Whatever is looked at, as often as the daemon makes it; one that is not new is not told."""
+        told: dict[tuple[str, bool], float] = {}
+        while not self._closed.is_set():
+            self._wait_for_somebody()
+            began = time.monotonic()
+            wanted = {(outbox.sensor, outbox.raw) for outbox in list(self._open)}
+            for sensor, raw in wanted & {(name, raw) for name in self._heard() for raw in (False, True)}:
+                frame = control.ask("view", sensor=sensor, raw=raw)
+                if told.get((sensor, raw)) != frame["t"]:
+                    told[sensor, raw] = frame["t"]
+                    for outbox in list(self._open):
+                        if (outbox.sensor, outbox.raw) == (sensor, raw):
+                            outbox.frame(frame)
+            self._closed.wait(max(0.0, began + LOOK_S - time.monotonic()))
+
+    def _heard(self) -> list[str]:
+        sensors = self._status.get("sensors", {})
+        return [name for name, sensor in sensors.items() if "source" in sensor]
+
+    def _tell_events(self, subscriber: Subscriber) -> None:
+        try:
+            for event in subscriber:
+                if event["type"] != "status":
+                    self._tell("event", event)
+        except GesturedError as error:
+            self._tell("gone", {"reason": str(error)})
+
+    def _keep(self, tap: Control) -> None:
+        """Keep what a tap says, until the daemon goes or nobody looks any more."""
+        try:
+            self._scene = tap.ask("tap")
+            for line in tap.lines():
+                if not self._open or self._closed.is_set():
+                    break
+                self._kept.append((time.monotonic(), line))
+                self._forget()
+        except (GesturedError, OSError):
+            pass  # that the daemon is gone, the others say
+        tap.close()
+        self._kept.clear()
+        self._scene, self._tap = {}, None
+
+    def _forget(self) -> None:
+        while self._kept and self._kept[0][0] < time.monotonic() - KEPT_S:
+            self._kept.popleft()
+
+    def _tell(self, kind: str, what: dict[str, Any]) -> None:
+        for outbox in list(self._open):
+            outbox.put(kind, what)

@@ -1,0 +1,377 @@
+"""`gesturectl view`: who may look, what the page shows in a real browser, and that a stalled one holds up nobody."""
+
+import http.client
+import json
+import os
+import re
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+
+from gestured.control.view.server import BODY_BYTES, FILES, PAGE
+from gestured.core.address import Address
+from gestured.record.tape import read
+from tests.control.browser import PROGRAM, Browser
+from tests.daemon import tiny_model
+from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
+
+pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+
+
+class Page:
+    """The viewer as an HTTP client sees it."""
+
+    def __init__(self, said: str) -> None:
+        where = urlsplit(said.strip())
+        self.whole, self.address, self.token = said.strip(), Address.parse(where.netloc), where.query
+        self.cookie = ""
+        self.header = ""
+
+    def ask(self, path: str, method: str = "GET", body: object = None, **headers: str) -> tuple[int, Any, bytes]:
+        """Status, headers and body; with the cookie, unless `headers` say otherwise."""
+        connection = http.client.HTTPConnection(*self.address, timeout=DEADLINE_S)
+        given = {"Cookie": self.cookie} | {name.replace("_", "-"): value for name, value in headers.items()}
+        data = None if body is None else json.dumps(body)
+        try:
+            connection.request(method, path, data, {k: v for k, v in given.items() if v})
+            answer = connection.getresponse()
+            return answer.status, answer.headers, answer.read()
+        finally:
+            connection.close()
+
+    def come_in(self) -> "Page":
+        """Use the token."""
+        status, headers, _ = self.ask("/?" + self.token)
+        assert status == 200
+        self.cookie = headers["Set-Cookie"].partition(";")[0]
+        return self
+
+    def stream(self, sensor: str = "") -> "Stream":
+        """The server-sent events."""
+        return Stream(self, sensor)
+
+
+class Stream:
+    """Server-sent events, read as they come."""
+
+    def __init__(self, page: Page, sensor: str, received: int | None = None) -> None:
+        self.sock = socket.socket(socket.AF_INET)
+        if received is not None:
+            self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, received)
+        self.sock.settimeout(DEADLINE_S)
+        self.sock.connect(page.address)
+        request = f"GET /stream?sensor={sensor} HTTP/1.1\r\nHost: {page.address}\r\nCookie: {page.cookie}\r\n\r\n"
+        self.sock.sendall(request.encode())
+        self._file = self.sock.makefile("rb")
+        assert b" 200 " in self._file.readline()
+        while self._file.readline().strip():
+            pass
+
+    def until(self, *kinds: str) -> tuple[str, dict[str, Any]]:
+        """The next event of one of these kinds."""
+        kind = ""
+        while line := self._file.readline().decode():
+            if line.startswith("event: "):
+                kind = line[7:].strip()
+            elif line.startswith("data: ") and kind in kinds:
+                return kind, json.loads(line[6:])
+        raise AssertionError("the viewer hung up")
+
+
+@pytest.fixture
+def real(tmp_path: Path) -> Iterator[Daemon]:
+    """A daemon that the test alone looks at, without a flight recorder."""
+    daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"), "--clock", "sensor", "--stale-s", 30)
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+    assert "Traceback" not in daemon.stderr()
+
+
+@pytest.fixture
+def view(start, real: Daemon, tmp_path: Path) -> Page:
+    process = start("view", "--control", real.ready["control"], "--listen", "127.0.0.1:0", "--folder", tmp_path)
+    return Page(process.stdout.readline().decode())
+
+
+def test_the_address_works_once_and_becomes_a_cookie(view: Page) -> None:
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{32}", view.whole)
+    assert view.ask("/")[0] == 403 and view.ask("/?token=x")[0] == 403 and view.ask("/stream")[0] == 403
+    view.come_in()
+    assert view.ask("/")[0] == 200
+    status, _, body = view.ask("/?" + view.token, Cookie="")
+    assert status == 403 and b"Start gesturectl view again" in body
+    other = f"gestured-view-{view.address.port}=somebody"
+    assert view.ask("/", Cookie=other)[0] == 403 and view.ask("/", Cookie="\x00=;;")[0] == 403
+
+
+def test_what_a_browser_is_told_to_allow(view: Page) -> None:
+    _, headers, _ = view.ask("/?" + view.token)
+    assert "SameSite=Strict" in headers["Set-Cookie"] and "HttpOnly" in headers["Set-Cookie"]
+    view.cookie = headers["Set-Cookie"].partition(";")[0]
+    for path in FILES:
+        status, headers, body = view.ask(path)
+        assert status == 200 and body == (PAGE / FILES[path][0]).read_bytes()
+        policy = headers["Content-Security-Policy"]
+        assert policy.startswith("default-src 'none'") and "unsafe" not in policy and "frame-ancestors 'none'" in policy
+        assert headers["Referrer-Policy"] == "no-referrer" and headers["X-Content-Type-Options"] == "nosniff"
+        assert not any(name.lower().startswith("access-control") for name in headers)
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Host": "evil.example:80"},
+        {"Host": "127.0.0.1"},
+        {"Origin": "http://evil.example"},
+        {"Origin": "null"},
+        {"Sec_Fetch_Site": "cross-site"},
+        {"Sec_Fetch_Site": "same-site"},
+    ],
+)
+def test_another_site_gets_nothing(view: Page, headers: dict[str, str]) -> None:
+    assert view.ask("/?" + view.token, **headers)[0] == 403  # and the token is not used up
+    view.come_in()
+    assert view.ask("/", **headers)[0] == 403 and view.ask("/stream", **headers)[0] == 403
+    _, hello = view.stream().until("hello")
+    assert view.ask("/flag", "POST", {}, X_Gestured_Token=hello["token"], **headers)[0] == 403
+
+
+def test_what_changes_anything_needs_the_header(view: Page, real: Daemon) -> None:
+    view.come_in()
+    Sensor(real, "arm").begin()
+    _, hello = view.stream().until("hello")
+    for headers in ({}, {"X_Gestured_Token": "x"}, {"X_Gestured_Token": hello["token"], "Cookie": ""}):
+        for path in ("/recalibrate", "/flag"):
+            status, _, body = view.ask(path, "POST", {"sensor": "arm"}, **headers)
+            assert status == 403 and "error" in json.loads(body)
+    mine = {"X_Gestured_Token": hello["token"], "Origin": f"http://{view.address}"}
+    status, _, body = view.ask("/recalibrate", "POST", {"sensor": "arm"}, **mine)
+    assert status == 200 and "arm: learned anew" in json.loads(body)["done"]
+    assert view.ask("/recalibrate", "POST", {"sensor": "nobody"}, **mine)[0] == 409
+    assert view.ask("/else", "POST", {}, **mine)[0] == 404
+    for wrong in ([], {"sensor": 1}, {"note": "x" * BODY_BYTES}):
+        assert view.ask("/flag", "POST", wrong, **mine)[0] == 400
+
+
+@pytest.mark.parametrize("listen", ["0.0.0.0:0", "192.0.2.1:9109", "[::]:0"])
+def test_it_is_served_on_this_machine_alone(run, real: Daemon, listen: str) -> None:
+    status, out, err = run("view", "--listen", listen, "--control", real.ready["control"])
+    assert (status, out) == (1, "") and "expected a loopback address" in err
+
+
+def test_a_port_that_is_taken_and_a_daemon_that_is_not_there(run, real: Daemon, tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        where = f"127.0.0.1:{taken.getsockname()[1]}"
+        status, _, err = run("view", "--listen", where, "--control", real.ready["control"])
+    assert status == 1 and where in err and f"(pid {os.getpid()})" in err
+    status, _, err = run("view", "--control", tmp_path / "none.ctl")
+    assert status == 1 and "no daemon on" in err
+
+
+def test_the_page_is_small_and_nothing_in_it_comes_from_elsewhere() -> None:
+    assert sum(path.stat().st_size for path in PAGE.iterdir()) < 60_000
+    for path in PAGE.iterdir():
+        text = path.read_text()
+        assert not re.search(r"https?://|//[a-z]+\.|innerHTML|outerHTML|insertAdjacent|document\.write|eval\(", text)
+
+
+def test_a_browser_that_stalls_is_back_in_the_present_and_holds_up_nobody(view: Page, real: Daemon) -> None:
+    view.come_in()
+    sensor = Sensor(real, "arm").begin()
+    other = view.stream("arm")
+    while other.until("sensors")[1]["sensors"].get("arm") is None:
+        pass
+    stalled = Stream(view, "arm", received=4096)
+    stalled.until("frame")
+    sent: list[float] = []
+    for _ in range(300):  # each one is shown to who reads before the next one comes
+        sensor.send([sensor.hand.frame()])
+        sent.append(other.until("frame")[1]["t"])
+    assert len(set(sent)) == 300
+    newest, seen = sent[-1], []
+    while not seen or seen[-1] < newest:
+        seen.append(stalled.until("frame")[1]["t"])
+    assert len(seen) < 200  # what was on its way, and then the newest: the rest it was spared
+    assert seen == sorted(set(seen))
+
+
+def test_it_waits_for_a_daemon_that_starts_again(start, tmp_path: Path) -> None:
+    model = tiny_model.make(tmp_path / "tiny.onnx")
+    first = Daemon.start(tmp_path, model)
+    process = start("view", "--control", first.ready["control"], "--listen", "127.0.0.1:0")
+    stream = Page(process.stdout.readline().decode()).come_in().stream()
+    stream.until("sensors")
+    first.stop()
+    assert "no daemon" in stream.until("gone")[1]["reason"]
+    second = Daemon.start(tmp_path, model)
+    try:
+        assert stream.until("sensors")[1]["state"] == "no_data"
+    finally:
+        second.stop()
+
+
+# In a real browser
+
+
+@pytest.fixture
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    if PROGRAM is None:
+        pytest.skip("chromium is not installed (apt install chromium)")
+    with Browser(tmp_path_factory.mktemp("chromium")) as browser:
+        yield browser
+
+
+def follow(page: Page, browser: Browser, name: str, real: Daemon) -> Sensor:
+    """Open the page, and a sensor that it looks at."""
+    sensor = Sensor(real, name).begin()
+    browser.call("Page.navigate", url=page.whole)
+    browser.until(f"document.getElementById('sensor')?.value === {name!r} && state.drawn > 0")
+    return sensor
+
+
+def perform(sensor: Sensor, browser: Browser, direction: str) -> None:
+    """A swipe, of which the page sees each frame."""
+    for frame in [*sensor.hand.swipe(direction), *sensor.hand.idle(1.0)]:
+        before = browser.run("state.frames.length ? state.frames[state.frames.length - 1].t : 0")
+        sensor.send([frame])
+        browser.until(f"state.frames[state.frames.length - 1].t > {before}")
+
+
+@pytest.mark.parametrize("width", [400, 1400])
+def test_a_swipe_is_drawn_named_and_flagged(view: Page, real: Daemon, browser: Browser, tmp_path, width: int) -> None:
+    browser.size(width, 900)
+    browser.colours("dark" if width < 600 else "light")
+    sensor = follow(view, browser, "armrest", real)
+    assert browser.run("location.search") == ""  # the token is gone from the address
+    perform(sensor, browser, "right")
+    browser.until("document.getElementById('answer').textContent.startsWith('swipe right')")
+    path = browser.run("state.frames.filter(f => f.centroid).map(f => f.centroid[1])")
+    assert len(path) >= 6 and path[-1] - path[0] > 4
+    phases = browser.run("[...new Set(state.frames.map(f => f.phase))]")
+    assert {"IDLE", "CONTACT", "RELEASING"} <= set(phases)
+    assert browser.run("document.querySelectorAll('#scores tbody tr').length") == 10
+    assert browser.run("document.querySelector('#events tbody tr').cells.length") == 5
+    assert "swipe right" in browser.run("document.getElementById('said').textContent")
+    assert browser.run("document.documentElement.scrollWidth <= innerWidth")  # nothing sticks out
+    browser.run("document.getElementById('note').value = 'a test'; document.getElementById('flag').click()")
+    said = browser.until("document.getElementById('done').textContent.includes('.mcap') && done.textContent")
+    (kept,) = tmp_path.glob("flag-*.mcap")
+    assert str(kept) in said
+    tape = read(kept)
+    assert any(event["type"] == "gesture" for event in tape.events) and tape.scene["note"] == "a test"
+    assert browser.complaints() == []
+    if folder := os.environ.get("PYTEST_PICTURES"):
+        browser.picture(Path(folder) / f"view-{width}.png")
+
+
+def test_pause_step_back_and_keys(view: Page, real: Daemon, browser: Browser) -> None:
+    browser.size(1400, 900)
+    sensor = follow(view, browser, "arm", real)
+    perform(sensor, browser, "left")
+
+    def key(name: str, code: str) -> None:
+        for kind in ("keyDown", "keyUp"):
+            browser.call("Input.dispatchKeyEvent", type=kind, key=name, code=code, text=name if len(name) == 1 else "")
+
+    key(" ", "Space")
+    assert browser.run("state.paused && document.getElementById('pause').getAttribute('aria-pressed')") == "true"
+    now = browser.run("state.moment")
+    for _ in range(5):
+        key("ArrowLeft", "ArrowLeft")
+    assert browser.run("state.moment") < now
+    shown = browser.run("state.moment")
+    sensor.send([sensor.hand.frame()])
+    browser.until("state.frames[state.frames.length - 1].time > state.moment + 0.1")
+    assert browser.run("state.moment") == shown
+    key("c", "KeyC")
+    assert browser.run("document.getElementById('counts').checked") is True
+    key(" ", "Space")
+    browser.until("!state.paused && document.getElementById('ago').textContent === 'now'")
+    key("m", "KeyM")
+    sensor.send([sensor.hand.frame()])
+    browser.until("document.getElementById('raw').checked && state.frames.some(f => f.raw)")
+    assert browser.complaints() == []
+
+
+def test_everything_has_a_name_for_who_does_not_see_it(view: Page, real: Daemon, browser: Browser) -> None:
+    browser.size(1400, 900)
+    perform(follow(view, browser, "arm", real), browser, "left")
+    nodes = browser.call("Accessibility.getFullAXTree")["nodes"]
+    roles = {
+        "button",
+        "checkbox",
+        "combobox",
+        "slider",
+        "textbox",
+        "image",
+        "table",
+        "meter",
+        "region",
+        "group",
+        "link",
+    }
+    seen = set()
+    for node in nodes:
+        role = node.get("role", {}).get("value", "").lower()
+        if node.get("ignored") or role not in roles:
+            continue
+        seen.add(role)
+        assert node.get("name", {}).get("value"), node
+    assert {"button", "checkbox", "combobox", "slider", "textbox", "image", "region"} <= seen
+    assert browser.run("document.querySelectorAll('[aria-live=polite]').length") == 1
+
+
+def test_a_name_is_never_markup(start, fake_control, browser: Browser) -> None:
+    evil = "<img src=x onerror=document.title='owned'>"
+    control = fake_control(evil)
+    process = start("view", "--control", control, "--listen", "127.0.0.1:0")
+    browser.call("Page.navigate", url=Page(process.stdout.readline().decode()).whole)
+    browser.until("document.querySelectorAll('#sensors tbody tr').length === 1")
+    assert browser.run("document.querySelector('#sensors td').textContent") == evil
+    assert browser.run("document.querySelectorAll('img').length") == 0 and browser.run("document.title") != "owned"
+
+
+@pytest.fixture
+def fake_control(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
+    """A daemon whose sensors are called as no real one's can be."""
+    listener = socket.socket(socket.AF_UNIX)
+    path = tmp_path / "fake.ctl"
+    listener.bind(str(path))
+    listener.listen()
+
+    def begin(name: str) -> Path:
+        sensor = {"state": name, "rate_hz": 15.0, "jitter_s": 0.0, "lost": 0, "bad_taxels": 0, "source": "a:1"}
+        status = {
+            "ok": True, "version": name, "state": "ok", "sensors": {name: sensor},
+            "flight_recorder": {"limit_bytes": 1},
+            "model": {"active": name, "gestures": [name]}, "addresses": {"socket": str(tmp_path / "none.sock")},
+        }  # fmt: skip
+
+        def answer(client: socket.socket) -> None:
+            with client, client.makefile("rb") as file:
+                for line in file:
+                    asked = json.loads(line)["verb"]
+                    reply = status if asked == "status" else {"ok": False, "reason": name}
+                    client.sendall(json.dumps(reply).encode() + b"\n")
+
+        def serve() -> None:
+            while True:
+                try:
+                    client, _ = listener.accept()
+                except OSError:
+                    return
+                threading.Thread(target=answer, args=(client,), daemon=True).start()
+
+        threading.Thread(target=serve, daemon=True).start()
+        return path
+
+    yield begin
+    listener.shutdown(socket.SHUT_RDWR)
+    listener.close()
