@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
+LEAST = 20  # gestures, of which percentiles say something
 NONE = "none"  # the label of whatever is no gesture
 TOLERANCE_S = 0.3  # clocks, filters and thresholds shift an onset by some frames
 MISSED_AFTER_S = 1.5  # after the end of what was performed; longer than any wait for a second tap
@@ -85,8 +86,8 @@ class Tally:
         return [self._count(Outcome("rejected" if p.label == NONE else "missed", p)) for p in silent]
 
     def summary(self) -> dict[str, Any]:
-        """The counts, latency and lead in milliseconds (None where there is none); one sensor's provisional events."""
-        ordered = sorted(self.latencies)
+        """The counts, latency and lead in milliseconds (None where too few, or none); one sensor's provisional events."""
+        ordered = sorted(self.latencies) if len(self.latencies) >= LEAST else []
         return self.counts | {
             "latency_ms_median": round(1000 * median(ordered)) if ordered else None,
             "latency_ms_p95": round(1000 * ordered[int(0.95 * len(ordered))]) if ordered else None,

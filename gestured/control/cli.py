@@ -30,11 +30,12 @@ from gestured.control import (
     sniff,
     status,
     view,
+    watch,
 )
 from gestured.core.errors import GesturedError
 
 SUBCOMMANDS = (
-    *(status, listen, view, doctor, sniff),
+    *(status, listen, view, watch, doctor, sniff),
     *(reload, recalibrate, shadow, emit),
     *(enrol, gestures, forget),
     *(record, flag, replay, export),

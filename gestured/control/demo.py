@@ -2,28 +2,34 @@
 
 import argparse
 import math
-import os
 import queue
 import signal
 import sys
 import threading
 import time
-from contextlib import closing
+from contextlib import closing, nullcontext, suppress
+from dataclasses import replace
+from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen
 from typing import Any
 
+from gestured.client.control import Control
 from gestured.client.engine import Engine
+from gestured.client.lines import Refused
 from gestured.client.picture import trace
 from gestured.client.say import say, say_drawn, say_json
 from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form, Sensor
 from gestured.client.stream import Stream
 from gestured.control.play import add_arguments, frames, play_from
+from gestured.control.screen import Felt, Screen, in_colour
 from gestured.control.show import as_dict, block, in_words
 from gestured.core.errors import GesturedError
 from gestured.simulator import Take
 
 DEMO_SENSOR = "demo"
 SLACK_S = 0.3  # idle frames shown before what was performed, and waited for at the end
+VIEW = (sys.executable, "-m", "gestured.control", "view", "--listen", "127.0.0.1:0")
 DRAWN_AFTER_S = 0.1
 POLL_S = 0.05
 HEARD = ("gesture", "unknown", "provisional")  # events that the daemon is asked for
@@ -54,47 +60,72 @@ def run(args: argparse.Namespace) -> int:
         raise GesturedError(f"--seconds {args.seconds:g}: expected 5 to 600")
     for signalled in (signal.SIGTERM, signal.SIGHUP):  # a closed terminal must not leave the daemon behind
         signal.signal(signalled, signal.default_int_handler)
-    play = play_from(args)
+    play = replace(play_from(args), first="circle_clockwise")
     ((_, take),) = play.takes(args.seconds)
-    show = Show(take, args.json)
+    show = Show(take, args.model, args.json)
     with Engine(args.model, play.rows, play.columns) as engine:
         try:
             with (
+                Control(Path(engine.ready["control"])) as control,
+                Page(control.path, args.json) as page,
                 closing(Stream(engine.socket, {"types": HEARD})) as stream,
                 closing(Sensor(engine.listen, Form(DEMO_SENSOR))) as sensor,
+                show.screen or nullcontext(),
             ):
                 show.say(
                     f"The daemon listens on {engine.listen} with the model {engine.ready['model']}.",
                     f"A simulated sensor of {play.rows} x {play.columns} taxels sends OSC to it "
                     f"at {play.rate_hz:g} Hz.",
+                    *([f"In a browser it is seen at {page.address}"] if page.address else []),
                     "For two seconds nobody touches it. Ctrl-C ends.",
                     "",
                 )
-                show.follow(sensor, stream)
+                show.follow(sensor, stream, control)
         except KeyboardInterrupt:
             show.say("")
     show.conclude()
     return 0
 
 
+class Page:
+    """`gesturectl view` in a process of its own, whose address is shown and never opened; a context manager."""
+
+    def __init__(self, control: Path, quiet: bool) -> None:
+        self.address = ""
+        self._process = (
+            None if quiet else Popen([*VIEW, "--control", str(control)], stdin=DEVNULL, stdout=PIPE, stderr=DEVNULL)
+        )
+
+    def __enter__(self) -> "Page":
+        if self._process is not None and self._process.stdout is not None:
+            self.address = self._process.stdout.readline().decode().strip()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._process is not None and self._process.stdout is not None:
+            self._process.terminate()
+            self._process.wait()
+            self._process.stdout.close()
+
+
 class Show:
     """The running comparison of one take with the events that come of it."""
 
-    def __init__(self, take: Take, as_json: bool) -> None:
+    def __init__(self, take: Take, model: str, as_json: bool) -> None:
 
-        self.take = take
+        self.take, self.model = take, model
         self.as_json = as_json
-        plain = "NO_COLOR" in os.environ or os.environ.get("TERM") == "dumb"
-        self.colour = sys.stdout.isatty() and not plain
-        self.tally = Tally()
+        self.colour = in_colour()
+        self.tally, self.felt = Tally(), Felt(self.colour)
+        self.screen = Screen() if sys.stdout.isatty() and not as_json else None
 
     def say(self, *lines: str) -> None:
         """Words for a person."""
         if not self.as_json:
             say(*lines)
 
-    def follow(self, sensor: Sensor, stream: Stream) -> None:
-        """Send the take and show what comes of it, until its end."""
+    def follow(self, sensor: Sensor, stream: Stream, control: Control) -> None:
+        """Send the take and show what comes of it, until its end; at a terminal also the finger as it moves."""
 
         heard: queue.SimpleQueue[tuple[float, dict[str, Any]] | None] = queue.SimpleQueue()
 
@@ -114,6 +145,7 @@ class Show:
                 self.tally.begin(Performed(event.label, event.kind, onset, offset))
             for outcome in self.tally.settle(now):
                 self._show(outcome, sensor)
+            self._draw(control)
             try:
                 item = heard.get(timeout=POLL_S)
             except queue.Empty:
@@ -134,6 +166,20 @@ class Show:
             say_json({"type": "summary"} | figures)
         else:
             say_drawn(in_words(figures, self.colour))
+            program = Path(sys.argv[0])
+            programs = program.parent if program.name == "gesturectl" else Path()
+            say(
+                "",
+                "Next, a daemon of your own, and in a second terminal a sensor that somebody touches:",
+                f"  {programs / 'gestured'} --model {self.model}",
+                f"  {programs / 'gesturectl'} simulate --sensor armrest",
+            )
+
+    def _draw(self, control: Control) -> None:
+        """The sensor as the daemon feels it, at a terminal."""
+        if self.screen is not None:
+            with suppress(Refused):  # its first frame has not come yet
+                self.screen.draw(self.felt.lines(control.ask("view", sensor=DEMO_SENSOR)))
 
     def _show(self, outcome: Outcome, sensor: Sensor) -> None:
 
@@ -144,4 +190,8 @@ class Show:
         onset, offset = (of.onset, of.offset) if of else (outcome.event["onset"], outcome.event["offset"])  # type: ignore[index]
         times = self.take.times + sensor.epoch
         shown = (times >= onset - SLACK_S) & (times <= offset + DRAWN_AFTER_S)
-        say_drawn(block(outcome, trace(self.take.frames[shown]), self.colour))
+        text = block(outcome, trace(self.take.frames[shown]), self.colour)
+        if self.screen is not None:
+            self.screen.above(text)
+        else:
+            say_drawn(text)

@@ -40,6 +40,7 @@ class Play:
     kinds: tuple[str, ...] = ()  # in this order, again and again; none: at random
     non_gestures: float = 0.2  # share of what is performed at random
     speed: str | None = None  # None: mixed
+    first: str | None = None  # what is performed before all else, where `kinds` does not say
 
     def takes(self, seconds: float | None) -> Iterator[tuple[float, Take]]:
         """(start, take) one after the other, `seconds` in all or without end; times in seconds from 0."""
@@ -70,6 +71,8 @@ class Play:
     def _kind(self, number: int, rng: np.random.Generator) -> str:
         if self.kinds:
             return self.kinds[number % len(self.kinds)]
+        if number == 0 and self.first is not None:
+            return self.first
         pool = NON_GESTURES if rng.random() < self.non_gestures else GESTURES
         return pool[int(rng.integers(len(pool)))]
 

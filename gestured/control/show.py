@@ -82,7 +82,7 @@ def in_words(figures: Mapping[str, Any], colour: bool) -> str:
         f"{figures['right']} right, {figures['wrong']} wrong, {figures['missed']} missed",
         f"  anything else  {others:3d}:  {figures['rejected']} rejected, {figures['false']} false events",
     ]
-    if figures["latency_ms_median"] is not None:
+    if figures["latency_ms_median"] is not None:  # of twenty gestures or more
         lines.append(
             f"  latency (end of the gesture to the event):  median {figures['latency_ms_median']} ms, "
             f"95th percentile {figures['latency_ms_p95']} ms"

@@ -68,7 +68,7 @@ def test_without_a_terminal_no_escape_codes_and_without_block_characters_words(r
 def test_ended_early_it_still_sums_up_and_leaves_nothing_behind(start, tmp_path, how):
     process = start("demo", "--seconds", 60, env={"TMPDIR": str(tmp_path)})
     assert b"listens on" in process.stdout.readline()
-    assert len(daemons(tmp_path)) == 1
+    assert len(daemons(tmp_path)) == 2  # and the page
     process.send_signal(how)
     out, err = process.communicate(timeout=30)
     assert process.returncode == 0

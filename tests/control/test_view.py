@@ -209,7 +209,7 @@ def test_it_waits_for_a_daemon_that_starts_again(start, tmp_path: Path) -> None:
     stream = Page(process.stdout.readline().decode()).come_in().stream()
     stream.until("sensors")
     first.stop()
-    assert "no daemon" in stream.until("gone")[1]["reason"]
+    assert "daemon on" in stream.until("gone")[1]["reason"]
     second = Daemon.start(tmp_path, model)
     try:
         assert stream.until("sensors")[1]["state"] == "no_data"
