@@ -1,4 +1,4 @@
-"""The import rule of ARCHITECTURE.md: core <- model, record, simulator, client <- daemon | control | lab."""
+"""The import rule of ARCHITECTURE.md: core <- model, record, simulator, client <- daemon | control | bridge | lab."""
 
 import ast
 import subprocess
@@ -12,13 +12,17 @@ ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "gestured"
 
 CORE_MAY = {"numpy", "dataclasses", "enum", "math", "struct", "json", "typing", "collections", "ipaddress"}
-LAYERS = {"core": 0, "daemon": 2, "control": 2, "lab": 2}  # everything else is between them
+LAYERS = {"core": 0, "daemon": 2, "control": 2, "bridge": 2, "lab": 2}  # everything else is between them
 LAB_ONLY = {"torch", "sklearn", "onnx", "joblib", "scipy"}
 ONLY_IN = {
     "onnxruntime": {"gestured/model/model.py"},
     "mcap": {"gestured/record/tape.py"},
     "pythonosc": {"gestured/client/osc_out.py"},
-    "prometheus_client": {"gestured/daemon/metrics.py", "gestured/daemon/http.py"},
+    "prometheus_client": {"gestured/daemon/metrics.py", "gestured/daemon/http.py", "gestured/bridge/counts.py"},
+    "aiomqtt": {"gestured/bridge/mqtt.py"},
+    "paho": {"gestured/bridge/mqtt.py"},
+    "zenoh": {"gestured/bridge/zenoh.py"},
+    "serial": {"gestured/bridge/serial.py"},
 }
 
 
@@ -116,6 +120,9 @@ def test_no_two_modules_know_each_other() -> None:
         ("daemon/x.py", "import prometheus_client"),
         ("control/x.py", "def f():\n    from pythonosc.udp_client import SimpleUDPClient"),
         ("daemon/x.py", "def f():\n    import onnxruntime"),
+        ("bridge/x.py", "from gestured.control import cli"),
+        ("daemon/x.py", "from gestured.bridge import mqtt"),
+        ("control/x.py", "import zenoh"),
     ],
 )
 def test_the_rule_notices(where: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,6 +28,10 @@ EXTRAS = (
     "hypothesis",
     "setuptools",
     "mcap",
+    "aiomqtt",
+    "paho",
+    "zenoh",
+    "serial",
 )
 ALL_BUT_LAB = """
 import importlib, pkgutil, gestured
@@ -237,3 +241,15 @@ def test_a_type_checker_sees_the_front_door(environment: Environment):
     )
     assert done.returncode == 0, done.stdout
     assert 'use.py:7: note: Revealed type is "str"' in done.stdout.replace("builtins.", "")
+
+
+@pytest.mark.parametrize(
+    ("extra", "flags"),
+    [("mqtt", ["mqtt", "--broker", "localhost"])],
+    ids=["mqtt"],
+)
+def test_without_its_extra_a_bridge_says_what_to_install(installed: Path, tmp_path: Path, extra: str, flags: list[str]):
+    code = f"sys.argv = ['gestured-bridge', *{flags!r}]\nfrom gestured.bridge.cli import main\nsys.exit(main())"
+    done = python_without(EXTRAS, code, installed, tmp_path)
+    assert done.returncode == 1
+    assert f"pip install 'gestured[{extra}]'" in done.stderr and done.stderr.count("\n") == 1

@@ -1,8 +1,15 @@
-"""HOST:PORT on the command line."""
+"""Where a daemon is: HOST:PORT on the command line, and the rules for its sockets."""
 
 import argparse
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
 
 from gestured.core.address import Address
+
+SYSTEM = Path("/run/gestured/events.sock")  # of the installed service
+SHARED = Path("/tmp")  # where a daemon without a session keeps its folder; anybody can make it first
 
 
 def host_port(text: str) -> Address:
@@ -22,3 +29,39 @@ def bind_address(text: str) -> Address:
         return Address.parse(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"{text!r}: expected {error}") from None
+
+
+def find_socket(environ: Mapping[str, str]) -> Path:
+    """The event socket that is meant where none is named, the first of these.
+
+    What the environment says, as the daemon reads it; that of a daemon in the session; the installed service's; the one
+    where a daemon without a session would keep it. Who serves it, `client.peer` looks at.
+    """
+    if path := setting(environ, "socket"):
+        return Path(path)
+    if directory := environ.get("RUNTIME_DIRECTORY"):
+        return Path(directory.split(":")[0]) / "events.sock"
+    session = environ.get("XDG_RUNTIME_DIR")
+    own = (Path(session, "gestured") if session else SHARED / f"gestured-{os.getuid()}") / "events.sock"
+    if session and os.path.exists(own):  # unlike Path.exists, no error where we may not look
+        return own
+    return SYSTEM if SYSTEM.parent.is_dir() else own
+
+
+def find_control(environ: Mapping[str, str]) -> Path:
+    """Where it keeps its control socket: beside the other."""
+    if path := setting(environ, "control"):
+        return Path(path)
+    return find_socket(environ).with_suffix(".ctl")
+
+
+def setting(environ: Mapping[str, str], key: str) -> str | None:
+    """A setting of the daemon's that a variable, or the file that a variable names, has; None where neither does."""
+    if value := environ.get(f"GESTURED_{key.upper()}"):
+        return value
+    try:
+        with open(environ.get("GESTURED_CONFIG") or os.devnull, "rb") as file:
+            value = tomllib.load(file).get(key)
+    except (OSError, ValueError):  # what is wrong with the file, the daemon says
+        return None
+    return value if isinstance(value, str) else None

@@ -79,6 +79,11 @@ class Subscriber:
         while (line := self._next_line()) is not None:
             yield line
 
+    @property
+    def connected(self) -> bool:
+        """Whether every daemon is there: it has greeted, and has not hung up since."""
+        return all(source.hello for source in self._sources)
+
     def close(self) -> None:
         """End the iteration and hang up; again is nothing. Any thread and any signal handler may call it."""
         self._closed = True

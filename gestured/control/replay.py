@@ -10,9 +10,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from gestured.client.address import host_port
+from gestured.client.address import find_socket, host_port
 from gestured.client.say import say, say_drawn, say_json, tell
-from gestured.control.address import find_socket
 from gestured.control.diff import Answer, Knew, Line, Recorded
 from gestured.control.labelled import Labelled
 from gestured.control.listen import readable

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gestured import __version__
+from gestured.client.notify import notify
 from gestured.core import messages
 from gestured.core.errors import GesturedError
 from gestured.core.events import Status
@@ -163,7 +164,7 @@ class Service:
                 status_at = max(status_at + STATUS_S, now)  # on time, but not all at once after a stall
                 self._every_second(now)
             if watchdog and canary.sings():
-                systemd.notify("WATCHDOG=1")
+                notify("WATCHDOG=1")
             if reload.is_set() and not self._reloading.locked():
                 reload.clear()
                 self._spawn(self.reload())  # a task: frames and timers go on
@@ -194,12 +195,12 @@ class Service:
         words = f"{snapshot.state}: {snapshot.models.active} answers; sensors: {states or 'none yet'}"
         if words != self._said:
             self._said = words
-            systemd.notify(f"STATUS={words}")
+            notify(f"STATUS={words}")
 
     async def _finish(self) -> None:
         """Answer what is in flight, give clients a moment to read it, and say goodbye."""
         self._stopping = True
-        systemd.notify("STOPPING=1")
+        notify("STOPPING=1")
         self._receiver.drain()
         self._receiver.close()
         self._control.close()
@@ -219,7 +220,7 @@ class Service:
     async def reload(self) -> str | None:
         """Read everything anew, and only where all of it is valid, change anything; else the reason."""
         async with self._reloading:
-            systemd.notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
+            notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
             try:
                 settings = await asyncio.to_thread(self._load)  # a long file, or a slow disk
                 ladder, osc, own = await asyncio.to_thread(self._open, settings)  # frames are served meanwhile
@@ -233,7 +234,7 @@ class Service:
                 self._swap(settings, ladder, osc, own)
                 return None
             finally:
-                systemd.notify("READY=1")
+                notify("READY=1")
 
     def _swap(self, settings: Settings, ladder: Ladder, osc: list[OscSink], own: OwnFile) -> None:
         for key in AT_A_RESTART:

@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
+from gestured.client.notify import notify
 from gestured.daemon import log as logging
 from gestured.daemon import systemd
 from gestured.daemon.bound import Bound, bind_all
@@ -141,7 +142,7 @@ def _announce(service: Service) -> None:
     ready: dict[str, Any] = {"type": "ready", **where, "model": model, "control": control}
     log.info("ready", **where, model=model)
     logging.print_line(json.dumps(ready, separators=(",", ":")))
-    systemd.notify(f"READY=1\nSTATUS={model} on {where['listen']}")
+    notify(f"READY=1\nSTATUS={model} on {where['listen']}")
 
 
 def _raise_descriptor_limit() -> None:

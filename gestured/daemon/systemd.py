@@ -1,4 +1,4 @@
-"""systemd's two conversations: what it passes to us (sockets), and what we tell it (sd_notify).
+"""What systemd passes to the daemon: sockets, and how often it wants to hear from it.
 
 Does nothing where nobody asked.
 """
@@ -7,17 +7,6 @@ import os
 import socket
 
 FIRST_FD = 3  # sd_listen_fds(3)
-
-
-def notify(state: str) -> None:
-    """Send `state` (such as "READY=1" or "STATUS=...") to $NOTIFY_SOCKET, if there is one; never raises."""
-    if path := os.environ.get("NOTIFY_SOCKET"):
-        try:
-            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as out:
-                out.connect("\0" + path[1:] if path.startswith("@") else path)
-                out.send(state.encode())
-        except OSError:
-            pass  # the supervisor is gone or busy: that must not stop the daemon
 
 
 def watchdog_period() -> float | None:

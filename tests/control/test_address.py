@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gestured.control import address
+from gestured.client import address
 
 
 @pytest.fixture

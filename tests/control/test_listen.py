@@ -215,7 +215,7 @@ def test_wrong_usage(run, wrong, tmp_path: Path):
 
 
 def test_the_default_socket_is_where_the_daemon_keeps_it(monkeypatch, tmp_path):
-    from gestured.control import address
+    from gestured.client import address
     from gestured.daemon.settings import default_socket as daemons
 
     monkeypatch.setattr(address, "SYSTEM", tmp_path / "none" / "events.sock")  # no daemon is installed

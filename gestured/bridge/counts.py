@@ -1,0 +1,80 @@
+"""What a bridge counts, says, and shows to Prometheus."""
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+from gestured.bridge.options import BridgeError
+from gestured.client.notify import notify
+from gestured.client.say import say, say_drawn
+from gestured.core.address import Address
+
+HELP = {
+    "events": "Events of the daemon, by what became of them",
+    "frames": "Frames on their way to the daemon, by what became of them",
+    "connected": "Whether the other side is there",
+    "reconnects": "How often the other side was found again",
+}
+
+
+class Counts:
+    """Numbers of one bridge: (name, label) -> value. `connected` is a gauge, the others only grow."""
+
+    def __init__(self, bridge: str) -> None:
+        self.bridge = bridge
+        self.values: Counter[tuple[str, str]] = Counter()
+        self._words: dict[str, str] = {}  # side -> how it is, for systemd's status line
+        self._ready = False
+
+    def add(self, name: str, label: str, count: int = 1) -> None:
+        """Count."""
+        self.values[name, label] += count
+
+    def connected(self, side: str, is_there: bool, words: str) -> None:
+        """Whether a side is there now; said where it changes."""
+        key = ("connected", side)
+        if key in self.values and self.values[key] == is_there:
+            return
+        if is_there and key in self.values:
+            self.add("reconnects", side)
+        self.values[key] = is_there
+        say(f"gestured-bridge {self.bridge}: {words}", to=sys.stderr)
+        self._words[side] = words
+        notify(f"STATUS={'; '.join(self._words.values())}")
+
+    def ready(self, **where: object) -> None:
+        """Say once that it works, as one line of JSON on standard output, and to systemd."""
+        if not self._ready:
+            self._ready = True
+            say_drawn(json.dumps({"type": "ready", "bridge": self.bridge, **where}))
+            notify("READY=1")
+
+    def serve(self, address: Address | None) -> str | None:
+        """Answer /metrics from a thread of its own, where an address is given; returns it with the real port."""
+        if address is None:
+            return None
+        import prometheus_client
+        from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
+
+        counts = self
+
+        class Collector:
+            def collect(self) -> Iterator[Any]:
+                found: dict[str, Any] = {}
+                for (name, label), value in list(counts.values.items()):
+                    kind = GaugeMetricFamily if name == "connected" else CounterMetricFamily
+                    key = "to" if name in ("connected", "reconnects") else "result"
+                    if name not in found:
+                        found[name] = kind(f"gestured_bridge_{name}", HELP[name], labels=["bridge", key])
+                    found[name].add_metric([counts.bridge, label], value)
+                yield from found.values()
+
+        registry = prometheus_client.CollectorRegistry()
+        registry.register(Collector())
+        try:
+            server, _ = prometheus_client.start_http_server(address.port, address.host, registry)
+        except OSError as error:
+            raise BridgeError(f"--metrics {address}: {error.strerror}: choose another address") from None
+        return str(Address(address.host, server.server_port))

@@ -1,0 +1,85 @@
+"""What a bridge knows of the daemon that it mirrors: whether it is there, its gestures and sensors, an event's age."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from gestured.client.subscriber import Subscriber
+
+NOTICE_S = 0.25  # after which a daemon that went is noticed
+GONE = "gone"  # the type of a line of ours: the daemon hung up, and is called until it is back
+MOST_SENSORS = 4096  # names that are remembered: whoever can send frames can invent some
+DRIFT = 0.1  # s in a second by which a sensor's clock may run away from ours; real ones do a ten-thousandth of it
+OLD_S = 1.0  # an event that is older helps nobody any more: the window would open a second late
+
+Line = Mapping[str, Any]
+
+
+def follow(subscriber: Subscriber) -> Iterator[Line]:
+    """Each line of a daemon, its hello among them, and GONE where it went; until the subscriber is closed.
+
+    The subscriber has a timeout of NOTICE_S.
+    """
+    connected = False
+    while True:
+        try:
+            for _, line in subscriber.lines():
+                connected = connected or line.get("type") == "hello"
+                yield line
+            return
+        except TimeoutError:
+            if connected and not subscriber.connected:
+                connected = False
+                yield {"type": GONE}
+
+
+class Daemon:
+    """How a daemon is, from the lines that it said."""
+
+    def __init__(self, sensors: Sequence[str] | None, gestures: Sequence[str] | None) -> None:
+        """`sensors` and `gestures` are the subscription's filters, None for all."""
+        self.hello: Line = {}  # empty while it is away
+        self.states: dict[str, str] = {}  # sensor -> how it is; what was known before it went is kept
+        self.gestures: list[str] | None = None  # None until it has said them
+        self._wanted_sensors, self._wanted_gestures = sensors, gestures
+        self._lags: dict[str, tuple[float, float]] = {}  # sensor -> its smallest lag, and when that was found
+
+    def take(self, line: Line) -> None:
+        """One line of `follow`."""
+        match line.get("type"):
+            case "hello":
+                self.hello = line
+                self._gestures(line["gestures"])
+                for name in line["sensors"]:
+                    self._state(name, self.states.get(name, "no_data"))
+            case "gestures":
+                self._gestures(line["gestures"])
+            case "status":
+                for name, state in line["sensors"].items():
+                    self._state(name, state)
+            case "gone":
+                self.hello = {}
+
+    def age(self, event: Line, now: float) -> float:
+        """How many seconds ago an event was decided; `now` is in seconds since the epoch.
+
+        A sensor's own clock may be off by any time, so its lag is counted from the smallest one so far.
+        """
+        if "decided" not in event:
+            return 0.0
+        lag = float(now - event["decided"])
+        if event["sensor"] not in self._lags and len(self._lags) >= MOST_SENSORS:
+            self._lags.clear()
+        smallest, found = self._lags.get(event["sensor"], (lag, now))
+        smallest = min(lag, smallest + DRIFT * max(now - found, 0.0))
+        self._lags[event["sensor"]] = smallest, now
+        return lag - smallest
+
+    def _state(self, name: str, state: str) -> None:
+        if self._wanted_sensors is not None and name not in self._wanted_sensors:
+            return
+        if name in self.states or len(self.states) < MOST_SENSORS:
+            self.states[name] = state
+
+    def _gestures(self, known: Sequence[str]) -> None:
+        wanted = self._wanted_gestures
+        self.gestures = [name for name in known if wanted is None or name in wanted]

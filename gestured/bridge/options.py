@@ -1,0 +1,74 @@
+"""What the bridges' command lines have in common."""
+
+import argparse
+import os
+from pathlib import Path
+
+from gestured.client.address import find_socket, host_port
+from gestured.client.subscriber import Subscriber
+from gestured.core.address import Address
+from gestured.core.errors import GesturedError
+from gestured.core.messages import EVENT_TYPES
+
+STATUS = "status"  # the type of the line that says how each sensor is, once a second
+
+
+class BridgeError(GesturedError):
+    """The bridge cannot do what it was asked, and waiting would not help."""
+
+
+def missing(package: str, extra: str) -> BridgeError:
+    """The error where the library of a bus is not installed."""
+    return BridgeError(f"this bridge needs the package {package}: pip install 'gestured[{extra}]'")
+
+
+def add_filters(parser: argparse.ArgumentParser) -> None:
+    """Add which daemon is heard, and what of it."""
+    text = "the daemon's event socket (default: the daemon's own default)"
+    parser.add_argument("--socket", type=Path, metavar="PATH", help=text)
+    text = f"which events, with commas, of {', '.join(EVENT_TYPES)} (default: gesture)"
+    parser.add_argument("--types", type=event_types, default=["gesture"], metavar="A,B", help=text)
+    parser.add_argument("--sensors", type=names, metavar="A,B", help="only these sensors (default: all)")
+    parser.add_argument("--gestures", type=names, metavar="A,B", help="only these gestures (default: all)")
+
+
+def add_metrics(parser: argparse.ArgumentParser) -> None:
+    """Add where Prometheus may ask."""
+    text = "HTTP address of /metrics; port 0 is any free one (default: off)"
+    parser.add_argument("--metrics", type=listen_address, metavar="HOST:PORT", help=text)
+
+
+def names(text: str) -> list[str]:
+    """Words between commas; for argparse."""
+    found = [word.strip() for word in text.split(",") if word.strip()]
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected names with commas between them")
+    return found
+
+
+def event_types(text: str) -> list[str]:
+    """Types of events between commas; for argparse."""
+    found = names(text)
+    if unknown := [name for name in found if name not in EVENT_TYPES]:
+        raise argparse.ArgumentTypeError(f"{', '.join(unknown)}: expected some of {', '.join(EVENT_TYPES)}")
+    return found
+
+
+def listen_address(text: str) -> Address:
+    """An address of our own, whose port may be 0; for argparse."""
+    try:
+        return Address.parse(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected {error}") from None
+
+
+def peer_address(text: str, port: int) -> Address:
+    """HOST or HOST:PORT of a peer, with the usual port where none is named. Raises argparse's error."""
+    return host_port(text if text.rpartition(":")[2].isdigit() and text.count(":") != 0 else f"{text}:{port}")
+
+
+def subscriber(args: argparse.Namespace, timeout: float) -> Subscriber:
+    """The subscription that was asked for, and how the sensors are. Next raises TimeoutError after `timeout` s."""
+    types = [*args.types, *({STATUS} - set(args.types))]
+    path = args.socket or find_socket(os.environ)
+    return Subscriber(path, types=types, sensors=args.sensors, gestures=args.gestures, timeout=timeout)

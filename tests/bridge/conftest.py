@@ -1,0 +1,173 @@
+"""gestured-bridge as a process, and a real broker."""
+
+import json
+import os
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gestured.client.control import Control
+from tests.control.conftest import FakeDaemon
+from tests.daemon import tiny_model
+from tests.daemon.harness import DEADLINE_S, Daemon
+
+
+class Process:
+    """A gestured-bridge; what it says goes into files."""
+
+    def __init__(self, folder: Path, number: int, *arguments: object, env: dict[str, str] | None = None) -> None:
+        self.errors = folder / f"bridge-{number}.txt"
+        with self.errors.open("wb") as errors:
+            self.process = subprocess.Popen(
+                [sys.executable, "-X", "faulthandler", "-m", "gestured.bridge", *map(str, arguments)],
+                stdout=subprocess.PIPE, stderr=errors, env=os.environ | (env or {}), text=True,
+            )  # fmt: skip
+
+    def ready(self) -> dict[str, Any]:
+        """Its ready line, once it can work."""
+        assert self.process.stdout is not None
+        readable, _, _ = select.select([self.process.stdout], [], [], DEADLINE_S)
+        line = self.process.stdout.readline() if readable else ""
+        assert line, self.said()
+        return json.loads(line)
+
+    def said(self) -> str:
+        """What it has said so far."""
+        return self.errors.read_text()
+
+    def until(self, words: str, count: int = 1) -> str:
+        """What it has said, once these words are in it so many times."""
+        return wait(lambda: self.said() if self.said().count(words) >= count else "", lambda: self.said())
+
+    def end(self) -> int:
+        """Its exit status, once it has ended by itself."""
+        return self.process.wait(DEADLINE_S)
+
+    def stop(self) -> int:
+        """End it as an operator does."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGCONT)
+            self.process.send_signal(signal.SIGTERM)
+        try:
+            return self.process.wait(DEADLINE_S)
+        finally:
+            self.process.kill()
+            self.process.stdout.close()
+
+
+def wait(look: Callable[[], Any], explain: Callable[[], object] = lambda: "it did not come") -> Any:
+    """What a look finds, once it finds something."""
+    end = time.monotonic() + DEADLINE_S
+    while not (found := look()):
+        assert time.monotonic() < end, explain()
+        time.sleep(0.01)
+    return found
+
+
+def free_port() -> int:
+    """A port that nobody has now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def bridge(tmp_path: Path) -> Iterator[Callable[..., Process]]:
+    """Starts bridges; whatever still runs at the end of the test is ended."""
+    running: list[Process] = []
+
+    def begin(*arguments: object, **more: Any) -> Process:
+        running.append(Process(tmp_path, len(running), *arguments, **more))
+        return running[-1]
+
+    yield begin
+    for process in running:
+        process.stop()
+        assert "Traceback" not in process.said()
+
+
+@pytest.fixture(scope="session")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A valid model file named tiny."""
+    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+    return tiny_model.make(tmp_path_factory.mktemp("model") / "tiny.onnx")
+
+
+@pytest.fixture(scope="module")
+def daemon(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A real daemon with the sensor's clock."""
+    daemon = Daemon.start(tmp_path_factory.mktemp("daemon"), model, "--clock", "sensor", "--stale-s", 30)
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+
+
+@pytest.fixture
+def fake(tmp_path: Path) -> Iterator[FakeDaemon]:
+    """An event socket that says what the test tells it to."""
+    daemon = FakeDaemon(tmp_path / "events.sock")
+    yield daemon
+    daemon.listener.close()
+
+
+def emit(daemon: Daemon, gesture: str, sensor: str = "armrest") -> None:
+    """A made-up event of a real daemon."""
+    with Control(daemon.socket.with_suffix(".ctl")) as control:
+        control.ask("emit", gesture=gesture, sensor=sensor)
+
+
+class Broker:
+    """Debian's mosquitto, on a port of the loopback."""
+
+    def __init__(self, folder: Path, *lines: str) -> None:
+        program = shutil.which("mosquitto", path=f"{os.environ['PATH']}:/usr/sbin")
+        if program is None:
+            pytest.skip("mosquitto is not installed (apt-get install mosquitto)")
+        self.port = free_port()
+        self._log = folder / "mosquitto.txt"
+        file = folder / "mosquitto.conf"
+        file.write_text("\n".join([f"listener {self.port} 127.0.0.1", *(lines or ["allow_anonymous true"])]) + "\n")
+        self._command = [program, "-c", str(file), "-v"]
+        self.start()
+
+    def start(self) -> None:
+        """Run it, and wait until it listens."""
+        with self._log.open("ab") as log:
+            self.process = subprocess.Popen(self._command, stdout=log, stderr=log)
+        wait(self._listens, lambda: self._log.read_text())
+
+    def _listens(self) -> bool:
+        assert self.process.poll() is None, self._log.read_text()
+        with socket.socket() as probe:
+            return probe.connect_ex(("127.0.0.1", self.port)) == 0
+
+    @property
+    def address(self) -> str:
+        return f"127.0.0.1:{self.port}"
+
+    def kill(self) -> None:
+        """Without a word."""
+        self.process.kill()
+        self.process.wait()
+
+
+@pytest.fixture
+def broker(tmp_path: Path) -> Iterator[Callable[..., Broker]]:
+    """Starts brokers with these lines of configuration."""
+    running: list[Broker] = []
+
+    def begin(*lines: str) -> Broker:
+        running.append(Broker(tmp_path, *lines))
+        return running[-1]
+
+    yield begin
+    for each in running:
+        each.kill()

@@ -1,0 +1,479 @@
+"""Events at a real broker: what is published, retained and cleared, and what happens when somebody goes."""
+
+import json
+import queue
+import signal
+import ssl
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.bridge.conftest import Broker, Process, emit, free_port, wait
+from tests.control.conftest import HELLO, FakeDaemon
+from tests.daemon.harness import DEADLINE_S, Daemon
+
+paho = pytest.importorskip("paho.mqtt.client", reason="the bridge to MQTT needs the extra [mqtt]")
+pytest.importorskip("aiomqtt", reason="the bridge to MQTT needs the extra [mqtt]")
+
+STATUS = {"type": "status", "state": "ok", "sensors": {"armrest": "ok"}, "model": "m", "time": 1.0}
+
+
+def gesture(sequence: int, name: str = "one_tap", **more: Any) -> dict[str, Any]:
+    """A gesture as a daemon says it, now."""
+    import time
+
+    now = time.time()
+    return {
+        "type": "gesture", "sensor": "armrest", "id": sequence, "gesture": name, "confidence": 0.9,
+        "sequence": sequence, "onset": now, "offset": now, "decided": now,
+    } | more  # fmt: skip
+
+
+class Listener:
+    """A subscriber of its own make, with MQTT 5."""
+
+    def __init__(self, port: int, *topics: str) -> None:
+        self._messages: queue.Queue[Any] = queue.Queue()
+        subscribed: queue.Queue[bool] = queue.Queue()
+        self.client = paho.Client(paho.CallbackAPIVersion.VERSION2, protocol=paho.MQTTv5)
+        self.client.on_message = lambda _, __, message: self._messages.put(message)
+        self.client.on_subscribe = lambda *_: subscribed.put(True)
+        self.client.connect("127.0.0.1", port)
+        self.client.loop_start()
+        for topic in topics:
+            self.client.subscribe(topic, qos=1)
+            subscribed.get(timeout=DEADLINE_S)
+
+    def next(self) -> Any:
+        """The next message."""
+        return self._messages.get(timeout=DEADLINE_S)
+
+    def until(self, topic: str, payload: str | None = None) -> Any:
+        """The next message under a topic (with a payload)."""
+        while True:
+            message = self.next()
+            if message.topic == topic and payload in (None, message.payload.decode()):
+                return message
+
+    def events(self, count: int) -> list[dict[str, Any]]:
+        """The next events."""
+        return [json.loads(self.until("gestured/car/armrest/gesture").payload) for _ in range(count)]
+
+    def close(self) -> None:
+        self.client.disconnect()
+        self.client.loop_stop()
+
+
+@pytest.fixture
+def listen() -> Iterator[Callable[..., Listener]]:
+    opened: list[Listener] = []
+
+    def begin(port: int, *topics: str) -> Listener:
+        opened.append(Listener(port, *topics))
+        return opened[-1]
+
+    yield begin
+    for listener in opened:
+        listener.close()
+
+
+def begin(bridge: Callable[..., Process], broker: Broker, daemon: Any, *more: object, **options: Any) -> Process:
+    """A bridge of the machine `car`."""
+    path = daemon.path if isinstance(daemon, FakeDaemon) else daemon.socket
+    return bridge("mqtt", "--broker", broker.address, "--socket", path, "--host", "car", *more, **options)
+
+
+def started(bridge: Callable[..., Process], broker: Broker, fake: FakeDaemon, *more: object) -> Process:
+    """A bridge between a broker and a scripted daemon, connected to both."""
+    process = begin(bridge, broker, fake, *more)
+    fake.accept()
+    assert process.ready()["host"] == "car"
+    return process
+
+
+def retained(listen: Callable[..., Listener], broker: Broker, topics: str = "#") -> dict[str, str]:
+    """What a subscriber gets who comes now: all that the broker retains."""
+    listener = listen(broker.port, topics)
+    end = f"end/{id(listener)}"
+    listener.client.subscribe(end, qos=1)
+    listener.client.publish(end, b"", qos=1)
+    found = {}
+    while (message := listener.next()).topic != end:
+        if message.retain:
+            found[message.topic] = message.payload.decode()
+    return found
+
+
+def test_a_real_daemons_events_arrive_and_none_is_retained(bridge, broker, listen, daemon: Daemon):
+    at = broker()
+    listener = listen(at.port, "gestured/#")
+    assert begin(bridge, at, daemon).ready() | {"metrics": None} == {
+        "type": "ready", "bridge": "mqtt", "broker": at.address, "host": "car", "metrics": None,
+    }  # fmt: skip
+    client = daemon.client()
+    for name in ("swipe_left", "one_tap"):
+        emit(daemon, name)
+        line = client.events("gesture", "armrest")[-1]
+        message = listener.until("gestured/car/armrest/gesture")
+        assert json.loads(message.payload) == line | {"instance": client.hello["instance"]}
+        assert (message.qos, message.retain) == (1, False)
+        assert message.properties.MessageExpiryInterval == 1
+    client.close()
+    found = retained(listen, at)
+    assert found["gestured/car/availability"] == "online"
+    assert not [topic for topic in found if topic.endswith("/gesture")]
+
+
+def test_sensors_states_are_retained_and_follow_the_daemon(bridge, broker, listen, fake: FakeDaemon):
+    at = broker()
+    listener = listen(at.port, "gestured/car/+/state")
+    started(bridge, at, fake)
+    listener.until("gestured/car/armrest/state", "no_data")
+    fake.say(STATUS)
+    listener.until("gestured/car/armrest/state", "ok")
+    fake.say(STATUS | {"sensors": {"armrest": "stale", "door": "starting"}})
+    listener.until("gestured/car/armrest/state", "stale")
+    listener.until("gestured/car/door/state", "starting")
+    found = retained(listen, at, "gestured/#")
+    assert found == {
+        "gestured/car/availability": "online",
+        "gestured/car/armrest/state": "stale",
+        "gestured/car/door/state": "starting",
+    }
+
+
+def test_what_is_asked_for_is_asked_of_the_daemon_and_unknown_keys_are_passed_on(bridge, broker, listen, fake):
+    at = broker()
+    listener = listen(at.port, "gestured/#")
+    process = begin(
+        bridge, at, fake, "--types", "gesture,unknown", "--sensors", "armrest", "--gestures", "one_tap,double_tap"
+    )
+    fake.accept()
+    assert fake.request() == {
+        "subscribe": {
+            "types": ["gesture", "unknown", "status"], "sensors": ["armrest"], "gestures": ["one_tap", "double_tap"],
+        }
+    }  # fmt: skip
+    process.ready()
+    fake.say(gesture(1, own=True, news={"of": 2027}), gesture(2) | {"type": "unknown", "reason": "hole"})
+    assert json.loads(listener.until("gestured/car/armrest/gesture").payload)["news"] == {"of": 2027}
+    assert json.loads(listener.until("gestured/car/armrest/unknown").payload)["reason"] == "hole"
+
+
+def test_availability_when_the_daemon_goes_when_the_bridge_ends_and_when_it_is_killed(bridge, broker, listen, fake):
+    at = broker()
+    listener = listen(at.port, "gestured/car/availability")
+    process = started(bridge, at, fake)
+    listener.until("gestured/car/availability", "online")
+    fake.close()
+    listener.until("gestured/car/availability", "offline")
+    fake.accept()
+    listener.until("gestured/car/availability", "online")
+    assert process.stop() == 0
+    listener.until("gestured/car/availability", "offline")
+    process = begin(bridge, at, fake)
+    fake.accept()
+    listener.until("gestured/car/availability", "online")
+    process.process.kill()
+    listener.until("gestured/car/availability", "offline")
+
+
+def test_a_killed_bridges_last_will_does_not_outlive_its_successor(bridge, broker, listen, fake):
+    at = broker()
+    first = started(bridge, at, fake)
+    first.process.send_signal(signal.SIGSTOP)  # its connection stays open
+    begin(bridge, at, fake)
+    fake.accept()
+    listener = listen(at.port, "gestured/car/availability")
+    wait(lambda: retained(listen, at, "gestured/#").get("gestured/car/availability") == "online")
+    first.process.kill()
+    fake.say(STATUS)
+    assert retained(listen, at, "gestured/#")["gestured/car/availability"] == "online"
+    listener.close()
+
+
+# What Home Assistant takes (homeassistant/components/mqtt: event.py, device_trigger.py, schemas.py, and the pages
+# integrations/event.mqtt, integrations/device_trigger.mqtt and integrations/mqtt of home-assistant.io, November 2026).
+BASE = {"qos", "encoding", "device", "origin"}
+DEVICE = {
+    "identifiers", "connections", "manufacturer", "model", "model_id", "name", "hw_version", "serial_number",
+    "sw_version", "via_device", "suggested_area", "configuration_url",
+}  # fmt: skip
+ORIGIN = {"name", "sw_version", "support_url"}
+KEYS = {  # component -> required, allowed
+    "event": (
+        {"state_topic", "event_types"},
+        BASE
+        | {
+            "state_topic", "event_types", "value_template", "name", "unique_id", "device_class", "icon",
+            "availability", "availability_mode", "availability_template", "availability_topic",
+            "payload_available", "payload_not_available", "enabled_by_default", "entity_category",
+            "entity_picture", "json_attributes_topic", "json_attributes_template", "object_id", "default_entity_id",
+        },
+    ),
+    "device_automation": (
+        {"automation_type", "device", "topic", "type", "subtype"},
+        BASE | {"automation_type", "topic", "type", "subtype", "payload", "value_template", "platform"},
+    ),
+}  # fmt: skip
+
+
+def test_discovery_holds_what_home_assistant_takes(bridge, broker, listen, fake):
+    at = broker()
+    listener = listen(at.port, "homeassistant/#")
+    begin(bridge, at, fake)
+    fake.accept(HELLO | {"gestures": ["one_tap", "swipe_left"]})
+    triggers = {}
+    for _ in range(3):
+        message = listener.next()
+        _, component, node, identifier, config = message.topic.split("/")
+        payload = json.loads(message.payload)
+        required, allowed = KEYS[component]
+        assert required <= payload.keys() <= allowed
+        assert payload["device"].keys() <= DEVICE and payload["origin"].keys() <= ORIGIN
+        assert (node, config, payload["device"]["identifiers"]) == ("gestured_car", "config", ["gestured_car_armrest"])
+        assert identifier.replace("-", "_").isidentifier()
+        if component == "event":
+            assert payload["event_types"] == ["one_tap", "swipe_left"]
+            assert payload["state_topic"] == "gestured/car/armrest/gesture"
+            assert payload["availability_topic"] == "gestured/car/availability"
+        else:
+            triggers[payload["subtype"]] = payload
+    assert {name: (each["topic"], each["payload"]) for name, each in triggers.items()} == {
+        name: ("gestured/car/armrest/gesture", name) for name in ("one_tap", "swipe_left")
+    }
+
+
+def test_templates_make_of_an_event_what_home_assistant_expects():
+    """With its template engine, and its filter `tojson`."""
+    jinja2 = pytest.importorskip("jinja2", reason="the extra [lab] brings the template engine")
+    from gestured.bridge.homeassistant import discovery
+
+    found = dict(discovery("homeassistant", "car", "1", "armrest", ["one_tap"]))
+    value = gesture(7) | {"instance": "i"}
+    event = found["homeassistant/event/gestured_car/armrest/config"]
+    made = json.loads(jinja2.Environment().from_string(event["value_template"]).render(value_json=value))
+    assert made == {"event_type": "one_tap", "confidence": 0.9, "sequence": 7, "instance": "i"}
+    trigger = found["homeassistant/device_automation/gestured_car/armrest-one_tap/config"]
+    assert jinja2.Environment().from_string(trigger["value_template"]).render(value_json=value) == trigger["payload"]
+
+
+def test_own_gestures_appear_and_vanish(bridge, broker, listen, fake):
+    at = broker()
+    listener = listen(at.port, "homeassistant/#")
+    process = started(bridge, at, fake)
+    trigger = "homeassistant/device_automation/gestured_car/armrest-{}/config"
+    event = "homeassistant/event/gestured_car/armrest/config"
+    fake.say({"type": "gestures", "gestures": ["one_tap", "wave"]})
+    assert json.loads(listener.until(trigger.format("wave")).payload)["subtype"] == "wave"
+    fake.say({"type": "gestures", "gestures": ["one_tap"]})
+    listener.until(trigger.format("wave"), "")
+    wait(lambda: json.loads(retained(listen, at, event)[event])["event_types"] == ["one_tap"])
+    assert trigger.format("wave") not in retained(listen, at)
+    # forgotten while no bridge runs
+    fake.say({"type": "gestures", "gestures": ["one_tap", "nod"]})
+    listener.until(trigger.format("nod"))
+    process.stop()
+    fake.close()
+    process = started(bridge, at, fake)
+    listener.until(trigger.format("nod"), "")
+    assert trigger.format("one_tap") in retained(listen, at)
+    process.stop()
+    fake.close()
+    process = started(bridge, at, fake, "--no-discovery")
+    listener.until(trigger.format("one_tap"), "")
+    wait(lambda: not [topic for topic in retained(listen, at) if topic.startswith("homeassistant")])
+
+
+def test_a_broker_that_is_killed_and_comes_back_gets_what_is_fresh(bridge, broker, listen, fake):
+    at = broker()
+    process = started(bridge, at, fake)
+    listener = listen(at.port, "gestured/car/armrest/gesture")
+    fake.say(*(gesture(n) for n in range(1, 4)))
+    assert [event["sequence"] for event in listener.events(3)] == [1, 2, 3]
+    at.kill()
+    process.until("is not there")
+    fake.say(*(gesture(n, decided=gesture(0)["decided"] - 30) for n in range(4, 3000)))  # more than it keeps, all old
+    at.start()
+    process.until("is there", 2)
+    listener = listen(at.port, "gestured/car/armrest/gesture")
+    fake.say(gesture(3000))
+    assert listener.events(1)[0]["sequence"] == 3000
+    assert retained(listen, at)["gestured/car/availability"] == "online"
+
+
+def test_after_a_pause_of_the_bridge_old_events_are_not_sent(bridge, broker, listen, fake):
+    at = broker()
+    process = started(bridge, at, fake)
+    listener = listen(at.port, "gestured/car/armrest/gesture")
+    fake.say(gesture(1))
+    listener.events(1)
+    process.process.send_signal(signal.SIGSTOP)
+    fake.say(gesture(2, decided=gesture(2)["decided"] - 1.5))  # as if it had waited in the socket for so long
+    process.process.send_signal(signal.SIGCONT)
+    fake.say(gesture(3))
+    assert listener.events(1)[0]["sequence"] == 3
+
+
+def test_a_daemon_that_starts_again_is_found(bridge, broker, listen, fake):
+    at = broker()
+    listener = listen(at.port, "gestured/car/armrest/gesture")
+    started(bridge, at, fake)
+    fake.say(gesture(1))
+    assert listener.events(1)[0]["instance"] == "a"
+    fake.close()
+    fake.accept(HELLO | {"instance": "b"})
+    fake.say(gesture(1))
+    assert listener.events(1)[0]["instance"] == "b"
+
+
+def test_metrics(bridge, broker, listen, fake):
+    import urllib.request
+
+    at = broker()
+    listener = listen(at.port, "gestured/#")
+    process = begin(bridge, at, fake, "--metrics", "127.0.0.1:0")
+    fake.accept()
+    address = process.ready()["metrics"]
+    fake.say(gesture(1))
+    listener.until("gestured/car/armrest/gesture")
+
+    def page() -> str:
+        with urllib.request.urlopen(f"http://{address}/metrics", timeout=DEADLINE_S) as answer:
+            return answer.read().decode()
+
+    wait(lambda: 'gestured_bridge_events_total{bridge="mqtt",result="sent"} 1.0' in page())
+    assert 'gestured_bridge_connected{bridge="mqtt",to="broker"} 1.0' in page()
+    assert 'gestured_bridge_connected{bridge="mqtt",to="daemon"} 1.0' in page()
+
+
+@pytest.fixture(scope="module")
+def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An authority, a broker's certificate for 127.0.0.1, and another authority."""
+    import shutil
+
+    if shutil.which("openssl") is None:
+        pytest.skip("openssl is not installed")
+    folder = tmp_path_factory.mktemp("certificates")
+
+    def openssl(*arguments: str) -> None:
+        subprocess.run(["openssl", *arguments], cwd=folder, check=True, capture_output=True, timeout=60)
+
+    key = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")
+    for name in ("ca", "other"):
+        openssl("req", "-x509", *key, "-keyout", f"{name}.key", "-out", f"{name}.pem", "-subj", f"/CN={name}")
+    openssl("req", *key, "-keyout", "broker.key", "-out", "broker.csr", "-subj", "/CN=broker")
+    (folder / "san").write_text("subjectAltName=IP:127.0.0.1\n")
+    openssl(
+        "x509", "-req", "-in", "broker.csr", "-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial",
+        "-out", "broker.pem", "-extfile", "san",
+    )  # fmt: skip
+    for path in folder.iterdir():
+        path.chmod(0o644)  # the broker gives up root's rights
+    folder.chmod(0o755)
+    return folder
+
+
+def tls(certificates: Path) -> list[str]:
+    return ["allow_anonymous true", f"certfile {certificates}/broker.pem", f"keyfile {certificates}/broker.key"]
+
+
+def test_tls(bridge, broker, fake, certificates: Path):
+    at = broker(*tls(certificates), "user root")
+    assert ssl.create_default_context(cafile=certificates / "ca.pem")
+    process = begin(bridge, at, fake, "--tls", "--ca", certificates / "ca.pem")
+    fake.accept()
+    process.ready()
+
+
+def test_a_certificate_of_somebody_else_is_refused(bridge, broker, fake, certificates: Path):
+    at = broker(*tls(certificates), "user root")
+    process = begin(bridge, at, fake, "--tls", "--ca", certificates / "other.pem")
+    assert process.end() == 1
+    assert f"the certificate of the broker {at.address} is not to be trusted" in process.said()
+    assert "--ca FILE" in process.said() and process.said().count("\n") <= 2
+
+
+def test_a_broker_with_tls_that_is_called_without_says_so(bridge, broker, fake, certificates: Path):
+    at = broker(*tls(certificates), "user root")
+    process = begin(bridge, at, fake)
+    assert at.address in process.until("trying again")
+
+
+def with_password(folder: Path) -> list[str]:
+    (folder / "passwords").write_text("car:secret\n")
+    subprocess.run(["mosquitto_passwd", "-U", str(folder / "passwords")], check=True, timeout=60)
+    (folder / "access").write_text("user car\ntopic write gestured/car/#\ntopic readwrite homeassistant/#\n")
+    for name in ("passwords", "access"):
+        (folder / name).chmod(0o644)
+    return ["allow_anonymous false", f"password_file {folder}/passwords", f"acl_file {folder}/access", "user root"]
+
+
+def test_user_and_password_come_from_the_environment_or_a_file(bridge, broker, fake, tmp_path: Path):
+    at = broker(*with_password(tmp_path))
+    process = begin(bridge, at, fake, env={"MQTT_USER": "car", "MQTT_PASSWORD": "secret"})
+    fake.accept()
+    process.ready()
+    process.stop()
+    fake.close()
+    file = tmp_path / "user"
+    file.write_text("car:secret\n")
+    file.chmod(0o600)
+    process = begin(bridge, at, fake, "--credentials", file)
+    fake.accept()
+    process.ready()
+
+
+def test_a_broker_that_refuses_and_topics_that_are_not_allowed(bridge, broker, fake, tmp_path: Path):
+    at = broker(*with_password(tmp_path))
+    process = begin(bridge, at, fake, env={"MQTT_USER": "car", "MQTT_PASSWORD": "wrong"})
+    assert process.end() == 1
+    assert f"the broker {at.address} refuses us" in process.said() and "MQTT_PASSWORD" in process.said()
+    process = bridge(
+        "mqtt", "--broker", at.address, "--socket", fake.path, "--host", "other",
+        env={"MQTT_USER": "car", "MQTT_PASSWORD": "secret"},
+    )  # fmt: skip
+    assert process.end() == 1
+    assert "does not let us publish" in process.said() and "gestured/other/#" in process.said()
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--broker", "a b"], "expected HOST:PORT"),
+        (["--broker", "localhost", "--ca", "x.pem"], "add --tls"),
+        (["--broker", "localhost", "--tls", "--ca", "/none.pem"], "/none.pem"),
+        (["--broker", "localhost", "--credentials", "/none"], "/none"),
+        (["--broker", "localhost", "--types", "gestures"], "--types"),
+    ],
+)
+def test_bad_input_is_one_sentence(bridge, tmp_path: Path, flags: list[str], words: str):
+    process = bridge("mqtt", "--socket", tmp_path / "none.sock", *flags)
+    assert process.end() in (1, 2)
+    assert words in process.said()
+
+
+def test_credentials_that_everybody_can_read_are_refused(bridge, tmp_path: Path):
+    file = tmp_path / "user"
+    file.write_text("car:secret\n")
+    process = bridge("mqtt", "--broker", "localhost", "--credentials", file)
+    assert process.end() == 1
+    assert f"chmod o= {file}" in process.said() and "secret" not in process.said()
+
+
+def test_a_broker_that_is_not_there_yet_is_waited_for(bridge, fake):
+    port = free_port()
+    process = bridge("mqtt", "--broker", f"127.0.0.1:{port}", "--socket", fake.path)
+    assert "Connection refused" in process.until("trying again")
+    assert process.stop() == 0
+
+
+def test_a_subscription_that_the_daemon_refuses_ends_the_bridge(bridge, broker, fake):
+    process = begin(bridge, broker(), fake, "--gestures", "wave")
+    fake.accept()
+    fake.say({"type": "error", "reason": "subscribe.gestures: unknown wave, there are one_tap"})
+    assert process.end() == 1
+    assert "there are one_tap" in process.said()
