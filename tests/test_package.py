@@ -245,8 +245,11 @@ def test_a_type_checker_sees_the_front_door(environment: Environment):
 
 @pytest.mark.parametrize(
     ("extra", "flags"),
-    [("mqtt", ["mqtt", "--broker", "localhost"])],
-    ids=["mqtt"],
+    [
+        ("mqtt", ["mqtt", "--broker", "localhost"]),
+        ("serial", ["serial", "/dev/ttyUSB0", "--protocol", "csv", "--sensor", "armrest"]),
+    ],
+    ids=["mqtt", "serial"],
 )
 def test_without_its_extra_a_bridge_says_what_to_install(installed: Path, tmp_path: Path, extra: str, flags: list[str]):
     code = f"sys.argv = ['gestured-bridge', *{flags!r}]\nfrom gestured.bridge.cli import main\nsys.exit(main())"

@@ -5,12 +5,12 @@ import sys
 from collections.abc import Sequence
 
 import gestured
-from gestured.bridge import mqtt
+from gestured.bridge import mqtt, serial
 from gestured.client.lines import JOIN, Forbidden
 from gestured.client.say import say
 from gestured.core.errors import GesturedError
 
-BRIDGES = (mqtt,)
+BRIDGES = (mqtt, serial)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -19,7 +19,8 @@ def parser() -> argparse.ArgumentParser:
         prog="gestured-bridge",
         description="Connects gestured to other buses, and sensors on serial lines to gestured.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="example:\n  gestured-bridge mqtt --broker 192.168.7.2",
+        epilog="examples:\n  gestured-bridge mqtt --broker 192.168.7.2\n"
+        "  gestured-bridge serial /dev/ttyUSB0 --protocol flexitac --sensor glove --grid 16x32",
     )
     top.add_argument("--version", action="version", version=f"gestured-bridge {gestured.__version__}")
     commands = top.add_subparsers(metavar="BRIDGE", required=True)

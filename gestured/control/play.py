@@ -1,12 +1,12 @@
 """What the simulated sensor plays: a person who performs gesture after gesture, and the frames of it."""
 
 import argparse
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gestured.client.grid import rows_by_columns
 from gestured.core.frames import Frame, Touch
 from gestured.simulator import (
     GESTURES,
@@ -110,7 +110,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--speed", choices=tuple(SPEEDS), help="how fast the person moves (default: mixed)")
     parser.add_argument("--rate", type=_rate, default=15.0, metavar="HZ", help="frames a second (default: 15)")
-    parser.add_argument("--grid", type=_grid, default=(9, 9), metavar="RxC", help="rows and columns (default: 9x9)")
+    parser.add_argument(
+        "--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="rows and columns (default: 9x9)"
+    )
 
 
 def play_from(args: argparse.Namespace) -> Play:
@@ -145,10 +147,3 @@ def _between(text: str, low: float, high: float) -> float:
     if not low <= value <= high:
         raise argparse.ArgumentTypeError(f"{text!r}: expected a number from {low:g} to {high:g}")
     return value
-
-
-def _grid(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(\d{1,2})x(\d{1,2})", text)
-    if match is None or not all(2 <= int(number) <= 64 for number in match.groups()):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected ROWSxCOLUMNS, each from 2 to 64, such as 9x9")
-    return int(match[1]), int(match[2])

@@ -1,0 +1,216 @@
+"""`gestured-bridge serial`: a sensor on a serial line, its frames sent to the daemon as OSC.
+
+Frames that came together because this host was slow are sent together, the newest KEPT of them: the counter tells the
+daemon which are missing, and no delay can build up. A device that goes is waited for.
+"""
+
+import argparse
+import errno
+import os
+import select
+import signal
+import socket
+import stat
+import sys
+import time
+from typing import Any
+
+from gestured.bridge.counts import Counts
+from gestured.bridge.options import BridgeError, add_metrics, missing
+from gestured.bridge.protocols import COUNTER, MOST_TAXELS, PROTOCOLS, Reading, looks_like
+from gestured.client.address import host_port
+from gestured.client.grid import rows_by_columns
+from gestured.client.say import say
+from gestured.client.sensor import Form, sent_after_refusal
+from gestured.core.address import Address
+from gestured.core.frames import Frame
+from gestured.core.wire import is_sensor
+
+KEPT = 8  # frames that are sent where more have come at once
+QUIET_S = 0.002  # a line that says nothing for so long has ended its frame; a byte takes 0.1 ms at 115,200 baud
+POLL_S = 0.25  # after which it is looked whether we are to end
+ANSWER_S = 0.25  # for a sensor's answer, then it is asked again
+AGAIN_S = 0.5  # from one attempt to open the device to the next
+SILENT_S = 5.0  # after which an open line that says nothing is mentioned
+JUDGED_BYTES = 4096 + 4 * MOST_TAXELS  # without a frame, after which it is said what they look like; and for each
+JUDGED_TAXEL_BYTES = 64  # taxel of ours so many more: two of the longest lines of text
+
+
+def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the bridge to the command line."""
+    parser = commands.add_parser(
+        "serial",
+        help="a serial sensor's frames to the daemon",
+        description="Read a sensor on a serial line and send its frames to the daemon as OSC.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="examples:\n  gestured-bridge serial /dev/ttyUSB0 --protocol flexitac --sensor glove --grid 16x32\n"
+        "  gestured-bridge serial /dev/ttyACM0 --protocol csv --sensor armrest --grid 9x9 --baud 115200",
+    )
+    parser.add_argument("device", metavar="DEVICE", help="such as /dev/ttyUSB0, or a link in /dev/serial/by-id")
+    parser.add_argument("--protocol", required=True, choices=tuple(PROTOCOLS), help="what the sensor speaks")
+    parser.add_argument("--sensor", required=True, metavar="NAME", help="its name for the daemon")
+    parser.add_argument("--baud", type=int, metavar="N", help="bits a second (default: as the protocol's sensors)")
+    text = "rows and columns (default: 16x16 for flexitac and e256, else 9x9)"
+    parser.add_argument("--grid", type=rows_by_columns, metavar="RxC", help=text)
+    text = "where the daemon listens (default: 127.0.0.1:9000)"
+    parser.add_argument("--to", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT", help=text)
+    add_metrics(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Forward frames until SIGTERM or Ctrl-C."""
+    try:
+        import serial  # noqa: F401  # said before anything is begun
+    except ImportError:
+        raise missing("pyserial", "serial") from None
+    bridge = Serial(args, Counts("serial"))
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: bridge.stop())
+    bridge.work()
+    return 0
+
+
+class Serial:
+    """One sensor's line."""
+
+    def __init__(self, args: argparse.Namespace, counts: Counts) -> None:
+        """Raises BridgeError for what cannot be."""
+        protocol = PROTOCOLS[args.protocol]
+        if not is_sensor(args.sensor):
+            raise BridgeError(f"--sensor {args.sensor}: expected letters, digits, _ and -, at most 64")
+        if protocol.fixed and args.grid not in (None, protocol.grid):
+            raise BridgeError(f"--grid: {args.protocol} sensors have {'x'.join(map(str, protocol.grid))} taxels")
+        self._name, self._protocol = args.protocol, protocol
+        rows, columns = args.grid or protocol.grid
+        self._rows, self._columns = int(rows), int(columns)
+        self._device, self._baud = args.device, args.baud or protocol.baud
+        self._sensor = args.sensor
+        self._forms = {form: Form(args.sensor, form) for form in ("floats", "ints", "uint8", "uint16")}
+        self._counts = counts
+        try:
+            family, kind, _, _, address = socket.getaddrinfo(args.to.host, args.to.port, type=socket.SOCK_DGRAM)[0]
+        except OSError as error:
+            raise BridgeError(f"--to {args.to}: {error.strerror}") from None
+        self._to = args.to
+        self._socket = socket.socket(family, kind)
+        self._socket.connect(address)
+        self._counter = 0
+        self._stopped = False
+        self._opened = False  # ever
+        self.metrics = counts.serve(args.metrics)
+
+    def stop(self) -> None:
+        """Let `work` end; a signal handler may call it."""
+        self._stopped = True
+
+    def work(self) -> None:
+        """Forward, and wait for the device where it went. Raises BridgeError where waiting does not help."""
+        while not self._stopped:
+            port = self._open()
+            if port is None:
+                time.sleep(AGAIN_S)
+                continue
+            with port:
+                self._opened = True
+                self._counts.connected("device", True, f"{self._device} is open")
+                self._counts.ready(device=self._device, sensor=self._sensor, to=str(self._to), metrics=self.metrics)
+                reason = self._forward(port)
+            if reason:
+                self._counts.connected("device", False, f"{self._device} went: {reason}; waiting for it")
+
+    def _open(self) -> Any:
+        """The device; None where it is to be waited for."""
+        import serial
+
+        try:
+            if not stat.S_ISCHR(os.stat(self._device).st_mode):
+                raise BridgeError(f"{self._device}: is no serial device: ls -l /dev/serial/by-id shows those that are")
+            return serial.Serial(self._device, self._baud, timeout=0, write_timeout=ANSWER_S, exclusive=True)
+        except ValueError:
+            raise BridgeError(f"--baud {self._baud}: this device does not take it") from None
+        except OSError as error:  # SerialException is one
+            number = error.errno
+            said = os.strerror(number) if number else str(error)
+            if number == errno.EACCES and not self._opened:  # a device that is plugged in anew is root's for a moment
+                remedy = 'sudo adduser "$USER" dialout, and log in again'
+                raise BridgeError(f"{self._device}: {said}: it is for members of its group ({remedy})") from None
+            if number == errno.EAGAIN:
+                raise BridgeError(f"{self._device}: another program has it open: end that one first") from None
+            if number is None and "onfigure" in said:
+                remedy = "ls -l /dev/serial/by-id shows those that are"
+                raise BridgeError(f"{self._device}: is no serial device: {remedy}") from None
+            self._counts.connected("device", False, f"{self._device} is not there: {said}; waiting for it")
+            return None
+
+    def _forward(self, port: Any) -> str | None:
+        """Forward what one connection brings; why it ended, None where it was we who ended it."""
+        protocol = self._protocol(self._rows, self._columns)
+        judged: bytes | None = b""  # what came before the first frame; None once that is told
+        asked = began = time.monotonic()
+        due = bool(protocol.request)
+        pending = False
+        try:
+            while not self._stopped:
+                if due:
+                    port.write(protocol.request)
+                    asked, due = time.monotonic(), False
+                readable, _, _ = select.select([port], [], [], QUIET_S if pending else POLL_S)
+                data = port.read(max(1, port.in_waiting)) if readable else b""
+                before = protocol.passed
+                readings = protocol.push(data) if data else protocol.flush()
+                pending = bool(data)
+                self._send(readings)
+                self._counts.add("bytes", "passed", protocol.passed - before)
+                if readings:
+                    judged = None
+                elif judged is not None:
+                    judged = self._judged(judged + data, began)
+                due = bool(protocol.request) and (bool(readings) or time.monotonic() > asked + ANSWER_S)
+        except OSError as error:
+            return error.strerror or "it was unplugged"
+        return None
+
+    def _send(self, readings: list[Reading]) -> None:
+        """The newest of them to the daemon."""
+        first = max(len(readings) - KEPT, 0)
+        for n, reading in enumerate(readings):
+            self._counter = (self._counter + 1) & COUNTER
+            if n < first:
+                self._counts.add("frames", "overtaken")
+                continue
+            counter = self._counter if reading.counter is None else reading.counter
+            moment = time.time() if reading.moment is None else reading.moment
+            packet = self._forms[form_of(reading)].packet(Frame(0.0, reading.values), counter, moment)
+            try:
+                heard = not sent_after_refusal(self._socket, packet)
+            except OSError:  # the network is down: as good as nobody who listens
+                heard = False
+            self._counts.add("frames", "sent" if heard else "unheard")
+            words = (
+                f"frames go to {self._to}" if heard else f"nobody listens at {self._to}: start gestured, or name --to"
+            )
+            self._counts.connected("daemon", heard, words)
+
+    def _judged(self, data: bytes, began: float) -> bytes | None:
+        """What came so far without a frame; None once it is said that it is no frame. Raises BridgeError."""
+        if not data and time.monotonic() > began + SILENT_S:
+            hint = "" if self._protocol.request else " (eTextile's E256 speaks only when it is asked: --protocol e256)"
+            say(f"gestured-bridge serial: {self._device} is open, but nothing comes{hint}", to=sys.stderr)
+            return None
+        if len(data) < JUDGED_BYTES + JUDGED_TAXEL_BYTES * self._rows * self._columns:
+            return data
+        what = f"{self._device}: no {self._name} frame of {self._rows}x{self._columns} in {len(data)} bytes"
+        if words := looks_like(data):
+            raise BridgeError(f"{what}: these bytes look like {words}: set --protocol and --grid so")
+        remedy = f"is --baud {self._baud} right, and --protocol?"
+        say(f"gestured-bridge serial: {what}, nor of another protocol: {remedy}", to=sys.stderr)
+        return None
+
+
+def form_of(reading: Reading) -> str:
+    """How a frame is written for the daemon: as small as holds it."""
+    kind = reading.values.dtype
+    if kind.kind == "u" and kind.itemsize <= 2:
+        return f"uint{8 * kind.itemsize}"
+    return "ints" if kind.kind == "i" else "floats"

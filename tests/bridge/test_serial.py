@@ -1,0 +1,312 @@
+"""Sensors on pseudo-terminals: from the simulator through the bridge to the real daemon, and what may go wrong."""
+
+import os
+import pty
+import select
+import signal
+import socket
+import stat
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gestured.core.wire import Addresses, Decoder
+from tests.bridge.conftest import Process, wait
+from tests.bridge.test_protocols import written
+from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, blob, floats
+
+pytest.importorskip("serial", reason="the bridge from serial lines needs the extra [serial]")
+
+GRID = {"flexitac": "9x9", "csv": "9x9", "osc-slip": "9x9", "e256": "16x16"}
+
+
+class Line:
+    """A serial line: the sensor's end is ours, the other one a link in a folder, as udev makes them."""
+
+    def __init__(self, link: Path) -> None:
+        self.link = link
+        self.plug()
+
+    def plug(self) -> None:
+        """A new device; the old one is unplugged."""
+        self.end, other = pty.openpty()
+        tty.setraw(self.end)
+        self.link.unlink(missing_ok=True)
+        self.link.symlink_to(os.ttyname(other))
+        os.close(other)
+
+    def unplug(self) -> None:
+        """Gone, and its name with it."""
+        os.close(self.end)
+        self.link.unlink()
+
+    def say(self, data: bytes) -> None:
+        """As the sensor."""
+        while data:
+            data = data[os.write(self.end, data) :]
+
+    def flood(self, process: Process, data: bytes) -> None:
+        """The same again and again, until the bridge has ended."""
+        os.set_blocking(self.end, False)
+        while process.process.poll() is None:
+            with suppress(BlockingIOError):  # it does not read any more
+                os.write(self.end, data)
+            select.select([], [self.end], [], 0.05)
+
+    def hear(self, count: int) -> bytes:
+        """So many bytes that the bridge says to the sensor."""
+        found = b""
+        while len(found) < count:
+            readable, _, _ = select.select([self.end], [], [], DEADLINE_S)
+            assert readable, found
+            found += os.read(self.end, count - len(found))
+        return found
+
+
+@pytest.fixture
+def line(tmp_path: Path) -> Iterator[Line]:
+    line = Line(tmp_path / "ttyUSB0")
+    yield line
+    os.close(line.end)
+
+
+@pytest.fixture
+def udp() -> Iterator[socket.socket]:
+    """Where the frames go."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(DEADLINE_S)
+        yield receiver
+
+
+def begin(bridge: Callable[..., Process], line: Line, protocol: str, udp: socket.socket, *more: object) -> Process:
+    """A bridge on the line that sends to a socket, open."""
+    to = f"127.0.0.1:{udp.getsockname()[1]}"
+    grid = () if "--grid" in more else ("--grid", GRID[protocol])
+    process = bridge("serial", line.link, "--protocol", protocol, "--sensor", "armrest", "--to", to, *grid, *more)
+    assert process.ready()["device"] == str(line.link)
+    return process
+
+
+class Out:
+    """The frames that reach the socket, by the daemon's own decoder."""
+
+    def __init__(self, udp: socket.socket, shape: tuple[int, int] = (9, 9)) -> None:
+        self.udp, self._decoder = udp, Decoder(Addresses(), lambda sensor: shape)
+
+    def next(self) -> Any:
+        """The next frame as it arrives."""
+        (arrival,), faults = self._decoder.decode(self.udp.recv(65536))
+        assert not faults and arrival.sensor == "armrest"
+        return arrival
+
+
+@pytest.mark.parametrize("protocol", sorted(GRID))
+def test_simulator_to_pty_to_bridge_to_daemon_gives_the_events_of_udp(bridge, line, udp, model, tmp_path, protocol):
+    """Each frame goes to one sensor by UDP and to another one through the line, with the same time."""
+    flags = ["--clock", "sensor", "--stale-s", 30, "--grid", GRID[protocol]]
+    daemon = Daemon.start(tmp_path, model, *flags)
+    try:
+        process = begin(bridge, line, protocol, udp)
+        client = daemon.client().subscribe("gesture", "unknown", "cancelled")
+        hand = Hand()
+        direct = Sensor(daemon, "direct", floats if protocol in ("csv", "osc-slip") else blob("u1"))
+        around = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        around.connect(daemon.address)
+        performed = [*hand.idle(2.0)]
+        for motion in (hand.swipe("left"), hand.tap(), hand.swipe("up"), hand.swipe("down")):
+            performed += [*motion, *hand.idle(1.0)]
+        if protocol == "csv":
+            line.say(b"cut off\n")
+        for frame in performed:
+            if protocol == "e256":
+                frame = np.pad(frame, ((3, 4), (3, 4)), "edge")
+                assert line.hear(10) == b"\xc0/r\0\0,\0\0\0\xc0"
+            sent = direct.packet(frame)
+            direct.sock.send(sent)
+            line.say(written(protocol, frame))
+            packet = udp.recv(65536)
+            around.send(packet[:8] + sent[8:16] + packet[16:])  # at the same time
+        events = {"direct": [], "armrest": []}
+        while min(map(len, events.values())) < 4:
+            event = client.line()
+            events[event["sensor"]].append(
+                {key: event.get(key) for key in ("type", "gesture", "id", "confidence", "scores", "frames", "lost")}
+            )
+        assert events["direct"] == events["armrest"]
+        assert [event["gesture"] for event in events["direct"]] == ["swipe_left", "one_tap", "swipe_up", "swipe_down"]
+        assert process.stop() == 0
+    finally:
+        around.close()
+        assert daemon.stop() == 0, daemon.stderr()
+
+
+def frame(value: int, shape: tuple[int, int] = (9, 9)) -> np.ndarray:
+    return np.full(shape, value, np.uint8)
+
+
+def test_a_sensor_without_a_counter_gets_one_and_one_with_a_counter_keeps_it(bridge, line, udp):
+    out = Out(udp)
+    process = begin(bridge, line, "flexitac", udp)
+    for n in range(1, 5):
+        line.say(written("flexitac", frame(n)))
+        arrival = out.next()
+        assert (arrival.values == n).all() and arrival.counter == n
+    process.stop()
+    begin(bridge, line, "csv", udp)
+    line.say(b"\n" + ",".join(["900", *["1.5"] * 81]).encode() + b"\n")
+    arrival = out.next()
+    assert (arrival.values == 1.5).all() and arrival.counter == 900
+
+
+def test_a_slow_host_gets_the_latest_frames(bridge, line, udp):
+    out = Out(udp)
+    process = begin(bridge, line, "flexitac", udp)
+    line.say(written("flexitac", frame(0)))
+    out.next()
+    process.process.send_signal(signal.SIGSTOP)
+    for n in range(1, 41):  # as many as a terminal's buffer takes
+        line.say(written("flexitac", frame(n)))
+    process.process.send_signal(signal.SIGCONT)
+    arrivals = [out.next()]
+    while not (arrivals[-1].values == 40).all():
+        arrivals.append(out.next())
+    assert arrivals[-1].counter == 41
+    assert len(arrivals) < 20
+    for arrival in arrivals:  # who is missing can be counted
+        assert (arrival.values == arrival.counter - 1).all()
+
+
+def test_garbage_costs_no_more_than_the_frame_that_it_hit(bridge, line, udp):
+    out = Out(udp)
+    begin(bridge, line, "flexitac", udp)
+    line.say(written("flexitac", frame(1)))
+    assert (out.next().values == 1).all()
+    line.say(written("flexitac", frame(2))[:40] + b"\x07" * 13)
+    line.say(written("flexitac", frame(3)) + written("flexitac", frame(4)))
+    assert (out.next().values == 3).all()
+    assert (out.next().values == 4).all()
+
+
+def test_an_unplugged_sensor_is_waited_for(bridge, line, udp):
+    out = Out(udp)
+    process = begin(bridge, line, "flexitac", udp)
+    line.say(written("flexitac", frame(1)))
+    out.next()
+    line.unplug()
+    process.until("waiting for it")
+    line.plug()
+    process.until("is open", 2)
+    line.say(written("flexitac", frame(2)))
+    arrival = out.next()
+    assert (arrival.values == 2).all() and arrival.counter == 2
+
+
+def test_a_sensor_that_is_plugged_in_later_is_waited_for(bridge, udp, tmp_path):
+    link = tmp_path / "ttyUSB0"
+    process = bridge("serial", link, "--protocol", "csv", "--sensor", "armrest", "--to", "127.0.0.1:1")
+    process.until(f"{link} is not there: No such file or directory; waiting for it")
+    line = Line(link)
+    process.ready()
+    os.close(line.end)
+
+
+def test_a_sensor_that_does_not_answer_is_asked_again(bridge, line, udp):
+    begin(bridge, line, "e256", udp)
+    assert line.hear(20) == 2 * b"\xc0/r\0\0,\0\0\0\xc0"
+
+
+@pytest.mark.parametrize("protocol", ["flexitac", "csv", "osc-slip", "e256"])
+def test_bytes_of_another_protocol_are_recognised(bridge, line, udp, protocol):
+    asked = "flexitac" if protocol != "flexitac" else "csv"
+    process = begin(bridge, line, asked, udp)
+    shape = (16, 16) if protocol == "e256" else (9, 9)
+    data = b"".join(written(protocol, frame(n, shape)) for n in range(1, 60))
+    line.flood(process, data)
+    assert process.end() == 1
+    said = process.said().splitlines()[-1]
+    assert f"no {asked} frame of 9x9" in said and f"these bytes look like {protocol}" in said
+
+
+def test_another_grid_is_recognised(bridge, line, udp):
+    process = begin(bridge, line, "flexitac", udp, "--grid", "8x8")
+    line.flood(process, b"".join(written("flexitac", frame(n)) for n in range(1, 40)))
+    assert process.end() == 1
+    assert "these bytes look like flexitac with frames of 81 taxels" in process.said()
+
+
+def test_nobody_who_listens_is_said_and_heals(bridge, line):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    process = bridge(
+        "serial", line.link, "--protocol", "flexitac", "--sensor", "a", "--grid", "9x9", "--to", f"127.0.0.1:{port}"
+    )
+    process.ready()
+
+    def refused() -> bool:
+        line.say(written("flexitac", frame(1)))
+        return "nobody listens" in process.said()
+
+    wait(refused, process.said)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", port))
+        receiver.settimeout(DEADLINE_S)
+        line.say(written("flexitac", frame(2)))
+        while bytes([2] * 81) not in receiver.recv(65536):
+            pass
+
+
+@pytest.mark.parametrize(
+    ("device", "more", "words"),
+    [
+        ("/dev/null", [], "/dev/null: is no serial device"),
+        ("FILE", [], "is no serial device"),
+        ("/dev/null", ["--sensor", "a/b"], "--sensor a/b"),
+        ("/dev/null", ["--protocol", "e256", "--grid", "8x8"], "16x16"),
+        ("/dev/null", ["--grid", "1x1"], "ROWSxCOLUMNS"),
+        ("/dev/null", ["--to", "nowhere.invalid:9000"], "--to nowhere.invalid:9000"),
+    ],
+)
+def test_bad_input_is_one_sentence(bridge, tmp_path: Path, device: str, more: list[str], words: str):
+    path = tmp_path / "a.txt" if device == "FILE" else Path(device)
+    if device == "FILE":
+        path.touch()
+    process = bridge("serial", path, "--protocol", "csv", "--sensor", "armrest", *more)
+    assert process.end() in (1, 2)
+    assert words in process.said()
+
+
+def test_a_device_of_another_program_and_one_that_is_not_ours(bridge, line, udp):
+    import serial
+
+    with serial.Serial(str(line.link), exclusive=True):
+        process = bridge("serial", line.link, "--protocol", "csv", "--sensor", "armrest")
+        assert process.end() == 1
+        assert "another program has it open" in process.said()
+    assert stat.S_ISCHR(os.stat(line.link).st_mode)
+
+
+def test_metrics(bridge, line, udp):
+    import urllib.request
+
+    out = Out(udp)
+    to = f"127.0.0.1:{udp.getsockname()[1]}"
+    flags = ("--protocol", "flexitac", "--sensor", "armrest", "--grid", "9x9", "--to", to, "--metrics", "127.0.0.1:0")
+    address = bridge("serial", line.link, *flags)
+    where = address.ready()["metrics"]
+    line.say(b"rubbish" + written("flexitac", frame(1)) + written("flexitac", frame(2)))
+    out.next()
+
+    def page() -> str:
+        with urllib.request.urlopen(f"http://{where}/metrics", timeout=DEADLINE_S) as answer:
+            return answer.read().decode()
+
+    wait(lambda: 'gestured_bridge_frames_total{bridge="serial",result="sent"} 2.0' in page())
+    assert 'gestured_bridge_bytes_total{bridge="serial",result="passed"} 7.0' in page()
