@@ -31,7 +31,7 @@ mkdir "$work/source"
 cp -RP pyproject.toml README.md LICENSE NOTICE gestured models gestured_models "$work/source"
 rm -rf "$new" "$old"
 mkdir -p "$(dirname "$new")"
-"$venv/bin/pip" install --no-compile --target "$new" "$work/source[record]" >"$venv/pip.log" 2>&1 </dev/null || {
+"$venv/bin/pip" install --no-compile --target "$new" "$work/source[record,mqtt,zenoh,serial]" >"$venv/pip.log" 2>&1 </dev/null || {
     echo "pip could not install gestured: $(grep -i error "$venv/pip.log" | tail -n 1) (all of it: $venv/pip.log)" >&2
     exit 1
 }
@@ -43,7 +43,7 @@ if [ -e "$root$lib" ]; then mv "$root$lib" "$old"; fi
 mv "$new" "$root$lib"
 rm -rf "$old"
 
-for program in gestured:daemon gesturectl:control; do
+for program in gestured:daemon gesturectl:control gestured-bridge:bridge; do
     name=${program%:*}
     # No site, no user's folder, no PYTHON* variables: it runs with what was installed with it.
     cat >"$work/$name" <<END

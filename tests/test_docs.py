@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from gestured.bridge.cli import parser as bridge_parser
 from gestured.control.cli import parser as gesturectl_parser
 from gestured.daemon.cli import parser as gestured_parser
 from gestured.lab.cli import parser as lab_parser  # imports no torch
@@ -54,7 +55,11 @@ def test_no_row_describes_a_flag_that_is_gone():
     assert rows == flags(gestured_parser())
 
 
-TOOLS = {"gesturectl": commands(gesturectl_parser()), "gestured-lab": commands(lab_parser())}
+TOOLS = {
+    "gesturectl": commands(gesturectl_parser()),
+    "gestured-bridge": commands(bridge_parser()),
+    "gestured-lab": commands(lab_parser()),
+}
 EACH = [(tool, command) for tool, found in TOOLS.items() for command in sorted(found)]
 
 
@@ -71,7 +76,7 @@ def test_each_subcommand_has_its_row_and_flags(tool: str, command: str):
 
 
 def test_no_row_describes_a_subcommand_that_is_gone():
-    rows = re.findall(r"^\| `(gesturectl|gestured-lab) ([a-z-]+)`", DOCUMENTS, re.MULTILINE)
+    rows = re.findall(r"^\| `(gesturectl|gestured-bridge|gestured-lab) ([a-z-]+)`", DOCUMENTS, re.MULTILINE)
     assert sorted(rows) == sorted(EACH)
 
 
@@ -89,11 +94,13 @@ def test_shell_blocks_hold_valid_commands():
                 gestured_parser().parse_args(arguments)
             case "gesturectl":
                 gesturectl_parser().parse_args(arguments)
+            case "gestured-bridge":
+                bridge_parser().parse_args(arguments)
             case "gestured-lab" if arguments == ["--help"]:
                 pass
             case "gestured-lab":
                 lab_parser().parse_args(arguments)
-            case "." | "pip" | "git" | "cd":
+            case "." | "pip" | "git" | "cd" | "mosquitto_sub":
                 continue
             case _:
                 raise AssertionError(f"README: {line!r} is no command that a test knows")

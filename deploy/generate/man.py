@@ -1,4 +1,4 @@
-"""Man pages in roff: gestured(8), gesturectl(1) with all its subcommands, gestured.toml(5)."""
+"""Man pages in roff: gestured(8); gesturectl(1) and gestured-bridge(1) with all subcommands; gestured.toml(5)."""
 
 from collections.abc import Iterable, Iterator
 
@@ -6,7 +6,7 @@ from deploy.generate import configuration
 from deploy.generate.programs import Option, Program
 from gestured import __version__
 
-OTHERS = ("gestured(8)", "gesturectl(1)", "gestured.toml(5)")
+OTHERS = ("gestured(8)", "gesturectl(1)", "gestured-bridge(1)", "gestured.toml(5)")
 
 
 def escape(text: str) -> str:

@@ -1,9 +1,10 @@
-"""The two programs that are installed, as their parsers describe them."""
+"""The programs that are installed, as their parsers describe them."""
 
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from gestured.bridge.cli import parser as bridge
 from gestured.control.cli import parser as gesturectl
 from gestured.daemon.cli import parser as gestured
 
@@ -56,8 +57,9 @@ def read(name: str, parser: argparse.ArgumentParser, summary: str) -> Program:
 
 
 def all_programs() -> tuple[Program, ...]:
-    """gestured and gesturectl."""
+    """gestured, gesturectl and gestured-bridge."""
     return (
         read("gestured", gestured(), "tactile gesture recognition daemon"),
         read("gesturectl", gesturectl(), "operator's client of gestured"),
+        read("gestured-bridge", bridge(), "gestured on other buses, and serial sensors"),
     )

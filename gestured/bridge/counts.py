@@ -1,6 +1,5 @@
 """What a bridge counts, says, and shows to Prometheus."""
 
-import json
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -8,7 +7,7 @@ from typing import Any
 
 from gestured.bridge.options import BridgeError
 from gestured.client.notify import notify
-from gestured.client.say import say, say_drawn
+from gestured.client.say import say, say_json
 from gestured.core.address import Address
 
 HELP = {
@@ -43,14 +42,15 @@ class Counts:
         self.values[key] = is_there
         say(f"gestured-bridge {self.bridge}: {words}", to=sys.stderr)
         self._words[side] = words
-        notify(f"STATUS={'; '.join(self._words.values())}")
+        here = all(value for (name, _), value in self.values.items() if name == "connected")
+        # gesturectl doctor reads its first word. READY: to be started does not mean that the others are there.
+        notify(f"READY=1\nSTATUS={'connected' if here else 'waiting'}: {'; '.join(self._words.values())}")
 
     def ready(self, **where: object) -> None:
-        """Say once that it works, as one line of JSON on standard output, and to systemd."""
+        """Say once that it works, as one line of JSON on standard output."""
         if not self._ready:
             self._ready = True
-            say_drawn(json.dumps({"type": "ready", "bridge": self.bridge, **where}))
-            notify("READY=1")
+            say_json({"type": "ready", "bridge": self.bridge, **where})
 
     def serve(self, address: Address | None) -> str | None:
         """Answer /metrics from a thread of its own, where an address is given; returns it with the real port."""

@@ -12,6 +12,7 @@ the broker keeps none longer for a subscriber. The gap in `sequence` says what w
 
 import argparse
 import asyncio
+import errno
 import json
 import os
 import re
@@ -148,6 +149,7 @@ async def _main(args: argparse.Namespace) -> None:
     bridge.metrics = counts.serve(args.metrics)
     source = subscriber(args, NOTICE_S)
     loop = asyncio.get_running_loop()
+    loop.set_exception_handler(_pass_over_closed)
     failed: list[GesturedError] = []
 
     def hear() -> None:
@@ -169,6 +171,13 @@ async def _main(args: argparse.Namespace) -> None:
         thread.join()
     if failed:
         raise failed[0]
+
+
+def _pass_over_closed(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """The library asks the loop to watch a socket a moment after that was closed; all else is a bug, and is said."""
+    error = context.get("exception")
+    if not (isinstance(error, OSError) and error.errno == errno.EBADF):
+        loop.default_exception_handler(context)
 
 
 async def first_of(*coroutines: Coroutine[Any, Any, None]) -> None:

@@ -16,6 +16,7 @@ from gestured.client.lines import JOIN, Forbidden, Refused, Unreachable
 from gestured.client.peer import Stranger
 from gestured.client.say import say, say_json
 from gestured.control.address import add_sockets, control_path
+from gestured.control.bridges import bridge_findings
 from gestured.control.findings import BUFFER_BYTES, Finding, examine_status, model_finding
 from gestured.core.address import Address
 
@@ -56,6 +57,7 @@ def examine(path: Path) -> Iterator[Finding]:
     yield _versions()
     yield _clock(time.time())
     yield _buffer(Path("/proc/sys/net/core/rmem_max"))
+    yield from bridge_findings()
     try:
         with Control(path) as control:
             status = control.ask("status")
@@ -78,7 +80,7 @@ def _versions() -> Finding:
     from importlib.metadata import PackageNotFoundError, version
 
     names = []
-    for package in ("numpy", "onnxruntime", "uvloop", "pydantic", "mcap"):
+    for package in ("numpy", "onnxruntime", "uvloop", "pydantic", "mcap", "aiomqtt", "eclipse-zenoh", "pyserial"):
         try:
             names.append(f"{package} {version(package)}")
         except PackageNotFoundError:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from gestured.bridge.cli import parser as bridge_parser
 from gestured.control.cli import parser as gesturectl_parser
 from gestured.daemon.cli import parser as gestured_parser
 from gestured.lab.cli import parser as lab_parser  # imports no torch
@@ -19,7 +20,12 @@ CHECKED = {
     "gestured --explain",
     "the command line",  # below: its programs take it
 }
-PARSERS = {"gestured": gestured_parser(), "gesturectl": gesturectl_parser(), "gestured-lab": lab_parser()}
+PARSERS = {
+    "gestured": gestured_parser(),
+    "gesturectl": gesturectl_parser(),
+    "gestured-bridge": bridge_parser(),
+    "gestured-lab": lab_parser(),
+}
 
 
 @pytest.mark.parametrize("block", blocks(), ids=str)

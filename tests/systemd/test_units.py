@@ -44,6 +44,8 @@ def exposure(folder: Path, unit: str) -> float:
         ("gestured.service", None, 0.3),
         ("gestured.service", "osc-output.conf", 1.0),
         ("gestured-standalone.service", None, 1.0),
+        ("gestured-bridge@.service", None, 1.0),
+        ("gestured-serial@.service", None, 1.3),
     ],
 )
 def test_exposure(tmp_path: Path, unit: str, dropin: str | None, most: float):
@@ -63,6 +65,7 @@ def test_systemd_finds_nothing_wrong(tmp_path: Path):
             (UNITS / path.name)
             .read_text()
             .replace("/usr/bin/gesturectl", sys.executable)
+            .replace("/usr/bin/gestured-bridge", sys.executable)
             .replace("/usr/bin/gestured", sys.executable)
         )
     done = subprocess.run(["systemd-analyze", "verify", "--man=no", *units], capture_output=True, text=True, timeout=60)

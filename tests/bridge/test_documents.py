@@ -1,0 +1,85 @@
+"""The consumers of docs/connect.md, but for the addresses, and what gesturectl doctor says of bridges."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.bridge.conftest import emit
+from tests.bridge.test_mqtt import begin
+from tests.control.conftest import ROOT
+from tests.daemon.harness import Daemon
+from tests.documents.blocks import blocks
+
+
+def consumer(phrase: str) -> str:
+    """The example with a phrase in it."""
+    (found,) = [block.text for block in blocks(document="docs/connect.md") if phrase in block.text]
+    return found
+
+
+def first_line(code: str, daemon: Daemon) -> str:
+    """What a consumer prints first, while somebody swipes again and again."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=environment) as process:
+        os.set_blocking(process.stdout.fileno(), False)
+        try:
+            while not (line := process.stdout.readline()):
+                assert process.poll() is None
+                emit(daemon, "swipe_left")
+        finally:
+            process.kill()
+    return line
+
+
+def test_the_mqtt_consumer(bridge, broker, daemon: Daemon):
+    pytest.importorskip("aiomqtt", reason="the bridge to MQTT needs the extra [mqtt]")
+    at = broker()
+    begin(bridge, at, daemon).ready()
+    code = consumer("paho.mqtt").replace("192.168.7.2", "127.0.0.1").replace("1883", str(at.port))
+    assert first_line(code, daemon) == "armrest swipe_left\n"
+
+
+SYSTEMCTL = """#!/bin/sh
+cat <<'END'
+Id=gestured-bridge@house.service
+ActiveState=active
+StatusText=connected: daemon is there; broker broker.example:8883 is there
+
+Id=gestured-bridge@car.service
+ActiveState=active
+StatusText=waiting: broker 192.168.7.2:1883 is not there: Connection refused; trying again
+
+Id=gestured-serial@glove.service
+ActiveState=failed
+StatusText=
+END
+"""
+
+
+def test_doctor_says_how_bridges_are(tmp_path: Path):
+    program = tmp_path / "systemctl"
+    program.write_text(SYSTEMCTL)
+    program.chmod(0o755)
+    command = [sys.executable, "-m", "gestured.control", "doctor", "--control", str(tmp_path / "none.ctl")]
+    environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    said = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60).stdout
+    assert "ok      gestured-bridge@house.service is connected: daemon is there" in said
+    assert "warn    gestured-bridge@car.service is waiting: broker 192.168.7.2:1883 is not there" in said
+    assert "bad     gestured-serial@glove.service is failed\n        -> journalctl --unit gestured-serial@glove" in said
+
+
+def test_systemd_is_told_how_a_bridge_is(bridge, broker, daemon: Daemon, tmp_path: Path):
+    import socket
+
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind(str(tmp_path / "notify"))
+        systemd.settimeout(30)
+        begin(bridge, broker(), daemon, env={"NOTIFY_SOCKET": str(tmp_path / "notify")})
+        words = ""
+        while "daemon" not in words or "broker" not in words:
+            words = systemd.recv(4096).decode()
+            assert words.startswith("READY=1\nSTATUS=")
+        assert words.partition("STATUS=")[2].startswith("connected: ")
