@@ -107,11 +107,16 @@ class Out:
         return arrival
 
 
+@pytest.fixture
+def start(model: Path, tmp_path: Path) -> Callable[..., Daemon]:
+    """Starts a daemon with these flags."""
+    return lambda *flags: Daemon.start(tmp_path, model, *flags)
+
+
 @pytest.mark.parametrize("protocol", sorted(GRID))
-def test_simulator_to_pty_to_bridge_to_daemon_gives_the_events_of_udp(bridge, line, udp, model, tmp_path, protocol):
+def test_simulator_to_pty_to_bridge_to_daemon_gives_the_events_of_udp(bridge, line, udp, start, protocol):
     """Each frame goes to one sensor by UDP and to another one through the line, with the same time."""
-    flags = ["--clock", "sensor", "--stale-s", 30, "--grid", GRID[protocol]]
-    daemon = Daemon.start(tmp_path, model, *flags)
+    daemon = start("--clock", "sensor", "--stale-s", 30, "--grid", GRID[protocol])
     try:
         process = begin(bridge, line, protocol, udp)
         client = daemon.client().subscribe("gesture", "unknown", "cancelled")
