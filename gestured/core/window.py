@@ -59,7 +59,7 @@ class Window:
         frames = self._regrid(frames, segment)
         frames = self._retime(frames, times, float(median(np.diff(segment.times))) if len(times) > 1 else 0.0)
         if self.smooth_frames > 1:
-            frames = _running_mean(frames, self.smooth_frames)
+            frames = running_mean(frames, self.smooth_frames)
         frames = np.maximum(frames, 0.0)
         peak = max(float(frames.max()), self.floor * segment.noise, 1e-37)
         return (frames / peak).astype(np.float32)
@@ -160,7 +160,7 @@ def _box_mean(
     return np.asarray((sums[1] - sums[0]) / np.maximum(edges[1] - edges[0], 1e-12)[:, None])
 
 
-def _running_mean(frames: NDArray[np.float64], length: int) -> NDArray[np.float64]:
+def running_mean(frames: NDArray[np.float64], length: int) -> NDArray[np.float64]:
     """Mean over `length` frames centred on each; fewer at the ends. Windows are short: no running sums."""
     before, after = length // 2, (length - 1) // 2
     n = len(frames)

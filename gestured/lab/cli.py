@@ -76,6 +76,9 @@ def parser() -> argparse.ArgumentParser:
                 "writes one HTML page, study.json and CSV files; goes on where it was interrupted",
                 "gestured-lab study --out report/ --jobs 2")  # fmt: skip
     study.add_argument("--out", type=Path, default=Path("report"), help="folder for the report (report)")
+    study.add_argument("--seeds", type=int, default=3, help="seeds of each figure of the main tables (3)")
+    study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: "
+                       "another generator's (python -m tests.foreign.recordings) or another sensor's")  # fmt: skip
     study.add_argument("--recordings", type=Path, nargs="+", default=[], metavar="FILE", help="recordings of your own")
     study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")
     study.add_argument("--seed", type=int, default=0, help="of splits and training: same seed, same numbers (0)")

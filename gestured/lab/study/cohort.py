@@ -22,7 +22,9 @@ from gestured.lab.progress import progress
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import Trial, cohort_take
 
-SEED = 0  # the cohort's
+SEED = 0  # of the cohort that learns and is judged
+TUNING_SEED = 1  # of other people, on whom hyperparameters are compared
+NEW_SEED = 2  # of people whom nothing has learned from, neither the study's models nor those that ship
 
 
 @dataclass(frozen=True)
@@ -77,13 +79,13 @@ def _cut(seed: int, index: int) -> Segment | None:
     return max(found, key=lambda s: min(s.offset, performed[0].offset) - max(s.onset, performed[0].onset), default=None)
 
 
-def load_cohort(cache: Path, trials: NDArray[np.int64], jobs: int) -> Cohort:
-    """The cohort's gestures of these trials, from `cache` where they were made before."""
+def load_cohort(cache: Path, trials: NDArray[np.int64], jobs: int, seed: int = SEED) -> Cohort:
+    """A cohort's gestures of these trials, from `cache` where they were made before."""
     key = hashlib.sha256(code_digest(__name__).encode() + trials.tobytes()).hexdigest()
-    path = cache / f"study-cohort-{len(trials)}-{key[:12]}.npz"
+    path = cache / f"study-cohort-{seed}-{len(trials)}-{key[:12]}.npz"
     if not path.exists():
         with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
-            made = pool.imap(partial(_cut, SEED), trials.tolist(), chunksize=30)
+            made = pool.imap(partial(_cut, seed), trials.tolist(), chunksize=30)
             segments = list(progress(made, len(trials), "simulating the cohort"))
         _write(path, trials, segments)
     with np.load(path, allow_pickle=False) as stored:

@@ -6,12 +6,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.window import running_mean
 from gestured.lab.dataset import Samples, join
 from gestured.lab.study.shifting import THRESHOLD, copies
 from gestured.simulator import GESTURES
 
 UNCHANGED, SHIFT, WIDE = "none", "shift", "wide"
 AUGMENTATIONS = (UNCHANGED, SHIFT, WIDE)
+STRANGER, JUDGE = -1, -2  # in the place of a gesture's index: other people, who teach alone or judge alone
 
 
 @dataclass(frozen=True)
@@ -22,11 +24,24 @@ class Data:
     name: str = field(compare=False)  # simulated, real or own
     gestures: Samples = field(compare=False)
     wide: Samples | None = field(compare=False, default=None)  # other people on randomised sensors: to learn from only
+    judges: Samples | None = field(compare=False, default=None)  # of another generator: they judge and teach nothing
 
     @classmethod
-    def of(cls, name: str, gestures: Samples, wide: Samples | None = None) -> "Data":
+    def of(cls, name: str, gestures: Samples, wide: Samples | None = None, judges: Samples | None = None) -> "Data":
         """With the key that belongs to it."""
-        return cls(gestures.digest()[:16] + (wide.digest()[:8] if wide else ""), name, gestures, wide)
+        more = "".join(part.digest()[:8] for part in (wide, judges) if part)
+        return cls(gestures.digest()[:16] + more, name, gestures, wide, judges)
+
+
+@dataclass(frozen=True)
+class Form:
+    """What is done to all windows before anything else: nothing, unless told."""
+
+    frames: int = 0  # each is cut, or followed by zeros, to so many; 0: each keeps its own
+    average: int = 1  # frames of a running average, after which a window has its peak at 1 again
+
+
+NO_FORM = Form()
 
 
 @dataclass(frozen=True)
@@ -35,7 +50,7 @@ class Pool:
 
     samples: Samples
     labels: NDArray[np.int64]  # class of each
-    source: NDArray[np.int64]  # the gesture that it was made of; -1 for strangers
+    source: NDArray[np.int64]  # the gesture that it was made of; `STRANGER`, `JUDGE`
     same: NDArray[np.bool_]  # whether it is that gesture itself, by a shift of zero
     gestures: int  # G
 
@@ -57,23 +72,34 @@ def equal_length(samples: Samples, frames: int) -> Samples:
     )
 
 
+def averaged(samples: Samples, count: int) -> Samples:
+    """Every window as a running average over so many frames, with its peak at 1 again."""
+    frames = samples.frames.copy()
+    for i in range(len(samples)):
+        span = slice(samples.offsets[i], samples.offsets[i + 1])
+        smooth = running_mean(frames[span].astype(np.float64), count)
+        frames[span] = smooth / max(float(smooth.max()), 1e-3)
+    return replace(samples, frames=frames)
+
+
 @lru_cache(maxsize=4)
-def pool(data: Data, augmentation: str, frames: int = 0, box: float = THRESHOLD) -> Pool:
-    """The gestures with what an augmentation adds; of equal length where `frames` is not 0.
+def pool(data: Data, augmentation: str, form: Form = NO_FORM, box: float = THRESHOLD) -> Pool:
+    """The gestures with what an augmentation adds, all in one form, and those who judge alone.
 
     `box` is the threshold of Algorithm 1's bounding box.
     """
     count = len(data.gestures)
-    parts, source, same = [data.gestures], np.arange(count), np.ones(count, bool)
+    gestures = averaged(data.gestures, form.average) if form.average > 1 else data.gestures
+    parts, source, same = [gestures], np.arange(count), np.ones(count, bool)
     if augmentation == SHIFT:
-        made = copies(data.gestures, box)
+        made = copies(gestures, box)
         parts, source, same = [*parts, made.samples], np.append(source, made.source), np.append(same, made.same)
-    elif augmentation == WIDE:
-        assert data.wide is not None
-        strangers = len(data.wide)
-        parts.append(data.wide)
-        source, same = np.append(source, np.full(strangers, -1)), np.append(same, np.zeros(strangers, bool))
+    for others, mark in ((data.wide if augmentation == WIDE else None, STRANGER), (data.judges, JUDGE)):
+        if others is not None:
+            parts.append(others)
+            source = np.append(source, np.full(len(others), mark))
+            same = np.append(same, np.zeros(len(others), bool))
     samples = join(parts)
-    if frames:
-        samples = equal_length(samples, frames)
+    if form.frames:
+        samples = equal_length(samples, form.frames)
     return Pool(samples, classes(samples), source, same, count)

@@ -17,13 +17,14 @@ from sklearn.ensemble import HistGradientBoostingClassifier, RandomForestClassif
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn.svm import SVC
 from torch import nn
 
 from gestured.lab.study import views
 from gestured.lab.study.nets import HistoryNet, sequence_net
 from gestured.lab.study.training import Indices, Inputs, train_net
+from gestured.lab.study.vectors import VectorMachine
 from gestured.lab.study.views import FRAMES, TOUCHES, TRAJECTORIES, WAVELETS, Values, View
+from gestured.lab.study.wavelets import TAXELS, WAVELET, WAVELET_LEVEL
 
 SPATIO_TEMPORAL, TOUCH_PATTERN, MOTION_HISTORY = (
     "spatio-temporal features",
@@ -70,8 +71,7 @@ def _forest(values: Values, seed: int) -> ClassifierMixin:
 
 
 def _vectors(values: Values, seed: int) -> ClassifierMixin:
-    machine = SVC(C=2.0 ** values["log2_c"], gamma=2.0 ** values["log2_gamma"], cache_size=400, random_state=seed)
-    return make_pipeline(StandardScaler(), machine)
+    return make_pipeline(StandardScaler(), VectorMachine(2.0 ** values["log2_c"], 2.0 ** values["log2_gamma"]))
 
 
 def _boosting(values: Values, seed: int) -> ClassifierMixin:
@@ -152,7 +152,7 @@ def _classical(
     return out
 
 
-HAAR = {"wavelet": "haar", "level": 3}
+HAAR = {"wavelet": WAVELET, "level": WAVELET_LEVEL, "reading": TAXELS}
 TRAINING_STEPS = 800  # batches
 
 

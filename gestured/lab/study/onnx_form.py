@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from sklearn.ensemble import RandomForestClassifier
+from sklearn.ensemble import HistGradientBoostingClassifier, RandomForestClassifier
 from torch import Tensor, nn
 
 from gestured.lab.forest_graph import OPSET, forest_graph
 from gestured.lab.nets import last_active
+from gestured.lab.study.boosted import Boosted
 from gestured.lab.study.nets import SENSOR_SIDE
 from gestured.simulator import GESTURES
 
@@ -58,8 +59,12 @@ class _AtTheEnd(nn.Module):
 def of_net(module: nn.Module, *, images: bool) -> Graph:
     """A trained network; batch, and time where there is one, stay open."""
     net = module.eval() if images else _AtTheEnd(module).eval()
-    example = torch.rand(2, SENSOR_SIDE, SENSOR_SIDE) if images else torch.rand(2, 5, SENSOR_SIDE, SENSOR_SIDE)
-    axes = {0: "B"} if images else {0: "B", 1: "T"}
+    if images:
+        return _traced(net, torch.rand(2, SENSOR_SIDE, SENSOR_SIDE), {0: "B"})
+    return _traced(net, torch.rand(2, 5, SENSOR_SIDE, SENSOR_SIDE), {0: "B", 1: "T"})
+
+
+def _traced(net: nn.Module, example: Tensor, axes: dict[int, str]) -> Graph:
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")  # the tracer's; tests compare the graph with the network
         path = Path(folder) / "net.onnx"
@@ -68,6 +73,11 @@ def of_net(module: nn.Module, *, images: bool) -> Graph:
             input_names=["inputs"], output_names=["scores"], dynamic_axes={"inputs": axes, "scores": {0: "B"}},
         )  # fmt: skip
         return Graph(path.read_bytes())
+
+
+def of_boosting(fitted: HistGradientBoostingClassifier) -> Graph:
+    """Gradient boosting on trajectory features, from the frames on."""
+    return _traced(Boosted(fitted).eval(), torch.rand(2, 5, SENSOR_SIDE, SENSOR_SIDE), {0: "B", 1: "T"})
 
 
 def of_forest(forest: RandomForestClassifier) -> Graph:

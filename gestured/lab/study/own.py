@@ -45,6 +45,18 @@ def real(folder: Path, of_each: int | None) -> tuple[Samples, dict[str, Any]] | 
     return samples.take(known), about
 
 
+def judges(path: Path) -> tuple[Samples, dict[str, Any]]:
+    """Gestures of a file that judge every method and teach none, and how many were performed and cut out."""
+    found = read(path)
+    performed = int(np.isin(found.labels, GESTURES).sum())
+    samples = recorded(found.take(np.flatnonzero(np.isin(found.labels, GESTURES))))
+    samples = samples.take(np.isin(samples.labels, GESTURES))
+    if not len(samples):
+        raise GesturedError(f"{path}: expected gestures that can be cut out, found none")
+    people = len(np.unique(samples.people))
+    return samples, {"name": path.name, "participants": people, "performed": performed, "cut": len(samples)}
+
+
 @dataclass(frozen=True)
 class Own:
     """A researcher's recordings: what is used, and what is not."""

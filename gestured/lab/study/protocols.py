@@ -1,11 +1,14 @@
 """Who learns and who is judged. One `Task` is one cell of a table; `run` computes it from the data alone.
 
-paper         85/15 by gesture, augmented before the split, padded or cut to equal length: copies of test gestures are
-              learned from, and padding is part of every input. The paper does not say its length; ours is the 90th
-              percentile of all gestures'.
+paper         85/15 by gesture, augmented before the split, filtered by a running average, padded or cut to equal
+              length: copies of test gestures are learned from, and padding is part of every input. The paper says
+              neither that it augments before it splits (we infer it from its figures) nor how long its average is
+              (ours: 3 frames) or its windows are (ours: the 90th percentile of all gestures).
+padded        the same, but padded to the longest gesture, so that nothing is cut off
 clean         85/15 by gesture, split first; only the training part is augmented; every window has its own length
 participants  whole participants are held out, in folds: everybody is judged once, by what has never seen them
 real          the same with the subjects of real recordings
+foreign       learned from all participants, judged on hands and sensors of another generator, which teaches nothing
 """
 
 import time
@@ -18,15 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.lab.study import elapsed
-from gestured.lab.study.material import SHIFT, Data, Pool, pool
+from gestured.lab.study.material import JUDGE, SHIFT, Data, Form, Pool, pool
 from gestured.lab.study.methods import METHODS, Scorer
 from gestured.lab.study.shifting import THRESHOLD
 from gestured.lab.study.training import Indices, Net
 from gestured.simulator import GESTURES
 
-PAPER, CLEAN, PARTICIPANTS, REAL = "paper", "clean", "participants", "real"
+PAPER, PADDED, CLEAN, PARTICIPANTS, REAL, FOREIGN = "paper", "padded", "clean", "participants", "real", "foreign"
+LEAKY = (PAPER, PADDED)  # protocols that augment before they split
 HELD_OUT = 0.15
 LENGTH = 0.9  # quantile of the lengths
+AVERAGE_FRAMES = 3  # of the running average under the paper's protocol
 Result = dict[str, Any]
 
 
@@ -44,6 +49,7 @@ class Task:
     people: int = 0  # learn from so many participants only; 0: from all that are not held out
     length: float = LENGTH  # of all windows in the paper's protocol: this quantile of the gestures' lengths
     box: float = THRESHOLD  # of the peak: what is in Algorithm 1's bounding box
+    average: int = AVERAGE_FRAMES  # frames of the running average in the paper's protocol; 1: none
     elapsed: bool = False  # ask the network in the middle of each gesture too
 
 
@@ -52,30 +58,36 @@ def values_of(values: Any) -> tuple[tuple[str, Any], ...]:
     return tuple(sorted(dict(values).items()))
 
 
-def _frames(task: Task, data: Data) -> int:
-    """The length that the paper's protocol brings all windows to; 0: each keeps its own."""
-    return int(np.quantile(data.gestures.lengths(), task.length)) if task.protocol == PAPER else 0
+def _form(task: Task, data: Data) -> Form:
+    """What the paper's protocol does to all windows; elsewhere each keeps its own length, and is not filtered."""
+    if task.protocol not in LEAKY:
+        return Form()
+    share = 1.0 if task.protocol == PADDED else task.length
+    return Form(int(np.quantile(data.gestures.lengths(), share)), task.average)
 
 
 @lru_cache(maxsize=6)
 def _inputs(
-    data: Data, augmentation: str, frames: int, box: float, method: str, prepared: tuple[tuple[str, Any], ...]
+    data: Data, augmentation: str, form: Form, box: float, method: str, prepared: tuple[tuple[str, Any], ...]
 ) -> Any:
-    return METHODS[method].view.all(pool(data, augmentation, frames, box).samples, dict(prepared), frames > 0)
+    return METHODS[method].view.all(pool(data, augmentation, form, box).samples, dict(prepared), form.frames > 0)
 
 
 def material(task: Task, data: Data) -> tuple[Pool, Any]:
     """The pool of a task, and its method's view of it."""
-    frames = _frames(task, data)
+    form = _form(task, data)
     prepared = tuple(item for item in task.values if item[0] in METHODS[task.method].view.by)
-    of = pool(data, task.augmentation, frames, task.box)
-    return of, _inputs(data, task.augmentation, frames, task.box, task.method, prepared)
+    of = pool(data, task.augmentation, form, task.box)
+    return of, _inputs(data, task.augmentation, form, task.box, task.method, prepared)
 
 
 def splits(task: Task, of: Pool) -> Iterator[tuple[Indices, Indices]]:
     """(training, test) indices into the pool, fold by fold."""
     rng = np.random.default_rng([task.seed, 0x59])
-    if task.protocol == PAPER:
+    if task.protocol == FOREIGN:
+        yield np.flatnonzero(of.source != JUDGE), np.flatnonzero(of.source == JUDGE)
+        return
+    if task.protocol in LEAKY:
         order = rng.permutation(len(of.labels))
         count = round(HELD_OUT * len(order))
         yield order[count:], order[:count]
@@ -102,8 +114,9 @@ def fitted(task: Task, inputs: Any, train: Indices, labels: NDArray[np.int64]) -
 def run(task: Task, data: Data) -> Result:
     """Every judged gesture of a cell: whose it was, what it was, what it was called and how surely.
 
-    `same` and `version` (the paper's protocol alone): whether the very same window, and whether any shifted version
-        of the same gesture, was learned from. `elapsed`, where asked for: right or not at each of `elapsed.POINTS`.
+    `same` and `version` (protocols that augment before they split): whether the very same window, and whether any
+        shifted version of the same gesture, was learned from. `elapsed`, where asked for: right or not at each of
+        `elapsed.POINTS`.
     """
     of, inputs = material(task, data)
     found: dict[str, list[Any]] = {n: [] for n in ("source", "person", "truth", "predicted", "confidence", "fold")}
@@ -122,7 +135,7 @@ def run(task: Task, data: Data) -> Result:
         found["predicted"] += scores.argmax(axis=1).tolist()
         found["confidence"] += scores.max(axis=1).round(4).tolist()
         found["fold"] += [fold] * len(test)
-        if task.protocol == PAPER and task.augmentation == SHIFT:
+        if task.protocol in LEAKY and task.augmentation == SHIFT:
             itself = of.source[train][of.same[train]]  # gestures that are learned from as they are
             seen["same"] += (of.same[test] & np.isin(of.source[test], itself)).tolist()
             seen["version"] += np.isin(of.source[test], of.source[train]).tolist()

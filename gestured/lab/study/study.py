@@ -28,12 +28,16 @@ from gestured.lab.study.protocols import PARTICIPANTS, Result
 from gestured.lab.study.report.page import write_report
 from gestured.lab.study.run_time import measure
 from gestured.lab.study.sessions import online
-from gestured.lab.study.tuning import tune
+from gestured.lab.study.tuning import TUNING, tune
 from gestured.lab.study.views import Values
 from gestured.model.model import shipped
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES, NONE
 
+PAPER_CITED = (
+    "C. Fumelli, A. Dutta and M. Kaboli: Advancements in Tactile Hand Gesture Recognition for Enhanced Human-Machine "
+    "Interaction"
+)
 WIDE_SEED = 1  # of the stream that the shipped models learn from as well
 
 
@@ -44,8 +48,11 @@ def run(args: argparse.Namespace) -> int:
     if args.real != REAL_FOLDER and not args.real.is_dir():
         raise GesturedError(f"--real: {args.real} is no folder")
     torch.set_num_threads(1)
-    plan = Plan.small(args.seed) if args.quick else Plan(args.seed)
-    study = compute(plan, Schedule(args.cache / "study", args.jobs, args.cluster), args.real, args.recordings)
+    if args.seeds < 1:
+        raise GesturedError(f"--seeds: expected 1 or more, found {args.seeds}")
+    plan = Plan.small(args.seed) if args.quick else Plan(args.seed, seeds=args.seeds)
+    schedule = Schedule(args.cache / "study", args.jobs, args.cluster)
+    study = compute(plan, schedule, args.real, args.recordings, args.foreign)
     study["about"]["command"] = args.words
     args.out.mkdir(parents=True, exist_ok=True)
     write(study, args.out)
@@ -54,27 +61,33 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def compute(plan: Plan, schedule: Schedule, folder: Path, recordings: Sequence[Path]) -> dict[str, Any]:
-    """Everything that study.json holds."""
+def compute(
+    plan: Plan, schedule: Schedule, folder: Path, recordings: Sequence[Path], others: Path | None = None
+) -> dict[str, Any]:
+    """Everything that study.json holds; `others` are recordings that judge and teach nothing."""
     start = time.monotonic()
     schedule.cache.mkdir(parents=True, exist_ok=True)
     mine = own.own(recordings)  # first, so that a wrong file is told of before half an hour of work
     people = cohort.load_cohort(schedule.cache, plan.trials(), schedule.jobs)
     real = own.real(folder, plan.real)
+    foreign = own.judges(others) if others else None
     wide = _strangers(plan, schedule)
     sets = {"simulated": Data.of("simulated", people.samples, wide)}
     if real:
         sets["real"] = Data.of("real", real[0], wide)
+    if foreign:
+        sets["foreign"] = Data.of("foreign", people.samples, wide, foreign[0])
     if mine.samples is not None:
         sets["own"] = Data.of("own", mine.samples)
-    tuned, tuning = tune(plan, sets, schedule)
+    tuned, tuning = tune(plan, _others(plan, schedule), schedule)
     cells = tables.wanted(plan, sets)
-    tasks = {cell: tables.task_of(cell, tuned, plan) for cell in cells}
-    results = schedule.results(list(tasks.values()), sets, "cells")
-    found = {cell: results[task] for cell, task in tasks.items()}
+    tasks = {cell: tables.tasks_of(cell, tuned, plan) for cell in cells}
+    results = schedule.results([task for some in tasks.values() for task in some], sets, "cells")
+    found = {cell: tables.pooled([results[task] for task in some]) for cell, some in tasks.items()}
     study: dict[str, Any] = {
         "about": {
-            "version": gestured.__version__, "command": "", "seed": plan.seed, "quick": plan.quick,
+            "version": gestured.__version__, "command": "", "seed": plan.seed, "seeds": plan.seeds, "quick": plan.quick,
+            "paper": PAPER_CITED,
             "gestures": list(GESTURES),
         },
         "machine": machine(),
@@ -84,7 +97,8 @@ def compute(plan: Plan, schedule: Schedule, folder: Path, recordings: Sequence[P
                 "participants": len({trial.participant for trial in people.trials()}),
                 "performed": people.performed, "cut": len(people), "lost": people.lost,
             },
-            "real": real[1] if real else None, "own": mine.files, "left_out": mine.left_out,
+            "real": real[1] if real else None, "foreign": foreign[1] if foreign else None,
+            "own": mine.files, "left_out": mine.left_out,
         },
         "methods": {method.id: _about(method.id, tuned) for method in METHODS.values()},
         "cells": [tables.row(cell, result) for cell, result in found.items()],
@@ -100,11 +114,14 @@ def compute(plan: Plan, schedule: Schedule, folder: Path, recordings: Sequence[P
     }  # fmt: skip
     # What is timed comes last and alone: nothing else of ours runs beside it.
     simulated_data = sets["simulated"]
-    key = [simulated_data.key, asdict(plan), tuned]
+    models = [file_digest(path) for path in shipped().values()]
+    judges = cohort.load_cohort(schedule.cache, plan.trials_of(plan.new_people), schedule.jobs, cohort.NEW_SEED)
+    key = [simulated_data.key, asdict(plan), tuned, judges.samples.digest(), models]
     study["run_time"] = schedule.once(
-        "run-time", measure.__module__, key, lambda: measure(plan, tuned, people, simulated_data)
+        "run-time", measure.__module__, key, lambda: measure(plan, tuned, judges, simulated_data)
     )
     study["online"], study["online_shipped"] = played(plan, tuned, simulated_data, schedule)
+    study["about"]["models"] = {name: file_digest(path) for name, path in shipped().items()}
     study["machine"]["minutes"] = round((time.monotonic() - start) / 60, 1)
     return study
 
@@ -128,6 +145,14 @@ def _failures(found: Mapping[tables.Cell, Result], people: cohort.Cohort) -> lis
             method, found[tables.Cell(method, tables.TUNED, SHIFT, PARTICIPANTS, "simulated")], by
         )
     ]
+
+
+def _others(plan: Plan, schedule: Schedule) -> Data | None:
+    """People on whom hyperparameters are compared; None in a quick study."""
+    if not plan.tuning_people:
+        return None
+    trials = plan.trials_of(plan.tuning_people)
+    return Data.of(TUNING, cohort.load_cohort(schedule.cache, trials, schedule.jobs, cohort.TUNING_SEED).samples)
 
 
 def _strangers(plan: Plan, schedule: Schedule) -> Samples | None:

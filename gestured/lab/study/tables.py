@@ -1,7 +1,7 @@
 """The main tables: which cells there are, and what each says."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,12 @@ from gestured.lab.study.bootstrap import curve, summary
 from gestured.lab.study.material import AUGMENTATIONS, SHIFT, UNCHANGED, WIDE, Data
 from gestured.lab.study.methods import METHODS, Method
 from gestured.lab.study.plan import Plan
-from gestured.lab.study.protocols import CLEAN, PAPER, PARTICIPANTS, REAL, Result, Task, values_of
+from gestured.lab.study.protocols import CLEAN, FOREIGN, PADDED, PAPER, PARTICIPANTS, REAL, Result, Task, values_of
 from gestured.lab.study.views import Values
 from gestured.simulator import GESTURES
 
 GIVEN, TUNED = "paper", "tuned"
+ASKED = {"real": (REAL,), "foreign": (FOREIGN,)}  # protocols of data that are not split as the paper does
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ def wanted(plan: Plan, sets: Mapping[str, Data]) -> list[Cell]:
     for method in METHODS.values():
         for settings in (GIVEN, TUNED) if method.paper else (TUNED,):
             for data in sets.values():
-                for protocol in (PAPER, CLEAN, PARTICIPANTS) if data.name != "real" else (REAL,):
+                for protocol in ASKED.get(data.name, (PAPER, PADDED, CLEAN, PARTICIPANTS)):
                     for augmentation in AUGMENTATIONS:
                         if _skipped(plan, method, settings, protocol, augmentation, data):
                             continue
@@ -45,14 +46,33 @@ def wanted(plan: Plan, sets: Mapping[str, Data]) -> list[Cell]:
 
 def _skipped(plan: Plan, method: Method, settings: str, protocol: str, augmentation: str, data: Data) -> bool:
     if augmentation == WIDE:  # it leads to other people and other sensors: asked there alone
-        return data.wide is None or protocol not in (PARTICIPANTS, REAL) or settings != TUNED
+        return data.wide is None or protocol not in (PARTICIPANTS, REAL, FOREIGN) or settings != TUNED
     if protocol == REAL and (augmentation == SHIFT or settings == GIVEN):
+        return True
+    if protocol == FOREIGN and settings == GIVEN:
         return True
     return plan.quick and settings == GIVEN
 
 
+def tasks_of(cell: Cell, tuned: Mapping[str, Values], plan: Plan) -> list[Task]:
+    """What has to be computed for a cell: the same with each seed."""
+    first = task_of(cell, tuned, plan)
+    return [replace(first, seed=plan.seed + k) for k in range(plan.seeds)]
+
+
+def pooled(results: Sequence[Result]) -> Result:
+    """The results of a cell's seeds as one: all answers, one seed's after the other's, and the share right of each."""
+    lists = {key for key, value in results[0].items() if isinstance(value, list)}
+    return {
+        **{key: [item for result in results for item in result[key]] for key in lists},
+        "train": results[0]["train"],
+        "seconds": round(sum(result["seconds"] for result in results) / len(results), 3),
+        "shares": [round(float(right(result).mean()), 4) for result in results],
+    }
+
+
 def task_of(cell: Cell, tuned: Mapping[str, Values], plan: Plan) -> Task:
-    """What has to be computed for a cell."""
+    """A cell's first task."""
     method = METHODS[cell.method]
     values = dict(tuned[cell.method])
     if cell.settings == GIVEN:
@@ -89,7 +109,8 @@ def row(cell: Cell, result: Result) -> dict[str, Any]:
     return {
         "method": cell.method, "settings": cell.settings, "augmentation": cell.augmentation,
         "protocol": cell.protocol, "data": cell.data,
-        "n": len(result["truth"]), **summary(right(result), result["person"]),
+        "n": len(result["truth"]) // len(result["shares"]), **summary(right(result), result["person"]),
+        "seeds": len(result["shares"]), "spread": round(float(np.std(result["shares"])), 4),
         "published": METHODS[cell.method].published.get(cell.augmentation) if cell.data == "simulated" else None,
         "train": result["train"], "seconds": result["seconds"], "confusion": confusion.tolist(),
     }  # fmt: skip
@@ -98,8 +119,9 @@ def row(cell: Cell, result: Result) -> dict[str, Any]:
 def copies(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:
     """How much of the gain by augmentation comes from copies of test gestures in the training set.
 
-    `with_copy` counts test gestures whose very same window is learned from too (a shift of zero), `with_version` those
-    of which any other version is. The gains are of augmentation under the paper's protocol and under the clean one.
+    `with_copy` counts test gestures, of all seeds, whose very same window is learned from too (a shift of zero),
+    `with_version` those of which any other version is. The gains are of augmentation under the paper's protocol and
+    under the clean one.
     """
     out = []
     for cell, result in found.items():

@@ -1,10 +1,11 @@
-"""Hyperparameters by cross-validation with participants left out, on gestures as they are, without augmentation.
+"""Hyperparameters by cross-validation with participants left out, on people who are not judged anywhere else.
 
-The grids are coarse and small. Networks are compared after fewer batches than they are trained for afterwards.
-What wins without augmentation is used with it too, which the paper does not (its Table IV has two columns).
+They are another cohort's (`cohort.TUNING_SEED`), with their gestures as they are. The paper compares hyperparameters on
+the people whom it judges. The grids are coarse and small. Networks are compared after fewer batches than they are
+trained for afterwards. What wins without augmentation is used with it too, which the paper does not (its Table IV has
+two columns).
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -18,10 +19,12 @@ from gestured.lab.study.protocols import PARTICIPANTS, Result, Task
 from gestured.lab.study.tables import right, task
 from gestured.lab.study.views import Values
 
+TUNING = "tuning"  # the name of the data
 
-def tune(plan: Plan, sets: Mapping[str, Data], schedule: Schedule) -> tuple[dict[str, Values], list[dict[str, Any]]]:
-    """The best hyperparameters of each method, and every candidate's figures; the first ones in a quick study."""
-    if plan.quick:
+
+def tune(plan: Plan, people: Data | None, schedule: Schedule) -> tuple[dict[str, Values], list[dict[str, Any]]]:
+    """The best hyperparameters of each method on `people`, and every candidate's figures; the first ones without."""
+    if people is None:
         return {method.id: method.grid[0] for method in METHODS.values()}, []
     asked: dict[tuple[str, int], tuple[Values, Task]] = {}
     for method in METHODS.values():
@@ -29,9 +32,9 @@ def tune(plan: Plan, sets: Mapping[str, Data], schedule: Schedule) -> tuple[dict
             shorter = {**values, "steps": plan.tuning_steps} if method.network else values
             asked[method.id, len(asked)] = (
                 values,
-                replace(task(method, shorter, UNCHANGED, PARTICIPANTS, "simulated", plan), folds=plan.tuning_folds),
+                replace(task(method, shorter, UNCHANGED, PARTICIPANTS, TUNING, plan), folds=plan.tuning_folds),
             )
-    found = schedule.results([item[1] for item in asked.values()], sets, "hyperparameters")
+    found = schedule.results([item[1] for item in asked.values()], {TUNING: people}, "hyperparameters")
     chosen: dict[str, Values] = {}
     rows = []
     for method in METHODS.values():

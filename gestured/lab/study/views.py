@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gestured.core.features import touch_pattern
 from gestured.lab.dataset import WINDOW, Samples
 from gestured.lab.study.motion_history import motion_history
-from gestured.lab.study.touch_patterns import PAPER_FEATURES
+from gestured.lab.study.touch_patterns import paper_features
 from gestured.lab.study.training import Images, Windows
 from gestured.lab.study.trajectory_boosting import trajectory_matrix, trajectory_row
 from gestured.lab.study.wavelets import spatio_temporal
@@ -37,19 +37,24 @@ def _alone(one: Callable[[Rows, Values], Rows], *by: str, form: Callable[[Rows],
     return View(every, one, by)
 
 
-def _listed(found: Rows, values: Values) -> Rows:
-    """(G, F) touch-pattern features: the set that the paper lists, or all that the daemon's forest sees."""
-    return found[:, PAPER_FEATURES] if values["features"] == "paper" else found
+def _all_touches(samples: Samples, values: Values, padded: bool) -> Rows:
+    if values["features"] == "daemon":
+        return samples.features()
+    return np.stack([paper_features(samples.window(i)) for i in range(len(samples))])
+
+
+def _touches(window: Rows, values: Values) -> Rows:
+    """Touch-pattern features: those that the paper lists, or all that the daemon's forest sees."""
+    return (touch_pattern(window, WINDOW.rate_hz) if values["features"] == "daemon" else paper_features(window))[None]
 
 
 WAVELETS = _alone(
-    lambda window, values: spatio_temporal(window, values["wavelet"], values["level"])[None], "wavelet", "level"
+    lambda window, values: spatio_temporal(window, values["wavelet"], values["level"], values["reading"])[None],
+    "wavelet",
+    "level",
+    "reading",
 )
-TOUCHES = View(
-    lambda samples, values, padded: _listed(samples.features(), values),
-    lambda window, values: _listed(touch_pattern(window, WINDOW.rate_hz)[None], values),
-    ("features",),
-)
+TOUCHES = View(_all_touches, _touches, ("features",))
 HISTORY = _alone(lambda window, values: motion_history(window, values["decay_s"])[None], "decay_s", form=Images)
 FRAMES = View(lambda samples, values, padded: Windows(samples, padded), lambda window, values: window[None])
 TRAJECTORIES = View(

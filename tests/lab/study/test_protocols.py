@@ -1,5 +1,7 @@
 """Who learns and who is judged: what crosses over under the paper's protocol, and nowhere else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,10 +9,22 @@ pytest.importorskip("torch")
 pytest.importorskip("pywt")
 
 from gestured.lab.study.bootstrap import interval
-from gestured.lab.study.material import SHIFT, UNCHANGED
+from gestured.lab.study.material import JUDGE, SHIFT, UNCHANGED, WIDE, Data
 from gestured.lab.study.methods import METHODS
-from gestured.lab.study.protocols import CLEAN, PAPER, PARTICIPANTS, Task, material, run, splits, values_of
-from tests.lab.study.material_made import data
+from gestured.lab.study.protocols import (
+    CLEAN,
+    FOREIGN,
+    PADDED,
+    PAPER,
+    PARTICIPANTS,
+    Task,
+    material,
+    run,
+    splits,
+    values_of,
+)
+from gestured.lab.study.tables import Cell, pooled, right, row
+from tests.lab.study.material_made import data, samples
 
 
 def task(protocol: str, augmentation: str = SHIFT, method: str = "tp_knn", **more: int) -> Task:
@@ -50,7 +64,37 @@ def test_learning_from_fewer_people() -> None:
 def test_all_windows_of_the_papers_protocol_are_equally_long() -> None:
     of, _ = material(task(PAPER), data())
     assert len(set(of.samples.lengths().tolist())) == 1
-    assert len(set(material(task(CLEAN), data())[0].samples.lengths().tolist())) > 1
+    lengths = material(task(CLEAN), data())[0].samples.lengths()
+    assert len(set(lengths.tolist())) > 1
+    assert set(material(task(PADDED), data())[0].samples.lengths().tolist()) == {lengths.max()}
+
+
+def test_under_the_papers_protocol_alone_frames_are_a_running_average() -> None:
+    gestures = data().gestures
+    smooth, raw = (material(task(protocol, UNCHANGED), data())[0].samples for protocol in (PADDED, CLEAN))
+    window, before = smooth.window(0), gestures.window(0)
+    assert np.array_equal(raw.window(0), before)
+    mean = np.stack([before[max(0, k - 1) : k + 2].mean(axis=0) for k in range(len(before))])
+    assert np.allclose(window[: len(before)], mean / mean.max(), atol=2e-3) and not window[len(before) :].any()
+
+
+def test_those_of_another_generator_judge_and_teach_nothing() -> None:
+    of = Data.of("foreign", samples(3), samples(2), samples(1))
+    asked = task(FOREIGN, WIDE)
+    found, _ = material(asked, of)
+    ((train, test),) = splits(asked, found)
+    assert len(test) == len(samples(1)) and len(train) == len(samples(3)) + len(samples(2))
+    assert (found.source[test] == JUDGE).all() and not (found.source[train] == JUDGE).any()
+    assert len(run(asked, of)["truth"]) == len(samples(1))
+
+
+def test_the_seeds_of_a_cell_are_counted_as_one_figure() -> None:
+    results = [run(replace(task(CLEAN, UNCHANGED), seed=seed), data()) for seed in (0, 1)]
+    both = pooled(results)
+    found = row(Cell("tp_knn", "tuned", UNCHANGED, CLEAN, "simulated"), both)
+    assert both["shares"] == [round(float(right(one).mean()), 4) for one in results]
+    assert found["right"] == pytest.approx(np.mean(both["shares"]), abs=1e-3) and found["seeds"] == 2
+    assert found["n"] == len(results[0]["truth"]) and found["spread"] == pytest.approx(np.std(both["shares"]), abs=1e-4)
 
 
 def test_an_interval_is_over_people_and_not_over_gestures() -> None:

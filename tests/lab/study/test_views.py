@@ -8,8 +8,10 @@ pywt = pytest.importorskip("pywt")
 
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.motion_history import motion_history
+from gestured.lab.study.touch_patterns import paper_features
 from gestured.lab.study.training import Images, Windows
-from gestured.lab.study.wavelets import band_statistics, spatio_temporal
+from gestured.lab.study.vectors import VectorMachine
+from gestured.lab.study.wavelets import POOLED, band_statistics, spatio_temporal
 from tests.lab.made import gestures, line, window
 from tests.lab.study.material_made import samples
 
@@ -32,7 +34,38 @@ def test_one_window_looks_as_it_does_among_all(name: str) -> None:
 @pytest.mark.parametrize("level", [0.0, 1.0])
 def test_wavelet_features_of_a_constant_signal_are_finite(frames: int, level: float) -> None:
     found = spatio_temporal(np.full((frames, 9, 9), level, np.float32))
-    assert found.shape == (60,) and np.isfinite(found).all()
+    assert found.shape == (4 * 5 * (81 + 3),) and np.isfinite(found).all()
+
+
+def test_the_two_readings_of_the_wavelet_features() -> None:
+    """The paper's reading still knows which taxel it was; the pooled one is its last part."""
+    swipe = gestures()["swipe_up"]
+    turned = swipe[:, ::-1]
+    whole, mirrored = spatio_temporal(swipe), spatio_temporal(turned)
+    pooled, pooled_mirrored = (spatio_temporal(window, reading=POOLED) for window in (swipe, turned))
+    assert np.array_equal(whole[-len(pooled) :], pooled)
+    assert np.allclose(pooled, pooled_mirrored, rtol=1e-5) and not np.allclose(whole, mirrored, rtol=1e-2)
+
+
+def test_touch_patterns_are_the_papers() -> None:
+    """Against its sentences, written down by hand for two frames of 2 x 2 taxels."""
+    window = np.array([[[1.0, 0.5], [0.0, 0.0]], [[0.2, 0.0], [0.0, 0.6]]], np.float32)
+    found = paper_features(window)
+    mean, variability = 2.3 / 8, (0.8 + 0.5 + 0.0 + 0.6) / 4
+    rows, columns = [1.7 / 4, 0.6 / 4], [1.2 / 4, 1.1 / 4]
+    assert np.allclose(found, [mean, 1.0, variability, *rows, *columns, 0.5, 0.5, 2 / 15])
+    assert np.array_equal(paper_features(np.concatenate([window, np.zeros((5, 2, 2), np.float32)])), found)
+    assert np.isfinite(paper_features(window[:1])).all() and np.isfinite(paper_features(0 * window)).all()
+
+
+def test_a_vector_machine_with_a_finished_kernel_answers_as_scikit_learns() -> None:
+    svm = pytest.importorskip("sklearn.svm")
+    rng = np.random.default_rng(1)
+    x, y = rng.normal(size=(120, 40)), rng.integers(0, 4, 120)
+    x[np.arange(120), y] += 2.0
+    ours, theirs = VectorMachine(8.0, 0.01).fit(x[:80], y[:80]), svm.SVC(C=8.0, gamma=0.01).fit(x[:80], y[:80])
+    assert np.array_equal(ours.predict(x), theirs.predict(x))
+    assert np.allclose(ours.decision_function(x), theirs.decision_function(x), atol=1e-3)
 
 
 def test_statistics_against_a_second_opinion() -> None:

@@ -1,0 +1,49 @@
+"""Gestures of the second generator as a file of recordings, for `gestured-lab study --foreign FILE`.
+
+    python -m tests.foreign.recordings foreign.npz --n 20 --level nominal
+
+Each take is another person at another sensor. What nobody can recognise is left out, as `judge` leaves it out.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from gestured.record.arrays import write
+from gestured.record.recordings import Recordings
+from tests.foreign import GESTURES, LEVELS, take
+from tests.foreign.judge import visible
+
+
+def recordings(count: int, level: str = "nominal", first: int = 0) -> Recordings:
+    """So many takes of each gesture in the contract's form."""
+    takes = [take(kind, seed, level) for kind in GESTURES for seed in range(first, first + count)]
+    takes = [one for one in takes if visible(one)]
+    return Recordings(
+        frames=np.concatenate([one["frames"] for one in takes]),
+        times=np.concatenate([one["times"] for one in takes]),
+        offsets=np.cumsum([0, *(len(one["times"]) for one in takes)], dtype=np.int64),
+        labels=np.array([one["label"] for one in takes]),
+        subjects=np.arange(len(takes)),
+        kinds=np.array([one["kind"] for one in takes]),
+        onsets=np.array([np.searchsorted(one["times"], one["onset"]) for one in takes], np.int64),
+        releases=np.array([np.searchsorted(one["times"], one["release"]) - 1 for one in takes], np.int64),
+    )
+
+
+def main() -> None:
+    """Write the file."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path, metavar="OUT", help="the .npz to write")
+    parser.add_argument("--n", type=int, default=20, help="takes of each gesture (%(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="first seed (%(default)s)")
+    parser.add_argument("--level", choices=LEVELS, default="nominal")
+    args = parser.parse_args()
+    made = recordings(args.n, args.level, args.first)
+    write(args.out, made)
+    print(f"{args.out}: {len(made)} gestures")
+
+
+if __name__ == "__main__":
+    main()
