@@ -10,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from benchmarks.timing import Row
+from gestured.lab.made_of import made_of, models_and_manifest
 
 
 def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
@@ -57,7 +58,7 @@ def main() -> int:
     rows = []
     if not args.json:
         print(
-            f"{machine()}\n\n| figure | gestured | against | ratio | to reach | |\n|---|---|---|---|---|---|",
+            f"{machine()}\n{made_of('make bench', models_and_manifest())}\n\n| figure | gestured | against | ratio | to reach | |\n|---|---|---|---|---|---|",
             flush=True,
         )
     for name in args.only or parts:

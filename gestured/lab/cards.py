@@ -5,6 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from gestured.lab.made_of import made_of, models_and_manifest
 from gestured.lab.train import TrainingPlan
 from gestured.model.model import open_model
 
@@ -44,7 +45,8 @@ def write_block(readme: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
             *((f"real, {k}", v) for k, v in found.get("real", {}).items() if k != "kinds"),
         ]
     ]
-    block = "\n".join([FIGURES_BEGIN, *HEAD, *rows, FIGURES_END])
+    origin = made_of("gestured-lab evaluate --readme README.md", models_and_manifest())
+    block = "\n".join([FIGURES_BEGIN, origin, "", *HEAD, *rows, FIGURES_END])
     readme.write_text(text[: text.index(FIGURES_BEGIN)] + block + text[text.index(FIGURES_END) + len(FIGURES_END) :])
 
 

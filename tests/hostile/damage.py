@@ -16,6 +16,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,9 @@ from gestured.daemon.backlog import Backlog, Datagram
 from gestured.daemon.health import TICK_S
 from gestured.daemon.merge import load_settings
 from gestured.daemon.scene import scene_of
+from gestured.lab.made_of import made_of
 from gestured.model.ladder import ladder_for
+from gestured.model.model import shipped
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 from tests.hostile.faults import FAULTS, Fault, Stall
 from tests.hostile.grammar import violations
@@ -202,6 +205,7 @@ def main() -> int:
         found.append(measure(name, takes, idle, bench).figures())
         if not args.json:  # row by row: it takes a while
             if len(found) == 1:
+                print(made_of("python -m tests.hostile.damage", [shipped().get(args.model, Path(args.model))]) + "\n")
                 print("| " + " | ".join(found[0]) + " |\n|" + "---|" * len(found[0]))
             print(
                 "| " + " | ".join("-" if value is None else str(value) for value in found[-1].values()) + " |",

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from gestured.lab.dataset import cuts
+from gestured.lab.made_of import made_of, models_and_manifest
 from gestured.lab.stability.extremes import month_table, parts_table, whole_path_table
 from gestured.lab.stability.figure import svg
 from gestured.lab.stability.metamorphic import metamorphic_table
@@ -49,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     where = f"{date.today()}, {platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
     where += f", numpy {np.__version__}"
     if not args.json:
-        print(where + "\n")
+        print(f"{where}\n{made_of('gestured-lab stability --out docs', models_and_manifest())}\n")
     done = []
     for table in all_tables(args.quick, args.out):
         done.append(table.plain())

@@ -156,7 +156,7 @@ def measure(plan: Plan, tuned: Mapping[str, Values], judges: Cohort, data: Data)
             named, said = (np.array(column) for column in zip(*answers, strict=True))
             rows.append({
                 "method": runner.method, "settings": runner.settings, "precision": runner.precision,
-                **summary(named == truth, people), **_published(named, said, truth, people, judges.lost),
+                **summary(named == truth, people), **told(named, said, truth, people, judges.lost),
                 "cold_us": round(float(np.median(cold)) * 1e6, 1), "median_us": round(float(np.median(warm)) * 1e6, 1),
                 "p95_us": round(float(np.quantile(warm, 0.95)) * 1e6, 1),
                 "memory_bytes": None if plan.quick else grown_by(runner, segments[:WARM]), "file_bytes": runner.size(),
@@ -166,7 +166,7 @@ def measure(plan: Plan, tuned: Mapping[str, Values], judges: Cohort, data: Data)
     return rows
 
 
-def _published(
+def told(
     named: NDArray[np.int64], said: NDArray[np.bool_], truth: NDArray[np.int64], people: NDArray[np.int64], lost: int
 ) -> dict[str, Any]:
     """Of all gestures that were performed: `wrong` were said wrongly, `lost` rejected or never cut; with intervals."""

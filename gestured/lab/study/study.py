@@ -16,9 +16,11 @@ from gestured.core.errors import GesturedError
 from gestured.lab.cli import REAL_FOLDER
 from gestured.lab.dataset import Samples, simulated
 from gestured.lab.digest import file_digest
+from gestured.lab.made_of import made_of
 from gestured.lab.study import cohort, elapsed, failures, own, signals, tables
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.choices import choices
+from gestured.lab.study.fields import with_fields
 from gestured.lab.study.learning import learning
 from gestured.lab.study.machine import machine
 from gestured.lab.study.material import SHIFT, Data
@@ -26,11 +28,13 @@ from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import PARTICIPANTS, Result
 from gestured.lab.study.report.page import write_report
+from gestured.lab.study.report.picture import write_picture
 from gestured.lab.study.run_time import measure
+from gestured.lab.study.said import said
 from gestured.lab.study.sessions import online
 from gestured.lab.study.tuning import TUNING, tune
 from gestured.lab.study.views import Values
-from gestured.model.model import shipped
+from gestured.model.model import open_model, shipped
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES, NONE
 
@@ -48,6 +52,11 @@ def run(args: argparse.Namespace) -> int:
     if args.real != REAL_FOLDER and not args.real.is_dir():
         raise GesturedError(f"--real: {args.real} is no folder")
     torch.set_num_threads(1)
+    if args.draw:
+        args.out.mkdir(parents=True, exist_ok=True)
+        path = write_picture(_kept(args.draw), args.out)
+        print(f"{path}\n{made_of('gestured-lab study', [path, path.with_suffix('.json')])}")
+        return 0
     if args.seeds < 1:
         raise GesturedError(f"--seeds: expected 1 or more, found {args.seeds}")
     plan = Plan.small(args.seed) if args.quick else Plan(args.seed, seeds=args.seeds)
@@ -57,8 +66,19 @@ def run(args: argparse.Namespace) -> int:
     args.out.mkdir(parents=True, exist_ok=True)
     write(study, args.out)
     page = write_report(study, args.out)
+    if study["run_time"]:
+        write_picture(study, args.out)
     print(json.dumps(study, indent=2) if args.json else f"{page}: {study['machine']['minutes']} minutes")
     return 0
+
+
+def _kept(path: Path) -> dict[str, Any]:
+    """What an earlier run wrote. Raises GesturedError where it is not that."""
+    try:
+        found = json.loads(path.read_text())
+        return {name: found[name] for name in ("about", "machine", "methods", "run_time", "said")}
+    except (ValueError, KeyError, TypeError) as error:
+        raise GesturedError(f"--draw: {path}: expected study.json or operating-points.json: {error!r}") from None
 
 
 def compute(
@@ -120,6 +140,10 @@ def compute(
     study["run_time"] = schedule.once(
         "run-time", measure.__module__, key, lambda: measure(plan, tuned, judges, simulated_data)
     )
+    figures = {cell: tables.row(cell, result) for cell, result in found.items()}
+    judged = (foreign[0], int(foreign[1]["performed"])) if foreign else None
+    study["run_time"] = with_fields(study["run_time"], figures, judged)
+    study["said"] = said(open_model(shipped()["cnn_lstm"]), plan.minutes) if plan.minutes else []
     study["online"], study["online_shipped"] = played(plan, tuned, simulated_data, schedule)
     study["about"]["models"] = {name: file_digest(path) for name, path in shipped().items()}
     study["machine"]["minutes"] = round((time.monotonic() - start) / 60, 1)

@@ -47,7 +47,14 @@ GROUPS = {
 def made_study(seed: int = 5) -> Study:
     """Every part of the schema, filled."""
     chance = random.Random(seed)
-    about = {"version": "0.0-made-up", "command": "gestured-lab study --out report/", "seed": 0, "quick": False}
+    about = {
+        "version": "0.0-made-up",
+        "command": "gestured-lab study --out report/",
+        "seed": 0,
+        "seeds": 3,
+        "quick": False,
+        "models": {"lstm": "ab" * 32},
+    }
     study: Study = {
         "about": {**about, "gestures": list(GESTURES)},
         "machine": _machine(),
@@ -65,6 +72,7 @@ def made_study(seed: int = 5) -> Study:
         "signals": {gesture: _signal(k) for k, gesture in enumerate(GESTURES)},
         "double_tap": _double_tap(),
         "online": [_online(method, chance) for method in ("tp_rf", "lstm", "cnn_lstm")],
+        "said": _said(),
         "online_shipped": [_online(method, chance) for method in ("lstm", "cnn_lstm")],
     }
     for row in study["run_time"]:
@@ -176,15 +184,16 @@ def _cells(method: str, chance: random.Random) -> list[Study]:
     cells = []
     for settings in ("paper", "tuned") if published else ("tuned",):
         for augmentation in ("none", "shift", "wide"):
-            for protocol in ("paper", "clean", "participants", "real"):
+            for protocol in ("paper", "padded", "clean", "participants", "real", "foreign"):
                 right = _strength(method) + chance.uniform(-0.03, 0.02) + (0.01 if settings == "tuned" else 0.0)
-                right += {"paper": 0.0, "clean": 0.0, "participants": -0.03, "real": -0.12}[protocol]
+                right += {"participants": -0.03, "real": -0.12, "foreign": -0.2}.get(protocol, 0.0)
                 if augmentation == "shift":
                     right += 0.6 * (0.99 - right) if protocol == "paper" else 0.015
                 figure = None if published is None or augmentation == "wide" else published[augmentation == "shift"]
                 about = {"method": method, "settings": settings, "augmentation": augmentation, "protocol": protocol}
-                data = "real" if protocol == "real" else "simulated"
-                rest = {"data": data, "n": 459, "published": figure, "train": 2601, "seconds": 12.5}
+                data = protocol if protocol in ("real", "foreign") else "simulated"
+                rest = {"data": data, "n": 459, "seeds": 3, "spread": 0.004, "published": figure, "train": 2601}
+                rest |= {"seconds": 12.5}
                 confusion = _confusion(right, chance) if protocol == "participants" else None
                 cells.append({**about, **_between(right), **rest, "confusion": confusion})
     return cells
@@ -242,22 +251,35 @@ def _choices(chance: random.Random) -> list[Study]:
 
 
 def _run_time(method: str, chance: random.Random) -> list[Study]:
+    recent = METHODS[method][1] in ("recurrent", "beyond the paper")
+    kinds = [("tuned", "float32"), ("tuned", "int8")] if recent else [("tuned", "float64")]
+    kinds += [("shipped", "float32")] if method in ("tp_rf", "lstm", "cnn_lstm") else []
     rows = []
-    for precision in ("float32", "int8") if METHODS[method][1] in ("recurrent", "beyond the paper") else ("float64",):
+    for settings, precision in kinds:
         median = 10 ** chance.uniform(1.7, 3.9)
+        right = _strength(method) + chance.uniform(-0.03, 0.02)
         sizes = {"memory_bytes": int(median * 3000), "file_bytes": int(median * 900)}
-        times = {"median_us": median, "p95_us": median * 1.4, "front": False}
-        rows.append(
-            {
-                "method": method,
-                "settings": "tuned",
-                "precision": precision,
-                **_between(_strength(method) + chance.uniform(-0.03, 0.02)),
-                **times,
-                **sizes,
-            }
-        )
+        times = {"median_us": median, "p95_us": median * 1.4, "cold_us": median * 2.5, "front": False}
+        lost = 0.02 if settings == "shipped" else 0.0
+        field = {
+            "wrong": 1 - right, "wrong_low": 0.9 - right * 0.9, "wrong_high": 1.03 - right, "error": 1 - right + lost,
+            "error_low": 0.9 - right * 0.9, "error_high": 1.05 - right, "performed": 540,
+        }  # fmt: skip
+        real = {"wrong": 0.01, "error": 0.04, "performed": 3000}
+        fields = {"simulated": field, "foreign": field, "real": real}
+        about = {"method": method, "settings": settings, "precision": precision}
+        rows.append({**about, **_between(right), **field, **times, **sizes, "fields": fields})
     return rows
+
+
+def _said() -> list[Study]:
+    found = []
+    for k, group in enumerate(("taps", "swipes", "circles", "two fingers")):
+        for kind, middle in (("provisional", -0.2), ("final", 0.2)):
+            at = {f"p{q}_s": middle + 0.03 * k + 0.002 * (q - 50) for q in (10, 50, 90)}
+            rest = {"n": 40, "wrong": 0.01 * k, "low": 0.0, "high": 0.08}
+            found.append({"group": group, "kind": kind, **rest, **at})
+    return found
 
 
 def _elapsed(method: str, chance: random.Random) -> Study:

@@ -13,6 +13,8 @@ from gestured.lab import cli
 from gestured.lab.dataset import TRIALS
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
+from gestured.record.arrays import write
+from tests.foreign.recordings import recordings
 
 SECTIONS = (
     "about", "machine", "data", "methods", "cells", "copies", "tuning", "choices", "run_time", "elapsed", "learning",
@@ -28,16 +30,21 @@ def test_a_small_study_has_every_section_and_is_the_same_again(tmp_path: Path, m
     few = [t.index for t in TRIALS if t.participant < 3 and t.speed == "normal" and t.inclination == 1]
     monkeypatch.setattr(Plan, "trials", lambda self: np.array(few, np.int64))
     (tmp_path / "none").mkdir()
+    write(tmp_path / "foreign.npz", recordings(1))
     where = ["--cache", str(tmp_path / "cache"), "--real", str(tmp_path / "none"), "--jobs", "1"]
+    where += ["--foreign", str(tmp_path / "foreign.npz")]
     for out in ("first", "second"):
         assert cli.main(["study", "--quick", "--out", str(tmp_path / out), *where]) == 0
     first, second = (json.loads((tmp_path / out / "study.json").read_text()) for out in ("first", "second"))
     assert set(SECTIONS) <= set(first)
     assert {(c["method"], c["protocol"]) for c in first["cells"]} == {
-        (m, p) for m in LEFT for p in ("paper", "clean", "participants")
+        (m, p) for m in LEFT for p in ("paper", "padded", "clean", "participants", "foreign")
     }
     assert all(0 <= c["low"] <= c["right"] <= c["high"] <= 1 for c in first["cells"])
     assert first["data"]["simulated"]["cut"] + first["data"]["simulated"]["lost"] == len(few)
     assert {**second, "about": 0, "machine": 0} == {**first, "about": 0, "machine": 0}
     assert (tmp_path / "first" / "cells.csv").read_text().count("\n") == len(first["cells"]) + 1
-    assert list((tmp_path / "first").glob("*.html"))
+    assert list((tmp_path / "first").glob("*.html")) and (tmp_path / "first" / "operating-points.svg").exists()
+    timed = {(row["method"], row["settings"]) for row in first["run_time"]}
+    assert {("cnn_lstm", "shipped"), ("lstm", "tuned"), ("tp_knn", "tuned")} <= timed
+    assert all(0 <= row["wrong"] <= row["error"] <= 1 and row["cold_us"] > 0 for row in first["run_time"])

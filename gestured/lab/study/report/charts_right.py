@@ -14,15 +14,18 @@ from .reading import Row, Study
 PUBLISHED = Mark(5)
 PROTOCOLS = {
     "paper": (Mark(1, "f1", 1), "ours, paper's protocol"),
+    "padded": (Mark(1, "f1", 2), "ours, padded to the longest"),
     "clean": (Mark(2, "f2"), "ours, clean"),
     "participants": (Mark(0, "f0"), "ours, participants held out"),
     "real": (Mark(4, "f3"), "ours, real recordings"),
+    "foreign": (Mark(4, "f3", 1), "ours, another generator"),
     "online": (Mark(3, "f4"), "ours, online"),
 }
 MARKS = dict.fromkeys(
     [Mark(k, f"f{k}", filling) for k in range(len(reading.FAMILIES)) for filling in range(len(DASHES))]
     + [PUBLISHED, *(mark for mark, _ in PROTOCOLS.values())]
 )
+Name = tuple[bool, float, float, str]  # whether it is bold and chooses first, x, y, the words
 LANE = 9.0  # pixels of one protocol's line
 REACH = (0, 10, 20, 32, 46, 62, 80, 100)  # pixels that a name may be moved away from its point
 QUARTERS = (0, 0.25, 0.5, 0.75, 1)
@@ -95,7 +98,13 @@ def run_time(study: Study) -> Markup:
     for row, error in zip(rows, errors, strict=True):
         mark, time = mark_of(study, row["method"]), row["median_us"]
         axes.plot([time, _p95(row)], [error, error], color=mark.hue, linewidth=1.8, alpha=0.45)
-        drawing.point(axes, time, error, mark._replace(filling=int(row["precision"] == "int8")), told(study, row))
+        drawing.point(
+            axes,
+            time,
+            error,
+            mark._replace(filling=3 if row["settings"] == "shipped" else int(row["precision"] == "int8")),
+            told(study, row),
+        )
         names.append((bool(row.get("front")), time, error, _name(study, row, rows)))
     front = sorted((time, error) for first, time, error, _ in names if first)
     if front:
@@ -103,11 +112,11 @@ def run_time(study: Study) -> Markup:
         for (x, y), (u, v) in pairwise(stairs):  # each tread and riser by itself, so that names find a place between
             for ends in (([x, u], [y, y]), ([u, u], [y, v])):
                 axes.plot(*ends, color=INK, linewidth=1.4, linestyle=(0, (1, 3)))
-    _place(drawing, axes, names)
+    place(drawing, axes, names)
     return drawing.svg("Error against run time, simulated data", "; ".join(told(study, row) for row in rows))
 
 
-def _place(drawing: Drawing, axes: Axes, names: list[tuple[bool, float, float, str]]) -> None:
+def place(drawing: Drawing, axes: Axes, names: list[Name]) -> None:
     """Write each name into the nearest free place around its point; those of the front are bold and choose first.
 
     A name that was moved far gets a line to its point; one that finds no place is left to the mark's own words.
@@ -151,6 +160,7 @@ def _name(study: Study, row: Row, rows: list[Row]) -> str:
     """The method's title, and what tells it from its other points."""
     same = [other for other in rows if other["method"] == row["method"]]
     more = ["tuned"] if row["settings"] == "tuned" and any(other["settings"] != "tuned" for other in same) else []
+    more += ["ships"] if row["settings"] == "shipped" else []
     more += ["int8"] if row["precision"] == "int8" else []
     return ", ".join([reading.title(study, row["method"]), *more])
 

@@ -11,9 +11,9 @@ Row = dict[str, Any]
 FAMILIES = (
     "spatio-temporal features", "touch-pattern features", "motion history image", "recurrent", "beyond the paper",
 )  # fmt: skip
-PROTOCOLS = ("paper", "clean", "participants", "real", "online")
+PROTOCOLS = ("paper", "padded", "clean", "participants", "real", "foreign", "online")
 AUGMENTATIONS = {"none": "no augmentation", "shift": "shifted (Algorithm 1)", "wide": "wide randomisation"}
-SETTINGS = {"paper": "the paper's", "tuned": "tuned"}
+SETTINGS = {"paper": "the paper's", "tuned": "tuned", "shipped": "ships"}
 SHORT = {" features, ": " ", "k nearest neighbours": "KNN", "support vector machine": "SVM", " (RBF)": ""}  # in figures
 KINDS = ("gesture", "participant", "signal to noise", "speed", "inclination", "hand size", "pressure", "place")
 NEAR = 0.05  # a figure this close to the published one counts as reproduced
@@ -189,7 +189,11 @@ def group(rows: list[Row], method: str, name: str) -> Row | None:
 
 def matrices(study: Study) -> list[Row]:
     """Of each method the cell whose confusion matrix is shown: new people first, then tuned, most augmented."""
-    first = ("participants", "clean", "paper", "real", "online"), ("tuned", "paper"), ("wide", "shift", "none")
+    first = (
+        ("participants", "clean", "paper", "padded", "real", "foreign", "online"),
+        ("tuned", "paper"),
+        ("wide", "shift", "none"),
+    )
     keys = ("protocol", "settings", "augmentation")
     drawn = [row for row in cells(study) if row.get("confusion")]
     drawn.sort(key=lambda row: [order.index(row[key]) for order, key in zip(first, keys, strict=True)])

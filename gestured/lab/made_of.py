@@ -1,0 +1,40 @@
+"""What a generated table was made of: one line above it with its command and the digests of models and files.
+
+A test compares the line with the files of the checkout, so that no table outlives the models that it speaks of.
+"""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from gestured.lab.digest import file_digest
+from gestured.model.model import shipped
+
+SHOWN = 12  # digits of a SHA-256 that are written: no two files of a project share them
+LINE = re.compile(r"<!-- made by `([^`]+)` of ((?:\S+ [0-9a-f]{12}(?:, )?)+) -->")
+OLDER = "**Made with models that no longer ship, or with older code; to be made again.**"  # stands below such a line
+
+
+def made_of(command: str, files: Iterable[Path]) -> str:
+    """The line, for a table that `command` prints of these files."""
+    return f"<!-- made by `{command}` of {', '.join(f'{p.name} {file_digest(p)[:SHOWN]}' for p in files)} -->"
+
+
+def models_and_manifest() -> list[Path]:
+    """What most tables are made of: the shipped models and the figures beside them."""
+    paths = list(shipped().values())
+    return [*paths, paths[0].parent / "manifest.json"]
+
+
+def stale(text: str, files: Iterable[Path]) -> list[str]:
+    """Of the lines in a text those that name another file than these, and do not say so (`OLDER`), in words."""
+    now = {path.name: file_digest(path)[:SHOWN] for path in files}
+    lines, found = text.splitlines(), []
+    for number, line in enumerate(lines):
+        match = LINE.fullmatch(line.strip())
+        if match is None or OLDER in lines[number + 1 : number + 3]:
+            continue
+        for name, digest in (part.split() for part in match[2].split(", ")):
+            if now.get(name) != digest:
+                found.append(f"line {number + 1}: `{match[1]}` was made of another {name} ({digest}); run it again")
+    return found

@@ -1,0 +1,68 @@
+"""When an answer is said, and how often it is wrong: provisional and final, relative to the last touched frame.
+
+A shipped model plays sessions of new people in this process, as the daemon would, frame by frame. A model without
+thresholds for provisional answers gives final ones alone.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from gestured.core.events import Gesture
+from gestured.core.frames import Frame
+from gestured.core.front_end import FrontEnd
+from gestured.core.recognizer import Recognizer
+from gestured.lab.online import takes
+from gestured.lab.study.bootstrap import interval
+from gestured.model.model import Model
+from gestured.simulator import GESTURES, Take
+
+GROUPS = {
+    "taps": ("one_tap", "double_tap"),
+    "swipes": ("swipe_down", "swipe_up", "swipe_right", "swipe_left"),
+    "circles": ("circle_clockwise", "circle_counter_clockwise"),
+    "two fingers": ("swipe_up_two_fingers", "swipe_down_two_fingers"),
+}
+SLACK_S = 0.3  # by which an onset may lie beside what was performed and still belong to it
+FIRST_PERSON = 940  # the sessions of `online` have others
+
+
+def said(model: Model, minutes: float) -> list[dict[str, Any]]:
+    """The section of study.json: for each group and kind of answer, when and how often wrong."""
+    found: dict[tuple[str, str], list[tuple[float, bool, int]]] = {}
+    for person, (_, take) in enumerate(takes(minutes, 0.0, FIRST_PERSON)):
+        for kind, label, after_s, wrong in _answers(model, take):
+            group = next(name for name, some in GROUPS.items() if label in some)
+            found.setdefault((group, kind), []).append((after_s, wrong, person))
+    return [
+        {"group": group, "kind": kind, **_row(found[group, kind])}
+        for group in GROUPS for kind in ("provisional", "final") if (group, kind) in found
+    ]  # fmt: skip
+
+
+def _row(answers: list[tuple[float, bool, int]]) -> dict[str, Any]:
+    after, wrong, people = (np.array(column) for column in zip(*answers, strict=True))
+    share, low, high = interval(wrong, people)
+    early, middle, late = np.quantile(after, [0.1, 0.5, 0.9])
+    return {
+        "n": len(after), "wrong": round(share, 4), "low": round(low, 4), "high": round(high, 4),
+        "p10_s": round(float(early), 3), "p50_s": round(float(middle), 3), "p90_s": round(float(late), 3),
+    }  # fmt: skip
+
+
+def _answers(model: Model, take: Take) -> Iterator[tuple[str, str, float, bool]]:
+    """(kind, what was performed, seconds after its last touched frame, wrong or not) of each answer to a gesture."""
+    recognizer = Recognizer(FrontEnd("said", *take.frames.shape[1:]), model)
+    events: list[Any] = []
+    for t, values in zip(take.sensor_times, take.frames, strict=True):
+        events += recognizer.push(Frame(float(t), values))
+    events += recognizer.flush(float(take.sensor_times[-1]) + 2.0)
+    for event in events:
+        kind = "final" if isinstance(event, Gesture) else type(event).__name__.lower()
+        if kind not in ("final", "provisional"):
+            continue
+        for act in take.events:
+            if act.label in GESTURES and act.onset_s - SLACK_S <= event.onset <= act.offset_s + SLACK_S:
+                yield kind, act.label, event.decided - act.offset_s, event.gesture != act.label
+                break

@@ -1,0 +1,53 @@
+"""Tables that a command has printed are of the models in this checkout, or say that they are not."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from gestured.lab.made_of import LINE, OLDER, made_of, models_and_manifest, stale
+from gestured.model.model import shipped
+from tests.documents.blocks import ROOT, documents
+
+# The tables that speak of the shipped models, and the beginning of the command that makes them.
+GENERATED = {
+    "README.md": ("gestured-lab evaluate", "python -m tests.foreign.judge"),
+    "docs/performance.md": ("make bench",),
+    "docs/numerics.md": ("gestured-lab stability",),
+    "docs/reliability.md": ("python -m tests.hostile.damage",),
+    "docs/study.md": ("gestured-lab study",),
+}
+
+
+def files() -> list[Path]:
+    return [*models_and_manifest(), *(ROOT / "docs").glob("*.json"), *(ROOT / "docs").glob("*.svg")]
+
+
+@pytest.mark.parametrize("path", documents(), ids=lambda path: path.name)
+def test_no_table_outlives_its_models(path: Path) -> None:
+    assert stale(path.read_text(), files()) == []
+
+
+@pytest.mark.parametrize("name", GENERATED)
+def test_every_generated_table_says_what_it_was_made_of(name: str) -> None:
+    commands = [command for command, _ in LINE.findall((ROOT / name).read_text())]
+    for wanted in GENERATED[name]:
+        assert any(command.startswith(wanted) for command in commands), wanted
+
+
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_a_card_is_its_models(name: str) -> None:
+    card = shipped()[name].with_suffix(".md").read_text()
+    of = made_of("gestured-lab evaluate", [shipped()[name]])
+    assert re.findall(r"SHA-256 \| `([0-9a-f]{12})", card) == [of.split()[-2]]
+
+
+def test_a_changed_file_is_told_unless_the_document_says_so(tmp_path: Path) -> None:
+    model = tmp_path / "cnn_lstm.onnx"
+    model.write_bytes(b"one")
+    text = made_of("make it", [model])
+    assert LINE.fullmatch(text) and stale(text, [model]) == []
+    model.write_bytes(b"two")
+    (said,) = stale(text, [model])
+    assert "line 1" in said and "`make it`" in said and "cnn_lstm.onnx" in said
+    assert stale(f"{text}\n{OLDER}\n", [model]) == []

@@ -1,0 +1,49 @@
+"""The picture of error against run time: every point in it, drawn again from what is kept."""
+
+import json
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+pytest.importorskip("torch")
+pytest.importorskip("matplotlib", reason="needs the extra [lab]")
+
+from gestured.lab import cli
+from gestured.lab.made_of import stale
+from gestured.lab.study.report.picture import FIELDS, write_picture
+from tests.lab.study.made_study import NAMES, made_study
+
+
+def test_it_tells_of_every_model_in_every_field_and_of_every_answer(tmp_path: Path) -> None:
+    study = made_study()
+    root = ElementTree.fromstring(write_picture(study, tmp_path).read_text())
+    told = [title.text or "" for title in root.iter("{http://www.w3.org/2000/svg}title")]
+    for row in study["run_time"]:
+        if row["precision"] == "int8":
+            continue
+        for field, words in FIELDS.items():
+            of = row["fields"][field]
+            start = f"{NAMES[row['method']]} ({row['settings']}, {row['precision']}), {words}: "
+            (found,) = [text for text in told if text.startswith(start)]
+            assert f"{100 * of['wrong']:.1f}\u202f% wrong, {100 * of['error']:.1f}\u202f% wrong or lost" in found
+    for row in study["said"]:
+        assert any(text.startswith(f"{row['group']}, {row['kind']}: ") for text in told)
+
+
+def test_it_is_drawn_again_from_what_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first = write_picture(made_study(), tmp_path)
+    again = tmp_path / "again"
+    assert cli.main(["study", "--draw", str(tmp_path / "operating-points.json"), "--out", str(again)]) == 0
+    assert (again / first.name).read_text() == first.read_text()
+    path, origin = capsys.readouterr().out.splitlines()
+    assert Path(path).samefile(again / first.name) and stale(origin, again.iterdir()) == []
+    assert not re.search(r"\b(nan|inf|None)\b", first.read_text())
+
+
+def test_what_is_no_study_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "x.json"
+    path.write_text(json.dumps({"about": {}}))
+    assert cli.main(["study", "--draw", str(path), "--out", str(tmp_path)]) == 1
+    assert capsys.readouterr().err.startswith(f"gestured-lab: --draw: {path}: expected study.json")
