@@ -53,6 +53,7 @@ def parser() -> argparse.ArgumentParser:
                    "gestured-lab evaluate --models models")  # fmt: skip
     evaluate.add_argument("--models", type=Path, default=MODELS, help=f"folder of the models ({MODELS})")
     evaluate.add_argument("--networks", action="store_true", help="also compare each network alone and with a second")
+    evaluate.add_argument("--field", action="store_true", help="also compare rules for deciding early")
     evaluate.add_argument("--curve", action="store_true", help="also print right, wrong and accepted by threshold")
     evaluate.add_argument("--readme", type=Path, help="a README whose table of figures is renewed")
     add_data(evaluate)

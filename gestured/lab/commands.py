@@ -13,7 +13,7 @@ from gestured.lab.cards import write_block, write_cards
 from gestured.lab.cli import REAL_FOLDER
 from gestured.lab.evaluate import Evaluation, held_out_kinds, print_curve, real_figures, simulated_figures
 from gestured.lab.export import write_manifest
-from gestured.lab.networks import compare
+from gestured.lab.networks import compare, compare_rules
 from gestured.lab.own import command as own
 from gestured.lab.own.command import open_file, teach
 from gestured.lab.train import TrainingPlan, calibration_set, learn, load_data, train
@@ -43,7 +43,7 @@ def train_models(args: argparse.Namespace) -> int:
         path = args.out / f"{name}.onnx"
         if open_file(path).embeds:
             teach(path, args.cache, own.QUICK_PEOPLE if args.quick else own.PEOPLE, args.jobs)
-    args.models, args.readme, args.curve, args.networks = args.out, None, False, False
+    args.models, args.readme, args.curve, args.networks, args.field = args.out, None, False, False, False
     return evaluate_models(args)
 
 
@@ -65,6 +65,8 @@ def evaluate_models(args: argparse.Namespace) -> int:
     calibrated = calibration_set(trained, data, plan)
     if args.networks:
         compare(trained, calibrated, data, plan)
+    if args.field:
+        compare_rules(trained, calibrated, data, plan, paths["cnn_lstm"])
     for name, found in real_figures(trained, calibrated, data).items():
         figures[name]["real"] = found
     figures["cnn_lstm"]["held_out_kinds"] = held_out_kinds(trained, data, plan)

@@ -11,7 +11,8 @@ from torch import Tensor, nn
 
 from gestured.lab.dataset import WINDOW, Samples, join
 from gestured.lab.early import Answers, Asked, at_release, calibrated, published, tap_threshold
-from gestured.lab.fit import FitConfig, logits
+from gestured.lab.field import Contacts
+from gestured.lab.fit import FitConfig, logits, targets
 from gestured.lab.nets import Decision
 from gestured.lab.prefixes import prefixes
 from gestured.simulator import GESTURES
@@ -52,6 +53,21 @@ class Foretold:
         together = join([samples for _, samples in parts])
         contacts = np.concatenate(contact), np.concatenate(since), np.concatenate(second)
         return cls(together, _joined(whole), _joined(released), _joined(early), *contacts)
+
+    def contacts(self, name: str, decision: Decision) -> Contacts:
+        """The gestures that are no taps, as a network with its decision sees them."""
+        labels = targets(self.samples)
+        chosen = (labels >= 0) & (labels < len(GESTURES)) & ~np.isin(self.samples.labels, (TAP, DOUBLE))
+        of = chosen[self.contact]
+        with torch.no_grad():
+            scores = decision(self.prefixes[name], self.prefixes["trajectory"])[0].numpy()[of]
+            whole = decision(self.whole[name], self.whole["trajectory"])[0].numpy()[chosen]
+        place = np.cumsum(chosen) - 1
+        asked = Asked(
+            place[self.contact[of]], self.since[of] / WINDOW.rate_hz, scores.argmax(axis=1),
+            scores.max(axis=1).astype(np.float64), whole.argmax(axis=1), self.samples.people[chosen],
+        )  # fmt: skip
+        return Contacts(asked, scores, labels[chosen])
 
     def rule(self, name: str, decision: Decision, least: float) -> dict[str, Any]:
         """The metadata `provisional` of a network with its decision, that publishes from `least` on."""

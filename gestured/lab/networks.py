@@ -1,5 +1,6 @@
 """Which network: each alone and with its second opinion, on the same data, with rejection, error against run time."""
 
+import json
 import tempfile
 import time
 from pathlib import Path
@@ -15,9 +16,12 @@ from gestured.lab.dataset import WINDOW
 from gestured.lab.decide import fit_decision, threshold
 from gestured.lab.evaluate import Evaluation, outcome
 from gestured.lab.export import Facts, export_net
+from gestured.lab.field import table
 from gestured.lab.fit import logits, targets
+from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Decision, Judged, Opinion
-from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan
+from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan, judged
+from gestured.model.file import inspect
 from gestured.model.model import Model, open_model
 from gestured.simulator import GESTURES
 
@@ -82,4 +86,23 @@ def compare(trained: Trained, calibrated: Calibrated, data: TrainingData, plan: 
                 result = outcome((scores.numpy(), unknown.numpy()), labels, least, data.performed[test])
                 figures[title][test] = result.wrong + result.lost
                 print(f"{result.row(f'{title}, {test}')}{result.wrong + result.lost:>8.3f}{took:>9.2f}", flush=True)
+    return figures
+
+
+def compare_rules(
+    trained: Trained, calibrated: Calibrated, data: TrainingData, plan: TrainingPlan, path: Path
+) -> dict[str, Any]:
+    """Print how early and how rightly each rule of `field` decides on the test sets, with the network in `path`."""
+    name = path.stem
+    module, _, _ = judged(trained, name, calibrated)
+    rule = json.loads(inspect(path.read_bytes())["provisional"])
+    teach = Foretold.of([(trained.nets, data.calibrate)], plan.fit).contacts(name, module.decision)
+    figures: dict[str, Any] = {}
+    print(f"{'rule':<40}{'earliness':>10}{'accuracy':>10}{'harmonic mean':>15}", flush=True)
+    for test, samples in data.tests.items():
+        contacts = Foretold.of([(trained.nets, samples)], plan.fit).contacts(name, module.decision)
+        figures[test] = table(teach, contacts, rule, GESTURES)
+        for title, row in figures[test].items():
+            cells = f"{row['earliness']:>10.3f}{row['accuracy']:>10.3f}{row['harmonic_mean']:>15.3f}"
+            print(f"{f'{title}, {test}':<40}{cells}", flush=True)
     return figures
