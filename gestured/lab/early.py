@@ -21,12 +21,15 @@ from gestured.lab.prefixes import floors
 CONFIRMED = 0.97  # share of the events that the answer must confirm, in every stretch
 DOUBT = 0.1  # probability that a threshold is let through although it does not
 IN_A_ROW = 2  # frames that must agree: one alone may be noise
-# Beginnings of the stretches in s, half-way between frames at 15 Hz.
-STRETCHES = (0.0, 0.1, 0.167, 0.233, 0.3, 0.433, 0.633, 0.9, 1.3)
+STRETCHES = (0.0, 0.233, 0.367, 0.5, 0.7, 1.0)  # their beginnings in s, half-way between frames at 15 Hz
+STARTS = (120, 240, 480)  # people with an event; 112 is the least that a third of the doubt can be tested with
 LADDER = (
     0.999, 0.998, 0.997, 0.996, 0.995, 0.993, 0.99, 0.987, 0.983, 0.98, 0.975, 0.97, 0.96, 0.95, 0.94, 0.92, 0.9, 0.87,
     0.84, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.5,
 )  # fmt: skip
+
+
+Questions = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_], NDArray[np.int64]]  # see `safe_from`
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,23 +56,16 @@ class Asked:
         return np.searchsorted(STRETCHES, self.elapsed_s + 1e-9, side="right") - 1
 
 
-def enough(events: int, share: float = CONFIRMED, doubt: float = DOUBT) -> bool:
-    """Whether so many events could pass the test at all, were they all confirmed."""
-    return bool(share**events <= doubt)
-
-
-def passes(
-    people: NDArray[np.int64], revoked: NDArray[np.bool_], share: float = CONFIRMED, doubt: float = DOUBT
-) -> bool:
-    """Whether events of these people show that at least `share` is confirmed: a binomial test over people.
+def chance_of(people: NDArray[np.int64], revoked: NDArray[np.bool_], share: float = CONFIRMED) -> float:
+    """How likely so few revoked events would be if less than `share` were confirmed: a binomial test over people.
 
     A person counts once, with the share of that person's events that were revoked.
     """
     _, who = np.unique(people, return_inverse=True)
     if not len(who):
-        return False
+        return 1.0
     each = np.bincount(who, revoked) / np.bincount(who)
-    return at_most(math.ceil(each.sum() - 1e-9), len(each), 1 - share) <= doubt
+    return at_most(math.ceil(each.sum() - 1e-9), len(each), 1 - share)
 
 
 def at_most(most: int, of: int, chance: float) -> float:
@@ -81,24 +77,41 @@ def at_most(most: int, of: int, chance: float) -> float:
 
 def safe_from(
     sure: NDArray[np.float64], contact: NDArray[np.int64], wrong: NDArray[np.bool_], person: NDArray[np.int64]
-) -> tuple[float | None, bool]:
-    """The lowest threshold that passes among the questions of one stretch, None for none; and whether data sufficed.
+) -> float | None:
+    """The lowest threshold that passes among the questions of one stretch, None for none.
 
-    `wrong` (N,) says of each question whether an event given there would be revoked; `person` (N,) whose it is.
+    `wrong` (N,) says of each question whether an event given there would be revoked; `person` (N,) whose it is. Testing
+    begins at several places, where so many people have an event as in `STARTS`, each with its part of the doubt: at the
+    safest threshold there are so few that a single revoked one would end it.
     """
-    found: float | None = None
-    tested = False
+    chances: list[tuple[float, int, float]] = []
     for threshold in LADDER:
         reached = np.flatnonzero(sure >= threshold)
         _, first = np.unique(contact[reached], return_index=True)
         events = reached[first]
-        if not tested and not enough(len(np.unique(person[events]))):
-            continue
-        tested = True
-        if not passes(person[events], wrong[events]):
-            break
-        found = threshold
-    return found, tested
+        chances.append((threshold, len(np.unique(person[events])), chance_of(person[events], wrong[events])))
+    found: float | None = None
+    for start in STARTS:
+        for threshold, people, chance in chances:
+            if people < start:
+                continue
+            if chance > DOUBT / len(STARTS):
+                break
+            found = threshold if found is None else min(found, threshold)
+    return found
+
+
+def deceives(questions: Questions, level: float) -> bool:
+    """Whether events at this threshold are surely revoked more often than allowed, though others' are not."""
+    sure, contact, wrong, person = questions
+    reached = np.flatnonzero(sure >= level)
+    _, first = np.unique(contact[reached], return_index=True)
+    events = reached[first]
+    _, who = np.unique(person[events], return_inverse=True)
+    if not len(who):
+        return False
+    each = np.bincount(who, wrong[events]) / np.bincount(who)
+    return 1 - at_most(math.floor(each.sum() + 1e-9) - 1, len(each), 1 - CONFIRMED) <= DOUBT
 
 
 def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None) -> dict[str, Any]:
@@ -117,14 +130,18 @@ def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None) -> dict
         sure = np.where(again, np.minimum(asked.confidence, earlier), 0.0)
         now = (stretch == k) & ~given[asked.contact]
 
-        def lowest(chosen: NDArray[np.bool_], sure: NDArray[np.float64] = sure) -> tuple[float | None, bool]:
-            return safe_from(sure[chosen], asked.contact[chosen], wrong[chosen], person[chosen])
+        def of(chosen: NDArray[np.bool_], sure: NDArray[np.float64] = sure) -> Questions:
+            return sure[chosen], asked.contact[chosen], wrong[chosen], person[chosen]
 
-        own = {g: lowest(now & (asked.best == g)) for g in range(len(gestures))}
-        rest = [g for g, (_, tested) in own.items() if not tested]
-        general.append(lowest(now & np.isin(asked.best, rest))[0])
+        everybody = safe_from(*of(now))
+        general.append(everybody)
         for g, name in enumerate(gestures):
-            rows[name].append(own[g][0] if own[g][1] else general[-1])
+            mine = of(now & (asked.best == g))
+            own = safe_from(*mine)
+            if everybody is not None and deceives(mine, everybody):
+                rows[name].append(own if own is not None and own > everybody else None)
+            else:
+                rows[name].append(min((t for t in (own, everybody) if t is not None), default=None))
         level = np.array([row[-1] if row[-1] is not None else np.inf for row in rows.values()])[asked.best]
         reached |= (stretch == k) & (asked.confidence >= level)
         given[asked.contact[now & (sure >= level)]] = True
@@ -182,4 +199,4 @@ def tap_threshold(answers: Answers, answer: NDArray[np.int64], person: NDArray[n
     scores, unknown = answers
     confidence = scores.max(axis=1).astype(np.float64) * (1 - unknown)
     sure = np.where(scores.argmax(axis=1) == tap, confidence, 0.0)
-    return safe_from(sure, np.arange(len(person)), answer != tap, person)[0]
+    return safe_from(sure, np.arange(len(person)), answer != tap, person)
