@@ -58,7 +58,8 @@ def main() -> int:
     rows = []
     if not args.json:
         print(
-            f"{machine()}\n{made_of('make bench', models_and_manifest())}\n\n| figure | gestured | against | ratio | to reach | |\n|---|---|---|---|---|---|",
+            f"{machine()}\n{made_of('make bench', models_and_manifest())}\n\n"
+            "| figure | gestured | against | ratio | to reach | |\n|---|---|---|---|---|---|",
             flush=True,
         )
     for name in args.only or parts:

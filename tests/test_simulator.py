@@ -383,8 +383,8 @@ def test_line_bursts_hit_whole_rows_or_columns_of_single_frames() -> None:
         )
         for rate in (0.0, 60.0)
     )
-    usual = np.abs(quiet.frames - np.median(quiet.frames, axis=0)).max()
-    above = np.abs(loud.frames - np.median(loud.frames, axis=0))
+    usual = np.abs(quiet.frames - np.median(quiet.frames.astype(float), axis=0)).max()
+    above = np.abs(loud.frames - np.median(loud.frames.astype(float), axis=0))
     struck = np.flatnonzero(above.max(axis=(1, 2)) > 4 * usual)
     assert len(struck) >= 5
     for frame in above[struck]:

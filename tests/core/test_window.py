@@ -222,6 +222,9 @@ def test_what_changes_evenly_still_does_at_any_rate(rate: float, frames: int, ji
     n = max(round(frames / 15 * rate), 3)
     rng = np.random.default_rng(seed)
     times = (np.arange(n) + jitter * rng.uniform(-1, 1, n)) / rate
+    assume(
+        other_rate(1 / float(np.median(np.diff(times))))
+    )  # few frames with much jitter may look like the model's rate
     values = linear(times, seed)
     found = scaled(TEXYZ, values, times)
     at = times[0] + np.arange(len(found)) / 15

@@ -49,7 +49,7 @@ def test_it_is_made_at_most_thirty_times_a_second_and_only_when_somebody_asks(mo
     clock: Any = SimpleNamespace(now=100.0, monotonic=lambda: clock.now, time=lambda: 1.7e9 + clock.now)
     monkeypatch.setattr(operations, "time", clock)
     verbs = operations.Operations(
-        parts.hub, parts.desk, None, parts.watch, parts.taps, parts.metrics, lambda: SNAPSHOT, None
+        parts.hub, parts.desk, None, parts.watch, parts.taps, parts.metrics, None, lambda: SNAPSHOT, None
     ).verbs()
     parts.feed("arm", Hand().idle(2.0), 90.0)
     assert made == []

@@ -163,14 +163,14 @@ class Logits(Net):
 class Embedding(Net):
     """Gives what its head sees, too."""
 
-    def forward(self, frames: Tensor) -> tuple[Tensor, ...]:
+    def forward(self, frames: Tensor) -> tuple[Tensor, ...]:  # type: ignore[override]
         return (*super().forward(frames), frames.flatten(2).amax(1))
 
 
 class MixedEmbedding(Embedding):
     """One window's embedding depends on the others in its batch."""
 
-    def forward(self, frames: Tensor) -> tuple[Tensor, ...]:
+    def forward(self, frames: Tensor) -> tuple[Tensor, ...]:  # type: ignore[override]
         scores, unknown, embedding = super().forward(frames)
         return scores, unknown, embedding - embedding.mean(0)
 
