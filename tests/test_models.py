@@ -196,7 +196,7 @@ def test_grid_of_the_window_must_be_that_of_the_graph(tmp_path: Path) -> None:
         ({"takes": "features", "shape": ("B", 3)}, ["'features' has the shape (any, 3)"]),
         ({"takes": "features", "drop": ("features",)}, ["['features']", "['frames']"]),
         ({"number": "double"}, ["tensor(double)", "tensor(float)"]),
-        ({"outputs": ("scores", "rejected")}, ["rejected", "expected 'scores', 'unknown'"]),
+        ({"outputs": ("scores", "rejected")}, ["rejected", "'scores', 'unknown' and perhaps 'embedding'"]),
         ({"classes": 3}, ["'scores' has the shape (any, 3)", "expected (any, 2)"]),
         ({"gain": 39.0}, ["self-test", "expected 0.001"]),
         ({"extra": "no probabilities"}, ["self-test", "not probabilities"]),

@@ -5,9 +5,7 @@ the model that was there when it was enrolled had it.
 """
 
 import base64
-import binascii
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +17,8 @@ from gestured.core.frames import Segment
 from gestured.core.prototypes import EXAMPLES
 from gestured.core.window import Window
 
-NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
+LETTERS = "abcdefghijklmnopqrstuvwxyz"
+LONGEST_NAME = 32  # characters
 RESERVED = ("use", "unknown", "none")  # of the configuration, of answers, and of recordings
 MOST = 20  # gestures
 MOST_FRAMES = 200  # of an example; the longest contact takes some 80 at 15 Hz
@@ -93,7 +92,8 @@ def from_dict(told: object) -> Examples:
 
 def is_name(name: str) -> bool:
     """Whether a gesture of the user's own may be called that."""
-    return NAME.fullmatch(name) is not None and name not in RESERVED
+    plain = set(name) <= set(LETTERS + "0123456789_") and 0 < len(name) <= LONGEST_NAME
+    return plain and name[0] in LETTERS and name not in RESERVED
 
 
 def _example(told: Any, place: str) -> Example:
@@ -109,6 +109,6 @@ def _example(told: Any, place: str) -> Example:
             raise ValueError
         if not (np.isfinite(frames).all() and 0 <= frames.min() and frames.max() <= 1):
             raise ValueError
-    except (KeyError, TypeError, ValueError, OverflowError, binascii.Error):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise ValueError(f"{place}: expected shape, rate_hz, first, last, noise and frames of an example") from None
     return Example(frames, rate_hz, first, last, noise)
