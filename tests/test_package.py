@@ -247,9 +247,10 @@ def test_a_type_checker_sees_the_front_door(environment: Environment):
     ("extra", "flags"),
     [
         ("mqtt", ["mqtt", "--broker", "localhost"]),
+        ("zenoh", ["zenoh"]),
         ("serial", ["serial", "/dev/ttyUSB0", "--protocol", "csv", "--sensor", "armrest"]),
     ],
-    ids=["mqtt", "serial"],
+    ids=["mqtt", "zenoh", "serial"],
 )
 def test_without_its_extra_a_bridge_says_what_to_install(installed: Path, tmp_path: Path, extra: str, flags: list[str]):
     code = f"sys.argv = ['gestured-bridge', *{flags!r}]\nfrom gestured.bridge.cli import main\nsys.exit(main())"

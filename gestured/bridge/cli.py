@@ -5,12 +5,12 @@ import sys
 from collections.abc import Sequence
 
 import gestured
-from gestured.bridge import mqtt, serial
+from gestured.bridge import mqtt, serial, zenoh
 from gestured.client.lines import JOIN, Forbidden
 from gestured.client.say import say
 from gestured.core.errors import GesturedError
 
-BRIDGES = (mqtt, serial)
+BRIDGES = (mqtt, zenoh, serial)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -20,6 +20,7 @@ def parser() -> argparse.ArgumentParser:
         description="Connects gestured to other buses, and sensors on serial lines to gestured.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gestured-bridge mqtt --broker 192.168.7.2\n"
+        "  gestured-bridge zenoh --connect tcp/192.168.7.2:7447 --site car7\n"
         "  gestured-bridge serial /dev/ttyUSB0 --protocol flexitac --sensor glove --grid 16x32",
     )
     top.add_argument("--version", action="version", version=f"gestured-bridge {gestured.__version__}")

@@ -42,6 +42,19 @@ def test_the_mqtt_consumer(bridge, broker, daemon: Daemon):
     assert first_line(code, daemon) == "armrest swipe_left\n"
 
 
+def test_the_zenoh_consumer(bridge, daemon: Daemon):
+    pytest.importorskip("zenoh", reason="the bridge to Zenoh needs the extra [zenoh]")
+    from tests.bridge import test_zenoh
+
+    site = test_zenoh.Site()
+    try:
+        test_zenoh.begin(bridge, site, daemon).ready()
+        code = consumer("import zenoh").replace("tcp/192.168.7.2:7447", site.endpoint)
+        assert first_line(code, daemon) == "armrest swipe_left\n"
+    finally:
+        site.close()
+
+
 SYSTEMCTL = """#!/bin/sh
 cat <<'END'
 Id=gestured-bridge@house.service

@@ -1,0 +1,237 @@
+"""Events and frames through a real router: Zenoh's own, from its wheel."""
+
+import json
+import queue
+import socket
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.bridge.conftest import Process, emit, free_port, wait
+from tests.bridge.test_mqtt import STATUS, gesture
+from tests.control.conftest import HELLO, FakeDaemon
+from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, counted
+
+zenoh = pytest.importorskip("zenoh", reason="the bridge to Zenoh needs the extra [zenoh]")
+
+
+def opened(mode: str, *, listen: str = "", connect: str = "") -> Any:
+    """A session that looks for nobody by itself."""
+    config = zenoh.Config()
+    for key, value in {
+        "mode": mode,
+        "listen/endpoints": [listen] if listen else [],
+        "connect/endpoints": [connect] if connect else [],
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+    }.items():
+        config.insert_json5(key, json.dumps(value))
+    return zenoh.open(config)
+
+
+class Site:
+    """A router, and a client of it that hears all."""
+
+    def __init__(self) -> None:
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self.router = opened("router", listen=self.endpoint)
+        self.client = opened("client", connect=self.endpoint)
+        self.samples: queue.Queue[Any] = queue.Queue()
+        self.tokens: queue.Queue[tuple[str, bool]] = queue.Queue()
+        self._hears = self.client.declare_subscriber("gestured/**", self.samples.put)
+        self._sees = self.client.liveliness().declare_subscriber(
+            "gestured/**", lambda sample: self.tokens.put((str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
+        )
+
+    def event(self) -> tuple[str, dict[str, Any]]:
+        """The next event, and its key."""
+        sample = self.samples.get(timeout=DEADLINE_S)
+        return str(sample.key_expr), json.loads(sample.payload.to_bytes())
+
+    def token(self) -> tuple[str, bool]:
+        """The next token that comes (True) or goes."""
+        return self.tokens.get(timeout=DEADLINE_S)
+
+    def get(self, key: str) -> dict[str, Any]:
+        """What is answered to a question."""
+        replies = self.client.get(key)
+        return {str(reply.ok.key_expr): json.loads(reply.ok.payload.to_bytes()) for reply in replies if reply.ok}
+
+    def close(self) -> None:
+        self.client.close()
+        self.router.close()
+
+
+@pytest.fixture
+def site() -> Iterator[Site]:
+    site = Site()
+    yield site
+    site.close()
+
+
+def begin(bridge: Callable[..., Process], site: Site, daemon: Any, *more: object) -> Process:
+    """A bridge of the site `car`."""
+    path = daemon.path if isinstance(daemon, FakeDaemon) else daemon.socket
+    return bridge("zenoh", "--connect", site.endpoint, "--site", "car", "--socket", path, *more)
+
+
+def test_a_real_daemons_events_arrive(bridge, site, daemon: Daemon):
+    process = begin(bridge, site, daemon)
+    assert process.ready()["site"] == "car"
+    client = daemon.client()
+    for name in ("swipe_left", "one_tap"):
+        emit(daemon, name)
+        line = client.events("gesture", "armrest")[-1]
+        assert site.event() == ("gestured/car/armrest/gesture", line | {"instance": client.hello["instance"]})
+    client.close()
+    assert process.stop() == 0
+
+
+def test_other_types_and_unknown_keys_are_passed_on(bridge, site, fake):
+    process = begin(bridge, site, fake, "--types", "gesture,provisional", "--sensors", "armrest")
+    fake.accept()
+    asked = fake.request()["subscribe"]
+    assert asked == {"types": ["gesture", "provisional", "status"], "sensors": ["armrest"]}
+    process.ready()
+    fake.say(gesture(1) | {"type": "provisional"}, gesture(1, provisional="confirmed"))
+    assert site.event()[0] == "gestured/car/armrest/provisional"
+    key, event = site.event()
+    assert (key, event["provisional"]) == ("gestured/car/armrest/gesture", "confirmed")
+
+
+def test_tokens_live_as_daemon_and_sensors_do(bridge, site, fake):
+    process = begin(bridge, site, fake)
+    fake.accept()
+    assert site.token() == ("gestured/car/alive", True)
+    fake.say(STATUS)
+    assert site.token() == ("gestured/car/armrest/alive", True)
+    fake.say(STATUS | {"sensors": {"armrest": "stale"}})
+    assert site.token() == ("gestured/car/armrest/alive", False)
+    fake.close()  # as after a kill of the daemon
+    assert site.token() == ("gestured/car/alive", False)
+    fake.accept()
+    assert site.token() == ("gestured/car/alive", True)
+    process.process.kill()
+    assert site.token() == ("gestured/car/alive", False)
+
+
+def test_latecomers_ask(bridge, site, fake):
+    process = begin(bridge, site, fake)
+    fake.accept()
+    process.ready()
+    fake.say(gesture(1), gesture(2, "double_tap"), {"type": "gestures", "gestures": ["one_tap", "wave"]}, STATUS)
+    wait(lambda: site.get("gestured/car/hello")["gestured/car/hello"]["gestures"] == ["one_tap", "wave"])
+    found = site.get("gestured/*/**")
+    assert found.keys() == {"gestured/car/hello", "gestured/car/armrest/gesture"}
+    assert found["gestured/car/armrest/gesture"]["sequence"] == 2
+    assert found["gestured/car/hello"]["instance"] == HELLO["instance"]
+
+
+def test_a_router_that_goes_and_comes_back(bridge, site, fake):
+    process = begin(bridge, site, fake)
+    fake.accept()
+    process.ready()
+    site.router.close()
+    fake.say(*(gesture(n) for n in range(1, 50)), STATUS)
+    process.until("no router and no peer")
+    site.router = opened("router", listen=site.endpoint)
+
+    def is_back() -> bool:
+        fake.say(STATUS)
+        return process.said().count("Zenoh is there") == 2
+
+    wait(is_back, process.said)
+
+    def heard() -> bool:
+        fake.say(gesture(50))
+        return not site.samples.empty()
+
+    wait(heard)
+    assert site.event()[1]["sequence"] == 50
+
+
+def test_a_router_that_is_not_there_yet_is_waited_for(bridge, fake):
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    process = bridge("zenoh", "--connect", endpoint, "--site", "car", "--socket", fake.path)
+    fake.accept()
+    assert endpoint in process.until("trying again")
+    router = opened("router", listen=endpoint)
+    wait(lambda: fake.say(STATUS) or "Zenoh is there" in process.said(), process.said)
+    process.ready()
+    router.close()
+
+
+def test_peers_need_no_router(bridge, fake):
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    bridge("zenoh", "--listen", endpoint, "--site", "car", "--socket", fake.path)
+    fake.accept()
+
+    def called() -> Any:
+        try:
+            return opened("client", connect=endpoint)
+        except zenoh.ZError:
+            return None
+
+    peer = wait(called)
+    samples: queue.Queue[Any] = queue.Queue()
+    hears = peer.declare_subscriber("gestured/**", samples.put)
+    assert wait(lambda: fake.say(gesture(1)) or not samples.empty())
+    hears.undeclare()
+    peer.close()
+
+
+def test_frames_of_another_machine_give_the_events_of_udp(bridge, site, model, tmp_path):
+    """The same packets go by UDP and through Zenoh, with their counter and time."""
+    daemon = Daemon.start(tmp_path, model, "--clock", "sensor", "--stale-s", 30)
+    try:
+        begin(bridge, site, daemon, "--frames", "--to", str(daemon.address)).ready()
+        client = daemon.client().subscribe("gesture")
+        hand = Hand()
+        sensors = {name: Sensor(daemon, name, counted) for name in ("direct", "distant")}
+        swipes = [part for name in ("left", "up", "down") for part in (*hand.swipe(name), *hand.idle(1.0))]
+        for n, frame in enumerate([*hand.idle(2.0), *swipes]):
+            packets = {name: sensor.packet(frame) for name, sensor in sensors.items()}
+            if n == 33:  # this one is lost: its counter tells
+                continue
+            sensors["direct"].sock.send(packets["direct"])
+            site.client.put("gestured/car/distant/frames", packets["distant"])
+        keys = ("gesture", "id", "sequence", "confidence", "scores", "frames", "lost")
+        events: dict[str, list[Any]] = {"direct": [], "distant": []}
+        while min(map(len, events.values())) < 3:
+            event = client.line()
+            events[event["sensor"]].append([event[key] for key in keys])
+        assert events["direct"] == events["distant"]
+        assert [event[0] for event in events["distant"]] == ["swipe_left", "swipe_up", "swipe_down"]
+        assert any(event[-1] for event in events["distant"]), "the frame that is missing was noticed"
+    finally:
+        assert daemon.stop() == 0
+
+
+def test_frames_are_of_the_sensor_that_their_key_says(bridge, site, fake):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(DEADLINE_S)
+        process = begin(bridge, site, fake, "--frames", "--to", f"127.0.0.1:{receiver.getsockname()[1]}")
+        fake.accept()
+        process.ready()
+        right = counted("/distant/pressure", np.zeros((9, 9)), 1)
+        for packet in (b"rubbish", counted("/other/pressure", np.zeros((9, 9)), 1), right):
+            site.client.put("gestured/car/distant/frames", packet)
+        assert receiver.recv(65536) == right
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--connect", "rubbish"], "tcp/127.0.0.1:7447"),
+        (["--site", "a/b"], "--site a/b"),
+        (["--config", "/none.json5"], "/none.json5"),
+        (["--frames", "--to", "nowhere.invalid:9000"], "--to nowhere.invalid:9000"),
+    ],
+)
+def test_bad_input_is_one_sentence(bridge, tmp_path, flags, words):
+    process = bridge("zenoh", "--socket", tmp_path / "none.sock", *flags)
+    assert process.end() == 1
+    assert words in process.said() and process.said().count("\n") == 1
