@@ -2,7 +2,6 @@
 
 import argparse
 import base64
-import dataclasses
 import queue
 import sys
 import threading
@@ -18,9 +17,6 @@ from gestured.client.say import say, say_json
 from gestured.control.address import add_sockets, connect, finish_on_signals
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
-from gestured.core.facts import Taken
-from gestured.core.hub import Hub
-from gestured.record.replay import Mute, maker
 from gestured.record.tape import Writer, library
 
 FLUSH_S = 1.0  # what a crash or a power cut costs
@@ -85,8 +81,6 @@ class Keeper:
         """`scene` is what the daemon said of itself."""
         self.scene = scene
         self._tape, self._epoch_ns = tape, scene["epoch_ns"]
-        known = maker(scene).scene
-        self._hub = Hub(dataclasses.replace(known, frames=True), Mute(known.gestures))  # which frames the daemon uses
         self._t_ns = time.time_ns()
         self._flushed = 0.0
         self.packets = self.events = self.lost = 0
@@ -98,9 +92,6 @@ class Keeper:
             packet = base64.b64decode(line["data"])
             source = Address(*line["source"])
             self._tape.packet(self._t_ns, str(source), packet)
-            for fact in self._hub.receive([(packet, source)], line["t_ns"] / 1e9):
-                if isinstance(fact, Taken):
-                    self._tape.picture(self._t_ns, fact.sensor, fact.frame.values)
             self.packets += 1
         elif line["type"] == "lost":
             self.lost += line["count"]

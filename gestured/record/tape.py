@@ -5,14 +5,12 @@ the channel's metadata), `/gestured/events` the lines of the event stream (JSON,
 the daemon read it, in nanoseconds since the epoch; packets of one read have one time. The metadata record `scene` says
 with which model and settings. So a tape replays through the same code to the same events.
 
-For the eye `/{sensor}/pressure` holds each frame once more, as a picture that robotics tools draw (foxglove.RawImage in
-JSON, docs.foxglove.dev/docs/visualization/message-schemas/raw-image); nothing is ever read back from there.
+For the eye of others `gesturectl export --ros2` makes a file with pictures (ros2.py).
 
 A tape is written once, never changed, and is good up to its last whole chunk, wherever writing was cut off. The mcap
 library comes with the extra `[record]`.
 """
 
-import base64
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -20,8 +18,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from numpy.typing import NDArray
 
 from gestured.core.address import Address
 from gestured.core.errors import RecordingError
@@ -63,20 +59,6 @@ NEEDED = {
     "unknown": ("sensor", "id", "confidence", "onset", "offset"),
     "cancelled": ("sensor", "id", "reason"),
     "release": ("sensor", "id"),
-}
-
-IMAGE_SCHEMA = {
-    "title": "foxglove.RawImage",
-    "type": "object",
-    "properties": {
-        "timestamp": {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}},
-        "frame_id": {"type": "string"},
-        "width": {"type": "integer"},
-        "height": {"type": "integer"},
-        "encoding": {"type": "string"},
-        "step": {"type": "integer"},
-        "data": {"type": "string", "contentEncoding": "base64"},
-    },
 }
 
 
@@ -124,9 +106,7 @@ class Writer:
         self._mcap.add_metadata(SCENE, {"json": json.dumps(scene)})
         schema = self._mcap.register_schema("gestured.Event", "jsonschema", json.dumps(EVENT_SCHEMA).encode())
         self._events = self._mcap.register_channel(EVENTS, "json", schema)
-        self._image = self._mcap.register_schema("foxglove.RawImage", "jsonschema", json.dumps(IMAGE_SCHEMA).encode())
         self._senders: dict[str, int] = {}
-        self._pictures: dict[str, int] = {}
         self._waiting = 0  # bytes that are not in the file yet
         self._broken = False  # the file took no more
         self.flush()
@@ -143,24 +123,6 @@ class Writer:
             if source not in self._senders:
                 self._senders[source] = self._mcap.register_channel(PACKETS, "osc", 0, {"source": source})
         self._add(self._senders[source], t_ns, data)
-
-    def picture(self, t_ns: int, sensor: str, values: NDArray[Any]) -> None:
-        """Keep a frame, (R, C) counts, for viewers; of the first SENDERS sensors."""
-        if sensor not in self._pictures:
-            if len(self._pictures) >= SENDER_CHANNELS:
-                return
-            self._pictures[sensor] = self._mcap.register_channel(f"/{sensor}/pressure", "json", self._image)
-        rows, columns = values.shape
-        picture = {
-            "timestamp": {"sec": t_ns // 10**9, "nsec": t_ns % 10**9},
-            "frame_id": sensor,
-            "width": columns,
-            "height": rows,
-            "encoding": "32FC1",
-            "step": 4 * columns,
-            "data": base64.b64encode(values.astype("<f4").tobytes()).decode(),
-        }
-        self._add(self._pictures[sensor], t_ns, json.dumps(picture).encode())
 
     def event(self, t_ns: int, event: Mapping[str, Any]) -> None:
         """Keep an event, as the event stream had it."""

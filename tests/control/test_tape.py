@@ -1,12 +1,12 @@
 """Recordings: what a real daemon hands over, what survives a crash, and what a replay makes of it."""
 
-import base64
 import json
 import os
 import socket
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +14,6 @@ import pytest
 from gestured.control.cli import main
 from gestured.control.diff import Answer, Difference, differences
 from gestured.core.errors import RecordingError
-from gestured.core.wire import Addresses, Decoder
 from gestured.record import arrays as recording
 from gestured.record import tape
 from tests.control.conftest import gestures
@@ -39,9 +38,6 @@ def test_a_recording_holds_every_packet_and_replays_to_the_same_events(recorded,
     found = tape.read(path)
     assert found.whole and [p.data for p in found.packets] == sent
     assert found.scene["model"]["name"] == "tiny" and found.scene["settings"]["clock"] == "sensor"
-    pictures = list(_pictures(path, "/rec/pressure"))
-    ((frame,), _) = Decoder(Addresses(), lambda sensor: (9, 9)).decode(sent[40])
-    assert len(pictures) == len(sent) and np.array_equal(pictures[40], frame.values)
     names = [e["gesture"] for e in found.events if e["type"] == "gesture"]
     assert names == ["swipe_left", "one_tap", "swipe_up"]
     model = found.scene["settings"]["model"]
@@ -54,18 +50,6 @@ def test_a_recording_holds_every_packet_and_replays_to_the_same_events(recorded,
             assert twin[key] == (value if isinstance(value, str) else pytest.approx(value, abs=1e-3)), key
     status, out, err = run("replay", path, "--diff", "--model", model)
     assert (status, out) == (0, "") and "3 recorded answers, 0 differences" in err
-
-
-def _pictures(path: Path, topic: str):
-    """The frames as a viewer of the library sees them, knowing nothing of ours."""
-    from mcap.reader import make_reader
-
-    with path.open("rb") as file:
-        for schema, _, message in make_reader(file).iter_messages(topics=[topic]):
-            picture = json.loads(message.data)
-            assert (schema.name, picture["encoding"]) == ("foxglove.RawImage", "32FC1")
-            values = np.frombuffer(base64.b64decode(picture["data"]), "<f4")
-            yield values.reshape(picture["height"], picture["width"])
 
 
 def test_a_replay_with_another_model_shows_what_differs(recorded, run, daemon, tmp_path) -> None:
@@ -245,3 +229,50 @@ def test_differences_match_contacts_by_sensor_and_onset() -> None:
     assert differences([a], [unsure]) == [Difference(a, unsure)]
     assert differences([], [a]) == [Difference(None, a)]
     assert Difference(a, None).words().startswith("- ") and "arm: one_tap 0.900" in Difference(a, None).words()
+
+
+def test_an_export_for_ros_2_is_read_by_a_library_that_knows_nothing_of_ours(recorded, run, daemon, tmp_path) -> None:
+    rosbags = pytest.importorskip("rosbags.rosbag2", reason="the package rosbags checks what is written for ROS 2")
+    from rosbags.typesys import Stores, get_typestore
+
+    sent = []
+    original = Sensor.packet
+
+    def packet(self, frame):
+        sent.append(frame)
+        return original(self, frame)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Sensor, "packet", packet)
+        path, _ = recorded(gestures(daemon, "ros", "left", "tap"))
+    out = tmp_path / "ros.mcap"
+    status, said, err = run("export", path, out, "--ros2", "--sensor", "ros", "--json")
+    assert (status, err) == (0, "")
+    assert json.loads(said) == {"file": str(out), "sessions": ["ros"], "frames": len(sent), "events": 2}
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    known = {event["gesture"]: event for event in tape.read(path).events if event["type"] == "gesture"}
+    images, texts, times = [], [], []
+    with rosbags.Reader(out) as reader:
+        assert {(c.topic, c.msgtype) for c in reader.connections} == {
+            ("/ros/pressure", "sensor_msgs/msg/Image"),
+            ("/ros/gesture", "std_msgs/msg/String"),
+        }
+        for connection in reader.connections:  # the definitions are ROS 2's own
+            text, digest = types.generate_msgdef(connection.msgtype, ros_version=2)
+            assert connection.msgdef.data.split() == text.split() or connection.digest == digest
+        for connection, t_ns, data in reader.messages():
+            message: Any = types.deserialize_cdr(data, connection.msgtype)
+            times.append(t_ns)
+            if connection.topic == "/ros/gesture":
+                texts.append(json.loads(message.data))
+            else:
+                assert (message.encoding, message.is_bigendian, message.step) == ("32FC1", 0, 36)
+                assert message.header.frame_id == "ros"
+                assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == t_ns
+                images.append(message.data.view("<f4").reshape(message.height, message.width))
+    assert np.array_equal(images, sent)
+    assert [text["gesture"] for text in texts] == ["swipe_left", "one_tap"]
+    assert all(text == known[text["gesture"]] for text in texts)
+    assert times == sorted(times)
+    status, _, err = run("export", path, path, "--ros2")
+    assert status == 1 and "is the recording itself" in err

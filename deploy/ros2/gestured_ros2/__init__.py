@@ -1,0 +1,1 @@
+"""Gestures of a gestured daemon as ROS 2 messages."""

@@ -1,0 +1,17 @@
+"""The package as colcon builds it."""
+
+from setuptools import setup
+
+NAME = "gestured_ros2"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    packages=[NAME],
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+    ],
+    install_requires=["gestured"],
+    entry_points={"console_scripts": [f"gestures = {NAME}.node:main"]},
+)
