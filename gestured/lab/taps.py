@@ -14,7 +14,7 @@ from gestured.lab.online import tallied
 from gestured.lab.progress import progress
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 
-WAITS_S = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
+WAITS_S = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)
 SESSION_S = 120.0  # of one participant; long enough for some dozens of taps
 TAPS = 100  # single and double ones in turn that a session has no time for
 
