@@ -1,9 +1,9 @@
-"""`python -m deploy.generate configuration | dashboard` prints what is kept; `... install SHARE` writes the rest."""
+"""`python -m deploy.generate configuration | dashboard | animation FILE` prints what is kept, `install SHARE` the rest."""
 
 import sys
 from pathlib import Path
 
-from deploy.generate import completion, configuration, dashboard, man, programs
+from deploy.generate import animation, completion, configuration, dashboard, man, programs
 
 
 def install(share: Path) -> None:
@@ -29,7 +29,9 @@ if __name__ == "__main__":
             print(configuration.example(), end="")
         case ["dashboard"]:
             print(dashboard.dashboard(), end="")
+        case ["animation", recording]:
+            print(animation.animation(Path(recording)), end="")
         case ["install", share]:
             install(Path(share))
         case _:
-            sys.exit("usage: python -m deploy.generate configuration | dashboard | install SHARE")
+            sys.exit("usage: python -m deploy.generate configuration | dashboard | animation RECORDING | install SHARE")

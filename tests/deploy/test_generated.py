@@ -8,10 +8,11 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
-from deploy.generate import completion, configuration, dashboard, man, programs
+from deploy.generate import animation, completion, configuration, dashboard, man, programs
 from gestured.daemon.settings import FLAGS, TABLES, Settings
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor
@@ -32,6 +33,17 @@ def test_what_is_kept_is_what_is_made(kept: str, made):
     what = made.__module__.rsplit(".", 1)[-1]
     hint = f"python -m deploy.generate {what} > {kept}"
     assert (ROOT / kept).read_text() == made(), f"make it anew: {hint}"
+
+
+def test_the_animation_in_the_readme_is_made_from_its_recording():
+    kept = ROOT / "docs" / "demo.svg"
+    hint = "python -m deploy.generate animation docs/demo.mcap > docs/demo.svg"
+    assert kept.read_text() == animation.animation(ROOT / "docs" / "demo.mcap"), f"make it anew: {hint}"
+    assert kept.stat().st_size < 200_000 and "docs/demo.svg" in (ROOT / "README.md").read_text()
+    picture = ElementTree.parse(kept).getroot()
+    spoken = picture.attrib["aria-label"]
+    assert "circle_clockwise, swipe_left" in spoken
+    assert len(picture.findall(".//{*}animate")) > 40 and not picture.findall(".//{*}script")
 
 
 def explain(path: Path) -> "subprocess.CompletedProcess[str]":

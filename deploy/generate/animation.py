@@ -1,0 +1,110 @@
+"""The animation on top of the README: a recording frame by frame, and what the daemon said when it said it."""
+
+import dataclasses
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.facts import Taken
+from gestured.core.hub import Hub
+from gestured.record.replay import Mute, maker
+from gestured.record.tape import Tape, read
+
+STOPS = (
+    "00204d",
+    "31446b",
+    "666970",
+    "958f78",
+    "cab969",
+    "ffea46",
+)  # cividis: it can be told apart without red and green
+LEVELS = 16  # shades: more cannot be seen, and cost room
+SIDE = 26  # pixels of a taxel
+LEFT, TOP = 20, 20  # pixels
+BEFORE_S, AFTER_S = 0.7, 1.6  # shown around the gestures
+IDLE_FRAMES = 15  # a second, of which the untouched sensor is known
+SHOWN = 4  # gestures
+
+
+def animation(path: Path) -> str:
+    """A recording's first gestures as an SVG that plays for ever."""
+    tape = read(path)
+    taken = list(_taken(tape))
+    sensor = taken[0].sensor
+    said = [e for e in tape.events if e["type"] == "gesture" and e["sensor"] == sensor][:SHOWN]
+    begin, end = said[0]["onset"] - BEFORE_S, said[-1]["decided"] + AFTER_S
+    times = np.array([one.frame.t for one in taken])
+    counts = np.array([np.asarray(one.frame.values, float) for one in taken])
+    values = counts - np.median(counts[:IDLE_FRAMES], axis=0)
+    inside = (times >= begin) & (times <= end)
+    length = end - begin
+    levels = np.clip(values[inside] / values[inside].max() * LEVELS, 0, LEVELS - 1).astype(int)
+    moments = (times[inside] - begin) / length
+    rows, columns = levels.shape[1:]
+    words = [(e["gesture"], e["confidence"], (e["decided"] - begin) / length, e["decided"] - e["offset"]) for e in said]
+    width, height = 2 * LEFT + SIDE * columns + 400, 2 * TOP + SIDE * rows
+    return "\n".join(
+        [
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
+            f'font-family="ui-monospace, monospace" role="img" aria-label="{rows} by {columns} taxels of a sensor that '
+            f'is touched, and the gestures that are recognised: {escape(", ".join(w[0] for w in words))}">',
+            f'<rect width="{width}" height="{height}" rx="10" fill="#101317"/>',
+            *_matrix(levels, moments, length),
+            *_text(words, length, LEFT + SIDE * columns + 30),
+            "</svg>",
+            "",
+        ]
+    )
+
+
+def _taken(tape: Tape) -> list[Taken]:
+    """The frames that the daemon used, by its own path."""
+    scene = maker(tape.scene).scene
+    hub = Hub(dataclasses.replace(scene, frames=True), Mute(scene.gestures))
+    facts = (f for p in tape.packets for f in hub.receive([(p.data, p.source)], p.t_ns / 1e9))
+    return [fact for fact in facts if isinstance(fact, Taken)]
+
+
+def _matrix(levels: NDArray[np.int_], moments: NDArray[np.float64], length: float) -> list[str]:
+    """A square for each taxel, whose colour changes when its level does."""
+    colours = [_colour((n + 0.5) / LEVELS) for n in range(LEVELS)]
+    drawn = []
+    for row in range(levels.shape[1]):
+        for column in range(levels.shape[2]):
+            course = levels[:, row, column]
+            steps = [0, *(n for n in range(1, len(course)) if course[n] != course[n - 1])]
+            x, y = LEFT + SIDE * column, TOP + SIDE * row
+            square = f'<rect x="{x}" y="{y}" width="{SIDE - 2}" height="{SIDE - 2}" fill="#{colours[course[0]]}"'
+            if len(steps) == 1:
+                drawn.append(square + "/>")
+                continue
+            values = ";".join("#" + colours[course[n]] for n in steps)
+            keys = ";".join("0" if n == 0 else f"{moments[n]:.3f}".lstrip("0") for n in steps)
+            drawn.append(
+                f'{square}><animate attributeName="fill" dur="{length:.2f}s" repeatCount="indefinite" '
+                f'calcMode="discrete" values="{values}" keyTimes="{keys}"/></rect>'
+            )
+    return drawn
+
+
+def _text(words: list[tuple[str, float, float, float]], length: float, x: int) -> list[str]:
+    """Each answer from the moment on when it was told."""
+    drawn = [f'<text x="{x}" y="{TOP + 24}" fill="#9aa5b1" font-size="15">pressure in, gestures out</text>']
+    for n, (gesture, confidence, moment, waited) in enumerate(words):
+        y, after = TOP + 66 + 44 * n, f"{1000 * waited:.0f} ms after the finger left"
+        line = f"{escape(gesture)}  {confidence:.2f}"
+        drawn.append(
+            f'<g opacity="0"><text x="{x}" y="{y}" fill="#ffea46" font-size="19">{line}</text>'
+            f'<text x="{x}" y="{y + 17}" fill="#9aa5b1" font-size="13">{after}</text>'
+            f'<animate attributeName="opacity" dur="{length:.2f}s" repeatCount="indefinite" calcMode="discrete" '
+            f'values="0;1" keyTimes="0;{moment:.3f}"/></g>'
+        )
+    return drawn
+
+
+def _colour(share: float) -> str:
+    place = share * (len(STOPS) - 1)
+    low, high = (bytes.fromhex(STOPS[min(int(place) + n, len(STOPS) - 1)]) for n in (0, 1))
+    return bytes(round(a + (b - a) * (place % 1)) for a, b in zip(low, high, strict=True)).hex()
