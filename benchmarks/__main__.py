@@ -14,7 +14,7 @@ from gestured.lab.made_of import made_of, models_and_manifest
 
 
 def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
-    from benchmarks import inside, latency, replay, scenes, side_by_side, start, traffic
+    from benchmarks import inside, latency, replay, scenes, side_by_side, start, traffic, viewers
 
     return {
         "decode": inside.decode,
@@ -27,6 +27,7 @@ def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
         "imports": start.imports,
         "further": lambda: start.further_sensors(model),
         "subscribers": inside.subscribers,
+        "viewers": lambda: viewers.viewers(model),
         "ordinary": lambda: side_by_side.ordinary(model),
         "subset": lambda: scenes.subset(model),
     }

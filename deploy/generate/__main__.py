@@ -1,4 +1,4 @@
-"""`python -m deploy.generate configuration | dashboard | animation FILE` prints what is kept, `install SHARE` the rest."""
+"""`python -m deploy.generate configuration | dashboard | animation FILE` prints it, `install SHARE` writes the rest."""
 
 import sys
 from pathlib import Path

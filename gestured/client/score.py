@@ -86,7 +86,7 @@ class Tally:
         return [self._count(Outcome("rejected" if p.label == NONE else "missed", p)) for p in silent]
 
     def summary(self) -> dict[str, Any]:
-        """The counts, provisional events among them; latency and lead in ms (None where there are too few, or none)."""
+        """The counts, latency and lead in milliseconds (None where too few, or none); provisional events."""
         ordered = sorted(self.latencies) if len(self.latencies) >= LEAST else []
         return self.counts | {
             "latency_ms_median": round(1000 * median(ordered)) if ordered else None,
