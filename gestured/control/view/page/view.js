@@ -84,6 +84,7 @@ function event(told) {
   if (told.type === "provisional") at("provisional").textContent = `${words(told.gesture)}, ${percent(told.confidence)}`;
   if (told.type === "cancelled") at("answer").textContent = what;
   if (told.type === "gesture" || told.type === "unknown") {
+    if (told.provisional) at("provisional").append(`, ${told.provisional}`); // confirmed, or revoked
     at("answer").textContent = `${what}, ${percent(told.confidence)}`;
     at("said").textContent = `${what}, ${percent(told.confidence)}, after ${latency}`;
     scores(told.scores, told.type === "gesture" ? told.gesture : "");
@@ -183,16 +184,21 @@ function matrix(now, i, full) {
 function path(g, now, i, side, left) {
   const spots = [];
   for (let n = i; n >= 0 && state.frames[n].time > now.time - PATH_S; n--) spots.push(state.frames[n]);
-  g.lineWidth = 3 * devicePixelRatio; g.lineCap = "round";
+  g.lineCap = "round";
+  const stroke = share => { // light on dark, so that it shows on every colour
+    g.lineWidth = 5 * devicePixelRatio; g.strokeStyle = `rgb(0 0 0 / ${.6 * share})`; g.stroke();
+    g.lineWidth = 2.5 * devicePixelRatio; g.strokeStyle = `rgb(255 255 255 / ${share})`; g.stroke();
+  };
   for (let n = spots.length - 1; n > 0; n--) {
     const a = spots[n].centroid, b = spots[n - 1].centroid;
     if (!a || !b) continue;
-    g.strokeStyle = `rgb(255 255 255 / ${1 - (now.time - spots[n - 1].time) / PATH_S})`;
-    g.beginPath(); g.moveTo(left + side * (a[1] + .5), side * (a[0] + .5)); g.lineTo(left + side * (b[1] + .5), side * (b[0] + .5)); g.stroke();
+    g.beginPath(); g.moveTo(left + side * (a[1] + .5), side * (a[0] + .5)); g.lineTo(left + side * (b[1] + .5), side * (b[0] + .5));
+    stroke(1 - (now.time - spots[n - 1].time) / PATH_S);
   }
   if (now.centroid) {
-    g.strokeStyle = "#fff"; g.beginPath();
-    g.arc(left + side * (now.centroid[1] + .5), side * (now.centroid[0] + .5), side / 3, 0, 7); g.stroke();
+    g.beginPath();
+    g.arc(left + side * (now.centroid[1] + .5), side * (now.centroid[0] + .5), side / 3, 0, 7);
+    stroke(1);
   }
 }
 
