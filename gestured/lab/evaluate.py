@@ -19,7 +19,7 @@ from gestured.lab.dataset import Samples
 from gestured.lab.decide import THRESHOLDS, curve, fit_decision, threshold
 from gestured.lab.fit import CLASSES, lengths_of, padded, targets
 from gestured.lab.nets import Perceptron, Recurrent
-from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan, folds, judged
+from gestured.lab.train import REAL_SETS, Calibrated, Trained, TrainingData, TrainingPlan, folds, is_of, judged
 from gestured.lab.trajectory import trajectory_features
 from gestured.model.model import Model, open_model
 from gestured.simulator import GESTURES, NONE
@@ -146,10 +146,10 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
             levels.append(calibration["threshold"])
         least = float(np.mean(levels))
         both = (scores, unknown)
-        strokes = np.array([label == "one_tap" or label.startswith("swipe") for label in real.labels])
-        sets = {"taps and swipes": strokes, "with non-gestures": np.ones(len(real), bool)}
-        for title, chosen in sets.items():
-            result = outcome((scores[chosen], unknown[chosen]), labels[chosen], least)
+        judged_once = np.arange(len(real)) < data.real_judged
+        for title in REAL_SETS:
+            chosen = is_of(real.labels, title) & judged_once
+            result = outcome((scores[chosen], unknown[chosen]), labels[chosen], least, data.performed.get(title))
             found.setdefault(name, {})[title] = asdict(result)
             print(result.row(f"{name}, real, {title}"), flush=True)
         found[name]["kinds"] = by_kind(both, real, least)

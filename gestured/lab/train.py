@@ -32,6 +32,7 @@ from gestured.lab.recordings.origin import origins
 from gestured.record.arrays import read
 from gestured.simulator import GESTURES, NONE, wide
 
+REAL_SETS = ("taps and swipes", "with non-gestures")  # sets of real recordings that judge
 REAL_FILES = ("capfingerid_gestures_dev.npz", "capfingerid_sessions_dev.npz")
 FOLDS = 3
 COHORT = 1_000_000  # the wide stream's people have larger numbers
@@ -66,6 +67,7 @@ class TrainingData:
     tests: dict[str, Samples]  # by name
     performed: dict[str, int]  # gestures that were performed in each test, cut out or not
     real: Samples | None
+    real_judged: int = 0  # of them, the first ones: cut gestures, whose touches the sessions behind them hold again
 
 
 def load_data(plan: TrainingPlan, cache: Path, real: Path | None, jobs: int) -> TrainingData:
@@ -80,6 +82,8 @@ def load_data(plan: TrainingPlan, cache: Path, real: Path | None, jobs: int) -> 
     person = both.people % 1000
     plans = np.array([trial.participant for trial in TRIALS[: plan.cohort]])
     own = both.take(person < 24)
+    recordings = _real(cache, real)
+    performed = _performed(real) if recordings else {}
     return TrainingData(
         join([teach, own]),
         len(own),
@@ -88,14 +92,30 @@ def load_data(plan: TrainingPlan, cache: Path, real: Path | None, jobs: int) -> 
         {
             "nominal": int((plans >= 28).sum()),
             "wide": sum(wide(3, index).label != NONE for index in range(plan.wide_check)),
+            **performed,
         },
-        _real(cache, real),
+        recordings and recordings[0],
+        recordings[1] if recordings else 0,
     )
 
 
-def _real(cache: Path, folder: Path | None) -> Samples | None:
+def _real(cache: Path, folder: Path | None) -> tuple[Samples, int] | None:
+    """All real samples, and how many of them, the first ones, are of the file of cut gestures."""
+    parts = [recorded(read(path)) for path in _real_files(folder)]
+    return (join(parts), len(parts[0])) if parts else None
+
+
+def _performed(folder: Path | None) -> dict[str, int]:
+    """Labelled gestures in the file of cut gestures, cut out again by the front end or not, by the set that judges."""
     paths = _real_files(folder)
-    return join([recorded(read(path)) for path in paths]) if paths else None
+    labels = read(paths[0]).labels.astype(str) if paths else np.zeros(0, str)
+    return {title: int((is_of(labels, title) & np.isin(labels, GESTURES)).sum()) for title in REAL_SETS}
+
+
+def is_of(labels: NDArray[np.str_], title: str) -> NDArray[np.bool_]:
+    """(N,) whether each label belongs to one of `REAL_SETS`."""
+    strokes = np.array([label == "one_tap" or str(label).startswith("swipe") for label in labels], bool)
+    return strokes if title == REAL_SETS[0] else np.ones(len(labels), bool)
 
 
 def _real_files(folder: Path | None) -> list[Path]:

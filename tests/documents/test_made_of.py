@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from gestured.lab.made_of import LINE, OLDER, made_of, models_and_manifest, stale
+from gestured.lab.recordings.origin import said
 from gestured.model.model import shipped
 from tests.documents.blocks import ROOT, documents
 
@@ -40,6 +41,8 @@ def test_a_card_is_its_models(name: str) -> None:
     card = shipped()[name].with_suffix(".md").read_text()
     of = made_of("gestured-lab evaluate", [shipped()[name]])
     assert re.findall(r"SHA-256 \| `([0-9a-f]{12})", card) == [of.split()[-2]]
+    learned = "real development recordings of CapFingerId" in card
+    assert learned == any("capfingerid" in one.file for one in said(shipped()[name]) or [])
 
 
 def test_a_changed_file_is_told_unless_the_document_says_so(tmp_path: Path) -> None:

@@ -21,6 +21,8 @@ from gestured.core.events import Cancelled, Gesture, Onset, Unknown
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
 from gestured.core.recognizer import Recognizer, events_of
+from gestured.lab.made_of import made_of
+from gestured.model.model import shipped
 from tests.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
 
 SEEN = 4.0  # times the noise
@@ -330,6 +332,8 @@ def main() -> None:
     if args.json:
         print(json.dumps({"takes": result, "sessions": long}, indent=1))
         return
+    if args.model in shipped():
+        print(made_of("python -m tests.foreign.judge", [shipped()[args.model]]))
     _show(result, args.front_end)
     for row in long:
         print(f"\n== sessions, {row['level']}: {row['gestures']} gestures", end="")

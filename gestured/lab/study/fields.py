@@ -17,10 +17,10 @@ from gestured.lab.study.material import SHIFT, UNCHANGED, classes
 from gestured.lab.study.protocols import FOREIGN, REAL
 from gestured.lab.study.run_time import SHIPPED, told
 from gestured.lab.study.tables import TUNED, Cell
+from gestured.lab.train import REAL_SETS
 from gestured.model.model import open_model, shipped
 from gestured.simulator import GESTURES
 
-REAL_SET = "taps and swipes"  # the manifest's name of real recordings without non-gestures
 SEEN = {"foreign": (FOREIGN, SHIFT), "real": (REAL, UNCHANGED)}  # protocol and augmentation of the study's own cells
 
 
@@ -70,7 +70,7 @@ def _published(name: str, judges: Samples, performed: int) -> dict[str, Any]:
 def _manifest(name: str) -> dict[str, Any] | None:
     """The manifest's figures of real subjects; it has no intervals."""
     entry = json.loads((shipped()[name].parent / "manifest.json").read_text())["models"].get(f"{name}.onnx", {})
-    row = entry.get("figures", {}).get("real", {}).get(REAL_SET)
+    row = entry.get("figures", {}).get("real", {}).get(REAL_SETS[0])
     if row is None:
         return None
     error = row["wrong"] + row["lost"]
