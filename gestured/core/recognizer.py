@@ -156,8 +156,9 @@ class Recognizer:
         if answer is None:
             return []
         _, best, confidence = self._best(answer)
-        least = math.inf if self._refractory_for(best, preview.segment) else self._threshold(best, answer)
-        said = foresight.see(preview, certainty, best, confidence, least)
+        least = self._threshold(best, answer)
+        held = self._refractory_for(best, preview.segment) or self._is_own(answer.own, confidence >= least)
+        said = foresight.see(preview, certainty, best, confidence, math.inf if held else least)
         return [] if said is None else [said]
 
     def _ask(self, segment: Segment) -> Scores | None:

@@ -7,11 +7,14 @@ from dataclasses import asdict
 from statistics import median
 from typing import Any
 
-import gestured
 from gestured.core.events import Gesture
-from gestured.core.scene import DOUBLE_TAP, ONE_TAP
+from gestured.core.feed import front_end_of
+from gestured.core.frames import Frame
+from gestured.core.recognizer import Classifier, Recognizer
+from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
 from gestured.lab.online import tallied
 from gestured.lab.progress import progress
+from gestured.model.model import open_model
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 
 WAITS_S = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)
@@ -28,10 +31,12 @@ def takes(people: int, seed: int) -> list[Take]:
     ]
 
 
-def read(model: str, take: Take, wait_s: float) -> tuple[Counter[str], list[float]]:
+def read(model: Classifier, take: Take, wait_s: float) -> tuple[Counter[str], list[float]]:
     """What was done and what it was taken for, with counts; how long right single taps waited for their answer, s."""
-    recognizer = gestured.open(model, grid=take.frames.shape[1:], tap_gap_s=wait_s)
-    found = [event for t, frame in zip(take.times, take.frames, strict=True) for event in recognizer.push(t, frame)]
+    rows, columns = take.frames.shape[1:]
+    scene = Scene(gestures=model.gestures, grid=(rows, columns), tap_gap_s=wait_s)
+    recognizer = Recognizer(front_end_of("pad", scene), model)
+    found = [one for t, frame in zip(take.times, take.frames, strict=True) for one in recognizer.push(Frame(t, frame))]
     found += recognizer.flush(float(take.times[-1]))
     events = [{"type": "gesture"} | asdict(event) for event in found if isinstance(event, Gesture)]
     tally, outcomes = tallied(take, 0.0, events)
@@ -48,13 +53,13 @@ def read(model: str, take: Take, wait_s: float) -> tuple[Counter[str], list[floa
 
 def figures(model: str, people: int, seed: int) -> list[dict[str, Any]]:
     """A row for each wait: shares of what was done, and the median single tap's wait in seconds."""
-    sessions = takes(people, seed)
+    sessions, opened = takes(people, seed), open_model(model)
     rows = []
     for wait_s in progress(WAITS_S, len(WAITS_S), "waits"):
         counts: Counter[str] = Counter()
         waited: list[float] = []
         for take in sessions:
-            more, also = read(model, take, wait_s)
+            more, also = read(opened, take, wait_s)
             counts, waited = counts + more, waited + also
         single, double = max(counts[ONE_TAP], 1), max(counts[DOUBLE_TAP], 1)
         rows.append(

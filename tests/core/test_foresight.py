@@ -19,6 +19,7 @@ from gestured.core.foresight import Certainty, Foresight
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.hub import Hub
+from gestured.core.prototypes import Match
 from gestured.core.recognizer import Recognizer, Scores, events_of
 from gestured.core.scene import Scene
 from gestured.model.ladder import Ladder
@@ -220,6 +221,12 @@ def test_a_tap_is_said_once_the_finger_has_left_without_a_further_run() -> None:
     quiet = hand()
     run(recognizer(quiet, asked=False), frames(IDLE, TAP, PAUSE))
     assert seer.asked == quiet.asked == 1
+
+
+def test_a_tap_that_a_gesture_of_ones_own_will_have_is_not_said() -> None:
+    own = replace(says("one_tap"), own=Match("slash", 0.99, True))
+    events = run(recognizer(Seer(lambda segment: own, lambda segment: says("one_tap"))), frames(IDLE, TAP, PAUSE))
+    assert names(events) == ["onset", "slash", "release"]
 
 
 def test_a_second_tap_revokes_it() -> None:
