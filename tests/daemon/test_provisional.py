@@ -2,15 +2,17 @@
 
 import socket
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from pythonosc.osc_message import OscMessage
 
+import gestured
 from gestured.client.control import Control
 from tests.daemon import tiny_model
-from tests.daemon.harness import Client, Daemon, Sensor
+from tests.daemon.harness import Client, Daemon, Hand, Sensor
 from tests.hostile.grammar import TYPES, violations
 
 ALL = (*TYPES, "provisional")
@@ -256,3 +258,21 @@ def test_a_tap_waits_as_long_as_it_is_set(early: Path, tmp_path: Path) -> None:
     finally:
         assert daemon.stop() == 0
     assert waited == [pytest.approx(0.333, abs=0.01), pytest.approx(0.667, abs=0.01)]
+
+
+def test_in_a_process_of_ones_own(early: Path) -> None:
+    hand = Hand()
+    frames = [*hand.idle(2.0), *hand.swipe("left"), *hand.idle(1.0), *hand.tap(), *hand.idle(1.0)]
+    told = []
+    for asked in (True, False):
+        recognizer = gestured.open(early, provisional=asked, tap_gap_s=0.35)
+        told.append([event for n, frame in enumerate(frames) for event in recognizer.push(n / 15, frame)])
+    said = [event for event in told[0] if isinstance(event, gestured.Provisional)]
+    assert [event.gesture for event in said] == ["swipe_left", "one_tap"]
+    answers = [[event for event in events if isinstance(event, gestured.Gesture)] for events in told]
+    assert [[event.provisional for event in events] for events in answers] == [["confirmed"] * 2, [None] * 2]
+    assert [replace(event, provisional=None) for event in answers[0]] == answers[1]
+    assert answers[0][1].decided - answers[0][1].offset == pytest.approx(0.467, abs=0.01)
+    for wrong in (0.1, 0.7, float("nan")):
+        with pytest.raises(gestured.GesturedError, match="tap_gap_s: expected 0.2 to 0.6 s"):
+            gestured.open(early, tap_gap_s=wrong)
