@@ -12,9 +12,10 @@ from gestured.core.feed import front_end_of
 from gestured.core.frames import Frame
 from gestured.core.recognizer import Classifier, Recognizer
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
+from gestured.lab.made_of import made_of
 from gestured.lab.online import tallied
 from gestured.lab.progress import progress
-from gestured.model.model import open_model
+from gestured.model.model import open_model, shipped, shipped_name
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 
 WAITS_S = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)
@@ -82,11 +83,15 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(rows, indent=2))
         return 0
+    name = shipped_name(args.model)
+    if name is not None:
+        print(made_of("gestured-lab taps", [shipped()[name]]))
     print("| `tap_gap_s` | double taps right | read as two taps | single taps right | a single tap's answer after |")
     print("|---|---|---|---|---|")
     for row in rows:
+        after = row["tap_answered_after_s"]
         print(
-            f"| {row['tap_gap_s']:.2f} | {row['double_taps_right']:.3f} | {row['double_taps_read_as_taps']:.3f} "
-            f"| {row['taps_right']:.3f} | {row['tap_answered_after_s']} s |"
+            f"| {row['tap_gap_s']:.2f} s | {row['double_taps_right']:.3f} | {row['double_taps_read_as_taps']:.3f} "
+            f"| {row['taps_right']:.3f} | {'-' if after is None else f'{after:.2f} s'} |"
         )
     return 0

@@ -14,6 +14,7 @@ from tests.documents.blocks import ROOT, documents
 GENERATED = {
     "README.md": ("gestured-lab evaluate", "python -m tests.foreign.judge"),
     "docs/performance.md": ("make bench",),
+    "docs/limits-and-choices.md": ("gestured-lab taps",),
     "docs/numerics.md": ("gestured-lab stability",),
     "docs/reliability.md": ("python -m tests.hostile.damage",),
     "docs/study.md": ("gestured-lab study",),

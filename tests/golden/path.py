@@ -89,10 +89,12 @@ def _sensor(name: str, state: str, reading: Reading) -> Line:
 
 
 def as_line(event: Event) -> Line:
-    """An event with the keys that the tapes know; nobody asks for provisional events here."""
+    """An event with the keys that the tapes know: nobody asks for provisional events, or has gestures of his own."""
     line = {"type": type(event).__name__} | asdict(event)
     if isinstance(event, Gesture | Unknown | Cancelled):
         assert line.pop("provisional") is None
+    if isinstance(event, Gesture):
+        assert line.pop("own") is False
     if isinstance(event, Unknown):
         assert line.pop("reason") in ("confidence", "hole", "rate")
     return line
