@@ -192,3 +192,21 @@ def test_the_first_steps_in_the_readme_lead_to_a_gesture(tmp_path: Path):
         for process in running:
             process.terminate()
             process.communicate(timeout=30)
+
+
+def test_the_first_screen_quotes_the_tables():
+    readme, performance = ((ROOT / name).read_text() for name in ("README.md", "docs/performance.md"))
+    screen = readme.partition("## Two commands")[0]
+
+    def cells(text: str, begins: str) -> list[str]:
+        line = next(line for line in text.splitlines() if line.startswith(f"| {begins}"))
+        return [cell.strip() for cell in line.strip("|").split("|")]
+
+    for begins in ("`cnn_lstm.onnx`, simulated, nominal", "`cnn_lstm.onnx`, real, taps and swipes"):
+        _, count, _, right, wrong, *_ = cells(readme, begins)
+        assert all(figure in screen for figure in (f"{right}", f"{wrong}", f" {count} ")), (begins, count, right, wrong)
+    for begins in ("last frame sent to event received (p50)", "start to ready"):
+        assert cells(performance, begins)[1] in screen, begins
+    assert f"{float(cells(performance, 'resident memory, one sensor')[1].split()[0]):.0f} MiB" in screen
+    (false,) = re.findall(r"(\d\.\d+) false events a minute", readme)
+    assert f"{false} false ones" in screen

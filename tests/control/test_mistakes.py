@@ -253,3 +253,23 @@ def test_a_port_that_is_taken_names_its_process(run, udp: socket.socket) -> None
     taken = f"127.0.0.1:{udp.getsockname()[1]}"
     status, _, err = run("sniff", "--listen", taken)
     assert status == 1 and f"(pid {os.getpid()})" in err and "Address already in use" in err
+
+
+def test_what_no_daemon_sends_ends_listen_with_2_and_a_line_that_names_it(run, daemon: Daemon) -> None:
+    status, out, err = run("listen", "--socket", daemon.socket, "--gesture", "swipe_lefft")
+    assert status == 2 and out == "" and "swipe_lefft" in err and "swipe_left" in err
+    status, out, err = run("listen", "--socket", daemon.socket, "--types", "gestures")
+    assert status == 2 and "gestures" in err and "gesture, " in err
+
+
+def test_why_an_answer_is_unknown_is_shown(start, own) -> None:
+    daemon = own("", "--clock", "sensor", "--stale-s", 30)
+    listener = start("listen", "--socket", daemon.socket, "--types", "unknown", "--count", 1)
+    assert b"model tiny" in listener.stderr.readline()
+    sensor = Sensor(daemon, "arm", counted).begin()
+    for n, frame in enumerate([*sensor.hand.swipe("left"), *sensor.hand.idle(1.0)]):
+        packet = sensor.packet(frame)
+        if n not in (2, 3, 4, 5):  # they are lost on the way
+            sensor.sock.send(packet)
+    out, _ = listener.communicate(timeout=30)
+    assert b"unknown (hole)" in out

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.client.score import MISSED_AFTER_S, NONE, Performed, Tally
+from gestured.client.score import LEAST, MISSED_AFTER_S, NONE, Performed, Tally
 
 
 def gesture(name: str, onset: float, offset: float) -> dict[str, object]:
@@ -107,3 +107,16 @@ def test_what_was_said_early_is_counted_with_its_lead():
     tally.begin(Performed("one_tap", "one_tap", 30.0, 30.2))
     assert tally.hear(gesture("one_tap", 30.0, 30.2) | {"provisional": None}, 30.4).early is None
     assert {"provisional": 2, "confirmed": 1, "lead_ms_median": 150}.items() <= tally.summary().items()
+
+
+@pytest.mark.parametrize(("gestures", "told"), [(LEAST - 1, False), (LEAST, True)])
+def test_percentiles_are_of_twenty_gestures_or_more(gestures: int, told: bool):
+    tally = Tally()
+    for n in range(gestures):
+        tally.begin(Performed("one_tap", "one_tap", 10.0 * n, 10.0 * n + 0.1))
+        event = {"type": "gesture", "gesture": "one_tap", "onset": 10.0 * n, "offset": 10.0 * n + 0.1}
+        tally.hear(event, 10.0 * n + 0.3)
+        tally.settle(10.0 * n + 5)
+    summary = tally.summary()
+    assert summary["right"] == gestures
+    assert (summary["latency_ms_median"] is not None) == (summary["latency_ms_p95"] is not None) == told
