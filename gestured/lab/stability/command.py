@@ -17,6 +17,7 @@ from gestured.lab.stability.figure import svg
 from gestured.lab.stability.metamorphic import metamorphic_table
 from gestured.lab.stability.models import models_table
 from gestured.lab.stability.path import simulated_series
+from gestured.lab.stability.precision import precision_table, state_table
 from gestured.lab.stability.relaxation import filters_table
 from gestured.lab.stability.table import Table
 from gestured.lab.stability.textbook import RANGES, points, textbook_table
@@ -39,9 +40,10 @@ def all_tables(quick: bool, out: Path | None) -> Iterator[Table]:
     yield month_table(best, 0.1 if quick else 30.0)
     window = best.metadata.window
     some = simulated_series(10 if quick else 60)
-    yield models_table(
-        [window.apply(segment) for _, stream in some for segment in cuts(stream.frames, stream.times)], quick
-    )
+    windows = [window.apply(segment) for _, stream in some for segment in cuts(stream.frames, stream.times)]
+    yield models_table(windows, quick)
+    yield precision_table(windows, quick)
+    yield state_table(windows)
     yield metamorphic_table(models, 10 if quick else 150)
 
 

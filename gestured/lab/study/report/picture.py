@@ -34,7 +34,8 @@ def points(study: Study) -> Study:
     """What the picture is drawn from, and where it comes from: the part of a study that is kept beside it."""
     about = {name: study["about"].get(name) for name in ("command", "version", "seed", "models", "quick")}
     methods = study.get("methods") or {}
-    named = {row["method"]: methods[row["method"]] for row in reading.part(study, "run_time")}
+    timed = {row["method"] for row in reading.part(study, "run_time")}
+    named = {name: of for name, of in methods.items() if name in timed}
     return {
         "about": about,
         "machine": study["machine"],
