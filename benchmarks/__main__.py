@@ -14,12 +14,13 @@ from gestured.lab.made_of import made_of, models_and_manifest
 
 
 def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
-    from benchmarks import inside, latency, replay, scenes, side_by_side, start, traffic, viewers
+    from benchmarks import buses, inside, latency, replay, scenes, side_by_side, start, traffic, viewers
 
     return {
         "decode": inside.decode,
         "datagrams": lambda: traffic.datagrams(model),
         "latency": lambda: latency.latency(model),
+        "buses": lambda: buses.buses(model),
         "sensors": lambda: [traffic.sensors(model, 1000), traffic.sensors(model, 500)],
         "recognise": lambda: inside.recognise(model),
         "replay": lambda: replay.replay(model),

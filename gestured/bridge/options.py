@@ -4,7 +4,7 @@ import argparse
 import os
 from pathlib import Path
 
-from gestured.client.address import find_socket, host_port
+from gestured.client.address import bind_address, find_socket, host_port
 from gestured.client.subscriber import Subscriber
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
@@ -35,7 +35,7 @@ def add_filters(parser: argparse.ArgumentParser) -> None:
 def add_metrics(parser: argparse.ArgumentParser) -> None:
     """Add where Prometheus may ask."""
     text = "HTTP address of /metrics; port 0 is any free one (default: off)"
-    parser.add_argument("--metrics", type=listen_address, metavar="HOST:PORT", help=text)
+    parser.add_argument("--metrics", type=bind_address, metavar="HOST:PORT", help=text)
 
 
 def names(text: str) -> list[str]:
@@ -52,14 +52,6 @@ def event_types(text: str) -> list[str]:
     if unknown := [name for name in found if name not in EVENT_TYPES]:
         raise argparse.ArgumentTypeError(f"{', '.join(unknown)}: expected some of {', '.join(EVENT_TYPES)}")
     return found
-
-
-def listen_address(text: str) -> Address:
-    """An address of our own, whose port may be 0; for argparse."""
-    try:
-        return Address.parse(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected {error}") from None
 
 
 def peer_address(text: str, port: int) -> Address:

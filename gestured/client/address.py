@@ -55,6 +55,14 @@ def find_control(environ: Mapping[str, str]) -> Path:
     return find_socket(environ).with_suffix(".ctl")
 
 
+def find_all_controls(environ: Mapping[str, str]) -> list[Path]:
+    """The control sockets of all daemons that are found: of the session, and the installed service's instances."""
+    session = environ.get("XDG_RUNTIME_DIR")
+    folders = [SYSTEM.parent.parent, *([Path(session)] if session else [])]
+    found = {path for folder in folders for path in folder.glob(f"{SYSTEM.parent.name}*/{SYSTEM.stem}.ctl")}
+    return sorted({find_control(environ), *found} if os.path.exists(find_control(environ)) else found)
+
+
 def setting(environ: Mapping[str, str], key: str) -> str | None:
     """A setting of the daemon's that a variable, or the file that a variable names, has; None where neither does."""
     if value := environ.get(f"GESTURED_{key.upper()}"):

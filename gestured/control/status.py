@@ -1,15 +1,21 @@
 """`gesturectl status`: how the daemon is, on one screen."""
 
 import argparse
+import os
 import sys
 import time
 from collections.abc import Iterator
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
-from gestured.client.say import say, say_drawn, say_json
+from gestured.client.address import SYSTEM, find_all_controls
+from gestured.client.control import Control
+from gestured.client.lines import Unreachable
+from gestured.client.say import say, say_drawn, say_json, tell
 from gestured.control.address import add_sockets, connect
 from gestured.control.shadow import words as shadow_words
+from gestured.core.errors import GesturedError
 from gestured.core.pace import RANGE_HZ, outside
 
 CLEAR = "\x1b[2J\x1b[H"
@@ -27,9 +33,11 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         description="Show sensors, rates, health, model and the last answers of a running daemon.\n"
         "Exit status 1 if it is not ready.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="examples:\n  gesturectl status --watch\n  gesturectl status --json",
+        epilog="examples:\n  gesturectl status --watch\n  gesturectl status --all\n  gesturectl status --json",
     )
     parser.add_argument("--watch", action="store_true", help="again every second, until Ctrl-C")
+    text = "each daemon that is found on this machine, a line each; exit status 1 if one is not ready"
+    parser.add_argument("--all", action="store_true", help=text)
     add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print all that is known as JSON, one line each time")
     parser.set_defaults(run=run)
@@ -37,6 +45,8 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
 
 def run(args: argparse.Namespace) -> int:
     """Print once, or again and again."""
+    if args.all:
+        return all_of_them(args)
     with connect(args) as control:
         while True:
             status = control.ask("status")
@@ -49,6 +59,42 @@ def run(args: argparse.Namespace) -> int:
             if not args.watch:
                 return 0 if status["ready"]["ready"] else 1
             time.sleep(REFRESH_S)
+
+
+def all_of_them(args: argparse.Namespace) -> int:
+    """Print a line for each daemon; 1 where one is not ready, does not answer, or there is none."""
+    paths = find_all_controls(os.environ)
+    if not paths:
+        raise Unreachable(f"no daemon is found: none has a socket below {SYSTEM.parent.parent} or in the session")
+    bad = 0
+    if not args.json:
+        say("control socket                       state        sensors    frames/s  gestures   dropped  load")
+    for path in paths:
+        try:
+            with Control(path) as control:
+                status: dict[str, Any] = control.ask("status")
+        except GesturedError as error:
+            bad += 1
+            tell(args.json, {"control": str(path), "error": str(error)}, f"{path!s:<36} {error}")
+            continue
+        bad += not status["ready"]["ready"]
+        if args.json:
+            say_json({"control": str(path), **status})
+        else:
+            say(summary(path, status))
+    return 1 if bad else 0
+
+
+def summary(path: Path, status: dict[str, Any]) -> str:
+    """How one daemon is, in a line."""
+    word = status["state"] if status["ready"]["ready"] else "not ready"
+    sensors = status["sensors"].values()
+    heard = sum(sensor["state"] not in ("stale", "no_data") for sensor in sensors)
+    rate = sum(sensor["rate_hz"] for sensor in sensors if sensor["state"] not in ("stale", "no_data"))
+    dropped = sum(status["input"]["dropped"].values()) + status["input"]["kernel_drops"]
+    gestures = sum(status["answers"]["gestures"].values())
+    late = f"{1000 * status['loop_lag_s']:.0f} ms late"
+    return f"{path!s:<36} {word:<10} {heard:5d}/{len(sensors):<5d} {rate:8.0f} {gestures:9d} {dropped:9d}  {late}"
 
 
 def screen(status: dict[str, Any]) -> Iterator[str]:

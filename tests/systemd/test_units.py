@@ -44,6 +44,7 @@ def exposure(folder: Path, unit: str) -> float:
         ("gestured.service", None, 0.3),
         ("gestured.service", "osc-output.conf", 1.0),
         ("gestured-standalone.service", None, 1.0),
+        ("gestured@.service", None, 1.0),
         ("gestured-bridge@.service", None, 1.0),
         ("gestured-serial@.service", None, 1.3),
     ],
@@ -75,6 +76,16 @@ def test_systemd_finds_nothing_wrong(tmp_path: Path):
 def test_the_services_differ_in_the_network_alone():
     activated, standalone = keys("gestured.service"), keys("gestured-standalone.service")
     assert {key for key in activated | standalone if activated.get(key) != standalone.get(key)} <= NETWORK
+
+
+def test_an_instance_differs_from_the_standalone_service_in_its_name_alone():
+    one, many = keys("gestured-standalone.service"), keys("gestured@.service")
+    different = {key for key in one | many if one.get(key) != many.get(key)}
+    assert different == {"Description", "Conflicts", "ExecStart", "ExecReload", "RuntimeDirectory", "StateDirectory"}
+    for key in different - {"Description", "Conflicts"}:
+        assert [value.replace("-%i", "").replace("%i", "gestured") for value in many[key]] == [
+            value if key != "ExecReload" else f"{value} --control /run/gestured/events.ctl" for value in one[key]
+        ]
 
 
 def test_each_socket_belongs_to_the_service_that_lists_it():
