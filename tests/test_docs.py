@@ -51,7 +51,7 @@ def test_each_flag_of_the_daemon_has_its_row(flag: str):
 
 
 def test_no_row_describes_a_flag_that_is_gone():
-    rows = set(re.findall(r"^\| `(--[a-z-]+)`", DOCUMENTS, re.MULTILINE))
+    rows = set(re.findall(r"^\| `(--[a-z0-9-]+)`", DOCUMENTS, re.MULTILINE))
     assert rows == flags(gestured_parser())
 
 
@@ -67,7 +67,7 @@ EACH = [(tool, command) for tool, found in TOOLS.items() for command in sorted(f
 def test_each_subcommand_has_its_row_and_flags(tool: str, command: str):
     described = row(f"{tool} {command}")
     own = flags(TOOLS[tool][command])
-    named = set(re.findall(r"`(--[a-z-]+)`", described))
+    named = set(re.findall(r"`(--[a-z0-9-]+)`", described))
     assert named <= own
     (other,) = re.findall(r"flags of `([a-z]+)`", described) or [None]
     if other is not None:
