@@ -124,9 +124,12 @@ def nearest(space: Space, prototypes: Mapping[str, Prototype], place: Array) -> 
     """The best match of a place (K,), None where there are no prototypes."""
     if not prototypes:
         return None
-    name = max(prototypes, key=lambda one: prototypes[one].confidence(place))
-    ahead = prototypes[name].nearness(place) - space.built_in_nearness(place)
-    return Match(name, prototypes[name].confidence(place), bool(ahead >= space.margin))
+    each = tuple(prototypes.values())
+    mean, variance = np.stack([one.mean for one in each]), np.stack([one.variance for one in each])
+    near = _ratio(place, mean, variance, space.between)
+    best = int((near - [one.threshold for one in each]).argmax())
+    nearer = bool(near[best] - space.built_in_nearness(place) >= space.margin)
+    return Match(tuple(prototypes)[best], each[best].confidence(place), nearer)
 
 
 def _ratio(place: Array, mean: Array, variance: Array, between: Array) -> Array:

@@ -20,7 +20,7 @@ from gestured.model.model import Model
 from gestured.record.files import PUBLIC, atomic_write
 
 AT_MOST = 0.02  # of other non-gestures, at which warping is compared
-PEOPLE, JUDGES = 16, 12  # people to learn from, and others to judge by
+PEOPLE, JUDGES = 20, 12  # people to learn from, and others to judge by
 QUICK_PEOPLE = 3
 
 
