@@ -128,7 +128,7 @@ def test_a_draft_comes_before_its_cut_and_is_the_same_segment(lines: tuple[str, 
     cuts = 0
     for frame in frames("quiet for 1500ms", *lines, "quiet for 900ms", *lines, "quiet for 900ms"):
         for found in front_end.push(frame):
-            if isinstance(found, Draft):
+            if isinstance(found, Draft | Preview):
                 drafts.append(found.segment)
             elif isinstance(found, Cut):
                 cuts += 1
