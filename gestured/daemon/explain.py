@@ -1,5 +1,6 @@
 """`gestured --explain`: what a configuration loads, listens to, computes per frame, leaves out, and why."""
 
+import math
 import os
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -15,6 +16,11 @@ from gestured.daemon.tap import KEPT_S
 from gestured.model.ladder import Ladder
 
 
+def _felt(wait_s: float, rate_hz: float) -> float:
+    """Seconds from the last touched frame to the answer: the first quiet frame, and those that the wait takes then."""
+    return (1 + math.ceil(wait_s * rate_hz - 1e-9)) / rate_hz
+
+
 def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     """The text; opens the models to do so, binds nothing. Raises ModelError or SettingsError."""
     ladder = open_ladder(settings)
@@ -26,7 +32,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     rungs = [f"{rung.name}{'' if rung.model is None else ', in use'}" for rung in ladder.rungs[1:]]
     forest = model.metadata.features is not None
     timing = Timing(tap_gap_s=settings.tap_gap_s)
-    waits = DOUBLE_TAP in used
+    waits, rate_hz = DOUBLE_TAP in used, model.metadata.rate_hz
 
     loads = [
         f"model {ladder.active}: {model.metadata.kind} {model.metadata.version}, {model.size:,} bytes, "
@@ -60,8 +66,8 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     computes = [
         "decode, check, stamp; subtract the baseline, compare with the noise; no smoothing, no inference",
         f"after a contact: {'touch-pattern features' if forest else 'its frames as a window'}, one inference",
-        f"a contact is decided {timing.release_s:g} s after it was let go"
-        + (f", a tap {timing.tap_gap_s:g} s after it, since a second one may come" if waits else ""),
+        f"at {rate_hz:g} Hz a contact is answered {_felt(timing.release_s, rate_hz):.2g} s after its last touched frame"
+        + (f", a tap {_felt(timing.tap_gap_s, rate_hz):.2g} s after it, since a second one may come" if waits else ""),
     ]
     leaves = [
         "finger positions (trajectory): nothing uses them, they are passed over at their address",

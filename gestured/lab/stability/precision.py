@@ -42,9 +42,8 @@ def precision_table(windows: WindowList, quick: bool) -> Table:
         compared("float64 against float32, extreme windows", extreme, run, reference(extreme))
         compared("float16 windows, as in training", [w.astype(np.float16).astype(np.float32) for w in windows])
         for steps in STEPS:
-            compared(
-                f"counts of {steps} steps at the peak", [np.rint(w * steps).astype(np.float32) / steps for w in windows]
-            )
+            coarse = [(np.rint(w * steps) / steps).astype(np.float32) for w in windows]
+            compared(f"counts of {steps} steps at the peak", coarse)
         smaller = quantised(Graph(data))
         if smaller is not None:
             compared("int8 weights", windows, _unchecked(smaller.data))
