@@ -69,6 +69,11 @@ def parser() -> argparse.ArgumentParser:
     taps.add_argument("--model", default="cnn_lstm", help="a path, or a shipped model's name (cnn_lstm)")
     taps.add_argument("--people", type=int, default=20, help="participants, two minutes of taps of each (20)")
     taps.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (900)")
+    early = add("early", "play simulated sessions and say how early and how rightly a model speaks",
+                "gestured-lab early --model cnn_lstm --minutes 20")  # fmt: skip
+    early.add_argument("--model", default="cnn_lstm", help="the model that is asked (cnn_lstm)")
+    early.add_argument("--minutes", type=float, default=20, help="minutes of sessions of each kind (20)")
+    early.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (900)")
     stability = add("stability", "measure filters, extreme inputs, models and symmetries of the whole path",
                     "gestured-lab stability --quick")  # fmt: skip
     stability.add_argument("--quick", action="store_true", help="some seconds instead of some minutes")
@@ -99,10 +104,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = parser().parse_args(arguments)
     try:
-        if args.command in ("online", "taps"):
-            from gestured.lab import online, taps
+        if args.command in ("early", "online", "taps"):
+            from gestured.lab import ahead, online, taps
 
-            return online.run(args) if args.command == "online" else taps.run(args)
+            programs = {"early": ahead.run, "online": online.run, "taps": taps.run}
+            return programs[args.command](args)
         if args.command in recordings.COMMANDS:
             return recordings.run(args)
         try:

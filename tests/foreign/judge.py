@@ -3,6 +3,7 @@
     python -m tests.foreign.judge --model cnn_lstm --n 40 --level nominal hard
     python -m tests.foreign.judge --front-end --n 40
     python -m tests.foreign.judge --model cnn_lstm --grids --sessions 5 --json
+    python -m tests.foreign.judge --model cnn_lstm --provisional --sessions 10
 
 A take's outcome is one of: `missed` (no segment), `cancelled:REASON`, `split` (more than one segment or
 event), or its one segment's label. Takes that nobody can
@@ -21,11 +22,13 @@ from gestured.core.events import Cancelled, Gesture, Onset, Unknown
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
 from gestured.core.recognizer import Recognizer, events_of
+from gestured.lab.ahead import Act, Ahead, heard, table
 from gestured.lab.made_of import made_of
 from gestured.model.model import shipped
 from tests.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
 
 SEEN = 4.0  # times the noise
+SESSION_S = 120.0  # of those with provisional events
 Take = dict[str, Any]
 
 
@@ -299,6 +302,17 @@ def sessions(source: str, level: str, count: int, first: int, seconds: float = 1
     }
 
 
+def provisional(source: str, level: str, share: float, seeds: range) -> Ahead:
+    """What became of provisional events in sessions with that share of non-gestures."""
+    classifier, found = _open(source), Ahead()
+    assert classifier is not None
+    for seed in seeds:
+        recording = session(seed, level, SESSION_S, share)
+        acts = [Act(event["label"], event["onset"], event["release"]) for event in recording["events"]]
+        found.add(heard(_frames(recording), (9, 9), classifier), acts, SESSION_S / 60)
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     what = parser.add_mutually_exclusive_group(required=True)
@@ -310,11 +324,20 @@ def main() -> None:
     parser.add_argument("--kinds", nargs="+", default=[*GESTURES, *NON_GESTURES])
     parser.add_argument("--grids", action="store_true", help=f"other grids instead of levels: {GRIDS}")
     parser.add_argument("--sessions", type=int, default=0, help="also this many sessions of two minutes a level")
+    parser.add_argument("--provisional", action="store_true", help="only: provisional events in those sessions")
     parser.add_argument("--list", action="store_true", help="print each gesture that went wrong, with its seed")
     parser.add_argument("--whole", action="store_true", help="keep takes that nobody can recognise")
     parser.add_argument("--jobs", type=int, default=1, help="processes (%(default)s)")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
+    if args.provisional:
+        sets = {level: (level, 0.25) for level in args.level} | {"non-gestures": ("nominal", 1.0)}
+        rows = {
+            name: provisional(args.model, level, share, range(args.first, args.first + (args.sessions or 10))).figures()
+            for name, (level, share) in sets.items()
+        }
+        print(json.dumps(rows, indent=1) if args.json else table(rows))
+        return
     levels = ["grids"] if args.grids else args.level
     tasks = [(args.model, k, lv, args.n, args.grids, args.first, args.whole) for lv in levels for k in args.kinds]
     outcomes: list[Outcome] = []

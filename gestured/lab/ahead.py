@@ -1,0 +1,183 @@
+"""How early and how rightly a model speaks: provisional events over whole sessions, held against what was performed.
+
+`gestured-lab early`. Nothing is cut by hand: frames go through the recogniser as in the daemon, and a tap is the
+beginning of a double tap, a scribble begins as a swipe.
+"""
+
+import argparse
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
+from gestured.core.frames import Frame
+from gestured.core.front_end import FrontEnd
+from gestured.core.recognizer import Classifier, Recognizer, events_of
+from gestured.lab.progress import progress
+from gestured.model.model import open_model
+from gestured.simulator import NONE, Participant, SimulatedSensor, Take, generator, session
+
+TAPS = ("one_tap", "double_tap")
+SESSION_S = 120.0
+NON_GESTURE_SHARE = 0.2
+SLACK_S = 0.2  # an onset may be found so far from the true one
+HARD = 0.9  # hardness of the simulator's hard sensors
+SETS = ("nominal", "hard", "non-gestures")
+
+
+@dataclass(frozen=True, slots=True)
+class Act:
+    """What was performed, from `onset` to `offset` seconds."""
+
+    label: str
+    onset: float
+    offset: float
+
+
+@dataclass(slots=True)
+class Ahead:
+    """What became of provisional events in some sessions."""
+
+    minutes: float = 0.0
+    moved: int = 0  # gestures that were performed and are no taps
+    early: int = 0  # of them with a right provisional event at or before the last touched frame
+    moved_s: list[float] = field(default_factory=list)  # first right word about each, after its last touched frame
+    tap_s: list[float] = field(default_factory=list)  # the same of single taps
+    confirmed: dict[bool, int] = field(default_factory=lambda: {True: 0, False: 0})  # events, but for taps
+    taps: dict[bool, int] = field(default_factory=lambda: {True: 0, False: 0})  # events of a tap at its release
+    right: int = 0  # answers to gestures
+    wrong: int = 0
+    gestures: int = 0
+
+    def add(self, events: Sequence[Event], acts: Iterable[Act], minutes: float) -> None:
+        """Count one session."""
+        self.minutes += minutes
+        said = {event.id: event for event in events if isinstance(event, Provisional)}
+        answers = [event for event in events if isinstance(event, Gesture | Unknown)]
+        ends = {event.id: event.provisional for event in events if isinstance(event, Gesture | Unknown | Cancelled)}
+        for number, event in said.items():
+            counts = self.taps if event.gesture == TAPS[0] else self.confirmed
+            counts[ends.get(number) == "confirmed"] += 1
+        used: set[int] = set()
+        for act in acts:
+            if act.label == NONE:
+                continue
+            near = [
+                a for a in answers
+                if a.id not in used and a.onset <= act.offset + SLACK_S and a.offset >= act.onset - SLACK_S
+            ]  # fmt: skip
+            used |= {answer.id for answer in near}
+            self._gesture(act, near, said)
+
+    def _gesture(self, act: Act, near: Sequence[Gesture | Unknown], said: dict[int, Provisional]) -> None:
+        """Count one gesture that was performed, by the answers at its time."""
+        self.gestures += 1
+        named = [answer for answer in near if isinstance(answer, Gesture)]
+        hit = any(answer.gesture == act.label for answer in named)
+        self.right += hit
+        self.wrong += bool(named) and not hit
+        moved = act.label not in TAPS
+        self.moved += moved
+        after = []
+        for answer in near:
+            first = said.get(answer.id)
+            if first is not None and first.gesture == act.label:
+                after.append(first.decided - answer.offset)
+            elif isinstance(answer, Gesture) and answer.gesture == act.label:
+                after.append(answer.decided - answer.offset)
+        if moved:
+            self.early += any(
+                answer.id in said and said[answer.id].gesture == act.label
+                and said[answer.id].decided <= answer.offset + 1e-6 for answer in near
+            )  # fmt: skip
+        if after and (moved or act.label == TAPS[0]):
+            (self.moved_s if moved else self.tap_s).append(after[0])
+
+    def figures(self) -> dict[str, Any]:
+        """Everything as plain data; None where there is nothing to divide by."""
+        return {
+            "minutes": round(self.minutes, 1),
+            "gestures": self.gestures,
+            "right": _share(self.right, self.gestures),
+            "wrong": _share(self.wrong, self.gestures),
+            "moved": self.moved,
+            "early": _share(self.early, self.moved),
+            "events": sum(self.confirmed.values()),
+            "confirmed": _share(self.confirmed[True], sum(self.confirmed.values())),
+            "moved_median_s": _median(self.moved_s),
+            "tap_median_s": _median(self.tap_s),
+            "taps": sum(self.taps.values()),
+            "taps_confirmed": _share(self.taps[True], sum(self.taps.values())),
+            "events_per_minute": round((sum(self.confirmed.values()) + sum(self.taps.values())) / self.minutes, 2)
+            if self.minutes
+            else None,
+        }
+
+
+def _share(part: int, whole: int) -> float | None:
+    return round(part / whole, 4) if whole else None
+
+
+def _median(values: Sequence[float]) -> float | None:
+    return round(float(np.median(values)), 3) if values else None
+
+
+def heard(frames: Iterable[Frame], grid: tuple[int, int], classifier: Classifier) -> list[Event]:
+    """The events of a session, provisional ones among them."""
+    front = FrontEnd("lab", *grid)
+    front.previews = True
+    recognizer = Recognizer(front, classifier)
+    events: list[Event] = []
+    last = 0.0
+    for frame in frames:
+        events += events_of(recognizer.push(frame))
+        last = frame.t
+    return events + events_of(recognizer.flush(last + 5.0))
+
+
+def takes(which: str, count: int, seed: int) -> Iterator[Take]:
+    """Sessions of one new participant each."""
+    for n in range(count):
+        person = seed + n
+        rng = generator(person, 0xEA)
+        sensor = SimulatedSensor.wide(rng, HARD) if which == "hard" else SimulatedSensor.nominal(day=person)
+        share = 1.0 if which == "non-gestures" else NON_GESTURE_SHARE
+        yield session(Participant(person), sensor, rng, SESSION_S, share)
+
+
+def run(args: argparse.Namespace) -> int:
+    """`gestured-lab early`."""
+    model = open_model(args.model)
+    count = max(round(args.minutes * 60 / SESSION_S), 1)
+    figures: dict[str, Any] = {"model": args.model}
+    for which in SETS:
+        ahead = Ahead()
+        for take in progress(takes(which, count, args.seed), count, which):
+            frames = (Frame(float(t), values) for t, values in zip(take.times, take.frames, strict=True))
+            rows, columns = take.frames.shape[1:]
+            acts = [Act(act.label, act.onset_s, act.offset_s) for act in take.events]
+            ahead.add(heard(frames, (rows, columns), model), acts, SESSION_S / 60)
+        figures[which] = ahead.figures()
+    if args.json:
+        print(json.dumps(figures, indent=2))
+    else:
+        print(table({which: figures[which] for which in SETS}))
+    return 0
+
+
+HEAD = ("gestures", "right", "wrong", "moved", "early", "events", "confirmed", "moved_median_s", "tap_median_s",
+        "taps_confirmed", "events_per_minute")  # fmt: skip
+
+
+def table(sets: dict[str, dict[str, Any]]) -> str:
+    """One line for each set."""
+    lines = [f"{'set':<14}" + "".join(f"{name:>{len(name) + 2}}" for name in HEAD)]
+    for which, found in sets.items():
+        cells = ("-" if found[name] is None else str(found[name]) for name in HEAD)
+        lines.append(
+            f"{which:<14}" + "".join(f"{cell:>{len(name) + 2}}" for name, cell in zip(HEAD, cells, strict=True))
+        )
+    return "\n".join(lines)
