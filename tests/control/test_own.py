@@ -42,7 +42,8 @@ def begun(start, daemon: Daemon, *flags: object):
 
 def test_a_gesture_is_enrolled_listed_and_forgotten(start, ctl, daemon: Daemon, sensor: Performer) -> None:
     process = begun(start, daemon, "--examples", 1, "--json")
-    sensor.perform("left").slash()
+    sensor.perform("left")
+    sensor.slash()
     first, *others = [json.loads(line) for line in process.communicate(timeout=30)[0].splitlines()]
     assert process.returncode == 0
     assert (first["example"], first["kept"]) == (1, False)
