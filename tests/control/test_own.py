@@ -107,7 +107,9 @@ def test_a_tape_holds_the_own_gestures_and_replays_to_the_same_events(
 
     def perform() -> None:
         client = daemon.client().subscribe("release", sensors=["seat"])
-        Performer(daemon, "seat", seed=7).begin().slash().backslash().perform("up").slash()
+        performer = Performer(daemon, "seat", seed=7).begin().slash().backslash()
+        performer.perform("up")
+        performer.slash()
         client.events("release", "seat", 4)
 
     path, _ = recorded(perform)
