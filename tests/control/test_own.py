@@ -107,8 +107,9 @@ def test_a_tape_holds_the_own_gestures_and_replays_to_the_same_events(
 
     def perform() -> None:
         client = daemon.client().subscribe("release", sensors=["seat"])
-        performer = Performer(daemon, "seat", seed=7).begin().slash().backslash()
-        performer.perform("up")
+        performer = Performer(daemon, "seat", seed=7)
+        performer.begin()
+        performer.slash().backslash().perform("up")
         performer.slash()
         client.events("release", "seat", 4)
 
