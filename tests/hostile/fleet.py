@@ -136,11 +136,11 @@ def trial(model: object, instances: int, sensors: int, rate: float, seconds: flo
         try:
             until(lambda: all(one.ready() == each for one in fleet))
             before = [lost_frames(one) for one in fleet]
-            cpu = [cpu_s(one.daemon.process.pid) for one in fleet]
+            used, sent, begun = [cpu_s(one.daemon.process.pid) for one in fleet], fleet[-1].sent, time.monotonic()
             time.sleep(seconds / 2)
-            share = [
-                (cpu_s(one.daemon.process.pid) - used) / (seconds / 2) for one, used in zip(fleet, cpu, strict=True)
-            ]
+            took = time.monotonic() - begun
+            worked = [cpu_s(one.daemon.process.pid) - was for one, was in zip(fleet, used, strict=True)]
+            frames = max(fleet[-1].sent - sent, 1)
             killed, others = fleet[0], fleet[1:]
             killed.daemon.process.kill()
             killed.daemon.process.wait()
@@ -158,7 +158,8 @@ def trial(model: object, instances: int, sensors: int, rate: float, seconds: flo
             "instances": instances, "sensors": each * instances, "rate_hz": rate, "cores": os.cpu_count(),
             "frames_sent": sum(one.sent for one in fleet), "rounds_late": senders.late,
             "others_lost": sum(lost_frames(one) - was for one, was in zip(others, before[1:], strict=True)),
-            "cpu_of_an_instance": round(max(share), 3), "ready_after_s": round(started, 2),
+            "frames_a_second": round(instances * frames / took), "cpu_us_a_frame": round(1e6 * max(worked) / frames, 1),
+            "ready_after_s": round(started, 2),
             "sensors_back_after_s": round(back, 2), "sensors_back": killed.ready(),
         }  # fmt: skip
         for one in fleet:

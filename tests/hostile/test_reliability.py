@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from gestured.bridge.counts import HELP
 from tests.hostile.faults import FAULTS
 
 TESTS = Path(__file__).parents[1]
 TEXT = (TESTS.parent / "docs" / "reliability.md").read_text()
 METRICS = {*re.findall(r"^# TYPE (\S+)", (TESTS / "daemon" / "metrics.txt").read_text(), re.MULTILINE)}
+METRICS |= {f"gestured_bridge_{name}{'' if name == 'connected' else '_total'}" for name in HELP}
 ROWS = [line for line in TEXT.split("\n## ")[0].splitlines() if line.startswith("| ")][1:]
 
 
