@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gestured.client.control import Control
+from gestured.client.lines import Refused
 from gestured.client.subscriber import Subscriber
 from gestured.control.flag import flag, flag_lines, flag_path
 from gestured.control.view.outbox import Outbox
@@ -18,7 +19,8 @@ SENSORS_S = 1.0
 LOOK_S = 1 / 30  # the daemon makes no more
 AGAIN_S = 0.5  # before a daemon that has gone is asked again
 KEPT_S = 30.0  # of packets, where the daemon has no flight recorder
-KEPT_LINES = 100_000  # of them at the most: 30 s of 1000 Hz, three times over
+LINE_BYTES = 500  # that Python takes for a line, its packet not counted
+KEPT_BYTES = 64 << 20  # of them at the most, as base64
 
 
 class Source:
@@ -34,7 +36,8 @@ class Source:
         self._subscriber: Subscriber | None = None
         self._tap: Control | None = None  # where there is no flight recorder: the view keeps packets itself
         self._scene: dict[str, Any] = {}
-        self._kept: deque[tuple[float, dict[str, Any]]] = deque(maxlen=KEPT_LINES)  # s, a tap's line
+        self._kept: deque[tuple[float, int, dict[str, Any]]] = deque()  # s, bytes, a tap's line
+        self._size = 0  # bytes that are kept
         for work in (self._tell_sensors, self._tell_frames):
             threading.Thread(target=self._again_and_again, args=(work,), daemon=True).start()
 
@@ -54,9 +57,8 @@ class Source:
     def recalibrate(self, sensor: str) -> str:
         """Have the daemon learn a sensor anew; what was done, in words. Raises GesturedError."""
         with Control(self._control) as control:
-            return (
-                f"{', '.join(control.ask('recalibrate', sensor=sensor)['sensors'])}: learned anew, leave it untouched"
-            )
+            control.ask("recalibrate", sensor=sensor)
+        return f"{sensor}: learned anew, leave it untouched for a second"
 
     def flag(self, note: str) -> str:
         """Keep the last 30 s as a recording; what was done, in words. Raises GesturedError."""
@@ -67,8 +69,7 @@ class Source:
         elif not self._scene:
             raise GesturedError("nothing was kept so far; try again in a moment")
         else:
-            self._forget()
-            keeper = flag_lines(self._scene, (line for _, line in list(self._kept)), path, note)
+            keeper = flag_lines(self._scene, (line for *_, line in list(self._kept)), path, note)
         return f"{path}: {keeper.packets} packets, {keeper.events} events"
 
     def close(self) -> None:
@@ -123,7 +124,10 @@ class Source:
             began = time.monotonic()
             wanted = {(outbox.sensor, outbox.raw) for outbox in list(self._open)}
             for sensor, raw in wanted & {(name, raw) for name in self._heard() for raw in (False, True)}:
-                frame = control.ask("view", sensor=sensor, raw=raw)
+                try:
+                    frame = control.ask("view", sensor=sensor, raw=raw)
+                except Refused:  # it was forgotten since
+                    continue
                 if told.get((sensor, raw)) != frame["t"]:
                     told[sensor, raw] = frame["t"]
                     for outbox in list(self._open):
@@ -150,17 +154,20 @@ class Source:
             for line in tap.lines():
                 if not self._open or self._closed.is_set():
                     break
-                self._kept.append((time.monotonic(), line))
+                size = len(line.get("data", "")) + LINE_BYTES
+                self._kept.append((time.monotonic(), size, line))
+                self._size += size
                 self._forget()
         except (GesturedError, OSError):
             pass  # that the daemon is gone, the others say
         tap.close()
         self._kept.clear()
-        self._scene, self._tap = {}, None
+        self._scene, self._tap, self._size = {}, None, 0
 
     def _forget(self) -> None:
-        while self._kept and self._kept[0][0] < time.monotonic() - KEPT_S:
-            self._kept.popleft()
+        oldest = time.monotonic() - KEPT_S
+        while self._kept and (self._kept[0][0] < oldest or self._size > KEPT_BYTES):
+            self._size -= self._kept.popleft()[1]
 
     def _tell(self, kind: str, what: dict[str, Any]) -> None:
         for outbox in list(self._open):
