@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from joblib import Parallel, delayed, parallel_config
 
 from gestured.core.errors import GesturedError
@@ -66,14 +67,27 @@ class Schedule:
             return
         with _backend(self.cluster, sets):
             jobs = -1 if self.cluster else self.jobs
-            calls = (delayed(_compute)(task, sets[task.data]) for task in todo)
+            calls = (delayed(compute)(task, sets[task.data]) for task in todo)
             yield from Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2 * n_jobs", batch_size=1)(
                 calls
             )
 
 
-def _compute(task: Task, data: Data) -> tuple[Task, Result]:
-    return task, run(task, data)
+OWN_SET = "own"  # of a researcher's recordings, which may be too few to learn from
+
+
+def compute(task: Task, data: Data) -> tuple[Task, Result]:
+    """A task and its result; GesturedError where own recordings are too few to learn from."""
+    try:
+        return task, run(task, data)
+    except ValueError as error:
+        if task.data != OWN_SET:
+            raise
+        people = len(np.unique(data.gestures.people))
+        raise GesturedError(
+            f"--recordings: {len(data.gestures)} gestures of {people} people are too few for {task.method}: "
+            f"{' '.join(str(error).split())[:120]}; record more people, or leave --recordings out"
+        ) from None
 
 
 @contextmanager

@@ -38,14 +38,14 @@ def here(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_second_run_computes_nothing(tmp_path: Path, here: None, monkeypatch: pytest.MonkeyPatch) -> None:
     sets = {"simulated": data()}
     first = Schedule(tmp_path, 1).results(TASKS, sets, "cells")
-    monkeypatch.setattr(cells, "_compute", lambda *_: pytest.fail("computed again"))
+    monkeypatch.setattr(cells, "compute", lambda *_: pytest.fail("computed again"))
     assert Schedule(tmp_path, 1).results(TASKS, sets, "cells") == first
 
 
 def test_what_was_finished_before_an_interruption_is_kept(
     tmp_path: Path, here: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sets, whole = {"simulated": data()}, cells._compute
+    sets, whole = {"simulated": data()}, cells.compute
     left = iter([whole, whole])
 
     def interrupted(*arguments: object) -> object:
@@ -54,12 +54,12 @@ def test_what_was_finished_before_an_interruption_is_kept(
             raise KeyboardInterrupt
         return step(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(cells, "_compute", interrupted)
+    monkeypatch.setattr(cells, "compute", interrupted)
     with pytest.raises(KeyboardInterrupt):
         Schedule(tmp_path, 1).results(TASKS, sets, "cells")
     kept = list(tmp_path.glob("cells/*.json"))
     assert kept and all(json.loads(path.read_text()) for path in kept)
-    monkeypatch.setattr(cells, "_compute", whole)
+    monkeypatch.setattr(cells, "compute", whole)
     assert len(Schedule(tmp_path, 1).results(TASKS, sets, "cells")) == len(TASKS)
 
 
@@ -111,7 +111,7 @@ def cluster() -> Iterator[str]:
 @pytest.mark.slow
 def test_a_cluster_gives_the_same_numbers(tmp_path: Path, cluster: str) -> None:
     sets = {"simulated": data()}
-    alone = dict(cells._compute(one, sets["simulated"]) for one in TASKS)
+    alone = dict(cells.compute(one, sets["simulated"]) for one in TASKS)
     together = Schedule(tmp_path / "together", 1, cluster).results(TASKS, sets, "cells")
     assert without_time(together) == without_time(alone)  # type: ignore[arg-type]
 

@@ -10,7 +10,10 @@ pytest.importorskip("torch")
 pytest.importorskip("pywt")
 
 from gestured.core.errors import GesturedError
+from gestured.lab.study import cells
+from gestured.lab.study.material import Data
 from gestured.lab.study.own import own
+from gestured.lab.study.protocols import Task
 from gestured.record.arrays import write
 from gestured.record.recordings import Recordings
 from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
@@ -69,3 +72,19 @@ def test_what_cannot_be_read_is_named_and_too_little_is_one_sentence(tmp_path: P
 def test_no_recordings_is_nothing() -> None:
     found = own([])
     assert found.samples is None and not found.files and not found.left_out
+
+
+def test_too_few_people_end_in_a_sentence_that_names_them(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    write(tmp_path / "a.npz", recordings(("anna", "berta")))
+    found = own([tmp_path / "a.npz"])
+    assert found.samples is not None
+
+    def fails(task: Task, data: Data) -> None:
+        raise ValueError("This solver needs samples of at least 2 classes in the data,\nbut it has 1")
+
+    monkeypatch.setattr(cells, "run", fails)
+    task = Task("svm", (), "none", "participants", "own", 0, 2, 0)
+    with pytest.raises(GesturedError, match=r"--recordings: 4 gestures of 2 people are too few for svm: .*has 1"):
+        cells.compute(task, Data.of("own", found.samples))
+    with pytest.raises(ValueError, match="at least 2 classes"):  # elsewhere it is a fault of ours
+        cells.compute(replace(task, data="simulated"), Data.of("simulated", found.samples))
