@@ -11,6 +11,7 @@ from gestured.lab.recordings.live import LiveSensor
 from gestured.lab.recordings.protocol import order
 from gestured.lab.recordings.session import Session
 from gestured.lab.recordings.terminal import Terminal
+from gestured.model.model import open_model
 from gestured.record.arrays import read
 from gestured.record.recordings import Recordings
 
@@ -20,9 +21,11 @@ def run(args: argparse.Namespace) -> int:
     terminal = Terminal()
     args.out.mkdir(parents=True, exist_ok=True)
     path: Path = args.out / f"{args.participant}.npz"
-    kept = already(path, args.participant, (args.rows, args.columns))
+    kept = already(path, args.participant, args.grid)
+    model = open_model(args.model)
     trials = order(args.participant, args.seed, args.gestures, args.repeats)
-    with closing(LiveSensor(args.listen, args.rows, args.columns, args.sensor)) as sensor, terminal:
+    rows, columns = args.grid
+    with closing(LiveSensor(args.listen, rows, columns, args.sensor, model)) as sensor, terminal:
         session = Session(args.participant, path, kept, sensor, terminal, args.countdown)
         session.run(trials)
     if args.json:
@@ -41,5 +44,5 @@ def already(path: Path, participant: str, grid: tuple[int, int]) -> Recordings |
         raise RecordingError(f"{path}: subjects: expected {participant} alone, found {others[0]}; choose another --out")
     if kept.frames.shape[1:] != grid:
         found, expected = ("x".join(map(str, shape)) for shape in (kept.frames.shape[1:], grid))
-        raise RecordingError(f"{path}: frames: expected the grid {expected}, found {found}; see --rows and --columns")
+        raise RecordingError(f"{path}: frames: expected the grid {expected}, found {found}; see --grid")
     return kept

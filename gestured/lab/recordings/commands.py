@@ -1,11 +1,14 @@
 """`gestured-lab collect`, `import`, `inspect` and `forget`: their flags, and who runs them."""
 
 import argparse
+import difflib
+import re
 from collections.abc import Callable
 from datetime import date
 from pathlib import Path
 
 from gestured.client.address import host_port
+from gestured.client.grid import rows_by_columns
 from gestured.core.address import Address
 from gestured.core.wire import is_sensor
 from gestured.lab.recordings.protocol import pseudonym
@@ -14,6 +17,8 @@ from gestured.simulator import GESTURES, NONE
 
 COMMANDS = ("collect", "import", "inspect", "forget")
 FOLDER = Path("recordings")
+OWN_NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
+TAKEN = (NONE, SESSION, "other", "unknown", "use")  # words that mean something else where a gesture may stand
 IMPORT = """\
 Make recordings of files of another form. What cannot be used is told and
 counted: the file, the line, the field, and what was expected.
@@ -40,10 +45,14 @@ def add(command: Add) -> None:
     collect.add_argument("--listen", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT",
                          help="where the sensor sends to (127.0.0.1:9000)")  # fmt: skip
     collect.add_argument("--sensor", type=_sensor, metavar="NAME", help="which sensor (the first that sends)")
-    collect.add_argument("--rows", type=_side, default=9, metavar="N", help="rows of its grid (9)")
-    collect.add_argument("--columns", type=_side, default=9, metavar="N", help="columns of its grid (9)")
+    collect.add_argument(
+        "--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="its rows and columns (9x9)"
+    )
     collect.add_argument("--seed", type=int, default=0, metavar="N", help="another order of the trials (0)")
-    collect.add_argument("--gestures", type=_gestures, default=GESTURES, metavar="A,B", help="only these (all ten)")
+    collect.add_argument("--gestures", type=_gestures, default=GESTURES, metavar="A,B",
+                         help="only these, or names of your own (all ten)")  # fmt: skip
+    collect.add_argument("--model", default="cnn_lstm", metavar="MODEL",
+                         help="says at once where a gesture looks like another (cnn_lstm)")  # fmt: skip
     collect.add_argument("--repeats", type=_count, default=1, metavar="N", help="times that each trial is done (1)")
     collect.add_argument("--countdown", type=_seconds, default=3, metavar="S", help="seconds before each gesture (3)")
 
@@ -55,11 +64,10 @@ def add(command: Add) -> None:
     bring.add_argument("--format", choices=("csv", "capfingerid"), required=True, help="their form")
     bring.add_argument("--out", type=Path, required=True, metavar="F.npz", help="a new file for all of them")
     only = bring.add_argument_group("only for --format csv")
-    only.add_argument("--rows", type=_side, metavar="N", help="rows of the grid (9)")
-    only.add_argument("--columns", type=_side, metavar="N", help="columns of the grid (9)")
+    only.add_argument("--grid", type=rows_by_columns, metavar="RxC", help="rows and columns (9x9)")
     only.add_argument("--time-unit", choices=("s", "ms", "us"), help="of the first column (s)")
     only.add_argument("--label", type=_label, metavar="LABEL",
-                      help="what was performed: one of the ten gestures, none, or session (session)")  # fmt: skip
+                      help="what was performed: a gesture, a name of your own, none, or session (session)")  # fmt: skip
     only.add_argument("--participant", type=pseudonym, metavar="NAME", help="whose recordings they are, a pseudonym")
     only.add_argument("--consent", type=_day, metavar="YYYY-MM-DD", help="the day of the participant's consent")
     look = command("inspect", "print and draw what a file of recordings holds",
@@ -91,16 +99,24 @@ def _sensor(text: str) -> str:
 
 
 def _gestures(text: str) -> tuple[str, ...]:
-    found = tuple(text.split(","))
-    unknown = [name for name in found if name not in GESTURES]
-    if unknown:
-        raise argparse.ArgumentTypeError(f"{unknown[0]!r}: expected some of {', '.join(GESTURES)}, with commas")
-    return tuple(dict.fromkeys(found))
+    return tuple(dict.fromkeys(_own(name) for name in text.split(",")))
 
 
 def _label(text: str) -> str:
-    if text not in (*GESTURES, NONE, SESSION):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected one of {', '.join((*GESTURES, NONE, SESSION))}")
+    return text if text in (NONE, SESSION) else _own(text)
+
+
+def _own(text: str) -> str:
+    """A gesture's name, or one of one's own; what is nearly a gesture's is a slip."""
+    if text in GESTURES:
+        return text
+    meant = difflib.get_close_matches(text, GESTURES, n=1, cutoff=0.85)
+    if meant or OWN_NAME.fullmatch(text) is None or text in TAKEN:
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: expected {meant[0]}, or a name of your own that is less like it"
+            if meant
+            else f"{text!r}: expected one of {', '.join(GESTURES)}, or a name of your own, 1 to 32 of a-z 0-9 _"
+        )
     return text
 
 
@@ -125,6 +141,5 @@ def _within(low: float, high: float, whole: bool) -> Callable[[str], float]:
     return parse
 
 
-_side = _within(2, 64, whole=True)
 _count = _within(1, 100, whole=True)
 _seconds = _within(0, 60, whole=True)

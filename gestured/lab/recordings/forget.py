@@ -17,6 +17,7 @@ from gestured.lab.recordings.origin import said
 from gestured.record.arrays import read, write
 from gestured.record.recordings import Recordings
 
+CANNOT = "; its weights cannot forget: adapt or train it again without them"
 FIELDS = {f"{field.name}.npy" for field in fields(Recordings)}
 
 
@@ -116,10 +117,11 @@ def told(participant: str, parts: Sequence[Holding], folder: Path) -> dict[str, 
         same = [digests[origin.sha256] for origin in origins if origin.sha256 in digests]
         named = [origin.file for origin in origins if participant in origin.subjects]
         if same:
-            answers[str(model)] = f"was trained with {participant}: it learned from {same[0]} as it is now"
+            answers[str(model)] = f"was trained with {participant}: it learned from {same[0]} as it is now{CANNOT}"
         elif named:
             answers[str(model)] = (
                 f"was trained with a participant {participant}, in a file {named[0]} with other contents than any here"
+                f"{CANNOT}"
             )
         else:
             answers[str(model)] = f"was not trained with {participant}"

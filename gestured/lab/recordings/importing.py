@@ -15,7 +15,7 @@ from gestured.record.arrays import write
 from gestured.record.check import SESSION
 from gestured.record.recordings import Recordings
 
-CSV_ALONE = ("rows", "columns", "time_unit", "label", "participant", "consent")
+CSV_ALONE = ("grid", "time_unit", "label", "participant", "consent")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -58,6 +58,7 @@ def _reader(args: argparse.Namespace) -> Callable[[Path], tuple[Recordings, list
         return read_capfingerid
     if args.participant is None:
         raise GesturedError("--participant: expected a pseudonym; a CSV file does not say whose it is")
-    form = Csv(args.rows or 9, args.columns or 9, args.time_unit or "s", args.label or SESSION,
+    rows, columns = args.grid or (9, 9)
+    form = Csv(rows, columns, args.time_unit or "s", args.label or SESSION,
                args.participant, args.consent or "")  # fmt: skip
     return partial(read_csv, form=form)

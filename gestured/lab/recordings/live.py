@@ -16,7 +16,7 @@ from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
 from gestured.core.owner import Source
 from gestured.core.reading import Reading
-from gestured.core.recognizer import Decided, Scores
+from gestured.core.recognizer import Classifier, Decided, Scores
 from gestured.core.scene import DOUBLE_TAP, Scene
 from gestured.lab.recordings.quality import Captured
 
@@ -47,16 +47,19 @@ class Listening:
 class LiveSensor:
     """The first sensor that sends to `address`, or the one called `name`. Raises GesturedError where it cannot listen.
 
-    `pump` reads; what the hub found of it since `begin` is `found`.
+    `classifier` says what each take looks like. `pump` reads; what the hub found of it since `begin` is `found`.
     """
 
-    def __init__(self, address: Address, rows: int, columns: int, name: str | None) -> None:
+    def __init__(
+        self, address: Address, rows: int, columns: int, name: str | None, classifier: Classifier | None = None
+    ) -> None:
         self.where = str(address)
         self.name = name
         self.grid = (rows, columns)
         self.ready = False  # the idle sensor is known
         self.found: list[Event | Decided] = []
-        classifier = Listening()
+        classifier = classifier or Listening()
+        self._gestures = classifier.gestures
         self._hub = Hub(Scene(classifier.gestures, self.grid, touches=True, frames=True), classifier)
         self._frames: deque[Frame] = deque()
         self._free = -math.inf  # s, when the last contact was over
@@ -163,7 +166,8 @@ class LiveSensor:
         onset = self.onset
         if onset is None:
             return None
-        cuts = [contact.segment for contact in self.found if isinstance(contact, Decided)]
+        decided = [contact for contact in self.found if isinstance(contact, Decided)]
+        cuts = [contact.segment for contact in decided]
         released = [contact.offset for contact in self.found if isinstance(contact, Release)]
         reasons = [contact.reason for contact in self.found if isinstance(contact, Cancelled)]
         first = cuts[0].onset if cuts else onset
@@ -182,4 +186,11 @@ class LiveSensor:
             min(int(marks[1]), len(frames) - 1),
             self._reading.noise if self._reading else 0.0,
             trouble,
+            *self._looks(decided[0].scores if len(decided) == 1 else None),
         )
+
+    def _looks(self, scores: Scores | None) -> tuple[str, float]:
+        """The gesture that a take looks like, and how surely."""
+        if scores is None or len(scores.values) != len(self._gestures):
+            return "", 0.0
+        return self._gestures[int(scores.values.argmax())], scores.confidence

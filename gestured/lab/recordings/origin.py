@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +20,22 @@ class Origin:
     file: str
     sha256: str
     subjects: list[str]
+    consents: dict[str, str] = field(default_factory=dict)  # subject -> the day of the latest consent that is known
 
 
 def origins(paths: Iterable[Path]) -> list[dict[str, Any]]:
     """What a model that learns from these files says of them; RecordingError for what is no recording."""
-    return [
-        asdict(Origin(path.name, file_digest(path), sorted(set(read(path).subjects.astype(str))))) for path in paths
-    ]
+    return [asdict(_origin(path)) for path in paths]
+
+
+def _origin(path: Path) -> Origin:
+    found = read(path)
+    subjects = found.subjects.astype(str).tolist()
+    days: dict[str, str] = {}
+    for subject, day in zip(subjects, [] if found.consents is None else found.consents.tolist(), strict=False):
+        if day:
+            days[subject] = max(day, days.get(subject, day))
+    return Origin(path.name, file_digest(path), sorted(set(subjects)), days)
 
 
 def said(model: Path) -> list[Origin] | None:
@@ -35,6 +44,14 @@ def said(model: Path) -> list[Origin] | None:
     if text is None:
         return None
     try:
-        return [Origin(str(o["file"]), str(o["sha256"]), [str(s) for s in o["subjects"]]) for o in json.loads(text)]
-    except (TypeError, KeyError, RecursionError) as error:
+        return [
+            Origin(
+                str(o["file"]),
+                str(o["sha256"]),
+                [str(s) for s in o["subjects"]],
+                {str(s): str(day) for s, day in o.get("consents", {}).items()},
+            )
+            for o in json.loads(text)
+        ]
+    except (TypeError, KeyError, AttributeError, RecursionError) as error:
         raise ValueError(f"{KEY}: expected a list of file, sha256 and subjects: {error}") from error

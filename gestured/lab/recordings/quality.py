@@ -26,6 +26,8 @@ class Captured:
     release: int  # last touched frame
     noise: float  # counts, one standard deviation of an idle taxel
     trouble: str = ""  # why the front end made no single gesture of it
+    looks: str = ""  # the gesture that a model takes it for
+    sure: float = 0.0  # 0..1, how sure the model is
 
     def values(self) -> NDArray[np.float64]:
         """(T, R, C) raw counts."""

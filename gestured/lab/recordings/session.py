@@ -5,6 +5,7 @@ Every kept take is on disk before the next prompt, so a session can end at any m
 
 import math
 import select
+import textwrap
 import time
 from collections.abc import Callable, Sequence
 from datetime import date
@@ -26,11 +27,15 @@ GESTURE_TIMEOUT_S = 10.0  # for a gesture to begin, and for it to end
 APART_S = 0.4  # a second contact within so long belongs to the take (and spoils it)
 CONSENT = """\
 Consent of participant {participant}
-  What is recorded: the pressure on the sensor while you perform gestures, and when. No name, no picture, no sound.
-  It is kept under the pseudonym {participant} in {path}, to train and test gesture recognition.
-  You may stop at any time, and have your recordings deleted later: gestured-lab forget {participant} {path}"""
+  What is recorded: the pressure on the sensor while you perform gestures, and
+  when. No name, no picture, no sound. It is kept under the pseudonym
+  {participant} in {path}, to train and test gesture recognition.
+  You may stop at any time, and have your recordings deleted later:
+  gestured-lab forget {participant} {path}"""
+WIDTH = 80  # columns of a terminal
 KEEP = "Enter keep  "
-KEYS = KEEP + "r repeat  d discard, it comes again later  p pause  q quit and go on later"
+KEYS = KEEP + "r repeat  d discard, it comes again  p pause  q quit, go on later"
+SURE = 0.9  # confidence of a model that contradicts
 
 
 class Paused(Exception):
@@ -92,7 +97,7 @@ class Session:
             except Paused:  # there is nothing to pause yet
                 pass
         rows, columns = self._sensor.grid
-        self._terminal.say(f"Sensor {self._sensor.name}: {rows} x {columns} at {self._sensor.rate_hz:.0f} Hz.")
+        self._terminal.say(f"Sensor {self._sensor.name}: {rows} x {columns} at {self._sensor.rate_hz:.1f} Hz.")
 
     def _trial(self, trial: Exercise, number: int, total: int) -> Captured | None:
         """The take to keep, or None where it was discarded."""
@@ -134,9 +139,14 @@ class Session:
         take = sensor.take()
         self._show(trial, take)
         usable = take is not None and not take.trouble
-        terminal.say(f"  {KEYS if usable else KEYS.removeprefix(KEEP)}")
+        doubt = usable and take is not None and take.sure >= SURE and take.looks != trial.gesture
+        if doubt and take is not None:
+            terminal.say(f"  that looked like {take.looks}, {take.sure:.2f}: keep? [y/N]")
+        terminal.say(f"  {KEYS if usable and not doubt else KEYS.removeprefix(KEEP)}")
         while True:
             key = self._until(None)
+            if doubt:
+                key = {"y": "\n", "n": "r", "\n": "r"}.get(key, key)
             if key in ("r", "d") or (usable and key == "\n"):
                 return key, take
 
@@ -153,13 +163,15 @@ class Session:
             "",
             f"touched for {take.seconds:.2f} s, frames: {take.release - take.onset + 1}",
             f"peak {peak:.0f} counts, {peak / max(take.noise, 1e-9):.0f} times the noise",
-            "good" if not wrong else "NOT GOOD: " + "; ".join(wrong),
+            "good" if not wrong else "",
             "",
         ]
         start = max(take.onset - 2, 0)
         picture = draw(trace(take.values()[start : take.release + 1]), colour=True)
         for row, text in zip(picture, words, strict=True):
             self._terminal.say(f"  {row}   {text}".rstrip())
+        if wrong:
+            self._terminal.say(textwrap.fill("  NOT GOOD: " + "; ".join(wrong), WIDTH, subsequent_indent="  "))
 
     def _keep(self, take: Captured, trial: Exercise) -> None:
         new = recording(take, trial, self.participant, self._consent)

@@ -149,10 +149,11 @@ def test_models_say_whose_recordings_they_learned_from(
 
     monkeypatch.setattr("gestured.lab.recordings.origin.inspect", inspect)
     _, out, _ = run(capsys, "07", path, "--models", models, "--yes")
+    cannot = "; its weights cannot forget: adapt or train it again without them"
     told = [line.split(": ", 1)[1] for line in out.splitlines() if line.startswith("model ")]
     assert told == [
-        f"was trained with 07: it learned from {path / 'both.npz'} as it is now",
-        "was trained with a participant 07, in a file 07.npz with other contents than any here",
+        f"was trained with 07: it learned from {path / 'both.npz'} as it is now{cannot}",
+        f"was trained with a participant 07, in a file 07.npz with other contents than any here{cannot}",
         "was not trained with 07",
         "cannot say: it does not list the recordings that it learned from",
         "was not trained with 07",
@@ -168,3 +169,11 @@ def test_what_is_no_model_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[
     write(tmp_path / "07.npz", join_recordings([of("07", "08"), of("08", "08")]))
     _, out, _ = run(capsys, "07", tmp_path / "07.npz", "--models", tmp_path, "--dry-run")
     assert f"model {tmp_path / 'broken.onnx'}: cannot be read: " in out
+
+
+def test_a_model_keeps_the_days_of_consent(tmp_path: Path) -> None:
+    days = np.array(["2026-01-31", "2026-02-28"])
+    write(tmp_path / "both.npz", replace(of("07", "07"), consents=days))
+    write(tmp_path / "08.npz", replace(of("08", "09"), consents=np.array(["2026-03-01", ""])))
+    found = origins([tmp_path / "both.npz", tmp_path / "08.npz"])
+    assert [origin["consents"] for origin in found] == [{"07": "2026-02-28"}, {"08": "2026-03-01"}]

@@ -103,7 +103,7 @@ def test_where_nothing_is_good_nothing_is_written(tmp_path: Path, capsys: pytest
     assert out.read_text() == "somebody's"
 
 
-@pytest.mark.parametrize("flags", [("--participant", "Anna Meier"), ("--label", "wave"), ("--consent", "May")])
+@pytest.mark.parametrize("flags", [("--participant", "Anna Meier"), ("--label", "swipe_lft"), ("--consent", "May")])
 def test_flags_are_checked(flags: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["import", "--format", "csv", "a.csv", "--out", str(tmp_path / "b.npz"), *flags])
@@ -116,8 +116,8 @@ def test_a_csv_file_needs_a_participant_and_capfingerid_says_it_itself(
 ) -> None:
     file, out = written(tmp_path / "a", ["1"]), tmp_path / "out.npz"
     assert "--participant: expected a pseudonym" in run(capsys, "--format", "csv", file, "--out", out)[2]
-    status, _, err = run(capsys, "--format", "capfingerid", "--rows", "9", file, "--out", out)
-    assert (status, "--rows: only for --format csv" in err) == (1, True)
+    status, _, err = run(capsys, "--format", "capfingerid", "--grid", "9x9", file, "--out", out)
+    assert (status, "--grid: only for --format csv" in err) == (1, True)
 
 
 def capfingerid_lines(tasks: Sequence[str]) -> tuple[list[str], np.ndarray]:

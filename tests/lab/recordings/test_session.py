@@ -1,6 +1,7 @@
 """How a session answers to takes and keys, with a scripted person and a sensor that feels what the test says."""
 
 import os
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -143,3 +144,33 @@ def test_a_pause_before_the_sensor_is_there_changes_nothing(tmp_path: Path) -> N
     sensor.not_yet = answers
     script = run(tmp_path / "07.npz", sensor, ("Waiting for the sensor", "p"), ("in place", "\n"), ("Enter keep", "\n"))
     assert "Ended with 1 recordings" in script.shown
+
+
+SWIPE = replace(GOOD, looks="swipe_right", sure=0.98)
+
+
+def test_what_looks_like_another_gesture_is_kept_only_when_somebody_says_so(tmp_path: Path) -> None:
+    asked = "that looked like swipe_right, 0.98: keep? [y/N]"
+    script = run(tmp_path / "07.npz", FakeSensor(SWIPE), ("in place", "\n"), (asked, "\n"), (asked, "y"), (asked, "q"))
+    assert "Enter keep" not in script.shown
+    assert script.shown.count(f"1/9  {TRIALS[0]}") == 2  # the first one is performed again at once
+    assert "Ended with 1 recordings" in script.shown
+
+
+@pytest.mark.parametrize("take", [replace(SWIPE, sure=0.5), replace(GOOD, looks="one_tap", sure=0.99)])
+def test_a_doubtful_model_or_one_that_agrees_says_nothing(tmp_path: Path, take: Captured) -> None:
+    script = run(tmp_path / "07.npz", FakeSensor(take), ("in place", "\n"), ("Enter keep", "\n"))
+    assert "looked like" not in script.shown
+
+
+def test_everything_fits_into_80_columns_and_the_measured_rate_is_shown(tmp_path: Path) -> None:
+    frames = list(GOOD.frames)
+    frames[GOOD.release] = replace(frames[GOOD.release], lost=2)
+    bad = replace(SWIPE, frames=tuple(frames), trouble="12 gestures were seen, expected one: " + "x " * 40)
+    sensor = FakeSensor(bad)
+    sensor.rate_hz = 59.94
+    script = run(tmp_path / "07.npz", sensor, ("in place", "\n"), ("NOT GOOD", "p"), ("Paused", "\n"))
+    assert "9 x 9 at 59.9 Hz" in script.shown
+    path = str(tmp_path)
+    plain = re.sub("\x1b\\[[0-9;]*m", "", script.shown)
+    assert max(len(line) for line in plain.splitlines() if path not in line) <= 80
