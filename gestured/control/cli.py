@@ -29,6 +29,7 @@ from gestured.control import (
     simulate,
     sniff,
     status,
+    tune,
     view,
     watch,
 )
@@ -38,7 +39,7 @@ SUBCOMMANDS = (
     *(status, listen, view, watch, doctor, sniff),
     *(reload, recalibrate, shadow, emit),
     *(enrol, gestures, forget),
-    *(record, flag, replay, export),
+    *(record, flag, replay, export, tune),
     *(simulate, check, names, demo),
 )
 

@@ -44,7 +44,7 @@ class Labelled:
 
     def compare(self, lines: Iterable[Line], knew: Knew) -> Verdict:
         """Hold the events of a replay against the labels."""
-        performed = list(self._performed())
+        performed = self.performed()
         asked = {id(one) for one in performed if knew(self._sensor, one.onset)}
         tally = Tally(waiting=performed)
         outcomes = [tally.hear(line, line["decided"]) for line in lines if line["type"] in ("gesture", "unknown")]
@@ -60,6 +60,10 @@ class Labelled:
         skipped = len(performed) - len(asked)
         return Verdict(f"{len(asked)} labels", skipped, [self._difference(outcome) for outcome in found])
 
+    def performed(self) -> list[Performed]:
+        """What the labels say, in the times of playing."""
+        return list(self._performed())
+
     def _packets(self) -> Iterator[Packet]:
         found = self._found
         form = Form(self._sensor, "ints" if np.can_cast(found.frames.dtype, np.int32) else "floats")
@@ -73,7 +77,6 @@ class Labelled:
                 yield Packet(round(1e9 * t), SOURCE, form.packet(frame, wrapped, t))
 
     def _performed(self) -> Iterator[Performed]:
-        """What the labels say, in the times of playing."""
         found = self._found
         for g, label in enumerate(found.labels.tolist()):
             if label != SESSION:
