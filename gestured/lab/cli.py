@@ -4,6 +4,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from gestured import __version__
 from gestured.client.say import say
@@ -45,10 +46,24 @@ def parser() -> argparse.ArgumentParser:
             help=f"folder of the real recordings; left out where it is not ({REAL_FOLDER})",
         )
 
+    mine: dict[str, Any] = {"type": Path, "nargs": "+", "default": [], "metavar": "FILE"}
     train = add("train", "make the three models again from nothing; goes on where it was interrupted",
                 "gestured-lab train --out models --jobs 2")  # fmt: skip
     train.add_argument("--out", type=Path, default=MODELS, help=f"folder for the models ({MODELS})")
+    train.add_argument("--recordings", **mine, help="recordings of your own to learn from, too")
     add_data(train)
+    adapt = add("adapt", "go on from a shipped model with recordings of your own, and say what that is worth; writes "
+                "nothing where it is no better", "gestured-lab adapt recordings/*.npz --out my.onnx")  # fmt: skip
+    adapt.add_argument("recordings", type=Path, nargs="+", metavar="FILE", help="recordings of your own (.npz)")
+    adapt.add_argument("--out", type=Path, required=True, metavar="MODEL", help="a new file for the model (*.onnx)")
+    adapt.add_argument("--base", default="cnn_lstm", metavar="MODEL", help="cnn_lstm, lstm, or a file (cnn_lstm)")
+    adapt.add_argument("--as-none", action="append", default=[], metavar="NAME",
+                       help="take a name of your own for no gesture; else it is left out")  # fmt: skip
+    adapt.add_argument("--force", action="store_true", help="write the model also where it is no better")
+    adapt.add_argument("--cache", type=Path, metavar="DIR", help="for simulated takes (gestured, in your cache folder)")
+    adapt.add_argument(
+        "--steps", type=int, default=200, metavar="N", help="of learning, for each group of people (200)"
+    )
     evaluate = add("evaluate", "print what the models are worth on people never seen; writes cards and manifest",
                    "gestured-lab evaluate --models models")  # fmt: skip
     evaluate.add_argument("--models", type=Path, default=MODELS, help=f"folder of the models ({MODELS})")
@@ -56,6 +71,7 @@ def parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--field", action="store_true", help="also compare rules for deciding early")
     evaluate.add_argument("--curve", action="store_true", help="also print right, wrong and accepted by threshold")
     evaluate.add_argument("--readme", type=Path, help="a README whose table of figures is renewed")
+    evaluate.add_argument("--recordings", **mine, help="those that the models were trained with")
     add_data(evaluate)
     online = add("online", "send continuous simulated sessions to a running daemon over UDP and score its events",
                  "gestured-lab online --model cnn_lstm --minutes 10")  # fmt: skip
@@ -87,7 +103,7 @@ def parser() -> argparse.ArgumentParser:
                        "run time again, from the study.json or operating-points.json of an earlier run")  # fmt: skip
     study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: "
                        "another generator's (python -m tests.foreign.recordings) or another sensor's")  # fmt: skip
-    study.add_argument("--recordings", type=Path, nargs="+", default=[], metavar="FILE", help="recordings of your own")
+    study.add_argument("--recordings", **mine, help="recordings of your own")
     study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")
     study.add_argument("--seed", type=int, default=0, help="of splits and training: same seed, same numbers (0)")
     add_data(study)
@@ -113,6 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return recordings.run(args)
         try:
             from gestured.lab import commands
+            from gestured.lab.adapt import command as adapt
             from gestured.lab.own import command as own
             from gestured.lab.stability import command as stability
             from gestured.lab.study import study
@@ -121,8 +138,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if package not in LAB_PACKAGES:
                 raise
             raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from error
-        if args.command in ("own", "stability"):
-            return own.run(args) if args.command == "own" else stability.run(args)
+        whole = {"adapt": adapt.run, "own": own.run, "stability": stability.run}
+        if args.command in whole:
+            return whole[args.command](args)
         if args.command == "study":
             args.words = " ".join(["gestured-lab", *(sys.argv[1:] if arguments is None else arguments)])
             return study.run(args)

@@ -34,7 +34,7 @@ def train_models(args: argparse.Namespace) -> int:
     """Train, export, evaluate."""
     plan, real = _plan(args)
     start = time.monotonic()
-    train(plan, args.out, args.cache, real, args.jobs)
+    train(plan, args.out, args.cache, real, args.jobs, args.recordings)
     print(
         f"trained in {(time.monotonic() - start) / 60:.1f} minutes (finished steps are taken from {args.cache})",
         flush=True,
@@ -53,7 +53,7 @@ def evaluate_models(args: argparse.Namespace) -> int:
     paths = {name: args.models / f"{name}.onnx" for name in LADDER}
     for path in paths.values():
         open_model(path)  # says what is wrong before anything is simulated
-    data = load_data(plan, args.cache, real, args.jobs)
+    data = load_data(plan, args.cache, real, args.jobs, args.recordings)
     print(Evaluation.HEAD, flush=True)
     figures: dict[str, dict[str, Any]] = {
         name: {"simulated": found} for name, found in simulated_figures(paths, data).items()

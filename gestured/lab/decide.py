@@ -29,7 +29,7 @@ def fit_decision(first: Tensor, second: Tensor, labels: NDArray[np.int64], gestu
         s = torch.nn.functional.softplus(share)
         return torch.nn.functional.cross_entropy(s[0] * one + s[1] * two, y[known])
 
-    _minimise([share], scores_loss)
+    minimise([share], scores_loss)
     decision.share.copy_(torch.nn.functional.softplus(share).detach())
 
     _, cues = decision.cues(first, second)
@@ -45,13 +45,14 @@ def fit_decision(first: Tensor, second: Tensor, labels: NDArray[np.int64], gestu
         loss = torch.nn.functional.binary_cross_entropy_with_logits(raw, none, weight, reduction="sum")
         return loss + 1e-3 * (slope**2).sum()
 
-    _minimise([slope, bias], unknown_loss)
+    minimise([slope, bias], unknown_loss)
     decision.weight.copy_(slope.detach())
     decision.bias.copy_(bias.detach())
     return decision
 
 
-def _minimise(parameters: list[Tensor], loss: Callable[[], Tensor]) -> None:
+def minimise(parameters: list[Tensor], loss: Callable[[], Tensor]) -> None:
+    """Change the parameters until the loss is least (L-BFGS)."""
     optimiser = torch.optim.LBFGS(parameters, max_iter=200, line_search_fn="strong_wolfe")
 
     def closure() -> Tensor:

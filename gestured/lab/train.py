@@ -7,7 +7,8 @@ networks that have not seen them: three folds, which share what was learned from
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from torch import Tensor, nn
 import gestured
 from gestured.core.features import feature_names
 from gestured.core.measures import MEASURES, measures
+from gestured.lab.adapt.material import own_recordings
 from gestured.lab.dataset import OTHER_TRIALS, TRIALS, WINDOW, Samples, join, recorded, simulated
 from gestured.lab.decide import fit_decision, threshold
 from gestured.lab.digest import code_digest
@@ -36,6 +38,7 @@ REAL_SETS = ("taps and swipes", "with non-gestures")  # sets of real recordings 
 REAL_FILES = ("capfingerid_gestures_dev.npz", "capfingerid_sessions_dev.npz")
 FOLDS = 3
 COHORT = 1_000_000  # the wide stream's people have larger numbers
+OWN = 100_000  # people of one's own recordings have larger numbers than the public subjects
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +73,11 @@ class TrainingData:
     real_judged: int = 0  # of them, the first ones: cut gestures, whose touches the sessions behind them hold again
 
 
-def load_data(plan: TrainingPlan, cache: Path, real: Path | None, jobs: int) -> TrainingData:
-    """Simulate, or take from the cache, and read the real recordings where they are."""
+def load_data(
+    plan: TrainingPlan, cache: Path, real: Path | None, jobs: int, recordings: Sequence[Path] = ()
+) -> TrainingData:
+    """Simulate, or take from the cache, and read the real recordings where they are, and those of one's own."""
+    found = _real(real, recordings)  # first, so that a wrong file is told of before anything is simulated
     teach, check, test = (
         simulated(cache, "wide", seed, count, jobs)
         for seed, count in ((1, plan.wide), (2, plan.wide_calibrate), (3, plan.wide_check))
@@ -82,8 +88,7 @@ def load_data(plan: TrainingPlan, cache: Path, real: Path | None, jobs: int) -> 
     person = both.people % 1000
     plans = np.array([trial.participant for trial in TRIALS[: plan.cohort]])
     own = both.take(person < 24)
-    recordings = _real(cache, real)
-    performed = _performed(real) if recordings else {}
+    performed = _performed(real) if found else {}
     return TrainingData(
         join([teach, own]),
         len(own),
@@ -94,14 +99,20 @@ def load_data(plan: TrainingPlan, cache: Path, real: Path | None, jobs: int) -> 
             "wide": sum(wide(3, index).label != NONE for index in range(plan.wide_check)),
             **performed,
         },
-        recordings and recordings[0],
-        recordings[1] if recordings else 0,
+        found and found[0],
+        found[1] if found else 0,
     )
 
 
-def _real(cache: Path, folder: Path | None) -> tuple[Samples, int] | None:
-    """All real samples, and how many of them, the first ones, are of the file of cut gestures."""
+def _real(folder: Path | None, recordings: Sequence[Path]) -> tuple[Samples, int] | None:
+    """All real samples, and how many of them, the first ones, are of the file of cut gestures.
+
+    Recordings of one's own stand at the end; where there are no others, they are what is judged.
+    """
     parts = [recorded(read(path)) for path in _real_files(folder)]
+    if recordings:
+        own = own_recordings(recordings).samples
+        parts.append(replace(own, people=own.people + OWN))
     return (join(parts), len(parts[0])) if parts else None
 
 
@@ -294,16 +305,18 @@ def answer_figures(confidence: NDArray[np.floating], known: NDArray[np.bool_], l
     return {"confidence": _at(given[given >= least]), "unknown": round(float((given < least).mean()), 4)}
 
 
-def train(plan: TrainingPlan, out: Path, cache: Path, real: Path | None, jobs: int) -> TrainingData:
+def train(
+    plan: TrainingPlan, out: Path, cache: Path, real: Path | None, jobs: int, recordings: Sequence[Path] = ()
+) -> TrainingData:
     """Make the three models in `out`, with an empty manifest; the figures come from `evaluate`."""
     torch.set_num_threads(max(jobs, 1))
-    data = load_data(plan, cache, real, jobs)
+    data = load_data(plan, cache, real, jobs, recordings)
     trained = learn(plan, data, cache)
     calibrated = calibration_set(trained, data, plan)
     digest = hashlib.sha256((data.teach.digest() + (data.real.digest() if data.real else "")).encode()).hexdigest()
     common: dict[str, Any] = {
         "version": gestured.__version__, "gestures": list(GESTURES), "window": WINDOW,
-        "training_data": digest, "learned_from": origins(_real_files(real)),
+        "training_data": digest, "learned_from": origins([*_real_files(real), *recordings]),
     }  # fmt: skip
     seen = quantiles(data.teach)
     out.mkdir(parents=True, exist_ok=True)

@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -134,7 +135,7 @@ def test_train_makes_three_models_and_evaluate_their_figures(
             made[stream, seed] = collect(s for i in spread[stream] for s in STREAMS[stream](seed, i))
         return made[stream, seed]
 
-    def real(cache: Path, folder: Path | None) -> tuple[Samples, int]:
+    def real(folder: Path | None, recordings: Sequence[Path]) -> tuple[Samples, int]:
         taken = collect(s for i in range(120) for s in STREAMS["wide"](4, i))
         subjects = np.arange(len(taken)) % 6
         return replace(taken, people=subjects), len(taken) - 10

@@ -268,5 +268,5 @@ def test_stage_two_starts_from_stage_one_and_leaves_it_alone(samples: Samples) -
 
 
 def test_real_recordings_are_left_out_where_they_are_not(tmp_path: Path) -> None:
-    assert train._real(tmp_path, None) is None
-    assert train._real(tmp_path, tmp_path) is None
+    assert train._real(None, []) is None
+    assert train._real(tmp_path, []) is None

@@ -1,0 +1,11 @@
+"""`gestured-lab adapt`: a shipped model goes on learning, from somebody's own recordings.
+
+The rooms, in the order in which a run goes through them:
+
+    weights     the networks of an .onnx file, as they were trained
+    material    what is learned from and judged on: own recordings, simulated takes
+    learning    a few hundred steps from there
+    judging     what an answer is worth, before and after, at an equal share of wrong ones
+    adaptation  people held out in turn, the decision, the threshold
+    command     the command line's side of it
+"""

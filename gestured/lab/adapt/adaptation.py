@@ -1,0 +1,199 @@
+"""A model before and after: people held out in turn, the decision fitted on them, the threshold for no more wrong ones.
+
+Each group of people is judged by networks that have not learned from it, with a decision that was fitted on the others.
+Training moves the confidence more than the order of the answers, so both models are compared where they are wrong
+equally often: the threshold, one number, is the only one that is chosen on the answers that it is judged by. The model
+that is written has learned from all, and takes its decision and its threshold from all that was held out.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from gestured.lab.adapt.judging import Answers, Shares
+from gestured.lab.adapt.learning import Course, between, classes_of, learned, opinions
+from gestured.lab.adapt.material import Own, held_out
+from gestured.lab.adapt.refitting import refitted
+from gestured.lab.adapt.weights import Base
+from gestured.lab.dataset import OTHER_TRIALS, Samples, join, simulated
+from gestured.lab.fit import FitConfig
+from gestured.lab.foretold import Foretold
+from gestured.lab.nets import Decision, Judged
+from gestured.simulator import GESTURES, NONE
+
+WAYS = (0.25, 0.5, 0.75, 1.0)  # of the way from the old weights to the new ones
+LOSS = 0.01  # of the simulated gestures that may be answered rightly no more
+PEOPLE = 6  # of the nominal simulated set, whom no training has met
+SEED = 31  # of all that is simulated here
+
+Opinions = tuple[Tensor, Tensor]  # (G, K) logits of the network and of its second opinion
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Simulated takes of people whom no training has met."""
+
+    teach: Samples
+    check: Samples  # to fit the decision
+    nominal: Samples  # to judge
+    missed: NDArray[np.int64]  # people of the nominal gestures that were never cut out
+
+
+def simulate(cache: Path, jobs: int) -> Simulated:
+    """A few thousand takes, from a seed; cut once, then from the cache."""
+    teach = simulated(cache, "wide", SEED, 4_000, jobs)
+    check = simulated(cache, "wide", SEED + 1, 1_500, jobs)
+    performed = 90 * PEOPLE
+    others = len(OTHER_TRIALS) // 34 * PEOPLE
+    nominal = join([simulated(cache, "cohort", SEED, performed, jobs), simulated(cache, "others", SEED, others, jobs)])
+    lost = max(performed - int((nominal.labels != NONE).sum()), 0)
+    return Simulated(teach, check, nominal, np.full(lost, nominal.people[0]))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a model answers own recordings and the simulated nominal ones."""
+
+    own: Shares
+    simulated: Shares
+
+
+@dataclass(frozen=True)
+class Adapted:
+    """The new model, and what both are worth."""
+
+    judged: Judged
+    least: float  # its threshold
+    provisional: Mapping[str, Any]  # when it may answer before the end
+    before: Outcome
+    after: Outcome
+    way: float  # of the way to the new weights
+    unit: str  # of what the groups are made that were held out in turn
+    groups: int
+    answers: Answers  # of the new model, to those held out
+
+    def reasons(self) -> list[str]:
+        """Why it is no better; empty where it is."""
+        found = []
+        old, new = self.before.own, self.after.own
+        if not new.right[0] > old.right[0]:
+            found.append(f"right does not go up ({old.right[0]:.3f} -> {new.right[0]:.3f})")
+        if new.wrong[0] > old.wrong[0]:
+            found.append(f"wrong goes up ({old.wrong[0]:.3f} -> {new.wrong[0]:.3f})")
+        lost = self.before.simulated.right[0] - self.after.simulated.right[0]
+        if lost > LOSS:
+            found.append(f"{100 * lost:.1f} points of the simulated gestures are lost, expected 1 at most")
+        return found
+
+
+def adapt(base: Base, own: Own, takes: Simulated, course: Course) -> Adapted:
+    """Learn, hold out, fit, judge."""
+    start, least = base.judged, base.model.threshold
+    groups = held_out(own)
+    run = _Run(start, own, groups.of_samples, takes, course)
+    ends = [
+        learned(start, takes.teach, own.samples.take(groups.of_samples != k), course, f"without {k + 1}/{groups.count}")
+        for k in range(groups.count)
+    ]
+    run.listen(ends)
+    samples = replace(own.samples, people=groups.unit_of_samples)
+
+    def answers(found: tuple[NDArray[np.float32], NDArray[np.float32]]) -> Answers:
+        return Answers.of(samples, *found, groups.unit_of_missed)
+
+    of_rows = np.concatenate([groups.of_samples, groups.of_missed])
+    before = answers(decided(start.decision, opinions(start, own.samples, course.longest))).shares(least)
+    new: Answers | None = None
+    for k in range(groups.count):
+        decision, way = run.decision(ends[k], groups.of_samples != k)
+        found = answers(decided(decision, run.said[way]))
+        new = found if new is None else new.where(of_rows == k, found)
+    assert new is not None
+
+    end = learned(start, takes.teach, own.samples, course, "all")
+    decision, way = run.decision(end, np.ones(len(own.samples), bool))
+    judged = between(start, end, way)
+    judged.decision = decision
+    chosen = _least(answers(decided(decision, run.said[way])), before)
+    held = [(between(start, ends[k], way), own.samples.take(groups.of_samples == k)) for k in range(groups.count)]
+    return Adapted(
+        judged, chosen, _early([(judged, takes.check), *held], decision, chosen, course),
+        Outcome(before, _nominal(start, least, takes, course)),
+        Outcome(new.shares(_least(new, before)), _nominal(judged, chosen, takes, course)),
+        way, groups.unit, groups.count, new,
+    )  # fmt: skip
+
+
+class _Run:
+    """What the networks without each group say of it, at each way, and the decisions that follow."""
+
+    def __init__(self, start: Judged, own: Own, groups: NDArray[np.int64], takes: Simulated, course: Course) -> None:
+        self._start, self._own, self._groups, self._takes, self._course = start, own, groups, takes, course
+        self._classes = classes_of(own.samples)
+        self.said: dict[float, Opinions] = {}
+        self._loss: dict[float, NDArray[np.float64]] = {}
+
+    def listen(self, ends: list[Judged]) -> None:
+        """Ask the networks without each group about it."""
+        parts = [np.flatnonzero(self._groups == k) for k in range(len(ends))]
+        back = torch.from_numpy(np.argsort(np.concatenate(parts)))
+        for way in WAYS:
+            found = [
+                opinions(between(self._start, end, way), self._own.samples.take(part), self._course.longest)
+                for end, part in zip(ends, parts, strict=True)
+            ]
+            first, second = (torch.cat([one[n] for one in found])[back] for n in (0, 1))
+            self.said[way] = first, second
+            self._loss[way] = _losses(self._start.decision, (first, second), self._classes)
+
+    def decision(self, end: Judged, others: NDArray[np.bool_]) -> tuple[Decision, float]:
+        """Fitted for networks that go to `end`, on those of `others` who were held out; and the way that suits them."""
+        way = min(WAYS, key=lambda one: float(self._loss[one][others].mean()))
+        check, course = self._takes.check, self._course
+        both = opinions(between(self._start, end, way), check, course.longest)
+        rows = torch.from_numpy(others)
+        first, second = (torch.cat([own[rows], made]) for own, made in zip(self.said[way], both, strict=True))
+        own, made = int(others.sum()), len(check)
+        weight = np.concatenate([np.ones(own), np.full(made, own / made)])  # simulated ones count as much in all
+        classes = np.concatenate([self._classes[others], classes_of(check)])
+        return refitted(self._start.decision, first, second, classes, weight), way
+
+
+def decided(decision: Decision, said: Opinions) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Scores (G, C) and unknown (G,) of both opinions' logits."""
+    with torch.no_grad():
+        scores, unknown = decision(*said)
+    return scores.numpy(), unknown.numpy()
+
+
+def _losses(decision: Decision, said: Opinions, classes: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(G,) how little each answer was expected."""
+    scores, unknown = decided(decision, said)
+    known = classes < len(GESTURES)
+    named = scores[np.arange(len(classes)), np.minimum(classes, len(GESTURES) - 1)] * (1 - unknown)
+    return -np.log(np.maximum(np.where(known, named, unknown), 1e-6)).astype(np.float64)
+
+
+def _early(
+    parts: Sequence[tuple[Judged, Samples]], decision: Decision, least: float, course: Course
+) -> Mapping[str, Any]:
+    """The rule for provisional events, from what networks say of samples that they have not learned from."""
+    name = "net"
+    asked = [(nn.ModuleDict({name: one.net, "trajectory": one.trajectory}), samples) for one, samples in parts]
+    return Foretold.of(asked, FitConfig(longest=course.longest)).rule(name, decision, least)
+
+
+def _nominal(judged: Judged, least: float, takes: Simulated, course: Course) -> Shares:
+    found = decided(judged.decision, opinions(judged, takes.nominal, course.longest))
+    return Answers.of(takes.nominal, *found, takes.missed).shares(least)
+
+
+def _least(answers: Answers, before: Shares) -> float:
+    """The lowest threshold with no more wrong ones, and no more non-gestures accepted, than the model before."""
+    return answers.least_for(before.wrong[0], 1.0 if np.isnan(before.accepted[0]) else before.accepted[0])

@@ -1,0 +1,126 @@
+"""`gestured-lab adapt`: flags in, a model out, or the reason why not."""
+
+import argparse
+import hashlib
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from gestured.client.say import say, say_json
+from gestured.core.errors import GesturedError
+from gestured.lab.adapt.adaptation import Adapted, adapt, simulate
+from gestured.lab.adapt.judging import Shares
+from gestured.lab.adapt.learning import Course
+from gestured.lab.adapt.material import Own, own_recordings
+from gestured.lab.adapt.weights import Base, base_of
+from gestured.lab.dataset import WINDOW, Samples
+from gestured.lab.export import Facts, export_net
+from gestured.lab.fit import CLASSES
+from gestured.lab.recordings.origin import KEY, origins
+from gestured.lab.train import answer_figures, quantiles
+from gestured.model.model import shipped_name
+from gestured.simulator import GESTURES, NONE
+
+MOST_STEPS = 10_000
+WORTH = {
+    "people": "Each person was judged by networks that had not learned from that person.",
+    "sessions": "All recordings are of one person, so sessions were held out in turn: that says how the model will do "
+    "with this person on another day, and nothing of other people.",
+    "parts of one session": "All recordings are one session of one person, so stretches of it were held out in turn: "
+    "that says little of another day, and nothing of other people.",
+}
+
+
+def cache_folder() -> Path:
+    """Where a user's simulated takes are kept between two runs."""
+    home = os.environ.get("XDG_CACHE_HOME")
+    return (Path(home) if home else Path.home() / ".cache") / "gestured"
+
+
+def run(args: argparse.Namespace) -> int:
+    """Adapt, say what it is worth, and write it where it is better. Exit status 1 where it is not."""
+    out: Path = args.out
+    if out.suffix != ".onnx" or not out.parent.is_dir():
+        raise GesturedError(f"--out: expected a file *.onnx in a folder that exists, found {out}")
+    if shipped_name(out) is not None:
+        raise GesturedError(f"--out: {out} is a shipped model, which stays as it is; give the new one another name")
+    if not 1 <= args.steps <= MOST_STEPS:
+        raise GesturedError(f"--steps: expected 1 to {MOST_STEPS}, found {args.steps}")
+    torch.set_num_threads(1)  # networks this small are slower on two, above all where something else computes
+    base = base_of(args.base)
+    own = own_recordings(args.recordings, args.as_none)
+    takes = simulate(args.cache or cache_folder(), jobs=2)
+    found = adapt(base, own, takes, Course(steps=args.steps))
+    reasons = found.reasons()
+    written = not reasons or args.force
+    if written:
+        export_net(found.judged, out, _facts(base, own, found, takes.teach, args.recordings))
+    if args.json:
+        say_json(_figures(own, found) | {"written": str(out) if written else None, "reasons": reasons})
+    else:
+        _tell(own, found)
+        why = f": {'; '.join(reasons)}" if reasons else ""
+        say(f"{out}: {'written' if written else 'not written'}{why}", to=sys.stdout if written else sys.stderr)
+    return 1 if reasons else 0
+
+
+def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, recordings: list[Path]) -> Facts:
+    """What the new file says of itself."""
+    decision, gestures = found.judged.decision, own.samples.take(own.samples.labels != NONE)
+    cut = found.answers.confidence >= 0
+    before = json.loads(base.properties.get(KEY, "[]"))
+    learned = base.model.metadata.training_data + own.samples.digest() + simulated.digest()
+    return Facts(
+        kind=base.kind,
+        version=base.model.metadata.version,
+        gestures=list(GESTURES),
+        window=WINDOW,
+        calibration={
+            "temperature": (1 / decision.share.clamp(min=1e-6)).tolist(),
+            "unknown_weight": decision.weight.tolist(),
+            "unknown_bias": float(decision.bias),
+            "threshold": found.least,
+        },
+        training_data=hashlib.sha256(learned.encode()).hexdigest(),
+        quantiles=quantiles(gestures)
+        | answer_figures(found.answers.confidence[cut], found.answers.known[cut], found.least),
+        classes=CLASSES,
+        provisional=found.provisional,
+        learned_from=[*before, *origins(recordings)],
+    )
+
+
+def _figures(own: Own, found: Adapted) -> dict[str, Any]:
+    return {
+        "people": len(own.names),
+        "held_out": {"unit": found.unit, "groups": found.groups, "worth": WORTH[found.unit]},
+        "left_out": own.left_out,
+        "before": {"own": found.before.own.as_dict(), "simulated": found.before.simulated.as_dict()},
+        "after": {"own": found.after.own.as_dict(), "simulated": found.after.simulated.as_dict()},
+        "threshold": round(found.least, 4),
+        "way": found.way,
+    }
+
+
+def _tell(own: Own, found: Adapted) -> None:
+    shares = found.before.own
+    say(f"{len(own.names)} people, {shares.gestures} gestures, {shares.others} non-gestures")
+    for name, count in sorted(own.left_out.items()):
+        say(f"left out: {name} ({count}), neither taught nor rejected, so that it can be enrolled")
+    say(f"{'':<18}{'right':>15}{'wrong':>15}{'unknown':>15}{'others taken':>15}")
+    for title, before, after in (
+        ("own", found.before.own, found.after.own), ("simulated", found.before.simulated, found.after.simulated),
+    ):  # fmt: skip
+        say(_row(f"{title}, before", before), _row(f"{title}, after", after))
+    say(f"threshold {found.least:.3f}, where no more are wrong than before", WORTH[found.unit])
+
+
+def _row(title: str, shares: Shares) -> str:
+    cells = []
+    for share, low, high in (shares.right, shares.wrong, shares.unknown, shares.accepted):
+        cells.append(f"{share:.3f} {low:.2f}-{high:.2f}" if share == share else "-")
+    return f"{title:<18}" + "".join(f"{cell:>15}" for cell in cells)

@@ -1,0 +1,135 @@
+"""The networks of a model file, as they were trained: what `adapt` starts from.
+
+An .onnx file holds every weight by its name in torch, but for those of an LSTM, whose gates ONNX keeps in another
+order and under no name, and for the shares of both opinions, which the calibration holds. Whether all were found is
+not believed: the networks must answer as the file does.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import onnx
+import torch
+from numpy.typing import NDArray
+from onnx import numpy_helper
+from torch import Tensor, nn
+
+from gestured.core.errors import ModelError
+from gestured.lab.dataset import WINDOW
+from gestured.lab.export import PARITY
+from gestured.lab.fit import CLASSES, build
+from gestured.lab.nets import Decision, Judged, Opinion
+from gestured.model.file import inspect, read_bytes
+from gestured.model.model import Model, open_model, shipped
+from gestured.simulator import GESTURES
+
+ADAPTABLE = ("cnn_lstm", "lstm")
+GATES = [0, 2, 3, 1]  # torch's order i f g o, in ONNX's i o f c
+
+
+@dataclass(frozen=True)
+class Base:
+    """A model that can be adapted: its file's answers, its networks, and what the file says of itself."""
+
+    model: Model
+    judged: Judged
+    properties: Mapping[str, str]
+
+    @property
+    def kind(self) -> str:
+        """Which of `ADAPTABLE` it is."""
+        return self.model.metadata.kind
+
+
+def base_of(source: str) -> Base:
+    """The networks of a model file, or of a shipped model by its name. Raises ModelError, also for a forest."""
+    model = open_model(source if source in shipped() else Path(source))
+    path = shipped().get(source, Path(source))
+    metadata = model.metadata
+    if metadata.kind not in ADAPTABLE:
+        raise ModelError(f"{path}: is not adaptable: its kind is {metadata.kind}, expected {' or '.join(ADAPTABLE)}")
+    if metadata.gestures != tuple(GESTURES) or metadata.window != WINDOW:
+        raise ModelError(f"{path}: is not adaptable: expected the gestures and the window that this version trains")
+    data = read_bytes(path)
+    properties = inspect(data)
+    if json.loads(properties.get("classes", "null")) not in (None, CLASSES):
+        raise ModelError(f"{path}: is not adaptable: expected the classes that this version trains")
+    try:
+        judged = read(onnx.load_model_from_string(data), metadata.kind, metadata.calibration.get("temperature"))
+        _compare(judged, model)
+    except ValueError as error:
+        raise ModelError(f"{path}: is not adaptable: {error}") from error
+    return Base(model, judged, properties)
+
+
+def untrained(kind: str) -> Judged:
+    """The networks of a kind, and their decision, before anything was learned."""
+    nets = build()
+    net, trajectory = nets[kind], nets["trajectory"]
+    assert isinstance(net, Opinion)
+    assert isinstance(trajectory, Opinion)
+    return Judged(net, trajectory, Decision(len(GESTURES))).eval()
+
+
+def read(proto: onnx.ModelProto, kind: str, temperatures: object) -> Judged:
+    """The networks of an ONNX graph and their decision; ValueError where it does not hold every weight."""
+    stored = {tensor.name: numpy_helper.to_array(tensor) for tensor in proto.graph.initializer}
+    judged = untrained(kind)
+    found = _recurrent(judged, proto, stored) | _shares(temperatures)
+    state = {}
+    for name, expected in judged.state_dict().items():
+        value = found.get(name, stored.get(name))
+        if value is None:
+            raise ValueError(f"it does not hold {name}")
+        if value.shape != tuple(expected.shape):
+            raise ValueError(f"{name}: expected the shape {tuple(expected.shape)}, found {value.shape}")
+        state[name] = torch.tensor(value, dtype=expected.dtype)
+    judged.load_state_dict(state)
+    return judged
+
+
+def _recurrent(
+    judged: Judged, proto: onnx.ModelProto, stored: Mapping[str, NDArray[np.generic]]
+) -> dict[str, NDArray[np.generic]]:
+    """The weights of every LSTM, under torch's names; they stand in the graph in the order of the modules."""
+    layers = [name for name, module in judged.named_modules() if isinstance(module, nn.LSTM)]
+    nodes = [node for node in proto.graph.node if node.op_type == "LSTM"]
+    if len(nodes) != len(layers) or any(name not in stored for node in nodes for name in node.input[1:4]):
+        raise ValueError(f"expected {len(layers)} LSTM with weights in the file, found {len(nodes)}")
+    found = {}
+    for layer, node in zip(layers, nodes, strict=True):
+        w, r, b = (stored[name][0] for name in node.input[1:4])
+        units = r.shape[-1]
+        if w.shape[0] != 4 * units or b.shape != (8 * units,):
+            raise ValueError("expected an LSTM of one direction with two biases")
+        rows = np.concatenate([np.arange(units) + gate * units for gate in GATES])
+        halves = b.reshape(2, 4 * units)
+        for part, value in (
+            ("weight_ih", w), ("weight_hh", r), ("bias_ih", halves[0]), ("bias_hh", halves[1]),
+        ):  # fmt: skip
+            found[f"{layer}.{part}_l0"] = value[rows]
+    return found
+
+
+def _shares(temperatures: object) -> dict[str, NDArray[np.generic]]:
+    """The weight of each opinion, of which the calibration holds the inverse."""
+    if not isinstance(temperatures, list) or len(temperatures) != 2 or not all(
+        isinstance(value, int | float) and value > 0 for value in temperatures
+    ):  # fmt: skip
+        raise ValueError(f"calibration: temperature: expected two numbers above 0, found {json.dumps(temperatures)}")
+    return {"decision.share": 1 / np.array(temperatures, np.float64)}
+
+
+def _compare(judged: Judged, model: Model) -> None:
+    """ValueError where the networks answer otherwise than the file, to its own self-test and to noise."""
+    noise = np.random.default_rng(1).random((3, 20, WINDOW.rows, WINDOW.columns), np.float32)
+    for values in (model.metadata.self_test.values, noise):
+        expected = model.run(values)
+        with torch.no_grad():
+            found: tuple[Tensor, ...] = judged(torch.from_numpy(values))
+        largest = max(float(np.abs(one.numpy() - other).max()) for one, other in zip(found, expected, strict=False))
+        if not largest <= PARITY:
+            raise ValueError(f"its weights, read back, answer by up to {largest:.2g} otherwise than the file")

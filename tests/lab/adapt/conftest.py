@@ -1,0 +1,40 @@
+"""A small simulated world in place of the thousands of takes that `adapt` cuts, and a trained model to start from."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+
+import torch
+
+from gestured.lab.adapt.adaptation import Simulated
+from gestured.lab.adapt.weights import untrained
+from gestured.lab.dataset import WINDOW, Samples, collect, from_take
+from gestured.lab.export import Facts, export_net
+from gestured.lab.fit import CLASSES
+from gestured.simulator import GESTURES, wide
+
+
+def some(seed: int, count: int) -> Samples:
+    return collect(sample for index in range(count) for sample in from_take(wide(seed, index)))
+
+
+@pytest.fixture(scope="session")
+def small_world() -> Simulated:
+    return Simulated(some(31, 60), some(32, 60), some(33, 60), np.zeros(0, np.int64))
+
+
+@pytest.fixture(scope="session")
+def base(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A model of this version that has learned nothing yet."""
+    torch.manual_seed(5)
+    path = tmp_path_factory.mktemp("base") / "base.onnx"
+    calibration = {"temperature": [2.0, 2.0], "unknown_weight": [0.0] * 6, "unknown_bias": 0.0, "threshold": 0.5}
+    origin = {"file": "old.npz", "sha256": "0" * 64, "subjects": ["1"], "consents": {}}
+    facts = Facts(
+        "cnn_lstm", "7", GESTURES, WINDOW, calibration, "0" * 64, {}, classes=CLASSES, learned_from=[origin]
+    )  # fmt: skip
+    export_net(untrained("cnn_lstm"), path, facts)
+    return path

@@ -1,0 +1,55 @@
+"""docs/own-sensor.md: its commands run, in its order, on a sensor that no model knows."""
+
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+
+from gestured.control.cli import main as gesturectl
+from gestured.lab.adapt import command
+from gestured.lab.cli import main as lab
+from gestured.model.file import inspect
+from gestured.model.model import shipped
+from gestured.record.arrays import write
+from gestured.simulator import GESTURES, SimulatedSensor
+from tests.documents.blocks import blocks
+from tests.lab.adapt.recorded import cut_gestures
+
+
+def unknown_sensor(seed: int) -> SimulatedSensor:
+    """Another grid, gain, noise and lag than any nominal sensor's."""
+    usual = SimulatedSensor.nominal(day=seed)
+    return replace(usual, rows=12, columns=10, gain=2 * usual.gain, noise=3 * usual.noise,
+                   relaxation=(0.4, 0.2), taus_s=(0.08, 0.6))  # fmt: skip
+
+
+@pytest.mark.hostile
+@pytest.mark.timeout(1800)
+def test_the_document_leads_to_a_model(
+    tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if "classes" not in inspect(shipped()["cnn_lstm"].read_bytes()):
+        pytest.skip("the shipped models were trained by a version before this one, which reads a network elsewhere")
+    monkeypatch.setattr(command, "simulate", lambda *_, **__: request.getfixturevalue("small_world"))
+    monkeypatch.chdir(tmp_path)
+    Path("recordings").mkdir()
+    for k, name in enumerate(("07", "08")):
+        made = cut_gestures((name,), GESTURES, repeats=2, sensor=unknown_sensor(k))
+        assert made.frames.shape[1:] == (12, 10) and np.ptp(made.frames) > 0
+        write(f"recordings/{name}.npz", made)
+    ran = []
+    words = "tests/lab/adapt/test_own_sensor.py::test_the_document_leads_to_a_model"
+    for line in "".join(block.text for block in blocks("run", words)).splitlines():
+        program, *arguments = shlex.split(line)
+        if arguments[0] == "adapt":
+            arguments += ["--steps", "20", "--force"]  # whether it is better is another test's
+        status = (gesturectl if program == "gesturectl" else lab)(arguments)
+        said = capsys.readouterr()
+        assert status == 0 or (arguments[0] == "adapt" and "written: " in said.out), said.err
+        ran.append(arguments[0])
+    assert ran == ["inspect", "tune", "adapt", "check"]
+    assert Path("my.onnx").exists()
