@@ -29,7 +29,7 @@ class Plan:
 
     @classmethod
     def small(cls, seed: int) -> "Plan":
-        """What takes at most two minutes on two cores."""
+        """What takes some minutes on two cores."""
         return cls(
             seed, True, 1, folds=2, tuning_people=0, new_people=1, steps=40, tuning_steps=0, wide=0, real=40,
             learning=(), timed=3, minutes=0.0,

@@ -51,7 +51,8 @@ def _skipped(plan: Plan, method: Method, settings: str, protocol: str, augmentat
         return True
     if protocol == FOREIGN and settings == GIVEN:
         return True
-    return plan.quick and settings == GIVEN
+    further = protocol == PADDED or (protocol == FOREIGN and augmentation != SHIFT)
+    return plan.quick and (settings == GIVEN or further)
 
 
 def tasks_of(cell: Cell, tuned: Mapping[str, Values], plan: Plan) -> list[Task]:

@@ -38,7 +38,7 @@ def test_a_small_study_has_every_section_and_is_the_same_again(tmp_path: Path, m
     first, second = (json.loads((tmp_path / out / "study.json").read_text()) for out in ("first", "second"))
     assert set(SECTIONS) <= set(first)
     assert {(c["method"], c["protocol"]) for c in first["cells"]} == {
-        (m, p) for m in LEFT for p in ("paper", "padded", "clean", "participants", "foreign")
+        (m, p) for m in LEFT for p in ("paper", "clean", "participants", "foreign")
     }
     assert all(0 <= c["low"] <= c["right"] <= c["high"] <= 1 for c in first["cells"])
     assert first["data"]["simulated"]["cut"] + first["data"]["simulated"]["lost"] == len(few)
