@@ -20,7 +20,7 @@ from gestured.model.model import Model
 ACCEPTED = (
     0.015  # of other non-gestures that a threshold lets through in simulation: less than the 0.02 that is promised
 )
-TAKEN = 0.001  # of the model's gestures that one gesture of the user's own may take from it in simulation
+TAKEN = 0.003  # of the model's gestures that one gesture of the user's own may take from it in simulation
 DIRECTIONS = 64  # that are kept, at most
 TELLING = 0.05  # variance between gestures over that within one, below which a direction tells nothing
 DIAGONAL, EVEN = 0.1, 0.1  # shares of the diagonal and of a multiple of one in the pooled covariance: shrinkage
