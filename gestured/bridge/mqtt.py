@@ -14,6 +14,7 @@ import argparse
 import asyncio
 import errno
 import json
+import logging
 import os
 import re
 import signal
@@ -52,6 +53,7 @@ LAST_S = 1.0  # for its answer to our good-bye; without it, it publishes our las
 KEEPALIVE_S = 5  # a broker that vanished without a word is noticed, and ours declared dead, after one and a half
 AGAIN_S = 0.1  # until a task that goes on is cancelled again
 FIRST_S, LONGEST_S = 0.25, 2.0  # from one attempt to the next: doubled each time, a broker that is back is found soon
+QUIET = logging.Logger("mqtt", logging.CRITICAL)  # how the connection is, the bridge says in its own words
 SAFE = re.compile(r"[^A-Za-z0-9_-]")  # what Home Assistant takes in no topic of discovery
 
 
@@ -204,7 +206,6 @@ class Mqtt:
         """Raises BridgeError for what cannot be."""
         self._broker = broker_address(args.broker, args.tls)
         self._host = SAFE.sub("_", args.host or socket.gethostname())
-        self._types = frozenset(args.types)
         self._user, self._password = credentials(args.credentials)
         self._tls = tls_context(args)
         self._prefix = args.discovery
@@ -227,7 +228,7 @@ class Mqtt:
         self._daemon.take(line)
         if kind in ("hello", GONE):
             self._counts.connected("daemon", kind == "hello", f"daemon {'is there' if kind == 'hello' else 'went'}")
-        if kind in self._types and "sensor" in line:
+        if "sensor" in line:  # an event: the daemon knows what was asked for, and which answers belong to it
             self._wait(line)
         if kind in ("hello", "gestures", STATUS, GONE):
             self._changed.set()
@@ -296,6 +297,7 @@ class Mqtt:
             clean_start=True,
             max_queued_incoming_messages=WAITING_EVENTS,
             tls_context=self._tls,
+            logger=QUIET,
         )
 
     async def _serve(self, client: Any) -> None:

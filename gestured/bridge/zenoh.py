@@ -121,7 +121,6 @@ class Zenoh:
             raise BridgeError(f"--site {self._site}: expected letters, digits, _ and -, at most 64")
         self._config = configuration(args)
         self._is_called = bool(args.listen or args.scout)  # nobody has to be there
-        self._types = frozenset(args.types)
         self._daemon = Daemon(args.sensors, args.gestures)
         self._counts = counts
         self._forward = Forward(args.to, counts) if args.frames else None
@@ -143,7 +142,7 @@ class Zenoh:
         self._daemon.take(line)
         if kind in ("hello", GONE):
             self._counts.connected("daemon", kind == "hello", f"daemon {'is there' if kind == 'hello' else 'went'}")
-        if kind in self._types and "sensor" in line:
+        if "sensor" in line:  # an event: the daemon knows what was asked for, and which answers belong to it
             self._publish(line)
         self._hold_tokens()
 
@@ -220,7 +219,7 @@ class Zenoh:
         """What a latecomer asks for; called by Zenoh in a thread of its own."""
         hello = dict(self._daemon.hello)
         if hello:
-            known = {"gestures": self._daemon.gestures, "sensors": self._daemon.states}
+            known = {"gestures": self._daemon.gestures, "states": self._daemon.states}
             self._reply(query, self._key("hello"), json.dumps(hello | known).encode())
         for sensor, data in list(self._latest.items()):
             self._reply(query, self._key(sensor, "gesture"), data)

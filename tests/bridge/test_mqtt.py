@@ -2,9 +2,11 @@
 
 import json
 import queue
+import re
 import signal
 import ssl
 import subprocess
+import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -290,7 +292,9 @@ def test_own_gestures_appear_and_vanish(bridge, broker, listen, fake):
 
 def test_a_broker_that_is_killed_and_comes_back_gets_what_is_fresh(bridge, broker, listen, fake):
     at = broker()
-    process = started(bridge, at, fake)
+    process = begin(bridge, at, fake, "--metrics", "127.0.0.1:0")
+    fake.accept()
+    where = process.ready()["metrics"]
     listener = listen(at.port, "gestured/car/armrest/gesture")
     fake.say(*(gesture(n) for n in range(1, 4)))
     assert [event["sequence"] for event in listener.events(3)] == [1, 2, 3]
@@ -302,6 +306,8 @@ def test_a_broker_that_is_killed_and_comes_back_gets_what_is_fresh(bridge, broke
     listener = listen(at.port, "gestured/car/armrest/gesture")
     fake.say(gesture(3000))
     assert listener.events(1)[0]["sequence"] == 3000
+    counted = dict(re.findall(r'_events_total{bridge="mqtt",result="(.+)"} (\d+)', page(where)))
+    assert int(counted["overflow"]) >= 2996 - 1000 and int(counted["old"]) >= 999
     assert retained(listen, at)["gestured/car/availability"] == "online"
 
 
@@ -330,9 +336,13 @@ def test_a_daemon_that_starts_again_is_found(bridge, broker, listen, fake):
     assert listener.events(1)[0]["instance"] == "b"
 
 
-def test_metrics(bridge, broker, listen, fake):
-    import urllib.request
+def page(address: str) -> str:
+    """What Prometheus is told."""
+    with urllib.request.urlopen(f"http://{address}/metrics", timeout=DEADLINE_S) as answer:
+        return answer.read().decode()
 
+
+def test_metrics(bridge, broker, listen, fake):
     at = broker()
     listener = listen(at.port, "gestured/#")
     process = begin(bridge, at, fake, "--metrics", "127.0.0.1:0")
@@ -341,13 +351,9 @@ def test_metrics(bridge, broker, listen, fake):
     fake.say(gesture(1))
     listener.until("gestured/car/armrest/gesture")
 
-    def page() -> str:
-        with urllib.request.urlopen(f"http://{address}/metrics", timeout=DEADLINE_S) as answer:
-            return answer.read().decode()
-
-    wait(lambda: 'gestured_bridge_events_total{bridge="mqtt",result="sent"} 1.0' in page())
-    assert 'gestured_bridge_connected{bridge="mqtt",to="broker"} 1.0' in page()
-    assert 'gestured_bridge_connected{bridge="mqtt",to="daemon"} 1.0' in page()
+    wait(lambda: 'gestured_bridge_events_total{bridge="mqtt",result="sent"} 1.0' in page(address))
+    assert 'gestured_bridge_connected{bridge="mqtt",to="broker"} 1.0' in page(address)
+    assert 'gestured_bridge_connected{bridge="mqtt",to="daemon"} 1.0' in page(address)
 
 
 @pytest.fixture(scope="module")
