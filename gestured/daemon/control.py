@@ -69,6 +69,7 @@ class ControlServer:
         self._throttle, self._journal = Throttle(), Throttle(burst=LOGGED)
         self._open: set[asyncio.StreamWriter] = set()
         self._served = 0  # connections that have a place
+        self._ended = False
         self._streaming = False  # one at a time: each keeps what it sends in memory
         self._quick, self._slow = asyncio.Lock(), asyncio.Lock()
 
@@ -77,7 +78,8 @@ class ControlServer:
         self._server = await asyncio.start_unix_server(self._serve, sock=self._sock, limit=MAX_REQUEST_BYTES)
 
     def close(self) -> None:
-        """Take no more, and hang up."""
+        """Take no more, and hang up. Nothing is asked from now on: what a verb looks at may be closed."""
+        self._ended = True
         self._server.close()
         for writer in tuple(self._open):
             writer.close()
@@ -139,7 +141,7 @@ class ControlServer:
                 user = {"verb": name, "uid": who.uid, "pid": who.pid}
                 self._journal.info("control", f"{name} by {who.uid}", **user, **parameters)
         async with self._turn(self._slow if verb.slow else self._quick):
-            if connection.closed:  # while it waited for its turn; or the daemon ends
+            if connection.closed or self._ended:  # while it waited for its turn
                 return
             found = await self._run(connection, verb, parameters)
             # On its way before what the verb streams after it.

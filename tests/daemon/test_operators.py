@@ -222,3 +222,25 @@ def test_a_crowd_that_asks_for_the_flight_recorder_without_end_costs_no_event_an
             client.events("gesture", "arm")
             assert operator.ask("status")["ok"] and daemon.get("/healthz")[0] == 200
         assert peak_bytes(daemon) - before < 32 << 20
+
+
+def test_who_comes_while_the_daemon_ends_is_asked_nothing(tmp_path: Path) -> None:
+    """What a verb looks at may be closed already."""
+
+    async def come() -> list[int]:
+        desk = Desk()
+        with socket.socket(socket.AF_UNIX) as sock:
+            sock.bind(str(tmp_path / "c"))
+            sock.listen()
+            server = ControlServer(sock, desk.verbs)
+            await server.start()
+            server.close()
+            ours, theirs = socket.socketpair()
+            with theirs:
+                reader, writer = await asyncio.open_unix_connection(sock=ours)  # it was taken a moment before
+                theirs.sendall(b'{"verb":"ask"}\n')
+                theirs.shutdown(socket.SHUT_WR)
+                await server._serve(reader, writer)
+        return desk.asked
+
+    assert asyncio.run(come()) == []
