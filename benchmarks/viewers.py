@@ -19,8 +19,9 @@ from gestured.core.frames import Frame
 
 VIEWERS = 3
 SENSORS = 20  # all of them are touched: so many events that a 99th percentile says something
-SECONDS = 15.0
-ROUNDS = 5
+SECONDS = 12.0
+ROUNDS = 3
+WARM = 30  # frames
 TYPES = ["onset", "gesture", "unknown", "cancelled", "release"]
 
 
@@ -78,10 +79,12 @@ def viewers(model: str) -> Row:
 
         def measure(watchers: int) -> float:
             delays: list[float] = []
-            play(sender, 1)
-            with Stream(engine.socket, {"types": TYPES}) as stream, ExitStack() as stack:
+            with ExitStack() as stack:
+                play(sender, 1)  # so that there is something to look at
                 for _ in range(watchers):
                     stack.enter_context(viewer(control, "bench0"))
+                play(sender, WARM)  # what the pause has left behind is over
+                stream = stack.enter_context(Stream(engine.socket, {"types": TYPES}))
 
                 def hear() -> None:
                     for event in stream:
