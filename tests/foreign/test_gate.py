@@ -1,0 +1,79 @@
+"""The shipped networks on fixed people and sensors of the foreign generator, from which nothing learns.
+
+The bounds are what a model that is worse breaks: one that names every eighth gesture otherwise does not pass.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from gestured.core.frames import Segment
+from gestured.core.recognizer import Classifier, Scores
+from gestured.model.model import open_model, shipped
+from tests.foreign import GESTURES, NON_GESTURES, take
+from tests.foreign.judge import Outcome, Take, judge, summary, visible
+
+SEEDS = range(9000, 9006)  # of each kind; `judge` counts from 0 unless told
+BOUNDS = {  # least right, most wrong of the gestures, least rejected of the others
+    ("cnn_lstm", "nominal"): (0.95, 0.02, 0.8),
+    ("cnn_lstm", "hard"): (0.82, 0.04, 0.8),
+    ("lstm", "nominal"): (0.93, 0.04, 0.7),
+    ("lstm", "hard"): (0.82, 0.07, 0.7),
+}
+
+
+@cache
+def takes(level: str) -> list[tuple[int, Take]]:
+    kinds = (*GESTURES, *NON_GESTURES[::4])
+    made = [(seed, take(kind, seed, level)) for kind in kinds for seed in SEEDS]
+    return [(seed, one) for seed, one in made if visible(one)]
+
+
+def figures(classifier: Classifier, level: str) -> tuple[float, float, float]:
+    """Right and wrong of the gestures, rejected of the others."""
+    outcomes: list[Outcome] = [judge(one, seed, level, classifier) for seed, one in takes(level)]
+    found = summary(outcomes, {})[level]
+    return found["right"], found["wrong"], found["rejected"]
+
+
+def passes(classifier: Classifier, name: str, level: str) -> tuple[bool, str]:
+    least, most, rejected = BOUNDS[name, level]
+    found = figures(classifier, level)
+    words = f"{name}, {level}: right {found[0]:.3f}, wrong {found[1]:.3f}, rejected {found[2]:.3f}"
+    return found[0] >= least and found[1] <= most and found[2] >= rejected, words
+
+
+@pytest.mark.parametrize(("name", "level"), BOUNDS)
+def test_a_shipped_network_is_as_good_as_it_was(name: str, level: str) -> None:
+    if not shipped()[name].exists():
+        pytest.skip(f"{shipped()[name]} is not there")
+    good, words = passes(open_model(name), name, level)
+    print(words)
+    assert good, f"{words}; expected {BOUNDS[name, level]}"
+
+
+@dataclass
+class Damaged:
+    """A model that names every eighth segment otherwise, as sure as before."""
+
+    model: Classifier
+    asked: int = 0
+
+    @property
+    def gestures(self) -> tuple[str, ...]:
+        return self.model.gestures
+
+    def classify(self, segment: Segment) -> Scores:
+        found = self.model.classify(segment)
+        self.asked += 1
+        return replace(found, values=np.roll(found.values, 1)) if self.asked % 8 == 0 else found
+
+
+@pytest.mark.parametrize("level", ["nominal", "hard"])
+def test_a_model_that_is_worse_does_not_pass(level: str) -> None:
+    if not shipped()["cnn_lstm"].exists():
+        pytest.skip(f"{shipped()['cnn_lstm']} is not there")
+    good, words = passes(Damaged(open_model("cnn_lstm")), "cnn_lstm", level)
+    assert not good, words
