@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gestured.lab.dataset import Samples, collect
+from gestured.lab.dataset import Sample, Samples, collect
 from gestured.lab.study.material import Data
 from gestured.simulator import GESTURES
 from tests.lab.made import gestures
@@ -18,7 +18,9 @@ def samples(people: int = 6) -> Samples:
             for name in GESTURES:
                 frames = windows[name] + 0.02 * rng.random(windows[name].shape).astype(np.float32)
                 frames = np.concatenate([frames, np.zeros((turn, 9, 9), np.float32)])
-                made.append(((frames / frames.max()).astype(np.float16), name, name, person, 20.0))
+                window = (frames / frames.max()).astype(np.float16)
+                touched = np.flatnonzero(frames.max(axis=(1, 2)) > 0.3)
+                made.append(Sample(window, name, name, person, 20.0, int(touched[0]), int(touched[-1])))
     return collect(made)
 
 
