@@ -15,10 +15,11 @@ from gestured.lab.field import Contacts
 from gestured.lab.fit import FitConfig, logits, targets
 from gestured.lab.nets import Decision
 from gestured.lab.prefixes import prefixes
-from gestured.simulator import GESTURES
+from gestured.simulator import GESTURES, NONE
 
 Logits = Mapping[str, Tensor]  # (N, K) of each network
 TAP, DOUBLE = "one_tap", "double_tap"
+OTHERS = 0.2  # share of non-gestures among what is performed, as in `gestured-lab online`'s sessions
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,11 @@ class Foretold:
     contact: NDArray[np.int64]  # (N,) whose prefix each is
     since: NDArray[np.int64]  # (N,) frames since its onset
     second: NDArray[np.bool_]  # (N,) whether the finger had left and come back
+
+    @classmethod
+    def sessions(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]], config: FitConfig) -> "Foretold":
+        """As `of`, with so many non-gestures of each part as sessions hold (`OTHERS`), drawn at random."""
+        return cls.of([(nets, samples.take(as_in_sessions(samples))) for nets, samples in parts], config)
 
     @classmethod
     def of(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]], config: FitConfig) -> "Foretold":
@@ -84,7 +90,8 @@ class Foretold:
         possible = np.where(self.second, best == GESTURES.index(DOUBLE), best != GESTURES.index(DOUBLE))
         confidence[~possible | (best == GESTURES.index(TAP))] = 0.0
         asked = Asked(self.contact, self.since / WINDOW.rate_hz, best, confidence, final, self.samples.people)
-        single = self.samples.labels != DOUBLE
+        # Where the finger comes back nobody can know it at the release: that depends on how often people do so.
+        single = at_release(self.samples).lengths() == self.samples.lengths()
         scores, unknown = answers(self.released)
         tap = tap_threshold(
             (scores[single], unknown[single]), final[single], self.samples.people[single], GESTURES.index(TAP)
@@ -94,3 +101,11 @@ class Foretold:
 
 def _joined(parts: Sequence[Logits]) -> Logits:
     return {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
+
+
+def as_in_sessions(samples: Samples, share: float = OTHERS, seed: int = 1) -> NDArray[np.int64]:
+    """Indices of all gestures, and of as many non-gestures as give that share of all, or all where there are fewer."""
+    others = np.flatnonzero(samples.labels == NONE)
+    gestures = np.flatnonzero(samples.labels != NONE)
+    count = round(len(gestures) * share / (1 - share))
+    return np.sort(np.concatenate([gestures, np.random.default_rng(seed).permutation(others)[:count]]))

@@ -205,7 +205,7 @@ def foretold(trained: Trained, data: TrainingData, plan: TrainingPlan) -> Foreto
     parts = [(trained.nets, data.calibrate)]
     if data.real is not None:
         parts += [(nets, data.real.take(held)) for nets, held in zip(trained.folds, folds(data.real), strict=True)]
-    return Foretold.of(parts, plan.fit)
+    return Foretold.sessions(parts, plan.fit)
 
 
 def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged, dict[str, Any], dict[str, Any]]:
