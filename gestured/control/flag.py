@@ -36,6 +36,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
 def run(args: argparse.Namespace) -> int:
     """Fetch it and write it."""
     path = args.file or flag_path(Path())
+    library()  # what is missing here is said before a daemon is asked
     with connect(args) as control:
         keeper = flag(control, path, args.note)
     kept = {"file": str(path), "packets": keeper.packets, "events": keeper.events, "model": keeper.scene["model"]}
@@ -51,7 +52,6 @@ def flag_path(folder: Path) -> Path:
 
 def flag(control: Control, path: Path, note: str) -> Keeper:
     """Fetch what the flight recorder holds, and write it. Raises Refused where it is off, and Unreachable."""
-    library()
     scene = control.ask("flight")
 
     def lines() -> Iterator[dict[str, Any]]:
