@@ -28,7 +28,7 @@ from gestured.lab.stability.metamorphic import (
 from gestured.lab.stability.path import Series, events, labels, simulated_series
 from gestured.model.model import LADDER, Model, open_model, shipped
 
-COUNT = 40
+COUNT = 60  # enough that LEAST lets one label differ
 LEAST = 0.98  # of the labels, where a learned net decides
 numbers = st.integers(0, COUNT - 1)
 changes = st.one_of(
