@@ -40,7 +40,7 @@ def write_block(readme: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
     if text.count(FIGURES_BEGIN) != 1 or text.count(FIGURES_END) != 1:
         raise ValueError(f"{readme}: expected the marks {FIGURES_BEGIN} and {FIGURES_END} once each")
     rows = [
-        _row(f"`{name}`, {title}", values)
+        _row(f"`{name}.onnx`, {title}", values)
         for name, found in figures.items()
         for title, values in [
             *((f"simulated, {test}", values) for test, values in found["simulated"].items()),
