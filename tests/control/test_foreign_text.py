@@ -219,7 +219,7 @@ def test_what_it_publishes_is_shown(start, fake: FakeDaemon, more) -> None:
     fake.say('{"type":"onset",\r"sensor":"\x9b2J\u202e\x7f"}\n'.encode())
     fake.say({"type": "error", "reason": HOSTILE})
     out, err = process.communicate(timeout=30)
-    assert process.returncode == 1 and b"Traceback" not in err
+    assert process.returncode == 2 and b"Traceback" not in err
     plain(err.decode())
     lines = out.decode().splitlines()
     assert len(lines) == len(EVENTS) + (2 if more else 1)

@@ -50,7 +50,8 @@ def test_reload_takes_a_new_model_and_configuration_and_keeps_what_was_learned(s
     reload(daemon, "done")
     sensor.send(sensor.hand.idle(0.2))  # it may have been silent for long: a model is tried
     sensor.perform("left", "tap")  # without two quiet seconds: the baseline is still known
-    lines = [client.line() for _ in range(2)]
+    told, *lines = [client.line() for _ in range(3)]
+    assert told == {"type": "gestures", "gestures": ["knock", *tiny_model.GESTURES[1:]]}
     assert [(e["type"], e.get("gesture"), e["id"]) for e in lines] == [
         ("unknown", None, 2),
         ("gesture", "knock", 3),
@@ -70,7 +71,8 @@ def test_reload_with_other_gestures_changes_what_is_waited_for(start, tmp_path: 
     slow = client.line()
     reload(daemon, "done")
     sensor.begin().perform("tap")
-    quick = client.line()
+    told, quick = client.line(), client.line()
+    assert told == {"type": "gestures", "gestures": ["one_tap", "swipe_left"]}
     assert (slow["gesture"], quick["gesture"], quick["sequence"]) == ("one_tap", "one_tap", 2)
     assert slow["decided"] - slow["offset"] > 0.5 > 0.25 > quick["decided"] - quick["offset"]
     assert set(quick["scores"]) == {"one_tap", "swipe_left"} == set(daemon.client().hello["gestures"])
