@@ -72,13 +72,18 @@ class OwnGestures:
             "gestures": {name: len(examples) for name, examples in self.gestures.items()},
             "off": self.off,
             "doubtful": list(bank.doubtful) if (bank := self._ladder.own.made(self._ladder.model)) else [],
-            "enrolling": None if self._enrolment is None else self._enrolment.name,
+            "enrolling": self._enrolment.name if self._enrolment is not None and self._waited_for else None,
         }
 
     @property
     def enrolling(self) -> bool:
         """Whether somebody performs examples now."""
         return self._enrolment is not None
+
+    @property
+    def _waited_for(self) -> bool:
+        """Whether the client that enrols is still there."""
+        return self._connection is not None and not self._connection.closed
 
     def begin(self, connection: Connection, name: str, sensor: str, examples: int, in_use: Collection[str]) -> None:
         """Take what is performed on a sensor as examples, and tell the connection of each. Raises Refusal."""
@@ -119,7 +124,7 @@ class OwnGestures:
         """Give up what nobody waits for any more; call it once a second."""
         if self._enrolment is None or self._finishing is not None:
             return
-        if self._connection is None or self._connection.closed:
+        if not self._waited_for:
             self._give_up("its client has gone")
         elif time.monotonic() - self._heard > PATIENCE_S:
             self._give_up(f"nothing was performed for {PATIENCE_S:g} s")
