@@ -29,9 +29,9 @@ help:  ## this list
 demo: .venv/.runtime  ## recognise simulated gestures with the real daemon: SECONDS=20 MODEL=lstm SPEED=fast ARGS="--seed 7"
 	@[ ! -t 0 ] || set -m; .venv/bin/gesturectl demo --seconds "$(SECONDS)" --model "$(MODEL)" $(if $(SPEED),--speed "$(SPEED)") $(ARGS)
 
-test: .venv-dev/.dev  ## run the tests: ARGS="tests/core -k tap"
+test: .venv-dev/.dev  ## run the tests, on all cores: ARGS="tests/core -k tap"
 	@$(MAKE) -s --no-print-directory .venv-dev/.lab || echo "note: without the lab's packages its tests are skipped" >&2
-	@.venv-dev/bin/python -m pytest $(ARGS)
+	@.venv-dev/bin/python -m pytest --numprocesses auto --dist loadfile $(ARGS)
 
 golden: .venv-dev/.dev  ## play all golden tapes: the same packets give the same events (tests/golden)
 	@.venv-dev/bin/python -m pytest tests/golden -m "hostile or not hostile" $(ARGS)
