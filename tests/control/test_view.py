@@ -189,6 +189,8 @@ def test_a_browser_that_stalls_is_back_in_the_present_and_holds_up_nobody(view: 
     while other.until("sensors")[1]["sensors"].get("arm") is None:
         pass
     stalled = Stream(view, "arm", received=4096)
+    stalled.until("sensors")
+    sensor.send([sensor.hand.frame()])  # who joins is shown what comes from then on
     stalled.until("frame")
     sent: list[float] = []
     for _ in range(300):  # each one is shown to who reads before the next one comes
