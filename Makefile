@@ -21,6 +21,9 @@ PREFIX = /usr
 TORCH = torch==2.13.0
 TORCH_INDEX = https://download.pytorch.org/whl/cpu
 
+# Tests with daemons in real time, one after the other; all others run on all cores.
+TIMED = tests/bridge tests/control tests/daemon tests/hostile tests/systemd
+
 help:  ## this list
 	@echo "usage: make TARGET [NAME=VALUE ...]"
 	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 10
@@ -29,9 +32,14 @@ help:  ## this list
 demo: .venv/.runtime  ## recognise simulated gestures with the real daemon: SECONDS=20 MODEL=lstm SPEED=fast ARGS="--seed 7"
 	@[ ! -t 0 ] || set -m; .venv/bin/gesturectl demo --seconds "$(SECONDS)" --model "$(MODEL)" $(if $(SPEED),--speed "$(SPEED)") $(ARGS)
 
-test: .venv-dev/.dev  ## run the tests, on all cores: ARGS="tests/core -k tap"
+test: .venv-dev/.dev  ## run the tests: ARGS="tests/core -k tap"
 	@$(MAKE) -s --no-print-directory .venv-dev/.lab || echo "note: without the lab's packages its tests are skipped" >&2
-	@.venv-dev/bin/python -m pytest --numprocesses auto --dist loadfile $(ARGS)
+ifdef ARGS
+	@.venv-dev/bin/python -m pytest $(ARGS)
+else
+	@.venv-dev/bin/python -m pytest --numprocesses auto --dist loadfile $(addprefix --ignore=,$(TIMED))
+	@.venv-dev/bin/python -m pytest $(TIMED)
+endif
 
 golden: .venv-dev/.dev  ## play all golden tapes: the same packets give the same events (tests/golden)
 	@.venv-dev/bin/python -m pytest tests/golden -m "hostile or not hostile" $(ARGS)
