@@ -14,9 +14,8 @@ from gestured.core.foresight import Certainty, Foresight
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Draft, Found, FrontEnd, Preview
 from gestured.core.holes import HOLE_FRAMES, HOLE_S
+from gestured.core.pace import outside
 from gestured.core.prototypes import NEAR, Match
-
-RATES_HZ = (4.9, 1020.0)  # frames a second that a sensor may send: 5 to 1000, known to some per cent
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,8 +217,7 @@ class Recognizer:
 
     def _reason(self, whole: bool) -> str:
         """Why a segment is unknown; a sensor that is too slow or too fast explains it first."""
-        rate = self.front_end.rate_hz
-        if rate and not RATES_HZ[0] <= rate <= RATES_HZ[1]:
+        if outside(self.front_end.rate_hz):
             return "rate"
         return "confidence" if whole else "hole"
 
