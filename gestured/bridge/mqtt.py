@@ -15,11 +15,9 @@ import asyncio
 import errno
 import json
 import logging
-import os
 import re
 import signal
 import socket
-import ssl
 import threading
 import time
 from collections import deque
@@ -30,6 +28,7 @@ from pathlib import Path
 from typing import Any
 
 from gestured.bridge import homeassistant
+from gestured.bridge.broker import PLAIN_PORT, TLS_PORT, broker_address, credentials, tls_context, why
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import GONE, NOTICE_S, OLD_S, Daemon, Line, follow
 from gestured.bridge.options import (
@@ -37,14 +36,11 @@ from gestured.bridge.options import (
     BridgeError,
     add_filters,
     add_metrics,
-    missing,
-    peer_address,
+    need,
     subscriber,
 )
-from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
-PLAIN_PORT, TLS_PORT = 1883, 8883  # registered with IANA
 EXPIRY_S = 1  # whole seconds in MQTT; as OLD_S
 WAITING_EVENTS = 1000  # that are kept for the broker; more than a second of the busiest daemon
 IN_FLIGHT = 20  # events whose acknowledgement is awaited at a time; more would only wait in the broker
@@ -86,54 +82,9 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
 
 def run(args: argparse.Namespace) -> int:
     """Mirror events until SIGTERM or Ctrl-C."""
-    try:
-        import aiomqtt  # noqa: F401  # said before anything is begun
-    except ImportError:
-        raise missing("aiomqtt", "mqtt") from None
+    need("aiomqtt", "aiomqtt", "mqtt")
     asyncio.run(_main(args))
     return 0
-
-
-def broker_address(text: str, tls: bool) -> Address:
-    """HOST or HOST:PORT. Raises BridgeError."""
-    try:
-        return peer_address(text, TLS_PORT if tls else PLAIN_PORT)
-    except argparse.ArgumentTypeError as error:
-        raise BridgeError(f"--broker {error}") from None
-
-
-def credentials(path: Path | None) -> tuple[str | None, str | None]:
-    """User and password, from the file or else from the environment. Raises BridgeError."""
-    if path is None:
-        return os.environ.get("MQTT_USER"), os.environ.get("MQTT_PASSWORD")
-    try:
-        with path.open() as file:
-            if os.fstat(file.fileno()).st_mode & 0o007:
-                raise BridgeError(f"--credentials {path}: everybody can read it: chmod o= {path}")
-            user, colon, password = file.readline(4096).rstrip("\n").partition(":")
-    except (OSError, UnicodeDecodeError) as error:
-        raise BridgeError(f"--credentials {path}: {getattr(error, 'strerror', 'is no text')}") from None
-    if not user or not colon:
-        raise BridgeError(f"--credentials {path}: expected one line, USER:PASSWORD")
-    return user, password
-
-
-def tls_context(args: argparse.Namespace) -> ssl.SSLContext | None:
-    """How to encrypt; None for a plain connection. Raises BridgeError."""
-    if not args.tls:
-        if args.ca or args.cert:
-            raise BridgeError("--ca and --cert are for encrypted connections: add --tls")
-        return None
-    for flag, path in (("--ca", args.ca), ("--cert", args.cert)):
-        if path is not None and not os.access(path, os.R_OK):
-            raise BridgeError(f"{flag} {path}: there is no such file that we may read")
-    try:
-        context = ssl.create_default_context(cafile=args.ca)
-        if args.cert:
-            context.load_cert_chain(args.cert)
-    except ssl.SSLError as error:
-        raise BridgeError(f"--ca or --cert: {error.reason or error}: expected certificates in PEM form") from None
-    return context
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +150,17 @@ async def first_of(*coroutines: Coroutine[Any, Any, None]) -> None:
         raise errors[0]
 
 
+def _cause(error: BaseException) -> BaseException:
+    """What ended the connection; what is none of the library's errors is raised as it is."""
+    import aiomqtt
+
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    if not isinstance(error, aiomqtt.MqttError):
+        raise error
+    return error.__cause__ or error
+
+
 class Mqtt:
     """One daemon's events, and what is known of it, at one broker."""
 
@@ -259,7 +221,9 @@ class Mqtt:
                     wait_s = FIRST_S
                     await self._serve(client)
             except (aiomqtt.MqttError, ExceptionGroup) as error:
-                reason = self._reason(error)
+                if self._refusal:
+                    raise self._refusal from None
+                reason = why(_cause(error), self._broker, self._host)
                 self._counts.connected("broker", False, f"broker {self._broker} is not there: {reason}; trying again")
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._stop.wait(), wait_s)
@@ -402,43 +366,3 @@ class Mqtt:
 
     def _topic(self, *parts: str) -> str:
         return "/".join(("gestured", self._host, *parts))
-
-    def _reason(self, error: BaseException) -> str:
-        """Why there is no connection, in words. Raises BridgeError where waiting does not help."""
-        import aiomqtt
-
-        if self._refusal:
-            raise self._refusal from None
-        while isinstance(error, BaseExceptionGroup):
-            error = error.exceptions[0]
-        if not isinstance(error, aiomqtt.MqttError):
-            raise error
-        error = error.__cause__ or error
-        said = str(error)
-        if "CERTIFICATE_VERIFY_FAILED" in said:
-            why = said.partition("verify failed: ")[2].partition(" (_ssl")[0] or said
-            raise BridgeError(
-                f"the certificate of the broker {self._broker} is not to be trusted: {why}: name its authority with "
-                "--ca FILE, and the broker as its certificate does"
-            )
-        code = getattr(getattr(error, "rc", None), "value", 0)
-        if code in REFUSALS:
-            raise BridgeError(f"the broker {self._broker} refuses us: {REFUSALS[code].format(host=self._host)}")
-        if "timed out" in said:
-            return "it does not answer as an MQTT broker does (is it one with TLS: --tls?)"
-        if code == LOST:
-            return "it closed the connection"
-        return said
-
-
-LOST = 128  # the reason code that the library gives where the broker named none
-# Reason codes of MQTT 5 (docs.oasis-open.org/mqtt/mqtt/v5.0, 2.4) after which waiting is no help.
-_LOGIN = "set MQTT_USER and MQTT_PASSWORD, or --credentials FILE, as the broker knows them"
-REFUSALS = {
-    132: "it does not speak MQTT 5: use a broker that does, such as mosquitto 1.6 or newer",
-    133: "it does not take the name gestured-{host}: choose another one with --host",
-    134: f"user or password are wrong: {_LOGIN}",
-    135: f"this user may not connect: {_LOGIN}",
-    138: "we are banned: ask whoever runs it",
-    142: "another bridge has the same name, {host}: give each its own with --host",
-}

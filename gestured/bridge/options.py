@@ -1,7 +1,10 @@
 """What the bridges' command lines have in common."""
 
 import argparse
+import importlib
 import os
+import signal
+from collections.abc import Callable
 from pathlib import Path
 
 from gestured.client.address import bind_address, find_socket, host_port
@@ -17,9 +20,12 @@ class BridgeError(GesturedError):
     """The bridge cannot do what it was asked, and waiting would not help."""
 
 
-def missing(package: str, extra: str) -> BridgeError:
-    """The error where the library of a bus is not installed."""
-    return BridgeError(f"this bridge needs the package {package}: pip install 'gestured[{extra}]'")
+def need(module: str, package: str, extra: str) -> None:
+    """See to it that the library of a bus is there, before anything is begun. Raises BridgeError."""
+    try:
+        importlib.import_module(module)
+    except ImportError:
+        raise BridgeError(f"this bridge needs the package {package}: pip install 'gestured[{extra}]'") from None
 
 
 def add_filters(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +42,18 @@ def add_metrics(parser: argparse.ArgumentParser) -> None:
     """Add where Prometheus may ask."""
     text = "HTTP address of /metrics; port 0 is any free one (default: off)"
     parser.add_argument("--metrics", type=bind_address, metavar="HOST:PORT", help=text)
+
+
+def add_destination(parser: argparse.ArgumentParser) -> None:
+    """Add which daemon takes frames."""
+    text = "where the daemon listens for frames (default: 127.0.0.1:9000)"
+    parser.add_argument("--to", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT", help=text)
+
+
+def on_stop(act: Callable[[], object]) -> None:
+    """Act when SIGTERM or Ctrl-C asks for the end."""
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: act())
 
 
 def names(text: str) -> list[str]:

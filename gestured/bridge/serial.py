@@ -8,7 +8,6 @@ import argparse
 import errno
 import os
 import select
-import signal
 import socket
 import stat
 import sys
@@ -16,13 +15,11 @@ import time
 from typing import Any
 
 from gestured.bridge.counts import Counts
-from gestured.bridge.options import BridgeError, add_metrics, missing
+from gestured.bridge.options import BridgeError, add_destination, add_metrics, need, on_stop
 from gestured.bridge.protocols import COUNTER, MOST_TAXELS, PROTOCOLS, Reading, looks_like
-from gestured.client.address import host_port
 from gestured.client.grid import rows_by_columns
 from gestured.client.say import say
 from gestured.client.sensor import Form, sent_after_refusal
-from gestured.core.address import Address
 from gestured.core.frames import Frame
 from gestured.core.wire import is_sensor
 
@@ -52,21 +49,16 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
     parser.add_argument("--baud", type=int, metavar="N", help="bits a second (default: as the protocol's sensors)")
     text = "rows and columns (default: 16x16 for flexitac and e256, else 9x9)"
     parser.add_argument("--grid", type=rows_by_columns, metavar="RxC", help=text)
-    text = "where the daemon listens (default: 127.0.0.1:9000)"
-    parser.add_argument("--to", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT", help=text)
+    add_destination(parser)
     add_metrics(parser)
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Forward frames until SIGTERM or Ctrl-C."""
-    try:
-        import serial  # noqa: F401  # said before anything is begun
-    except ImportError:
-        raise missing("pyserial", "serial") from None
+    need("serial", "pyserial", "serial")
     bridge = Serial(args, Counts("serial"))
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: bridge.stop())
+    on_stop(bridge.stop)
     bridge.work()
     return 0
 

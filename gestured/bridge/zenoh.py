@@ -10,7 +10,6 @@ gestured/{site}/{sensor}/frames     in: OSC packets as over UDP, with counter an
 import argparse
 import json
 import re
-import signal
 import socket
 import threading
 import time
@@ -20,8 +19,15 @@ from typing import Any
 
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import GONE, MOST_SENSORS, NOTICE_S, OLD_S, Daemon, Line, follow
-from gestured.bridge.options import BridgeError, add_filters, add_metrics, missing, subscriber
-from gestured.client.address import host_port
+from gestured.bridge.options import (
+    BridgeError,
+    add_destination,
+    add_filters,
+    add_metrics,
+    need,
+    on_stop,
+    subscriber,
+)
 from gestured.client.sensor import sent_after_refusal
 from gestured.core.address import Address
 from gestured.core.errors import ProtocolError
@@ -54,24 +60,21 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
     parser.add_argument("--site", metavar="NAME", help="name of this place in keys (default: the hostname)")
     add_filters(parser)
     parser.add_argument("--frames", action="store_true", help="also take frames from Zenoh to the daemon")
-    text = "where the daemon listens for them (default: 127.0.0.1:9000)"
-    parser.add_argument("--to", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT", help=text)
+    add_destination(parser)
     add_metrics(parser)
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Mirror events until SIGTERM or Ctrl-C."""
-    try:
-        import zenoh
-    except ImportError:
-        raise missing("eclipse-zenoh", "zenoh") from None
+    need("zenoh", "eclipse-zenoh", "zenoh")
+    import zenoh
+
     zenoh.init_log_from_env_or("off")  # what is wrong is said here, in one line
     counts = Counts("zenoh")
     bridge = Zenoh(args, counts)
     source = subscriber(args, NOTICE_S)
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: source.close())
+    on_stop(source.close)
     try:
         bridge.begin(counts.serve(args.metrics))
         for line in follow(source):
