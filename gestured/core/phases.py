@@ -37,42 +37,22 @@ class Action(IntEnum):
     LEFT = auto()  # a given-up contact was let go
 
 
-# --- what a frame says: which activity is quiet, weak or strong
+# --- which activity says something: from the first number on a frame is strong, below the second it is quiet
 
 
-def _untouched(memory: Memory, t: float, activity: float) -> Signal:
+def _untouched(memory: Memory, t: float) -> tuple[float, float]:
     """A contact has to exceed what the last one has left behind."""
-    if activity < memory.on:  # the common case first
-        return Signal.QUIET if activity < memory.off else Signal.WEAK
-    return Signal.STRONG if activity >= memory.on + memory.after.level(t) else Signal.WEAK
-
-
-def _touched(memory: Memory, t: float, activity: float) -> Signal:
-    """A finger is off below a share of its own peak, and back above a larger one: hysteresis."""
-    peak = memory.after.peak
-    if activity < max(memory.off, OFF_SHARE * peak):
-        return Signal.QUIET
-    return Signal.STRONG if activity >= max(memory.on, ON_SHARE * peak) else Signal.WEAK
-
-
-def _given_up(memory: Memory, t: float, activity: float) -> Signal:
-    """What lies there counts as touched down to `off`: it is never weak."""
-    return Signal.QUIET if activity < memory.off else Signal.STRONG
-
-
-# --- the same as two numbers, for whoever looks at it: activity from which it is strong, and below which it is quiet
-
-
-def _levels_untouched(memory: Memory, t: float) -> tuple[float, float]:
     return memory.on + memory.after.level(t), memory.off
 
 
-def _levels_touched(memory: Memory, t: float) -> tuple[float, float]:
+def _touched(memory: Memory, t: float) -> tuple[float, float]:
+    """A finger is off below a share of its own peak, and back above a larger one: hysteresis."""
     peak = memory.after.peak
     return max(memory.on, ON_SHARE * peak), max(memory.off, OFF_SHARE * peak)
 
 
-def _levels_given_up(memory: Memory, t: float) -> tuple[float, float]:
+def _given_up(memory: Memory, t: float) -> tuple[float, float]:
+    """What lies there counts as touched down to `off`: it is never weak."""
     return memory.off, memory.off
 
 
@@ -171,19 +151,23 @@ class Phase:
     """What is true of the sensor, and how frames and waits are read while it is."""
 
     name: str
-    reads: Callable[[Memory, float, float], Signal]  # s and activity of a frame -> what it says
     levels: Callable[[Memory, float], tuple[float, float]]  # s -> activity that is strong, and that is not quiet
     waits: Callable[[Memory, float], Signal | None] = _no_wait  # s of quiet -> what they say, if anything
     touched: bool = True  # a contact goes on, given up or not
     pending: bool = True  # it is not given up, and what becomes of it is open
     let_go: bool = False  # the finger is off: if the stream ends, what is open may be decided
 
+    def reads(self, memory: Memory, t: float, activity: float) -> Signal:
+        """What a frame at `t` s says by its activity, in noise units."""
+        strong, quiet = self.levels(memory, t)
+        return Signal.QUIET if activity < quiet else Signal.STRONG if activity >= strong else Signal.WEAK
 
-IDLE = Phase("IDLE", _untouched, _levels_untouched, touched=False, pending=False)
-CONTACT = Phase("CONTACT", _touched, _levels_touched)
-RELEASING = Phase("RELEASING", _touched, _levels_touched, _released, let_go=True)
-GAP = Phase("GAP", _touched, _levels_touched, _gap_over, let_go=True)
-SPENT = Phase("SPENT", _given_up, _levels_given_up, _left, pending=False)
+
+IDLE = Phase("IDLE", _untouched, touched=False, pending=False)
+CONTACT = Phase("CONTACT", _touched)
+RELEASING = Phase("RELEASING", _touched, _released, let_go=True)
+GAP = Phase("GAP", _touched, _gap_over, let_go=True)
+SPENT = Phase("SPENT", _given_up, _left, pending=False)
 
 
 class Row(NamedTuple):
