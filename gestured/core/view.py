@@ -1,6 +1,6 @@
 """One sensor as it is felt at a moment, for whoever looks at it; nothing of it is made unless somebody does."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,15 +36,10 @@ def view_of(front_end: FrontEnd, *, raw: bool) -> View | None:
     if look is None:
         return found
     taxels = front_end.conditioner.taxels
-    return View(
-        frame.t,
-        phase,
-        on,
-        off,
-        front_end.noise,
-        taxels.bridge(look.above[None])[0],
-        taxels.bad.reshape(taxels.rows, taxels.columns),
-        look.activity,
-        front_end.conditioner.place(look) if look.activity >= off else None,
-        found.raw,
+    return replace(
+        found,
+        values=taxels.bridge(look.above[None])[0],
+        bad=taxels.bad.reshape(taxels.rows, taxels.columns),
+        activity=look.activity,
+        centroid=front_end.conditioner.place(look) if look.activity >= off else None,
     )
