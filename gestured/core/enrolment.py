@@ -8,7 +8,7 @@ import numpy as np
 
 from gestured.core.events import Cancelled
 from gestured.core.frames import Segment
-from gestured.core.holes import HOLE_FRAMES, HOLE_S
+from gestured.core.holes import bearable_s
 from gestured.core.own import Example
 from gestured.core.prototypes import EXAMPLES
 
@@ -58,7 +58,7 @@ class Enrolment:
         if what.last - what.first + 1 < FEWEST or what.offset - what.onset < SHORTEST_S:
             return f"too short: a gesture of your own takes {SHORTEST_S:g} s and {FEWEST} frames at least"
         steps = np.diff(what.times[what.first : what.last + 1])
-        if steps.max() > max(HOLE_S, HOLE_FRAMES * float(np.median(steps))):
+        if steps.max() > bearable_s(float(np.median(steps))):
             return "frames were lost in the middle of it; do it again"
         example = self.judge.example(what)
         if example is None:

@@ -20,6 +20,11 @@ BENT = math.radians(75.0)  # the same where both ways bend to the same side, as 
 SLOWEST = 0.75  # times the speed beside the hole: who got less far has turned a corner, or stopped
 
 
+def bearable_s(interval_s: float) -> float:
+    """The longest hole in s that says nothing against a contact, of a sensor with so many s from frame to frame."""
+    return max(HOLE_S, HOLE_FRAMES * interval_s)
+
+
 class Sight(NamedTuple):
     """Where the finger was seen."""
 

@@ -13,7 +13,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.foresight import Certainty, Foresight
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Draft, Found, FrontEnd, Preview
-from gestured.core.holes import HOLE_FRAMES, HOLE_S
+from gestured.core.holes import bearable_s
 from gestured.core.pace import outside
 from gestured.core.prototypes import NEAR, Match
 
@@ -213,7 +213,7 @@ class Recognizer:
 
     def _whole(self, hole_s: float) -> bool:
         """Whether the longest time without a frame is too short for the finger to have moved unseen."""
-        return hole_s <= max(HOLE_S, HOLE_FRAMES * self.front_end.interval_s)
+        return hole_s <= bearable_s(self.front_end.interval_s)
 
     def _reason(self, whole: bool) -> str:
         """Why a segment is unknown; a sensor that is too slow or too fast explains it first."""
