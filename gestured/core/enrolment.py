@@ -10,7 +10,6 @@ from gestured.core.events import Cancelled
 from gestured.core.frames import Segment
 from gestured.core.holes import bearable_s
 from gestured.core.own import Example
-from gestured.core.prototypes import EXAMPLES
 
 SHORTEST_S = 0.15  # of an example: what is shorter is a tap, whatever was meant
 FEWEST = 3  # touched frames: fewer show no movement
@@ -77,8 +76,3 @@ CANCELLED = {
     "glitch": "too short: that was no finger",
     "stuck": "the contact did not look like a finger; do it again",
 }
-
-
-def allowed(examples: int) -> bool:
-    """Whether a gesture can be learned from so many examples."""
-    return 1 <= examples <= EXAMPLES

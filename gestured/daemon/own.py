@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
-from gestured.core.enrolment import Enrolment, allowed
+from gestured.core.enrolment import Enrolment
 from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled
 from gestured.core.facts import Fact
@@ -91,7 +91,7 @@ class OwnGestures:
         if self._enrolment is not None:
             raise Refusal(f"{self._enrolment.name!r} is being enrolled on {self._enrolment.sensor}; one at a time")
         self._check(name)
-        if not allowed(examples):
+        if not 1 <= examples <= EXAMPLES:
             raise Refusal(f"expected 1 to {EXAMPLES} examples, found {examples}")
         model = self._ladder.model
         if not isinstance(model, Model) or model.space is None:
