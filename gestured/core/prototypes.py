@@ -152,12 +152,11 @@ def _unpacked(text: object) -> Array:
     return values
 
 
-def clashes(space: Space, examples: Mapping[str, Array]) -> list[tuple[str, str]]:
+def clashes(prototypes: Mapping[str, Prototype], examples: Mapping[str, Array]) -> list[tuple[str, str]]:
     """Pairs of gestures of which one of the (n, K) examples of the first would be taken for the second."""
-    prototypes = {name: Prototype.of(space, places) for name, places in examples.items()}
     return [
         (name, other)
         for name, places in examples.items()
-        for other in prototypes
-        if other != name and any(prototypes[other].confidence(place) >= NEAR for place in places)
+        for other, prototype in prototypes.items()
+        if other != name and any(prototype.confidence(place) >= NEAR for place in places)
     ]

@@ -58,7 +58,7 @@ class Own:
     def _made(self, model: Model, space: Space) -> Bank:
         places = {name: places_of(model, space, examples) for name, examples in self.gestures.items()}
         prototypes = {name: Prototype.of(space, found) for name, found in places.items()}
-        doubtful = [f"{one} may be taken for {other}" for one, other in clashes(space, places)]
+        doubtful = [f"{one} may be taken for {other}" for one, other in clashes(prototypes, places)]
         for name, examples in self.gestures.items():
             taken = (taken_for(model, space, one.segment(), model.gestures) for one in examples)
             doubtful += sorted({f"{name} may be taken for the model's {found[0]}" for found in taken if found})

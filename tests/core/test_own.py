@@ -84,7 +84,8 @@ def test_the_nearest_wins_and_lies_nearer_than_the_models_only_far_from_them() -
 
 def test_gestures_of_which_one_may_be_taken_for_the_other_are_named() -> None:
     places = {"a": np.array([[8.0, 0, 0, 0]]), "b": np.array([[8.3, 0, 0, 0]]), "c": np.array([[-20.0, 9, 0, 0]])}
-    assert set(clashes(space(), places)) == {("a", "b"), ("b", "a")}
+    prototypes = {name: Prototype.of(space(), found) for name, found in places.items()}
+    assert set(clashes(prototypes, places)) == {("a", "b"), ("b", "a")}
 
 
 def test_a_space_outlives_its_json_and_a_wrong_one_is_refused() -> None:
