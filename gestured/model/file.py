@@ -5,7 +5,7 @@ wire format once, with a stack of its own and a bounded number of steps: it take
 data kept in other files and tensors that claim to be larger than what is there. `Metadata.parse` then holds
 every key against the contract. Field numbers are those of onnx.proto (ONNX 1.23).
 
-Functions here raise ValueError with the reason; `models.open_model` adds the file's name.
+Functions here raise ValueError with the reason; `model.open_model` adds the file's name.
 """
 
 import base64
@@ -16,6 +16,7 @@ import os
 import re
 import stat
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -286,16 +287,16 @@ class Metadata:
             raise ValueError("metadata 'version': expected 1 to 64 printable characters")
         if not re.fullmatch(r"[0-9a-f]{64}", properties["training_data"]):
             raise ValueError("metadata 'training_data': expected a sha256 in hexadecimal")
-        try:
+        with _naming("window"):
             window = Window.from_json(properties["window"])
-        except ValueError as error:
-            raise ValueError(f"metadata 'window': {error}") from error
-        provisional = None
+        provisional = own = None
         if "provisional" in properties:
-            try:
+            with _naming("provisional"):
                 provisional = Certainty.from_json(properties["provisional"], gestures)
-            except ValueError as error:
-                raise ValueError(f"metadata 'provisional': {error}") from error
+        if "own" in properties:
+            told = _json(properties["own"], "own", dict)
+            with _naming("own"):
+                own = Space.from_json(told, len(gestures))
         grid = {}
         for key in ("rows", "columns", "rate_hz"):
             try:
@@ -319,15 +320,17 @@ class Metadata:
             quantiles=_json(properties["quantiles"], "quantiles", dict),
             self_test=SelfTest.from_json(properties["self_test"]),
             provisional=provisional,
-            own=_space(properties["own"], len(gestures)) if "own" in properties else None,
+            own=own,
         )
 
 
-def _space(text: str, gestures: int) -> Space:
+@contextmanager
+def _naming(key: str) -> Iterator[None]:
+    """Have a ValueError say in which key of the metadata the mistake is."""
     try:
-        return Space.from_json(_json(text, "own", dict), gestures)
+        yield
     except ValueError as error:
-        raise ValueError(f"metadata 'own': {error}") from None
+        raise ValueError(f"metadata {key!r}: {error}") from error
 
 
 def _check_extent(key: str, text: str) -> None:
