@@ -154,19 +154,22 @@ class OwnGestures:
 
     async def _keep(self, gestures: Examples) -> None:
         """Write them, and use them."""
-        if self.path is None or self.fault is not None:
-            raise Refusal(self.fault or f"there is no file for own gestures: {own_file.REMEDY}")
-        model = self._ladder.model
+        path, model = self._file(), self._ladder.model
         sha256 = model.sha256 if isinstance(model, Model) else ""
-        await asyncio.to_thread(own_file.write, self.path, gestures, sha256)
+        await asyncio.to_thread(own_file.write, path, gestures, sha256)
         self.gestures = gestures
         self._use()
         self._changed()
 
-    def _check(self, name: str) -> None:
-        """Raises Refusal for a name that cannot be enrolled here and now."""
+    def _file(self) -> Path:
+        """The file that examples are written to. Raises Refusal where there is none, or it could not be read."""
         if self.path is None or self.fault is not None:
             raise Refusal(self.fault or f"there is no file for own gestures: {own_file.REMEDY}")
+        return self.path
+
+    def _check(self, name: str) -> None:
+        """Raises Refusal for a name that cannot be enrolled here and now."""
+        self._file()
         if not is_name(name):
             raise Refusal(f"{name!r} is no gesture's name: expected a-z, then a-z, 0-9, _, 32 at most, not `use`")
         if name in self._ladder.gestures:
