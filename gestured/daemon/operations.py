@@ -9,6 +9,7 @@ from itertools import chain
 
 from gestured.core.events import Gesture, Onset, Provisional, Release
 from gestured.core.hub import Hub
+from gestured.core.reading import Reading
 from gestured.core.wire import is_sensor
 from gestured.daemon.control import Connection
 from gestured.daemon.desk import Desk
@@ -83,9 +84,7 @@ class Operations:
 
     async def recalibrate(self, connection: Connection, sensor: str | None = None) -> Reply:
         """Learn the idle sensor anew: one, or all. Refused while one of them is touched: a hand is no baseline."""
-        heard = {name: one for name, one in self.snapshot().sensors.items() if one.source is not None}
-        if sensor is not None and sensor not in heard:
-            raise Refusal(f"no sensor {sensor!r}, expected one of {', '.join(heard) or 'none: no sensor was heard'}")
+        heard = _heard(self.snapshot(), sensor)
         chosen = list(heard) if sensor is None else [sensor]
         if not chosen:
             raise Refusal("no sensor was heard so far")
@@ -147,10 +146,7 @@ class Operations:
     async def enrol(self, connection: Connection, name: str, sensor: str, examples: int = 3) -> Reply:
         """Learn a gesture from what is performed on a sensor; a line follows for each example, and one at the end."""
         snapshot = self.snapshot()
-        reading = snapshot.sensors.get(sensor)
-        if reading is None or reading.source is None:
-            heard = [known for known, one in snapshot.sensors.items() if one.source is not None]
-            raise Refusal(f"no sensor {sensor!r}, expected one of {', '.join(heard) or 'none: no sensor was heard'}")
+        _heard(snapshot, sensor)
         if connection.tap:
             raise Refusal("this connection is a tap already")
         self.own.begin(connection, name, sensor, examples, snapshot.gestures)
@@ -182,3 +178,11 @@ class Operations:
 
     def _scene(self) -> Reply:
         return scene(self.snapshot(), time.time_ns() - time.monotonic_ns(), self.own.gestures)
+
+
+def _heard(snapshot: Snapshot, sensor: str | None) -> dict[str, Reading]:
+    """The sensors that were heard, by name. Raises Refusal where the one that is asked for is none of them."""
+    heard = {name: reading for name, reading in snapshot.sensors.items() if reading.source is not None}
+    if sensor is not None and sensor not in heard:
+        raise Refusal(f"no sensor {sensor!r}, expected one of {', '.join(heard) or 'none: no sensor was heard'}")
+    return heard
