@@ -63,8 +63,7 @@ class Service:
         for name in settings.sensors:
             self._metrics.sensor_label(name)  # those in the file are named first
         self._own = OwnGestures(self._own_changed)
-        path = own_file.where(settings.own_gestures, os.environ)
-        self._own.follow(ladder, path, own_file.load(path))
+        self._own.follow(ladder, *_own_file(settings))
         self._hub = Hub(scene_of(settings, ladder), ladder)
         self._watch, self._taps = Watch(ladder), Taps(settings.flight_recorder << 20)
         self._clients = EventServer(
@@ -214,8 +213,7 @@ class Service:
 
     def _open(self, settings: Settings) -> tuple[Ladder, list[OscSink], OwnFile]:
         """What may take long: models, names of hosts, and the file of own gestures."""
-        path = own_file.where(settings.own_gestures, os.environ)
-        return open_ladder(settings, insist=True), self._destinations(settings), (path, own_file.load(path))
+        return open_ladder(settings, insist=True), self._destinations(settings), _own_file(settings)
 
     async def reload(self) -> str | None:
         """Read everything anew, and only where all of it is valid, change anything; else the reason."""
@@ -255,3 +253,9 @@ class Service:
         self._foresee()
         self._metrics.reloads.add("done")
         log.info("reloaded", model=ladder.active)
+
+
+def _own_file(settings: Settings) -> OwnFile:
+    """Find the file of own gestures, and read it."""
+    path = own_file.where(settings.own_gestures, os.environ)
+    return path, own_file.load(path)
