@@ -13,7 +13,7 @@ from gestured.daemon.ladder import open_ladder
 from gestured.daemon.settings import TABLES, Settings, control_beside, default_socket
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
-from gestured.model.ladder import Ladder
+from gestured.model.ladder import Ladder, gestures_in_use
 
 
 def _felt(wait_s: float, rate_hz: float) -> float:
@@ -26,7 +26,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     ladder = open_ladder(settings)
     model: Any = ladder.model
     window = model.metadata.window
-    used = [g for g in ladder.gestures if settings.gestures is None or g in settings.gestures]
+    used = gestures_in_use(ladder, settings.gestures)
     path = settings.socket or default_socket(os.environ)
     grid = settings.grid or f"{ladder.rows}x{ladder.columns}"
     rungs = [f"{rung.name}{'' if rung.model is None else ', in use'}" for rung in ladder.rungs[1:]]

@@ -4,15 +4,14 @@ from gestured.core.mounting import Mounting
 from gestured.core.scene import Scene, Setup
 from gestured.core.wire import Addresses
 from gestured.daemon.settings import Settings
-from gestured.model.ladder import Ladder
+from gestured.model.ladder import Ladder, gestures_in_use
 
 
 def scene_of(settings: Settings, ladder: Ladder) -> Scene:
     """What decides, with the models of `ladder`, which knows all gestures that the settings name."""
-    chosen = settings.gestures
     parts = settings.per_gesture
     return Scene(
-        gestures=tuple(name for name in ladder.gestures if chosen is None or name in chosen),
+        gestures=gestures_in_use(ladder, settings.gestures),
         grid=settings.grid or (ladder.rows, ladder.columns),
         sensors={
             name: Setup(own.grid, Mounting(own.rotate, own.mirror, own.invert), own.clock)

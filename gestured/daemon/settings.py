@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gestured.core.address import Address
 from gestured.core.scene import TAP_GAP_S
+from gestured.core.timing import Timing
 from gestured.core.wire import Addresses
 from gestured.daemon.values import (
     AddressField,
@@ -107,7 +108,10 @@ class Settings(Part):
         default=1.0, ge=0.2, le=60, description="seconds of silence after which a sensor counts as gone"
     )
     tap_gap_s: float = Field(
-        default=0.5, ge=TAP_GAP_S[0], le=TAP_GAP_S[1], description="seconds that a tap waits for a second one"
+        default=Timing().tap_gap_s,
+        ge=TAP_GAP_S[0],
+        le=TAP_GAP_S[1],
+        description="seconds that a tap waits for a second one",
     )
     provisional_taps: bool = Field(
         default=True, description="whether one tap is said provisionally before a second one may come"
