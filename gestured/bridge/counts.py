@@ -46,6 +46,10 @@ class Counts:
         # gesturectl doctor reads its first word. READY: to be started does not mean that the others are there.
         notify(f"READY=1\nSTATUS={'connected' if here else 'waiting'}: {'; '.join(self._words.values())}")
 
+    def daemon(self, is_there: bool) -> None:
+        """Count and say whether the daemon is there, of a bridge that mirrors its events."""
+        self.connected("daemon", is_there, f"daemon {'is there' if is_there else 'went'}")
+
     def ready(self, **where: object) -> None:
         """Say once that it works, as one line of JSON on standard output."""
         if not self._ready:

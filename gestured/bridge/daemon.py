@@ -1,5 +1,6 @@
 """What a bridge knows of the daemon that it mirrors: whether it is there, its gestures and sensors, an event's age."""
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -73,6 +74,11 @@ class Daemon:
         smallest = min(lag, smallest + DRIFT * max(now - found, 0.0))
         self._lags[event["sensor"]] = smallest, now
         return lag - smallest
+
+    def payload(self, event: Line) -> bytes:
+        """An event as it is published: the daemon's line as JSON, with the daemon's `instance`."""
+        told = {**event, "instance": self.hello.get("instance")}
+        return json.dumps(told, separators=(",", ":")).encode()
 
     def _state(self, name: str, state: str) -> None:
         if self._wanted_sensors is not None and name not in self._wanted_sensors:

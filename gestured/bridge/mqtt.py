@@ -15,9 +15,7 @@ import asyncio
 import errno
 import json
 import logging
-import re
 import signal
-import socket
 import threading
 import time
 from collections import deque
@@ -36,6 +34,7 @@ from gestured.bridge.options import (
     BridgeError,
     add_filters,
     add_metrics,
+    host_name,
     need,
     subscriber,
 )
@@ -50,7 +49,6 @@ KEEPALIVE_S = 5  # a broker that vanished without a word is noticed, and ours de
 AGAIN_S = 0.1  # until a task that goes on is cancelled again
 FIRST_S, LONGEST_S = 0.25, 2.0  # from one attempt to the next: doubled each time, a broker that is back is found soon
 QUIET = logging.Logger("mqtt", logging.CRITICAL)  # how the connection is, the bridge says in its own words
-SAFE = re.compile(r"[^A-Za-z0-9_-]")  # what Home Assistant takes in no topic of discovery
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -167,7 +165,7 @@ class Mqtt:
     def __init__(self, args: argparse.Namespace, counts: Counts) -> None:
         """Raises BridgeError for what cannot be."""
         self._broker = broker_address(args.broker, args.tls)
-        self._host = SAFE.sub("_", args.host or socket.gethostname())
+        self._host = host_name(args.host)
         self._user, self._password = credentials(args.credentials)
         self._tls = tls_context(args)
         self._prefix = args.discovery
@@ -189,7 +187,7 @@ class Mqtt:
         kind = line.get("type")
         self._daemon.take(line)
         if kind in ("hello", GONE):
-            self._counts.connected("daemon", kind == "hello", f"daemon {'is there' if kind == 'hello' else 'went'}")
+            self._counts.daemon(kind == "hello")
         if "sensor" in line:  # an event: the daemon knows what was asked for, and which answers belong to it
             self._wait(line)
         if kind in ("hello", "gestures", STATUS, GONE):
@@ -201,9 +199,8 @@ class Mqtt:
         if len(self._events) >= WAITING_EVENTS:
             self._events.popleft()
             self._counts.add("events", "overflow")
-        payload = {**event, "instance": self._daemon.hello.get("instance")}
-        topic = f"gestured/{self._host}/{event['sensor']}/{event['type']}"
-        self._events.append(Event(decided, topic, json.dumps(payload, separators=(",", ":")).encode()))
+        topic = self._topic(event["sensor"], event["type"])
+        self._events.append(Event(decided, topic, self._daemon.payload(event)))
         self._arrived.set()
 
     def stop(self) -> None:

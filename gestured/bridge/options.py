@@ -3,9 +3,12 @@
 import argparse
 import importlib
 import os
+import re
 import signal
+import socket
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from gestured.client.address import bind_address, find_socket, host_port
 from gestured.client.subscriber import Subscriber
@@ -48,6 +51,23 @@ def add_destination(parser: argparse.ArgumentParser) -> None:
     """Add which daemon takes frames."""
     text = "where the daemon listens for frames (default: 127.0.0.1:9000)"
     parser.add_argument("--to", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT", help=text)
+
+
+def destination(to: Address) -> tuple[int, Any]:
+    """The family and the address of a UDP socket that sends to `--to`. Raises BridgeError where it is no address."""
+    try:
+        family, _, _, _, address = socket.getaddrinfo(to.host, to.port, type=socket.SOCK_DGRAM)[0]
+    except OSError as error:
+        raise BridgeError(f"--to {to}: {error.strerror}") from None
+    return family, address
+
+
+def host_name(named: str | None) -> str:
+    """The name that was given, else this machine's, with an underscore for all but letters, digits, _ and -.
+
+    Home Assistant takes nothing else in a topic of discovery.
+    """
+    return re.sub(r"[^A-Za-z0-9_-]", "_", named or socket.gethostname())
 
 
 def on_stop(act: Callable[[], object]) -> None:

@@ -15,7 +15,7 @@ import time
 from typing import Any
 
 from gestured.bridge.counts import Counts
-from gestured.bridge.options import BridgeError, add_destination, add_metrics, need, on_stop
+from gestured.bridge.options import BridgeError, add_destination, add_metrics, destination, need, on_stop
 from gestured.bridge.protocols import COUNTER, MOST_TAXELS, PROTOCOLS, Reading, looks_like
 from gestured.client.grid import rows_by_columns
 from gestured.client.say import say
@@ -80,12 +80,9 @@ class Serial:
         self._sensor = args.sensor
         self._forms = {form: Form(args.sensor, form) for form in ("floats", "ints", "uint8", "uint16")}
         self._counts = counts
-        try:
-            family, kind, _, _, address = socket.getaddrinfo(args.to.host, args.to.port, type=socket.SOCK_DGRAM)[0]
-        except OSError as error:
-            raise BridgeError(f"--to {args.to}: {error.strerror}") from None
+        family, address = destination(args.to)
         self._to = args.to
-        self._socket = socket.socket(family, kind)
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.connect(address)
         self._counter = 0
         self._stopped = False

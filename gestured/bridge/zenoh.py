@@ -24,6 +24,8 @@ from gestured.bridge.options import (
     add_destination,
     add_filters,
     add_metrics,
+    destination,
+    host_name,
     need,
     on_stop,
     subscriber,
@@ -119,7 +121,7 @@ class Zenoh:
 
     def __init__(self, args: argparse.Namespace, counts: Counts) -> None:
         """Raises BridgeError for what cannot be."""
-        self._site = args.site or re.sub(r"[^A-Za-z0-9_-]", "_", socket.gethostname())
+        self._site = args.site or host_name(None)
         if not SITE.fullmatch(self._site):
             raise BridgeError(f"--site {self._site}: expected letters, digits, _ and -, at most 64")
         self._config = configuration(args)
@@ -144,7 +146,7 @@ class Zenoh:
         kind = line.get("type")
         self._daemon.take(line)
         if kind in ("hello", GONE):
-            self._counts.connected("daemon", kind == "hello", f"daemon {'is there' if kind == 'hello' else 'went'}")
+            self._counts.daemon(kind == "hello")
         if "sensor" in line:  # an event: the daemon knows what was asked for, and which answers belong to it
             self._publish(line)
         self._hold_tokens()
@@ -179,8 +181,7 @@ class Zenoh:
     def _publish(self, event: Line) -> None:
         import zenoh
 
-        payload = {**event, "instance": self._daemon.hello.get("instance")}
-        data = json.dumps(payload, separators=(",", ":")).encode()
+        data = self._daemon.payload(event)
         if event["type"] == "gesture":
             if event["sensor"] not in self._latest and len(self._latest) >= MOST_SENSORS:
                 self._latest.clear()
@@ -242,11 +243,7 @@ class Forward:
 
     def __init__(self, to: Address, counts: Counts) -> None:
         """Raises BridgeError where `to` is no address."""
-        try:
-            family, _, _, _, address = socket.getaddrinfo(to.host, to.port, type=socket.SOCK_DGRAM)[0]
-        except OSError as error:
-            raise BridgeError(f"--to {to}: {error.strerror}") from None
-        self._family, self._address = family, address
+        self._family, self._address = destination(to)
         self._counts = counts
         self._senders: dict[str, Callable[[bytes], bool]] = {}
 
