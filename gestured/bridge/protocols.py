@@ -239,11 +239,6 @@ def slip_decoded(packet: bytes) -> bytes:
     return packet.replace(b"\xdb\xdc", b"\xc0").replace(b"\xdb\xdd", b"\xdb")
 
 
-def slip_encoded(packet: bytes) -> bytes:
-    """A packet between END bytes."""
-    return SLIP_END + packet.replace(b"\xdb", b"\xdb\xdd").replace(b"\xc0", b"\xdb\xdc") + SLIP_END
-
-
 def messages_of(packet: bytes) -> list[Message]:
     """The OSC messages of a packet; none where it is no OSC."""
     try:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from gestured.bridge.protocols import PROTOCOLS, Protocol, looks_like, slip_encoded
+from gestured.bridge.protocols import PROTOCOLS, Protocol, looks_like
 
 ROWS, COLUMNS = 4, 5
 SIZE = ROWS * COLUMNS
@@ -28,6 +28,12 @@ def message(address: str, *arguments: object) -> bytes:
     for argument in arguments:
         builder.add_arg(argument)
     return builder.build().dgram
+
+
+def slip_encoded(packet: bytes) -> bytes:
+    """A packet between two END bytes, byte by byte as RFC 1055 has it."""
+    escaped = {0xC0: b"\xdb\xdc", 0xDB: b"\xdb\xdd"}
+    return b"\xc0" + b"".join(escaped.get(byte, bytes((byte,))) for byte in packet) + b"\xc0"
 
 
 def written(name: str, frame: np.ndarray) -> bytes:
