@@ -11,8 +11,7 @@ from gestured.client.say import say, say_drawn, say_json
 from gestured.client.subscriber import Subscriber
 from gestured.control.address import add_sockets, event_path
 from gestured.control.show import said_when
-
-TYPES = ("gesture", "provisional", "unknown", "cancelled", "onset", "release", "status")
+from gestured.core.messages import EVENT_TYPES
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -27,7 +26,7 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         "  gesturectl listen --json --gesture swipe_left --count 1",
     )
     add_sockets(parser)
-    parser.add_argument("--types", type=_types, help=f"comma-separated, of {', '.join(TYPES)} (default: gesture)")
+    parser.add_argument("--types", type=_types, help=f"comma-separated, of {', '.join(EVENT_TYPES)} (default: gesture)")
     parser.add_argument("--sensor", action="append", metavar="NAME", help="only this sensor; may be repeated")
     parser.add_argument("--gesture", action="append", metavar="NAME", help="only this gesture; may be repeated")
     parser.add_argument("--count", type=int, metavar="N", help="end after N events")
@@ -119,7 +118,7 @@ def _repeat(line: str, event: dict[str, Any]) -> None:
 
 def _types(text: str) -> list[str]:
     types = [word.strip() for word in text.split(",") if word.strip()]
-    unknown = [word for word in types if word not in TYPES]
+    unknown = [word for word in types if word not in EVENT_TYPES]
     if unknown or not types:
-        raise argparse.ArgumentTypeError(f"{', '.join(unknown) or text!r}: expected some of {', '.join(TYPES)}")
+        raise argparse.ArgumentTypeError(f"{', '.join(unknown) or text!r}: expected some of {', '.join(EVENT_TYPES)}")
     return types

@@ -17,6 +17,7 @@ from gestured.control.address import add_sockets, connect
 from gestured.control.shadow import words as shadow_words
 from gestured.core.errors import GesturedError
 from gestured.core.pace import RANGE_HZ, outside
+from gestured.core.reading import SILENT
 
 CLEAR = "\x1b[2J\x1b[H"
 REFRESH_S = 1.0
@@ -89,12 +90,12 @@ def summary(path: Path, status: dict[str, Any]) -> str:
     """How one daemon is, in a line."""
     word = status["state"] if status["ready"]["ready"] else "not ready"
     sensors = status["sensors"].values()
-    heard = sum(sensor["state"] not in ("stale", "no_data") for sensor in sensors)
-    rate = sum(sensor["rate_hz"] for sensor in sensors if sensor["state"] not in ("stale", "no_data"))
+    heard = [sensor for sensor in sensors if sensor["state"] not in SILENT]
+    rate = sum(sensor["rate_hz"] for sensor in heard)
     dropped = sum(status["input"]["dropped"].values()) + status["input"]["kernel_drops"]
     gestures = sum(status["answers"]["gestures"].values())
     late = f"{1000 * status['loop_lag_s']:.0f} ms late"
-    return f"{path!s:<36} {word:<10} {heard:5d}/{len(sensors):<5d} {rate:8.0f} {gestures:9d} {dropped:9d}  {late}"
+    return f"{path!s:<36} {word:<10} {len(heard):5d}/{len(sensors):<5d} {rate:8.0f} {gestures:9d} {dropped:9d}  {late}"
 
 
 def screen(status: dict[str, Any]) -> Iterator[str]:
