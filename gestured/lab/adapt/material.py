@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.dataset import Samples, collect, join, recorded
+from gestured.lab.recordings.sources import UNNAMED
 from gestured.lab.recordings.store import touched
 from gestured.record.arrays import read
 from gestured.record.check import SESSION
@@ -21,7 +22,6 @@ from gestured.simulator import GESTURES, NONE
 
 MOST_PEOPLE = 1000  # more is another field, such as the number of the trial, where the participant belongs
 FEWEST = 20  # gestures; with fewer nobody can tell better from worse
-OTHER = "other"  # something was performed, and nobody knows exactly what: nothing is learned from it
 GROUPS = 5  # of people, each of which is held out in turn
 
 
@@ -148,7 +148,7 @@ def _named(found: Recordings, path: Path, as_none: Collection[str], left: Counte
         found = replace(found, event_labels=labels_of, event_kinds=kinds_of)
     elif (labels == SESSION).any():
         raise RecordingError(f"{path}: event_labels: missing; nobody knows what was performed in its sessions")
-    return found.take(np.flatnonzero(labels != OTHER))
+    return found.take(np.flatnonzero(labels != UNNAMED))
 
 
 def _as_known(
@@ -159,8 +159,8 @@ def _as_known(
         if label in as_none:
             label, kind = NONE, label
         elif label not in (*GESTURES, NONE, SESSION):
-            left.update([] if label == OTHER else [label])
-            label = OTHER
+            left.update([] if label == UNNAMED else [label])
+            label = UNNAMED
         names.append(label)
         fine.append(kind)
     return np.array(names, dtype="U64"), np.array(fine, dtype="U1024")

@@ -2,7 +2,6 @@
 
 import argparse
 import difflib
-import re
 from collections.abc import Callable
 from datetime import date
 from pathlib import Path
@@ -10,15 +9,16 @@ from pathlib import Path
 from gestured.client.address import host_port
 from gestured.client.grid import rows_by_columns
 from gestured.core.address import Address
+from gestured.core.own import is_name
 from gestured.core.wire import is_sensor
 from gestured.lab.recordings.protocol import pseudonym
+from gestured.lab.recordings.sources import UNNAMED
 from gestured.record.check import SESSION
 from gestured.simulator import GESTURES, NONE
 
 COMMANDS = ("collect", "import", "inspect", "forget")
 FOLDER = Path("recordings")
-OWN_NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
-TAKEN = (NONE, SESSION, "other", "unknown", "use")  # words that mean something else where a gesture may stand
+NO_NAMES = (SESSION, UNNAMED)  # labels of recordings that are no gesture's, besides those that no gesture may have
 IMPORT = """\
 Make recordings of files of another form. What cannot be used is told and
 counted: the file, the line, the field, and what was expected.
@@ -111,7 +111,7 @@ def _own(text: str) -> str:
     if text in GESTURES:
         return text
     meant = difflib.get_close_matches(text, GESTURES, n=1, cutoff=0.85)
-    if meant or OWN_NAME.fullmatch(text) is None or text in TAKEN:
+    if meant or not is_name(text) or text in NO_NAMES:
         raise argparse.ArgumentTypeError(
             f"{text!r}: expected {meant[0]}, or a name of your own that is less like it"
             if meant
