@@ -16,25 +16,16 @@ from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Classifier, Recognizer, events_of
+from gestured.lab.dataset import Truth, truths
+from gestured.lab.online import NON_GESTURE_SHARE, SESSION_S
 from gestured.lab.progress import progress
 from gestured.model.model import open_model
 from gestured.simulator import NONE, Participant, SimulatedSensor, Take, generator, session
 
 TAPS = ("one_tap", "double_tap")
-SESSION_S = 120.0
-NON_GESTURE_SHARE = 0.2
 SLACK_S = 0.2  # an onset may be found so far from the true one
 HARD = 0.9  # hardness of the simulator's hard sensors
 SETS = ("nominal", "hard", "non-gestures")
-
-
-@dataclass(frozen=True, slots=True)
-class Act:
-    """What was performed, from `onset` to `offset` seconds."""
-
-    label: str
-    onset: float
-    offset: float
 
 
 @dataclass(slots=True)
@@ -52,7 +43,7 @@ class Ahead:
     wrong: int = 0
     gestures: int = 0
 
-    def add(self, events: Sequence[Event], acts: Iterable[Act], minutes: float) -> None:
+    def add(self, events: Sequence[Event], acts: Iterable[Truth], minutes: float) -> None:
         """Count one session."""
         self.minutes += minutes
         said = {event.id: event for event in events if isinstance(event, Provisional)}
@@ -72,7 +63,7 @@ class Ahead:
             used |= {answer.id for answer in near}
             self._gesture(act, near, said)
 
-    def _gesture(self, act: Act, near: Sequence[Gesture | Unknown], said: dict[int, Provisional]) -> None:
+    def _gesture(self, act: Truth, near: Sequence[Gesture | Unknown], said: dict[int, Provisional]) -> None:
         """Count one gesture that was performed, by the answers at its time."""
         self.gestures += 1
         named = [answer for answer in near if isinstance(answer, Gesture)]
@@ -158,8 +149,7 @@ def run(args: argparse.Namespace) -> int:
         for take in progress(takes(which, count, args.seed), count, which):
             frames = (Frame(float(t), values) for t, values in zip(take.times, take.frames, strict=True))
             rows, columns = take.frames.shape[1:]
-            acts = [Act(act.label, act.onset_s, act.offset_s) for act in take.events]
-            ahead.add(heard(frames, (rows, columns), model), acts, SESSION_S / 60)
+            ahead.add(heard(frames, (rows, columns), model), truths(take), SESSION_S / 60)
         figures[which] = ahead.figures()
     if args.json:
         print(json.dumps(figures, indent=2))

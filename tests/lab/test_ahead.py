@@ -5,7 +5,12 @@ from typing import Any
 import pytest
 
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, Release, Unknown
-from gestured.lab.ahead import Act, Ahead
+from gestured.lab.ahead import Ahead
+from gestured.lab.dataset import Truth
+
+
+def act(label: str, onset: float, offset: float) -> Truth:
+    return Truth(label, label, 1, onset, offset)
 
 
 def answer(number: int, gesture: str, span: tuple[float, float], said: str | None, wait: float = 0.2) -> Gesture:
@@ -22,7 +27,7 @@ def early(number: int, gesture: str, onset: float, decided: float) -> Provisiona
     return Provisional("s", number, gesture, 0.95, onset, decided)
 
 
-def counted(acts: list[Act], events: list[Event], minutes: float = 1.0) -> dict[str, Any]:
+def counted(acts: list[Truth], events: list[Event], minutes: float = 1.0) -> dict[str, Any]:
     ahead = Ahead()
     ahead.add(events, acts, minutes)
     return ahead.figures()
@@ -30,7 +35,7 @@ def counted(acts: list[Act], events: list[Event], minutes: float = 1.0) -> dict[
 
 def test_a_right_word_before_the_end_counts_as_early() -> None:
     found = counted(
-        [Act("swipe_left", 1.0, 1.6)],
+        [act("swipe_left", 1.0, 1.6)],
         [Onset("s", 1, 1.0), early(1, "swipe_left", 1.0, 1.3), answer(1, "swipe_left", (1.0, 1.6), "confirmed")],
     )
     assert (found["early"], found["confirmed"], found["right"]) == (1.0, 1.0, 1.0)
@@ -50,14 +55,14 @@ def test_a_right_word_before_the_end_counts_as_early() -> None:
 def test_what_is_not_both_right_and_early_is_not_counted_as_that(
     events: list[Event], early_share: float, confirmed: float | None, after: float | None
 ) -> None:
-    found = counted([Act("swipe_left", 1.0, 1.6)], events)
+    found = counted([act("swipe_left", 1.0, 1.6)], events)
     assert (found["early"], found["confirmed"]) == (early_share, confirmed)
     assert found["moved_median_s"] == (None if after is None else pytest.approx(after))
 
 
 def test_taps_have_figures_of_their_own() -> None:
     found = counted(
-        [Act("one_tap", 1.0, 1.1), Act("double_tap", 5.0, 5.5)],
+        [act("one_tap", 1.0, 1.1), act("double_tap", 5.0, 5.5)],
         [
             early(1, "one_tap", 1.0, 1.23), answer(1, "one_tap", (1.0, 1.1), "confirmed", 0.6),
             early(2, "one_tap", 5.0, 5.2), answer(2, "double_tap", (5.0, 5.5), "revoked"),
@@ -70,5 +75,5 @@ def test_taps_have_figures_of_their_own() -> None:
 
 
 def test_nothing_but_other_things_gives_events_a_minute() -> None:
-    found = counted([Act("none", 1.0, 3.0)], [early(1, "swipe_up", 1.0, 1.5), unknown(1, 1.0, 3.0, "revoked")], 2.0)
+    found = counted([act("none", 1.0, 3.0)], [early(1, "swipe_up", 1.0, 1.5), unknown(1, 1.0, 3.0, "revoked")], 2.0)
     assert (found["gestures"], found["events_per_minute"], found["confirmed"]) == (0, 0.5, 0.0)

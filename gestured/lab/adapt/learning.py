@@ -16,7 +16,7 @@ from torch import Tensor, nn
 
 from gestured.lab.augment import symmetry_table, turned, varied
 from gestured.lab.dataset import Samples, join
-from gestured.lab.fit import CLASSES, lengths_of, padded, targets
+from gestured.lab.fit import CLASSES, FitConfig, lengths_of, logits, padded, targets
 from gestured.lab.nets import Judged, Opinion
 from gestured.lab.prefixes import askable, drawn, floors, shortened
 from gestured.lab.progress import progress
@@ -91,16 +91,9 @@ def between(start: Judged, end: Judged, share: float) -> Judged:
 
 def opinions(judged: Judged, samples: Samples, longest: int) -> tuple[Tensor, Tensor]:
     """(G, K) logits of the network and of its second opinion for all samples, in their order."""
-    order = np.argsort(samples.lengths(), kind="stable")
-    parts: tuple[list[Tensor], list[Tensor]] = [], []
-    with torch.no_grad():
-        for i in range(0, len(order), 256):
-            chosen = order[i : i + 256]
-            x, lengths = padded(samples, chosen, longest), lengths_of(samples, chosen, longest)
-            parts[0].append(judged.net(x, lengths))
-            parts[1].append(judged.trajectory(x, lengths))
-    back = torch.from_numpy(np.argsort(order, kind="stable"))
-    return torch.cat(parts[0])[back], torch.cat(parts[1])[back]
+    nets = nn.ModuleDict({"net": judged.net, "trajectory": judged.trajectory})
+    found = logits(nets, samples, FitConfig(longest=longest))
+    return found["net"], found["trajectory"]
 
 
 def _batches(
