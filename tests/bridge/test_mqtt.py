@@ -185,16 +185,17 @@ def test_availability_when_the_daemon_goes_when_the_bridge_ends_and_when_it_is_k
 
 def test_a_killed_bridges_last_will_does_not_outlive_its_successor(bridge, broker, listen, fake):
     at = broker()
+    listener = listen(at.port, "gestured/car/availability")
     first = started(bridge, at, fake)
+    listener.until("gestured/car/availability", "online")
     first.process.send_signal(signal.SIGSTOP)  # its connection stays open
     begin(bridge, at, fake)
     fake.accept()
-    listener = listen(at.port, "gestured/car/availability")
-    wait(lambda: retained(listen, at, "gestured/#").get("gestured/car/availability") == "online")
+    listener.until("gestured/car/availability", "offline")  # the broker cuts off the first for its successor
+    listener.until("gestured/car/availability", "online")
     first.process.kill()
-    fake.say(STATUS)
+    first.process.wait()
     assert retained(listen, at, "gestured/#")["gestured/car/availability"] == "online"
-    listener.close()
 
 
 # What Home Assistant takes (homeassistant/components/mqtt: event.py, device_trigger.py, schemas.py, and the pages

@@ -134,7 +134,7 @@ def test_counts_that_fall_when_touched(run, own) -> None:
 
 
 def test_a_sensor_that_sends_only_while_it_is_touched(run, own) -> None:
-    daemon = own("", "--stale-s", 0.2)
+    daemon = own("", "--clock", "sensor", "--stale-s", 0.2)  # its rate is not that of the burst which the test sends
     sensor, hand = Sensor(daemon, "arm", counted), Hand()
     for n in range(3):
         sensor.count = 100 * n  # it counts on while it says nothing

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.client.control import Control
 from gestured.core.address import Address
 from tests import encoding
 
@@ -154,7 +155,16 @@ class Daemon:
             return error.code, error.read().decode()
 
     def metric(self, name: str, **labels: str) -> float:
-        """A sample's value, 0 where there is none."""
+        """A sample's value, 0 where there is none, once all that was published before is counted.
+
+        An event goes out before it is counted, and /metrics is answered beside the loop: a question to the loop first.
+        """
+        with Control(Path(self.ready["control"]), patience_s=DEADLINE_S) as control:
+            control.ask("status")
+        return self.sample(name, **labels)
+
+    def sample(self, name: str, **labels: str) -> float:
+        """A sample's value as it is just now, 0 where there is none; the loop may hang."""
         for line in self.get("/metrics")[1].splitlines():
             match = re.fullmatch(r"(\w+)(?:\{(.*)\})? (\S+)", line)
             if match and match[1] == name and dict(re.findall(r'(\w+)="([^"]*)"', match[2] or "")) == labels:

@@ -52,11 +52,11 @@ def test_health_and_metrics_answer_while_a_model_hangs_and_the_watchdog_is_not_f
                 supervisor.recv(4096)  # what was said before it hung
         status, body = daemon.get("/readyz")
         assert status == 503 and "hangs" in json.loads(body)["reason"]
-        assert daemon.metric("gestured_loop_lag_seconds") > 1
+        assert daemon.sample("gestured_loop_lag_seconds") > 1
         with Control(Path(daemon.ready["control"]), patience_s=0.1) as control:
             with pytest.raises(Unreachable, match="hangs"):
                 control.ask("status")
-        assert daemon.metric("gestured_sensor_state", sensor="arm", state="stale") == 1
+        assert daemon.sample("gestured_sensor_state", sensor="arm", state="stale") == 1
         with pytest.raises(BlockingIOError):
             supervisor.recv(4096)
         open(tmp_path / "pipe", "w").close()  # now it may go on
