@@ -162,6 +162,7 @@ class Zenoh:
     def _open(self) -> None:
         """Until it is open: a router that is not there yet is waited for. After that Zenoh connects again by itself."""
         import zenoh
+        from zenoh.handlers import Callback
 
         while not self._closed.is_set():
             try:
@@ -171,9 +172,12 @@ class Zenoh:
                 self._counts.connected("zenoh", False, words)
                 self._closed.wait(AGAIN_S)
                 continue
-            self._answers = session.declare_queryable(self._key("**"), self._answer)
+            # Called by Zenoh's own threads: a thread of Python's that waits for Zenoh would abort the process at its end.
+            answer = Callback(self._answer, indirect=False)
+            self._answers = session.declare_queryable(self._key("**"), answer)
             if self._forward is not None:
-                self._frames = session.declare_subscriber(self._key("*", "frames"), self._forward.take)
+                take = Callback(self._forward.take, indirect=False)
+                self._frames = session.declare_subscriber(self._key("*", "frames"), take)
             self._session = session
             self._hold_tokens()
             return
