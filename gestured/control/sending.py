@@ -106,13 +106,13 @@ class Hearing:
     """What the daemon on an event socket says of some sensors; a thread reads. Raises Unreachable, GesturedError."""
 
     def __init__(self, path: Path, sensors: frozenset[str]) -> None:
-        """Begins once nobody else feeds these sensors."""
+        """Begins once the daemon says all that is asked for, and nobody else feeds these sensors."""
         self._sensors = sensors
         self._stream = Stream(path, {"types": EVENT_TYPES})
         self._heard: queue.Queue[dict[str, Any] | None] = queue.Queue()
         threading.Thread(target=self._read, daemon=True).start()
         end = time.monotonic() + STATUS_TIMEOUT_S
-        while sensors & set(self._stream.hello["sensors"]) and (live := self._live()):
+        while live := self._live():  # a first status says that the subscription holds
             if time.monotonic() > end:
                 self.close()
                 raise GesturedError(f"{', '.join(live)}: is being sent to that daemon already; end that first")
