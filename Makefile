@@ -21,9 +21,6 @@ PREFIX = /usr
 TORCH = torch==2.13.0
 TORCH_INDEX = https://download.pytorch.org/whl/cpu
 
-# Tests with daemons in real time, one after the other; all others run on all cores.
-TIMED = tests/bridge tests/control tests/daemon tests/hostile tests/systemd
-
 help:  ## this list
 	@echo "usage: make TARGET [NAME=VALUE ...]"
 	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 10
@@ -37,8 +34,7 @@ test: .venv-dev/.dev  ## run the tests: ARGS="tests/core -k tap"
 ifdef ARGS
 	@.venv-dev/bin/python -m pytest $(ARGS)
 else
-	@.venv-dev/bin/python -m pytest --numprocesses auto --dist loadfile $(addprefix --ignore=,$(TIMED))
-	@.venv-dev/bin/python -m pytest $(TIMED)
+	@.venv-dev/bin/python -m pytest --numprocesses auto --dist loadfile
 endif
 
 golden: .venv-dev/.dev  ## play all golden tapes: the same packets give the same events (tests/golden)

@@ -172,7 +172,7 @@ class Zenoh:
                 self._counts.connected("zenoh", False, words)
                 self._closed.wait(AGAIN_S)
                 continue
-            # Called by Zenoh's own threads: a thread of Python's that waits for Zenoh would abort the process at its end.
+            # Called by Zenoh's own threads: one of Python's that waits for Zenoh would abort the process at its end.
             answer = Callback(self._answer, indirect=False)
             self._answers = session.declare_queryable(self._key("**"), answer)
             if self._forward is not None:

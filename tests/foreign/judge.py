@@ -22,7 +22,8 @@ from gestured.core.events import Cancelled, Gesture, Onset, Unknown
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
 from gestured.core.recognizer import Recognizer, events_of
-from gestured.lab.ahead import Act, Ahead, heard, table
+from gestured.lab.ahead import Ahead, heard, table
+from gestured.lab.dataset import Truth
 from gestured.lab.made_of import made_of
 from gestured.model.model import shipped
 from tests.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
@@ -308,7 +309,10 @@ def provisional(source: str, level: str, share: float, seeds: range) -> Ahead:
     assert classifier is not None
     for seed in seeds:
         recording = session(seed, level, SESSION_S, share)
-        acts = [Act(event["label"], event["onset"], event["release"]) for event in recording["events"]]
+        acts = [
+            Truth(event["label"], event["label"], seed, event["onset"], event["release"])
+            for event in recording["events"]
+        ]
         found.add(heard(_frames(recording), (9, 9), classifier), acts, SESSION_S / 60)
     return found
 
