@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from gestured.lab.made_of import made_of, models_and_manifest
+from gestured.lab.made_of import made_of, models_and_manifest, renew
 from gestured.lab.recordings.origin import said
 from gestured.lab.train import TrainingPlan
 from gestured.model.model import open_model
@@ -31,14 +31,8 @@ def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: Tr
         (folder / f"{name}.md").write_text(_card(folder / f"{name}.onnx", name, found, plan))
 
 
-FIGURES_BEGIN, FIGURES_END = "<!-- figures: begin -->", "<!-- figures: end -->"
-
-
 def write_block(readme: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
-    """Renew the table of figures between the marks in a README; ValueError where they are missing."""
-    text = readme.read_text()
-    if text.count(FIGURES_BEGIN) != 1 or text.count(FIGURES_END) != 1:
-        raise ValueError(f"{readme}: expected the marks {FIGURES_BEGIN} and {FIGURES_END} once each")
+    """Renew the table of figures in a README; GesturedError where its marks are missing."""
     rows = [
         _row(f"`{name}.onnx`, {title}", values)
         for name, found in figures.items()
@@ -48,8 +42,7 @@ def write_block(readme: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
         ]
     ]
     origin = made_of("gestured-lab evaluate --readme README.md", models_and_manifest())
-    block = "\n".join([FIGURES_BEGIN, origin, "", *HEAD, *rows, FIGURES_END])
-    readme.write_text(text[: text.index(FIGURES_BEGIN)] + block + text[text.index(FIGURES_END) + len(FIGURES_END) :])
+    renew(readme, "figures", [origin, "", *HEAD, *rows])
 
 
 HEAD = (

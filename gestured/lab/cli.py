@@ -101,6 +101,8 @@ def parser() -> argparse.ArgumentParser:
     study.add_argument("--seeds", type=int, default=3, help="seeds of each figure of the main tables (3)")
     study.add_argument("--draw", type=Path, metavar="FILE", help="compute nothing: draw the picture of error against "
                        "run time again, from the study.json or operating-points.json of an earlier run")  # fmt: skip
+    study.add_argument("--readme", type=Path, metavar="FILE", help="with --draw: a README whose table below the "
+                       "picture is renewed")  # fmt: skip
     study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: "
                        "another generator's (python -m tests.foreign.recordings) or another sensor's")  # fmt: skip
     study.add_argument("--recordings", **mine, help="recordings of your own")

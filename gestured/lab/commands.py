@@ -73,10 +73,7 @@ def evaluate_models(args: argparse.Namespace) -> int:
     write_manifest(args.models, figures)
     write_cards(args.models, figures, plan)
     if args.readme:
-        try:
-            write_block(args.readme, figures)
-        except ValueError as error:
-            raise GesturedError(str(error)) from error
+        write_block(args.readme, figures)
     if args.json:
         print(json.dumps(figures, indent=2))
     return 0

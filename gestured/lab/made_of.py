@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from gestured.core.errors import GesturedError
 from gestured.lab.digest import file_digest
 from gestured.model.model import shipped
 
@@ -18,6 +19,16 @@ OLDER = "**Made with models that no longer ship, or with older code; to be made 
 def made_of(command: str, files: Iterable[Path]) -> str:
     """The line, for a table that `command` prints of these files."""
     return f"<!-- made by `{command}` of {', '.join(f'{p.name} {file_digest(p)[:SHOWN]}' for p in files)} -->"
+
+
+def renew(document: Path, name: str, lines: Iterable[str]) -> None:
+    """Put these lines between the marks `name: begin` and `name: end` of a document. GesturedError without them."""
+    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    text = document.read_text()
+    if text.count(begin) != 1 or text.count(end) != 1:
+        raise GesturedError(f"{document}: expected the marks {begin} and {end} once each")
+    block = "\n".join([begin, *lines, end])
+    document.write_text(text[: text.index(begin)] + block + text[text.index(end) + len(end) :])
 
 
 def models_and_manifest() -> list[Path]:

@@ -16,7 +16,7 @@ from gestured.core.errors import GesturedError
 from gestured.lab.cli import REAL_FOLDER
 from gestured.lab.dataset import Samples, simulated
 from gestured.lab.digest import file_digest
-from gestured.lab.made_of import made_of
+from gestured.lab.made_of import made_of, renew
 from gestured.lab.study import cohort, elapsed, failures, own, signals, tables
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.choices import choices
@@ -27,6 +27,7 @@ from gestured.lab.study.material import SHIFT, Data
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import PARTICIPANTS, Result
+from gestured.lab.study.report.choice import table
 from gestured.lab.study.report.page import write_report
 from gestured.lab.study.report.picture import write_picture
 from gestured.lab.study.run_time import measure
@@ -54,8 +55,12 @@ def run(args: argparse.Namespace) -> int:
     torch.set_num_threads(1)
     if args.draw:
         args.out.mkdir(parents=True, exist_ok=True)
-        path = write_picture(_kept(args.draw), args.out)
-        print(f"{path}\n{made_of('gestured-lab study', [path, path.with_suffix('.json')])}")
+        kept = _kept(args.draw)
+        path = write_picture(kept, args.out)
+        below = [made_of("gestured-lab study", [path, path.with_suffix(".json")]), "", *table(kept)]
+        if args.readme:
+            renew(args.readme, "choice", below)
+        print("\n".join([str(path), *below]))
         return 0
     if args.seeds < 1:
         raise GesturedError(f"--seeds: expected 1 or more, found {args.seeds}")
@@ -76,7 +81,8 @@ def _kept(path: Path) -> dict[str, Any]:
     """What an earlier run wrote. Raises GesturedError where it is not that."""
     try:
         found = json.loads(path.read_text())
-        return {name: found[name] for name in ("about", "machine", "methods", "run_time", "said")}
+        needed = ("about", "machine", "methods", "run_time", "said", "online", "online_shipped")
+        return {name: found[name] for name in needed}
     except (ValueError, KeyError, TypeError) as error:
         raise GesturedError(f"--draw: {path}: expected study.json or operating-points.json: {error!r}") from None
 

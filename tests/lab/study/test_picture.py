@@ -10,8 +10,9 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("matplotlib", reason="needs the extra [lab]")
 
+from gestured.core.errors import GesturedError
 from gestured.lab import cli
-from gestured.lab.made_of import stale
+from gestured.lab.made_of import renew, stale
 from gestured.lab.study.report.picture import FIELDS, write_picture
 from tests.lab.study.made_study import NAMES, made_study
 
@@ -37,9 +38,31 @@ def test_it_is_drawn_again_from_what_is_kept(tmp_path: Path, capsys: pytest.Capt
     again = tmp_path / "again"
     assert cli.main(["study", "--draw", str(tmp_path / "operating-points.json"), "--out", str(again)]) == 0
     assert (again / first.name).read_text() == first.read_text()
-    path, origin = capsys.readouterr().out.splitlines()
+    path, origin, *_ = capsys.readouterr().out.splitlines()
     assert Path(path).samefile(again / first.name) and stale(origin, again.iterdir()) == []
     assert not re.search(r"\b(nan|inf|None)\b", first.read_text())
+
+
+def test_the_table_below_it_is_put_into_a_readme_and_only_there(tmp_path: Path) -> None:
+    study, kept, readme = made_study(), tmp_path / "study.json", tmp_path / "README.md"
+    kept.write_text(json.dumps(study))
+    readme.write_text("before\n<!-- choice: begin -->\nold\n<!-- choice: end -->\nafter\n")
+    assert cli.main(["study", "--draw", str(kept), "--out", str(tmp_path), "--readme", str(readme)]) == 0
+    first, *block, last = readme.read_text().splitlines()
+    assert (first, last) == ("before", "after") and "old" not in block
+    ships = next(line for line in block if line.startswith("| CNN-LSTM, ships |"))
+    (row,) = [r for r in study["run_time"] if (r["method"], r["settings"]) == ("cnn_lstm", "shipped")]
+    wrong = [f"{100 * row['fields'][field]['wrong']:.1f}" for field in FIELDS]
+    assert ships.split(" | ")[2] == ", ".join(wrong) and ships.endswith("| 0.31 |")
+    assert len({line.count("|") for line in block if line.startswith("|")}) == 1
+
+
+def test_a_document_without_marks_is_left_alone(tmp_path: Path) -> None:
+    readme = tmp_path / "README.md"
+    readme.write_text("no marks\n")
+    with pytest.raises(GesturedError, match="choice: begin"):
+        renew(readme, "choice", ["new"])
+    assert readme.read_text() == "no marks\n"
 
 
 def test_what_is_no_study_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

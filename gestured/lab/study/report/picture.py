@@ -42,7 +42,12 @@ def points(study: Study) -> Study:
         "methods": {name: {"title": of["title"], "family": of["family"]} for name, of in named.items()},
         "run_time": study["run_time"],
         "said": study.get("said") or [],
+        **{name: [_false(row) for row in study.get(name) or []] for name in ("online", "online_shipped")},
     }
+
+
+def _false(row: Row) -> Row:
+    return {name: row[name] for name in ("method", "false_per_minute")}
 
 
 def operating_points(study: Study) -> str:

@@ -1,0 +1,53 @@
+"""The table below the picture: five models of those that are drawn, and who takes which."""
+
+from typing import NamedTuple
+
+from . import formats, reading
+from .reading import Row, Study
+
+FIELDS = ("simulated", "foreign", "real")
+
+
+class Choice(NamedTuple):
+    """One model, and who takes it."""
+
+    method: str
+    settings: str
+    when: str
+
+
+CHOICES = (
+    Choice("cnn_lstm", "shipped", "you want what the daemon runs unless told otherwise"),
+    Choice("lstm", "shipped", "the first cannot be used: it is its fallback"),
+    Choice("tp_rf", "shipped", "nothing else can be used, and silence is better than a guess"),
+    Choice("trajectory_gb", "tuned", "you train for clean sensors, and nothing but the ten gestures is ever done"),
+    Choice("mhi_cnn", "tuned", "you compare with the paper's fastest network"),
+)
+HEAD = (
+    "| take | if | % wrong: simulated, another generator, real | % wrong or lost "
+    "| a decision, cold | memory | false events a minute |",
+    "|---|---|---|---|---|---|---|",
+)
+
+
+def table(study: Study) -> list[str]:
+    """Lines of Markdown; a model that was not timed is left out."""
+    rows = {
+        (row["method"], row["settings"]): row for row in reading.part(study, "run_time") if row["precision"] != "int8"
+    }
+    return [*HEAD, *(_line(study, one, rows[one[:2]]) for one in CHOICES if one[:2] in rows)]
+
+
+def _line(study: Study, one: Choice, row: Row) -> str:
+    ships = one.settings == "shipped"
+    played = {of["method"]: of for of in study.get("online_shipped" if ships else "online") or []}
+    fields = [row["fields"].get(field, {}) for field in FIELDS]
+    wrong, error = (", ".join(formats.percent(of.get(name)) for of in fields) for name in ("wrong", "error"))
+    name = f"{reading.title(study, one.method)}{', ships' if ships else ''}"
+    memory = row["memory_bytes"]
+    cells = (
+        name, one.when, wrong, error, formats.duration(row["cold_us"]),
+        formats.NONE if memory is None else f"{memory / 2**20:.0f} MiB",
+        formats.number(played.get(one.method, {}).get("false_per_minute", formats.NONE)),
+    )  # fmt: skip
+    return f"| {' | '.join(cells)} |"
