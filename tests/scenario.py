@@ -36,7 +36,8 @@ from numpy.typing import NDArray
 
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Contact, Cut, Draft, Found, FrontEnd
+from gestured.core.front_end import Contact, Cut, Found, FrontEnd
+from gestured.core.unfinished import Draft
 
 Finger = tuple[float, float, float]  # row, column, amplitude
 Fingers = Callable[[float], list[Finger]]  # by the share of a step's time that has passed

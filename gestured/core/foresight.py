@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from gestured.core.events import Cancelled, Gesture, Provisional, Unknown
-from gestured.core.front_end import Preview
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP
+from gestured.core.unfinished import Preview
 
 MOST_IN_A_ROW = 100  # frames; a model that needs more says nothing in time
 MOST_S = 3600.0  # no contact lasts that long; also, no number beyond a float's range

@@ -15,29 +15,7 @@ from gestured.core.pace import Pace
 from gestured.core.phases import Action
 from gestured.core.segmentation import Deed, Segmenter
 from gestured.core.timing import Timing
-
-PREVIEW_S = 0.0666  # from one look at a contact that goes on to the next: 15 a second, whatever rounding does to them
-EACH_FRAME_S = 0.0635  # a sensor this slow is looked at with each frame: at 15 Hz its rate is known to some per cent
-DRAFT_S = 0.085  # quiet for so long, all that a window takes in is there; the wait goes on to see the finger stay off
-
-
-@dataclass(frozen=True, slots=True)
-class Draft:
-    """A segment as it will be cut if the finger stays off; its name may be looked for meanwhile."""
-
-    segment: Segment
-
-
-@dataclass(frozen=True, slots=True)
-class Preview:
-    """A contact that is not over: what of it has come so far."""
-
-    id: int
-    segment: Segment  # to the last touched frame; once the finger has left, the same object as in the draft
-    t: float  # s, now
-    down: bool  # whether the finger is on the sensor; else it has left, perhaps for good
-    second: bool  # whether the second contact of the segment has begun: the first was a tap
-    hole_s: float  # the longest time from one frame to the next so far
+from gestured.core.unfinished import Draft, Preview, Unfinished
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +58,8 @@ class FrontEnd:
         self.habits = Habits(rows, columns)
         self.latest: tuple[Frame | None, Look | None] = (None, None)  # the last frame, and how it was seen
         self._pace = Pace()
+        self._unfinished = Unfinished(self._segmenter, self._cutter, self._pace, self.timing)
         self._below_since: float | None = None  # s, since when the frames lie far below the baseline
-        self._passed_over = 0  # frames since the last preview of a finger that is down
 
     @property
     def rows(self) -> int:
@@ -173,8 +151,8 @@ class FrontEnd:
         if segmenter.phase.pending:
             self.habits.pressed(frame.values, look.activity)
             conditioner.busy(look)
-            found += self._draft(t)
-            return found + self._preview(t) if self.previews else found
+            found += self._unfinished.show(self.segments, t, previews=self.previews)
+            return found
         cutter.trim(t)
         if segmenter.phase.touched:
             conditioner.settle(t, raw)  # what stays on the sensor becomes part of its baseline
@@ -261,13 +239,13 @@ class FrontEnd:
         """A segment begins, with the next id."""
         self.segments += 1
         self.habits.rise()
-        self._passed_over = 0
+        self._unfinished.begin()
         return [Onset(self.sensor, self.segments, onset)]
 
     def _close(self, onset: float, offset: float, t: float, seen: float) -> list[Contact]:
         """A segment is over, as decided at `t` s: it is cut, unless it was no finger's."""
         release = Release(self.sensor, self.segments, offset)
-        if self._glitch(onset, offset):
+        if self._pace.longest_s(onset, offset) < self.timing.glitch_s:
             return [Cancelled(self.sensor, self.segments, "glitch"), release]
         self.habits.touched()
         made = self._cutter.cut(onset, offset)
@@ -281,37 +259,3 @@ class FrontEnd:
         if not self._segmenter.phase.pending:  # it has been cancelled already
             return [release]
         return [Cancelled(self.sensor, self.segments, reason), release]
-
-    def _draft(self, t: float) -> list[Found]:
-        """The segment as it would be cut, once the finger has been off for so long that its window is complete."""
-        segmenter = self._segmenter
-        onset, offset = segmenter.onset, segmenter.last_touched
-        if not segmenter.phase.let_go or t - offset < DRAFT_S or self._glitch(onset, offset):
-            return []
-        segment = self._cutter.draft(onset, offset)
-        if segment is None:
-            return []
-        return [Draft(segment), *([self._preview_of(segment, t, down=False)] if self.previews else [])]
-
-    def _preview(self, t: float) -> list[Found]:
-        """The contact so far while the finger is down: at most 15 times a second, and with every frame at 15 Hz."""
-        segmenter = self._segmenter
-        onset, offset = segmenter.onset, segmenter.last_touched
-        if segmenter.phase.let_go or self._glitch(onset, offset):
-            return []
-        self._passed_over += 1
-        if self._passed_over * self.interval_s < PREVIEW_S and self.interval_s < EACH_FRAME_S:
-            return []
-        self._passed_over = 0
-        segment = self._cutter.so_far(onset, offset)
-        if segment.frames.max() < segmenter.off * segment.noise:  # nothing is left without its bad taxels
-            return []
-        return [self._preview_of(segment, t, down=True)]
-
-    def _preview_of(self, segment: Segment, t: float, *, down: bool) -> Preview:
-        hole_s = self._cutter.hole(segment.onset, segment.offset, t)
-        return Preview(self.segments, segment, t, down, self._segmenter.second, hole_s)
-
-    def _glitch(self, onset: float, offset: float) -> bool:
-        """Whether the longest that a contact can have lasted is shorter than any finger's."""
-        return offset - onset + self.interval_s < self.timing.glitch_s

@@ -25,6 +25,10 @@ class Pace:
         """A frame has come so many seconds after the last one, without a silence between them."""
         self.interval_s += (step - self.interval_s) * (SHARE if self.interval_s else 1.0)
 
+    def longest_s(self, first: float, last: float) -> float:
+        """The longest that something can have lasted which frames from `first` to `last` s have shown."""
+        return last - first + self.interval_s
+
 
 def outside(rate_hz: float) -> bool:
     """Whether frames come so slowly or so fast that nothing is promised; not before the rate is known."""

@@ -12,10 +12,11 @@ from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.foresight import Certainty, Foresight
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, Draft, Found, FrontEnd, Preview
+from gestured.core.front_end import Cut, Found, FrontEnd
 from gestured.core.holes import bearable_s
 from gestured.core.pace import outside
 from gestured.core.prototypes import NEAR, Match
+from gestured.core.unfinished import Draft, Preview
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,9 +17,10 @@ from hypothesis import strategies as st
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Contact, Cut, Draft, FrontEnd, Preview
+from gestured.core.front_end import Contact, Cut, FrontEnd
 from gestured.core.recognizer import Decided, Recognizer, Scores, events_of
 from gestured.core.timing import Timing
+from gestured.core.unfinished import Draft, Preview
 from gestured.core.window import Window
 from tests.scenario import Player, parse
 
@@ -117,7 +118,7 @@ def test_what_is_asked_ahead_is_what_is_cut() -> None:
 def cut_late(stream: Sequence[Frame]) -> list[Segment]:
     """Segments with all frames up to their cut: nothing is drafted before."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("gestured.core.front_end.DRAFT_S", math.inf)
+        patch.setattr("gestured.core.unfinished.DRAFT_S", math.inf)
         return [x.segment for x in cut_out(stream) if isinstance(x, Cut)]
 
 
