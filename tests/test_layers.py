@@ -19,8 +19,8 @@ ONLY_IN = {
     "mcap": {"gestured/record/tape.py"},
     "pythonosc": {"gestured/client/osc_out.py"},
     "prometheus_client": {"gestured/daemon/metrics.py", "gestured/daemon/http.py", "gestured/bridge/counts.py"},
-    "aiomqtt": {"gestured/bridge/mqtt.py"},
-    "paho": {"gestured/bridge/mqtt.py"},
+    "aiomqtt": {"gestured/bridge/broker.py"},
+    "paho": {"gestured/bridge/broker.py"},
     "zenoh": {"gestured/bridge/zenoh.py"},
     "serial": {"gestured/bridge/serial.py"},
 }
