@@ -21,7 +21,7 @@ ONLY_IN = {
     "prometheus_client": {"gestured/daemon/metrics.py", "gestured/daemon/http.py", "gestured/bridge/counts.py"},
     "aiomqtt": {"gestured/bridge/broker.py"},
     "paho": {"gestured/bridge/broker.py"},
-    "zenoh": {"gestured/bridge/zenoh.py"},
+    "zenoh": {"gestured/bridge/zenoh_session.py"},
     "serial": {"gestured/bridge/serial.py"},
 }
 

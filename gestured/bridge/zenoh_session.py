@@ -1,0 +1,176 @@
+"""What the bridge to Zenoh does while it runs: one daemon's events, and what is known of it, in one Zenoh session."""
+
+import argparse
+import json
+import re
+import threading
+import time
+from typing import Any
+
+from gestured.bridge.counts import Counts
+from gestured.bridge.daemon import GONE, MOST_SENSORS, OLD_S, Daemon, Line
+from gestured.bridge.forward import Forward
+from gestured.bridge.options import BridgeError, host_name
+
+ROUTER = "tcp/127.0.0.1:7447"  # where a router of this machine listens unless told otherwise
+AGAIN_S = 0.5  # from one attempt to reach the router to the next
+HEARD = frozenset(("ok", "degraded", "starting", "faulty"))  # states of a sensor whose frames come
+SITE = re.compile(r"[A-Za-z0-9_-]{1,64}")
+
+
+class Zenoh:
+    """One daemon's events, and what is known of it, on Zenoh."""
+
+    def __init__(self, args: argparse.Namespace, counts: Counts) -> None:
+        """Raises BridgeError for what cannot be."""
+        import zenoh
+
+        zenoh.init_log_from_env_or("off")  # what is wrong is said here, in one line
+        self._site = args.site or host_name(None)
+        if not SITE.fullmatch(self._site):
+            raise BridgeError(f"--site {self._site}: expected letters, digits, _ and -, at most 64")
+        self._config = _configuration(args)
+        self._is_called = bool(args.listen or args.scout)  # nobody has to be there
+        self._daemon = Daemon(args.sensors, args.gestures)
+        self._counts = counts
+        self._forward = Forward(args.to, counts) if args.frames else None
+        self._session: Any = None
+        self._tokens: dict[str, Any] = {}
+        self._latest: dict[str, bytes] = {}  # sensor -> its last gesture
+        self._closed = threading.Event()
+        self._opening = threading.Thread(target=self._open, name="zenoh", daemon=True)
+        self._metrics: str | None = None
+
+    def begin(self, metrics: str | None) -> None:
+        """Reach the router, in a thread of its own; `metrics` is where they are served."""
+        self._metrics = metrics
+        self._opening.start()
+
+    def take(self, line: Line) -> None:
+        """One line of `follow`."""
+        kind = line.get("type")
+        self._daemon.take(line)
+        if kind in ("hello", GONE):
+            self._counts.daemon(kind == "hello")
+        if "sensor" in line:  # an event: the daemon knows what was asked for, and which answers belong to it
+            self._publish(line)
+        self._hold_tokens()
+
+    def close(self) -> None:
+        """Say good-bye."""
+        self._closed.set()
+        if self._opening.is_alive():
+            self._opening.join()
+        if self._session is not None:
+            self._session.close()
+
+    def _open(self) -> None:
+        """Until it is open: a router that is not there yet is waited for. After that Zenoh connects again by itself."""
+        import zenoh
+        from zenoh.handlers import Callback
+
+        while not self._closed.is_set():
+            try:
+                session = zenoh.open(self._config)
+            except zenoh.ZError as error:
+                words = f"Zenoh cannot be reached: {_first_words(error)}; trying again"
+                self._counts.connected("zenoh", False, words)
+                self._closed.wait(AGAIN_S)
+                continue
+            # Called by Zenoh's own threads: one of Python's that waits for Zenoh would abort the process at its end.
+            answer = Callback(self._answer, indirect=False)
+            self._answers = session.declare_queryable(self._key("**"), answer)
+            if self._forward is not None:
+                take = Callback(self._forward.take, indirect=False)
+                self._frames = session.declare_subscriber(self._key("*", "frames"), take)
+            self._session = session
+            self._hold_tokens()
+            return
+
+    def _publish(self, event: Line) -> None:
+        import zenoh
+
+        data = self._daemon.payload(event)
+        if event["type"] == "gesture":
+            if event["sensor"] not in self._latest and len(self._latest) >= MOST_SENSORS:
+                self._latest.clear()
+            self._latest[event["sensor"]] = data
+        if self._daemon.age(event, time.time()) > OLD_S:
+            self._counts.add("events", "old")
+        elif not self._reached():
+            self._counts.add("events", "unheard")
+        else:
+            key = self._key(event["sensor"], event["type"])
+            self._session.put(key, data, encoding=zenoh.Encoding.APPLICATION_JSON)
+            self._counts.add("events", "sent")
+
+    def _reached(self) -> bool:
+        """Whether a router or a peer is there now; said where that changes."""
+        if self._session is None:
+            return False
+        info = self._session.info
+        there = self._is_called or bool(list(info.routers_zid()) or list(info.peers_zid()))
+        self._counts.connected("zenoh", there, "Zenoh is there" if there else "no router and no peer; trying again")
+        return there
+
+    def _hold_tokens(self) -> None:
+        """A token for the daemon and for each sensor that is heard now."""
+        if self._session is None:
+            return
+        alive = set()
+        if self._daemon.hello:
+            heard = (name for name, state in self._daemon.states.items() if state in HEARD)
+            alive = {self._key("alive"), *(self._key(name, "alive") for name in heard)}
+        for key in self._tokens.keys() - alive:
+            self._tokens.pop(key).undeclare()
+        for key in alive - self._tokens.keys():
+            self._tokens[key] = self._session.liveliness().declare_token(key)
+        if self._reached() and self._daemon.hello:
+            self._counts.ready(site=self._site, metrics=self._metrics)
+
+    def _answer(self, query: Any) -> None:
+        """What a latecomer asks for; called by Zenoh in a thread of its own."""
+        hello = dict(self._daemon.hello)
+        if hello:
+            known = {"gestures": self._daemon.gestures, "states": self._daemon.states}
+            self._reply(query, self._key("hello"), json.dumps(hello | known).encode())
+        for sensor, data in list(self._latest.items()):
+            self._reply(query, self._key(sensor, "gesture"), data)
+
+    def _reply(self, query: Any, key: str, data: bytes) -> None:
+        import zenoh
+
+        if query.key_expr.intersects(zenoh.KeyExpr(key)):
+            query.reply(key, data, encoding=zenoh.Encoding.APPLICATION_JSON)
+
+    def _key(self, *parts: str) -> str:
+        return "/".join(("gestured", self._site, *parts))
+
+
+def _configuration(args: argparse.Namespace) -> Any:
+    """Zenoh's own, from the flags. Raises BridgeError."""
+    import zenoh
+
+    connect, listen = args.connect or [], args.listen or []
+    if not connect and not listen and not args.scout and args.config is None:
+        connect = [ROUTER]
+    try:
+        config = zenoh.Config() if args.config is None else zenoh.Config.from_file(str(args.config))
+        settings: dict[str, object] = {"scouting/multicast/enabled": args.scout, "scouting/gossip/enabled": args.scout}
+        if args.config is None:
+            settings["mode"] = "peer" if listen or args.scout else "client"
+        if connect or args.config is None:
+            settings["connect/endpoints"] = connect
+        if listen or args.config is None:
+            settings["listen/endpoints"] = listen
+        for key, value in settings.items():
+            config.insert_json5(key, json.dumps(value))
+    except zenoh.ZError as error:
+        where = f"--config {args.config}" if args.config else "--connect or --listen"
+        raise BridgeError(f"{where}: {_first_words(error)}: an endpoint is such as {ROUTER}") from None
+    return config
+
+
+def _first_words(error: BaseException) -> str:
+    """What Zenoh says, without the place in its sources."""
+    return re.sub(r" at /\S+\.rs:\d+\.?", "", str(error).partition("\n")[0])[:300].strip(" .!")
