@@ -1,9 +1,8 @@
-"""What an .onnx file says about itself, read without onnxruntime.
+"""What is in an .onnx file, read without onnxruntime: its metadata, and the self-test that it brings.
 
-A model file may be damaged or hostile. Before its bytes reach onnxruntime, `inspect` walks the protobuf
-wire format once, with a stack of its own and a bounded number of steps: it takes the metadata, and refuses
-data kept in other files and tensors that claim to be larger than what is there. `Metadata.parse` then holds
-every key against the contract. Field numbers are those of onnx.proto (ONNX 1.23).
+A model file may be damaged or hostile. Before its bytes reach onnxruntime, `inspect` walks them once, with a stack of
+its own and a bounded number of steps: it takes the metadata, and refuses data kept in other files and tensors that
+claim to be larger than what is there. Field numbers are those of onnx.proto (ONNX 1.23).
 
 Functions here raise ValueError with the reason; `model.open_model` adds the file's name.
 """
@@ -13,10 +12,8 @@ import binascii
 import json
 import math
 import os
-import re
 import stat
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,22 +21,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.foresight import Certainty
-from gestured.core.prototypes import Space
-from gestured.core.window import Window
+from gestured.model.protobuf import BYTES, VARINT, Field, fields, varint
 
-MAX_MODEL_BYTES = 64 * 1024 * 1024
+MAX_MODEL_BYTES = 64 << 20  # far more than a net for a grid of taxels needs; a file is held in memory
 MAX_FIELDS = 500_000  # protobuf fields that are looked at; a shipped model has some thousands
 MAX_MESSAGE_DEPTH = 16  # messages inside messages
 MAX_PROPERTIES = 64  # metadata; a shipped model has a dozen
 MAX_TEXT = 2 << 20  # bytes of one of them; the largest is the self-test, some kilobytes
 MAX_METADATA = 4 << 20  # bytes of all of them
-MAX_ITEMS = 50_000  # of the lists and objects in one; each costs a hundred times as much memory as text
-MAX_NESTING = 16  # lists and objects inside each other in one
-MAX_SELF_TEST = 400_000  # values; more are no MAX_TEXT
-GESTURE_NAME = re.compile(r"[a-z0-9_]{1,64}")
+MAX_SELF_TEST = 400_000  # values; more do not fit into MAX_TEXT
+MOST_VALUES = 1 << 63  # values of a tensor, as far as they are counted: what claims more claims too much anyway
 
-# (message, field number) -> the message inside that is looked at; everything else is skipped.
+# (message, field number) -> the message inside that is looked at; everything else is skipped. "property" stands for
+# StringStringEntryProto.
 _INSIDE = {
     ("model", 7): "graph",
     ("model", 14): "property",
@@ -54,12 +48,15 @@ _INSIDE = {
     ("attribute", 10): "tensor",
     ("attribute", 11): "graph",
 }
+# (message, field number) -> what a model may have, and none of ours does.
 _REFUSED = {
     ("model", 20): "training information",
     ("graph", 15): "sparse tensors",
     ("attribute", 22): "sparse tensors",
     ("attribute", 23): "sparse tensors",
 }
+# The fields of a tensor that tell how much it holds, and where.
+DIMS, DATA_TYPE, RAW_DATA, EXTERNAL_DATA, DATA_LOCATION = 1, 2, 9, 13, 14
 # TensorProto.DataType -> bytes of a value in raw_data, where that is a whole number.
 _ITEM_BYTES = {
     1: 4, 2: 1, 3: 1, 4: 2, 5: 2, 6: 4, 7: 8, 9: 1, 10: 2, 11: 8, 12: 4, 13: 8, 14: 8, 15: 16, 16: 2,
@@ -100,8 +97,8 @@ def inspect(data: bytes) -> dict[str, str]:
         kind, start, end, depth = stack.pop()
         if depth > MAX_MESSAGE_DEPTH:
             raise ValueError(f"nests deeper than {MAX_MESSAGE_DEPTH} messages")
-        fields = []
-        for field in _fields(data, start, end):
+        found: list[Field] = []
+        for field in fields(data, start, end):
             steps += 1
             if steps > MAX_FIELDS:
                 raise ValueError(f"has more than {MAX_FIELDS} fields, too many for a gesture model")
@@ -109,84 +106,50 @@ def inspect(data: bytes) -> dict[str, str]:
             if (kind, number) in _REFUSED:
                 raise ValueError(f"has {_REFUSED[kind, number]}, which gestured does not take")
             if kind in ("tensor", "property"):
-                fields.append(field)
+                found.append(field)
             elif (inside := _INSIDE.get((kind, number))) is not None:
-                if wire != 2:
+                if wire != BYTES:
                     raise ValueError("is not an ONNX model (or damaged)")
                 graphs += (kind, inside) == ("model", "graph")
                 stack.append((inside, first, last, depth + 1))
         if kind == "tensor":
-            _check_tensor(data, fields, end - start)
+            _check_tensor(data, found, end - start)
         elif kind == "property":
-            _add_property(data, fields, properties)
+            _add_property(data, found, properties)
     if graphs != 1:
         raise ValueError("is not an ONNX model: expected one graph in it")
     return properties
 
 
-def _fields(data: bytes, at: int, end: int) -> Iterator[tuple[int, int, int, int]]:
-    """(field number, wire type, first, last): a varint's value is `first`, else the payload's span."""
-    while at < end:
-        tag, at = _varint(data, at, end)
-        number, wire = tag >> 3, tag & 7
-        if wire == 0:
-            value, at = _varint(data, at, end)
-            yield number, wire, value, at
-            continue
-        if wire == 2:
-            length, at = _varint(data, at, end)
-        else:
-            length = {1: 8, 5: 4}.get(wire, -1)
-        if number == 0 or length < 0 or length > end - at:
-            raise ValueError("is not an ONNX model, or is truncated or damaged")
-        yield number, wire, at, at + length
-        at += length
-
-
-def _varint(data: bytes, at: int, end: int) -> tuple[int, int]:
-    if at < end and data[at] < 0x80:  # most are a single byte
-        return data[at], at + 1
-    value = 0
-    for shift in range(0, 70, 7):
-        if at >= end:
-            break
-        byte = data[at]
-        at += 1
-        value |= (byte & 0x7F) << shift
-        if byte < 0x80:
-            return value, at
-    raise ValueError("is not an ONNX model, or is truncated or damaged")
-
-
-def _check_tensor(data: bytes, fields: list[tuple[int, int, int, int]], size: int) -> None:
+def _check_tensor(data: bytes, found: list[Field], size: int) -> None:
     """A tensor must bring its values itself: as many as its dimensions claim."""
     count = 1
     item = 0
     raw = -1
-    for number, wire, first, last in fields:
-        if number == 13 or (number == 14 and first != 0):
+    for number, wire, first, last in found:
+        if number == EXTERNAL_DATA or (number == DATA_LOCATION and first != 0):
             raise ValueError("keeps data in another file, expected everything in this one")
-        if number == 1 and wire == 0:
+        if number == DIMS and wire == VARINT:
             count *= first
-        elif number == 1:
+        elif number == DIMS:  # several of them, packed
             at = first
             while at < last:
-                value, at = _varint(data, at, last)
-                count = min(count * value, 1 << 63)
-        elif number == 2:
+                value, at = varint(data, at, last)
+                count = min(count * value, MOST_VALUES)
+        elif number == DATA_TYPE:
             item = _ITEM_BYTES.get(first, 0)
-        elif number == 9:
+        elif number == RAW_DATA:
             raw = last - first
-        count = min(count, 1 << 63)
+        count = min(count, MOST_VALUES)
     # Packed 4-bit values are two to a byte; every other encoding needs at least a byte a value.
     if (raw >= 0 and item and count * item != raw) or count > 2 * size:
         raise ValueError(f"has a tensor that claims {count} values but does not hold them")
 
 
-def _add_property(data: bytes, fields: list[tuple[int, int, int, int]], properties: dict[str, str]) -> None:
-    texts = {1: "", 2: ""}
-    for number, wire, first, last in fields:
-        if wire == 2 and number in texts:
+def _add_property(data: bytes, found: list[Field], properties: dict[str, str]) -> None:
+    texts = {1: "", 2: ""}  # field number -> key, value
+    for number, wire, first, last in found:
+        if wire == BYTES and number in texts:
             if last - first > MAX_TEXT:
                 # What is too long may come before its own name, or be it.
                 raise ValueError(f"has metadata {texts[1][:64]!r} of {last - first} bytes, expected at most {MAX_TEXT}")
@@ -224,9 +187,8 @@ class SelfTest:
         )
 
     @classmethod
-    def from_json(cls, text: str) -> "SelfTest":
-        """The inverse of `to_json`; ValueError says what is wrong."""
-        stored = _json(text, "self_test", dict)
+    def from_json(cls, stored: Mapping[str, Any]) -> "SelfTest":
+        """What `to_json` wrote, parsed; ValueError says what is wrong."""
         missing = [key for key in ("shape", "values", "scores", "unknown") if key not in stored]
         if missing:
             raise ValueError(f"metadata 'self_test' has no {missing[0]!r}")
@@ -250,118 +212,3 @@ class SelfTest:
         if not all(np.isfinite(array).all() for array in (values, scores, unknown)):
             raise ValueError("metadata 'self_test': a value is not finite")
         return cls(values, scores, unknown)
-
-
-@dataclass(frozen=True, eq=False)
-class Metadata:
-    """A model file's `metadata_props`, checked."""
-
-    gestures: tuple[str, ...]
-    kind: str
-    version: str
-    rows: int
-    columns: int
-    rate_hz: float
-    window: Window
-    features: tuple[str, ...] | None  # names, where the model takes features instead of frames
-    calibration: Mapping[str, Any]
-    training_data: str  # sha256
-    quantiles: Mapping[str, Any]  # what the training data looked like
-    self_test: SelfTest
-    provisional: Certainty | None  # how sure it must be of a contact that is not over, where it was made for that
-    own: Space | None  # where gestures of the user's own are compared; None for a model that cannot
-
-    @classmethod
-    def parse(cls, properties: Mapping[str, str]) -> "Metadata":
-        """Holds every key against the contract; ValueError names the key and what was expected."""
-        required = ("gestures", "kind", "version", "rows", "columns", "rate_hz", "window", "calibration")
-        missing = [k for k in (*required, "self_test", "training_data", "quantiles") if k not in properties]
-        if missing:
-            raise ValueError(f"has no metadata {', '.join(map(repr, missing))}, expected gestured's own")
-        for key, text in properties.items():
-            _check_extent(key, text)
-        gestures = _names(properties, "gestures", 2, 64)
-        if not all(GESTURE_NAME.fullmatch(name) for name in (*gestures, properties["kind"])):
-            raise ValueError("metadata 'gestures' and 'kind': expected 1 to 64 of a-z, 0-9, _ each")
-        if not 1 <= len(properties["version"]) <= 64 or not properties["version"].isprintable():
-            raise ValueError("metadata 'version': expected 1 to 64 printable characters")
-        if not re.fullmatch(r"[0-9a-f]{64}", properties["training_data"]):
-            raise ValueError("metadata 'training_data': expected a sha256 in hexadecimal")
-        with _naming("window"):
-            window = Window.from_json(properties["window"])
-        provisional = own = None
-        if "provisional" in properties:
-            with _naming("provisional"):
-                provisional = Certainty.from_json(properties["provisional"], gestures)
-        if "own" in properties:
-            told = _json(properties["own"], "own", dict)
-            with _naming("own"):
-                own = Space.from_json(told, len(gestures))
-        grid = {}
-        for key in ("rows", "columns", "rate_hz"):
-            try:
-                grid[key] = float(properties[key])
-            except ValueError:
-                grid[key] = math.nan
-            if grid[key] != getattr(window, key):
-                found, expected = properties[key][:40], getattr(window, key)
-                raise ValueError(f"metadata {key!r} is {found!r}, expected {expected} as in 'window'")
-        return cls(
-            gestures=gestures,
-            kind=properties["kind"],
-            version=properties["version"],
-            rows=window.rows,
-            columns=window.columns,
-            rate_hz=window.rate_hz,
-            window=window,
-            features=_names(properties, "features", 1, 10_000) if "features" in properties else None,
-            calibration=_json(properties["calibration"], "calibration", dict),
-            training_data=properties["training_data"],
-            quantiles=_json(properties["quantiles"], "quantiles", dict),
-            self_test=SelfTest.from_json(properties["self_test"]),
-            provisional=provisional,
-            own=own,
-        )
-
-
-@contextmanager
-def _naming(key: str) -> Iterator[None]:
-    """Have a ValueError say in which key of the metadata the mistake is."""
-    try:
-        yield
-    except ValueError as error:
-        raise ValueError(f"metadata {key!r}: {error}") from error
-
-
-def _check_extent(key: str, text: str) -> None:
-    """Counts what JSON in a value would become, before it is parsed."""
-    items = depth = 0
-    for found in re.finditer(r"[][{},]", text):
-        items += found[0] in "[{,"
-        depth += (found[0] in "[{") - (found[0] in "]}")
-        if items > MAX_ITEMS or depth > MAX_NESTING:
-            raise ValueError(
-                f"metadata {key[:64]!r}: expected at most {MAX_ITEMS} items, {MAX_NESTING} inside each other"
-            )
-
-
-def _names(properties: Mapping[str, str], key: str, least: int, most: int) -> tuple[str, ...]:
-    names = _json(properties[key], key, list)
-    if not (least <= len(names) <= most and all(isinstance(name, str) for name in names)):
-        raise ValueError(f"metadata {key!r}: expected {least} to {most} names")
-    if len(set(names)) != len(names):
-        raise ValueError(f"metadata {key!r}: expected names that differ")
-    return tuple(names)
-
-
-def _json(text: str, key: str, kind: type) -> Any:
-    def refuse(constant: str) -> None:
-        raise ValueError(constant)  # NaN and Infinity are no JSON
-
-    try:
-        value = json.loads(text, parse_constant=refuse)
-    except (ValueError, RecursionError):
-        value = None
-    if not isinstance(value, kind):
-        raise ValueError(f"metadata {key!r}: expected a JSON {'list' if kind is list else 'object'}")
-    return value

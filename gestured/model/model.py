@@ -22,8 +22,9 @@ from gestured.core.errors import ModelError
 from gestured.core.features import feature_names, touch_pattern
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Scores
-from gestured.model.file import Metadata, inspect, read_bytes
+from gestured.model.file import inspect, read_bytes
 from gestured.model.limit import limited
+from gestured.model.metadata import Metadata
 from gestured.model.process import ModelProcess, try_out
 
 LADDER = ("cnn_lstm", "lstm", "touch_pattern_rf")  # the shipped models, best first

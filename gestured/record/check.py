@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.model.file import GESTURE_NAME
+from gestured.model.metadata import GESTURE_NAME
 from gestured.record.recordings import Recordings
 
 SESSION = "session"  # the label of a recording that holds many gestures, and marks for each

@@ -1,0 +1,140 @@
+"""What a model says of itself: the metadata of its file, held key by key against the contract.
+
+Functions here raise ValueError with the key and what was expected; `model.open_model` adds the file's name.
+"""
+
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from gestured.core.foresight import Certainty
+from gestured.core.prototypes import Space
+from gestured.core.window import Window
+from gestured.model.file import SelfTest
+
+MAX_ITEMS = 50_000  # of the lists and objects in one value; each costs a hundred times as much memory as text
+MAX_NESTING = 16  # lists and objects inside each other in one value
+GESTURE_NAME = re.compile(r"[a-z0-9_]{1,64}")
+
+
+@dataclass(frozen=True, eq=False)
+class Metadata:
+    """A model file's `metadata_props`, checked."""
+
+    gestures: tuple[str, ...]
+    kind: str
+    version: str
+    rows: int
+    columns: int
+    rate_hz: float
+    window: Window
+    features: tuple[str, ...] | None  # names, where the model takes features instead of frames
+    calibration: Mapping[str, Any]
+    training_data: str  # sha256
+    quantiles: Mapping[str, Any]  # what the training data looked like
+    self_test: SelfTest
+    provisional: Certainty | None  # how sure it must be of a contact that is not over, where it was made for that
+    own: Space | None  # where gestures of the user's own are compared; None for a model that cannot
+
+    @classmethod
+    def parse(cls, properties: Mapping[str, str]) -> "Metadata":
+        """Holds every key against the contract; ValueError names the key and what was expected."""
+        required = ("gestures", "kind", "version", "rows", "columns", "rate_hz", "window", "calibration")
+        missing = [k for k in (*required, "self_test", "training_data", "quantiles") if k not in properties]
+        if missing:
+            raise ValueError(f"has no metadata {', '.join(map(repr, missing))}, expected gestured's own")
+        for key, text in properties.items():
+            _check_extent(key, text)
+        gestures = _names(properties, "gestures", 2, 64)
+        if not all(GESTURE_NAME.fullmatch(name) for name in (*gestures, properties["kind"])):
+            raise ValueError("metadata 'gestures' and 'kind': expected 1 to 64 of a-z, 0-9, _ each")
+        if not 1 <= len(properties["version"]) <= 64 or not properties["version"].isprintable():
+            raise ValueError("metadata 'version': expected 1 to 64 printable characters")
+        if not re.fullmatch(r"[0-9a-f]{64}", properties["training_data"]):
+            raise ValueError("metadata 'training_data': expected a sha256 in hexadecimal")
+        with _naming("window"):
+            window = Window.from_json(properties["window"])
+        provisional = own = None
+        if "provisional" in properties:
+            with _naming("provisional"):
+                provisional = Certainty.from_json(properties["provisional"], gestures)
+        if "own" in properties:
+            told = _json(properties["own"], "own", dict)
+            with _naming("own"):
+                own = Space.from_json(told, len(gestures))
+        _check_grid(properties, window)
+        return cls(
+            gestures=gestures,
+            kind=properties["kind"],
+            version=properties["version"],
+            rows=window.rows,
+            columns=window.columns,
+            rate_hz=window.rate_hz,
+            window=window,
+            features=_names(properties, "features", 1, 10_000) if "features" in properties else None,
+            calibration=_json(properties["calibration"], "calibration", dict),
+            training_data=properties["training_data"],
+            quantiles=_json(properties["quantiles"], "quantiles", dict),
+            self_test=SelfTest.from_json(_json(properties["self_test"], "self_test", dict)),
+            provisional=provisional,
+            own=own,
+        )
+
+
+def _check_grid(properties: Mapping[str, str], window: Window) -> None:
+    """Grid and rate stand in the metadata by themselves, too, and must be the window's."""
+    for key in ("rows", "columns", "rate_hz"):
+        expected = getattr(window, key)
+        try:
+            found = float(properties[key])
+        except ValueError:
+            found = math.nan
+        if found != expected:
+            raise ValueError(f"metadata {key!r} is {properties[key][:40]!r}, expected {expected} as in 'window'")
+
+
+@contextmanager
+def _naming(key: str) -> Iterator[None]:
+    """Have a ValueError say in which key of the metadata the mistake is."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"metadata {key!r}: {error}") from error
+
+
+def _check_extent(key: str, text: str) -> None:
+    """Counts what JSON in a value would become, before it is parsed."""
+    items = depth = 0
+    for found in re.finditer(r"[][{},]", text):
+        items += found[0] in "[{,"
+        depth += (found[0] in "[{") - (found[0] in "]}")
+        if items > MAX_ITEMS or depth > MAX_NESTING:
+            raise ValueError(
+                f"metadata {key[:64]!r}: expected at most {MAX_ITEMS} items, {MAX_NESTING} inside each other"
+            )
+
+
+def _names(properties: Mapping[str, str], key: str, least: int, most: int) -> tuple[str, ...]:
+    names = _json(properties[key], key, list)
+    if not (least <= len(names) <= most and all(isinstance(name, str) for name in names)):
+        raise ValueError(f"metadata {key!r}: expected {least} to {most} names")
+    if len(set(names)) != len(names):
+        raise ValueError(f"metadata {key!r}: expected names that differ")
+    return tuple(names)
+
+
+def _json(text: str, key: str, kind: type) -> Any:
+    def refuse(constant: str) -> None:
+        raise ValueError(constant)  # NaN and Infinity are no JSON
+
+    try:
+        value = json.loads(text, parse_constant=refuse)
+    except (ValueError, RecursionError):
+        value = None
+    if not isinstance(value, kind):
+        raise ValueError(f"metadata {key!r}: expected a JSON {'list' if kind is list else 'object'}")
+    return value
