@@ -1,8 +1,6 @@
 """The event stream: JSON lines to any number of clients on a Unix socket.
 
-A line is encoded once and sent at once to each client that wants it. What a client's socket does not take
-waits in a bounded backlog of its own, from which the oldest lines are dropped; the loop waits for nobody. Raw
-sockets instead of transports: a transport's buffer has no bound that drops the oldest.
+A line is encoded once and sent at once to each client that wants it; what its socket does not take waits there.
 """
 
 import asyncio
@@ -14,153 +12,20 @@ from collections import deque
 from collections.abc import Callable, Collection
 
 from gestured.core import messages
-from gestured.core.errors import ProtocolError
-from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
-from gestured.core.subscription import MAX_LINE, Subscription, parse_subscription
+from gestured.core.events import Event
+from gestured.core.subscription import Subscription
+from gestured.daemon.audience import Audience
+from gestured.daemon.client import Client
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 
 CLIENTS = 1024
-BACKLOG_BYTES = 256 << 10
 STALLED_S = 30.0  # a client that takes nothing for this long is cut off
 END, TEST = b"}\n", b',"test":true}\n'  # how a line ends
-READ_BYTES = 1024  # small: a client that sends rubbish waits its turn
-TURNS = 20  # reads and lines of one client in a second; what is more waits
 LINES = 16  # of all clients that are answered before the loop looks after its frames again
-RUBBISH = 100  # bad lines without a good one between them after which a client is cut off: some seconds of nothing else
-
-
-class Client:
-    """One connection: a socket, what it wants, and what waits for it."""
-
-    def __init__(self, server: "EventServer", sock: socket.socket) -> None:
-        self._server, self.sock = server, sock
-        self.subscription = Subscription()
-        self.blocked_since: float | None = None
-        self.half_closed = False
-        self._begun = b""  # rest of a line of which the client already has a part
-        self._waiting: deque[bytes] = deque()
-        self._size = 0
-        self._lost = 0
-        self.turns = TURNS  # that it has left in this second
-        self._request = bytearray()  # a line that is not complete
-        self._asked: deque[bytes] = deque()  # lines that wait for an answer
-        self._rubbish = 0
-
-    @property
-    def backlog(self) -> int:
-        """Bytes that wait."""
-        return len(self._begun) + self._size
-
-    def send(self, line: bytes) -> None:
-        """Send a line now, or keep it; never blocks."""
-        if self.blocked_since is not None:
-            self._keep(line)
-        elif (rest := self._write(line)) is not None:
-            self._begun = rest if len(rest) < len(line) else b""
-            if not self._begun:
-                self._keep(line)
-            self.blocked_since = time.monotonic()
-            self._server.loop.add_writer(self.sock, self.flush)
-
-    def flush(self) -> None:
-        """Send what waits, as far as it goes."""
-        while self.sock.fileno() >= 0:
-            if self._begun:
-                line, self._begun = self._begun, b""
-            elif self._lost:
-                line, self._lost = messages.lost_json(self._lost), 0
-            elif self._waiting:
-                line = self._waiting.popleft()
-                self._size -= len(line)
-            else:
-                self.blocked_since = None
-                self._server.loop.remove_writer(self.sock)
-                return
-            if (rest := self._write(line)) is not None:
-                self._begun = rest  # whole or in part: it goes first, and it is no longer dropped
-                return
-            self.blocked_since = time.monotonic()
-
-    def read(self) -> None:
-        """Take requests; an end of file only means that no more will come. No more is read until they are answered."""
-        self._server.loop.remove_reader(self.sock)
-        self.turns -= 1
-        try:
-            data = self.sock.recv(READ_BYTES)
-        except (BlockingIOError, InterruptedError):
-            self.go_on()
-            return
-        except OSError:
-            self._server.remove(self)
-            return
-        if not data:
-            self.half_closed = True
-            self._server.check(self)
-            return
-        *lines, rest = data.split(b"\n")
-        for line in lines:
-            self._request += line
-            if self._request.strip():
-                self._asked.append(bytes(self._request))
-            self._request.clear()
-        self._request += rest
-        if len(self._request) > MAX_LINE:
-            del self._request[MAX_LINE + 1 :]  # one byte too many is enough to refuse it
-            self._refuse()
-        self.go_on()
-
-    def answer(self) -> None:
-        """Answer one line."""
-        self.turns -= 1
-        try:
-            self._server.subscribe(self, parse_subscription(self._asked.popleft(), self._server.gestures()))
-            self._rubbish = 0
-        except ProtocolError as error:
-            self.send(messages.error_json(str(error)))
-            self._refuse()
-        self.go_on()
-
-    def go_on(self) -> None:
-        """See to what comes next, a line or a read, unless its turns are used up or it is gone."""
-        if self.turns > 0 and self.sock.fileno() >= 0:
-            if self._asked:
-                self._server.queue(self)
-            elif not self.half_closed:
-                self._server.loop.add_reader(self.sock, self.read)
-
-    def new_second(self) -> None:
-        """It has all its turns again."""
-        used_up, self.turns = self.turns <= 0, TURNS
-        if used_up:
-            self.go_on()
-
-    def _refuse(self) -> None:
-        self._rubbish += 1
-        if self._rubbish > RUBBISH:
-            self._server.cut_off(self, "rubbish")
-
-    def _write(self, line: bytes) -> bytes | None:
-        """What the socket did not take, or None if it took everything (or is gone)."""
-        try:
-            sent = self.sock.send(line)
-        except (BlockingIOError, InterruptedError):
-            return line
-        except OSError:
-            self._server.remove(self)
-            return None
-        if sent == len(line):
-            return None
-        self.blocked_since = time.monotonic()
-        return line[sent:]
-
-    def _keep(self, line: bytes) -> None:
-        self._waiting.append(line)
-        self._size += len(line)
-        while self._size > BACKLOG_BYTES:
-            self._size -= len(self._waiting.popleft())
-            self._lost += 1
-            self._server.metrics.lost_lines.add()
+ACCEPTED = 64  # clients at most before the loop does so
+AGAIN_S = 1.0  # until the next one is accepted after there was no descriptor for one
+DRAINED_S = 0.01  # from one look at what still waits to the next, at the end
 
 
 class EventServer:
@@ -182,9 +47,8 @@ class EventServer:
         self.loop = asyncio.get_running_loop()
         self.metrics = metrics
         self._listener, self._hello, self._throttle = listener, hello, Throttle()
-        self._classes: dict[Subscription, set[Client]] = {}
         self._clients: set[Client] = set()
-        self._owed: dict[tuple[str, int], set[Client]] = {}  # who was sent a provisional event, until its answer
+        self._audience = Audience()
         self._queue: deque[Client] = deque()  # each once, with a line that waits for its answer
         self.loop.add_reader(listener, self._accept)
 
@@ -203,22 +67,14 @@ class EventServer:
 
         A test's events have one key more: `"test":true`.
         """
-        groups = [clients for asked, clients in self._classes.items() if asked.matches(event)]
-        if isinstance(event, Provisional):
-            self._owed[event.sensor, event.id] = set().union(*groups)
-        elif self._owed and isinstance(event, Gesture | Unknown | Cancelled):
-            owed = self._owed.pop((event.sensor, event.id), set()) & self._clients
-            groups.append({client for client in owed if not client.subscription.matches(event)})
         line = None
-        for clients in groups:
-            for client in tuple(clients):
-                line = line or messages.to_json(event, epoch)[: -len(END)] + (TEST if test else END)
-                client.send(line)
+        for client in self._audience.of(event):
+            line = line or messages.to_json(event, epoch)[: -len(END)] + (TEST if test else END)
+            client.send(line)
 
     def foresees(self) -> tuple[frozenset[str], bool]:
         """The sensors whose provisional events somebody asks for by name, and whether somebody asks for all."""
-        named = [asked.sensors for asked in self._classes if asked.foresees]
-        return frozenset().union(*(names for names in named if names is not None)), None in named
+        return self._audience.foresees()
 
     def tell(self, line: bytes) -> None:
         """Send a line that is no event to every client, whatever it asks for."""
@@ -229,9 +85,8 @@ class EventServer:
         """Change what a client wants."""
         if client not in self._clients:
             return  # it went while it was being answered
-        self._leave_class(client)
-        client.subscription = subscription
-        self._classes.setdefault(subscription, set()).add(client)
+        self._leave(client)
+        self._audience.join(client, subscription)
         if subscription.foresees:
             self._changed()
 
@@ -239,7 +94,7 @@ class EventServer:
         """Forget a client that is gone."""
         if client in self._clients:
             self._clients.discard(client)
-            self._leave_class(client)
+            self._leave(client)
             self.loop.remove_reader(client.sock)
             self.loop.remove_writer(client.sock)
             client.sock.close()
@@ -287,21 +142,16 @@ class EventServer:
         self.loop.remove_reader(self._listener)
         end = time.monotonic() + drain_s
         while any(client.backlog for client in self._clients) and time.monotonic() < end:
-            await asyncio.sleep(0.01)
+            await asyncio.sleep(DRAINED_S)
         for client in tuple(self._clients):
             self.remove(client)
 
-    def _leave_class(self, client: Client) -> None:
-        members = self._classes.get(client.subscription)
-        if members is not None:
-            members.discard(client)
-            if not members:
-                del self._classes[client.subscription]
-                if client.subscription.foresees:
-                    self._changed()
+    def _leave(self, client: Client) -> None:
+        if self._audience.leave(client) and client.subscription.foresees:
+            self._changed()
 
     def _accept(self) -> None:
-        for _ in range(64):
+        for _ in range(ACCEPTED):
             try:
                 sock, _ = self._listener.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
@@ -309,7 +159,7 @@ class EventServer:
             except OSError as error:  # out of descriptors: the socket stays readable, so do not come back at once
                 log.error("cannot accept a client", reason=errno.errorcode.get(error.errno or 0, str(error)))
                 self.loop.remove_reader(self._listener)
-                self.loop.call_later(1.0, self.loop.add_reader, self._listener, self._accept)
+                self.loop.call_later(AGAIN_S, self.loop.add_reader, self._listener, self._accept)
                 return
             sock.setblocking(False)
             if len(self._clients) >= CLIENTS:

@@ -8,7 +8,8 @@ from typing import Any
 from gestured import __version__
 from gestured.core.scene import DOUBLE_TAP
 from gestured.core.timing import Timing
-from gestured.daemon import clients
+from gestured.daemon.client import BACKLOG_BYTES
+from gestured.daemon.clients import CLIENTS
 from gestured.daemon.ladder import open_ladder
 from gestured.daemon.settings import TABLES, Settings, control_beside, default_socket
 from gestured.daemon.sockets import RECEIVE_BYTES
@@ -59,7 +60,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
         listens.append(f"http {settings.metrics} for /metrics, /healthz, /readyz")
     what = "gestures and provisional events" if settings.publish_provisional else "gestures"
     publishes = [
-        f"unix {path}, mode 0660, {clients.CLIENTS} clients, {clients.BACKLOG_BYTES >> 10} KiB waiting each",
+        f"unix {path}, mode 0660, {CLIENTS} clients, {BACKLOG_BYTES >> 10} KiB waiting each",
         *(f"osc://{destination}: {what}, and the status once a second" for destination in settings.publish),
     ]
     publishes.append(f"control: unix {settings.control or control_beside(path)}, mode 0660, for owner and group")

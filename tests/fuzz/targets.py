@@ -18,7 +18,7 @@ from gestured.core.frames import Segment
 from gestured.core.stamping import Stamper
 from gestured.core.subscription import parse_subscription
 from gestured.core.wire import Addresses, Arrival, Decoder
-from gestured.daemon.clients import Client, EventServer
+from gestured.daemon.client import Client, Server
 from gestured.model import model as models
 from tests.bounds import little_memory
 
@@ -138,7 +138,7 @@ def request(data: bytes) -> None:
             assert error.reason == "subscription"
             refused.append(str(error))
     sock, server = _Socket(chunks), _Server()
-    client = Client(cast(EventServer, server), cast(Any, sock))
+    client = Client(cast(Server, server), cast(Any, sock))
     while chunks:
         client.turns = 2
         client.read()

@@ -1,0 +1,44 @@
+"""Who wants to hear what: the clients of the event stream, in classes of those that ask for the same."""
+
+from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
+from gestured.core.subscription import Subscription
+from gestured.daemon.client import Client
+
+
+class Audience:
+    """Clients by their subscriptions: an event is held against each subscription once, however many share it."""
+
+    def __init__(self) -> None:
+        self._classes: dict[Subscription, set[Client]] = {}
+        self._owed: dict[tuple[str, int], set[Client]] = {}  # who was sent a provisional event, until its answer
+
+    def join(self, client: Client, subscription: Subscription) -> None:
+        """A client that is in no class wants this."""
+        client.subscription = subscription
+        self._classes.setdefault(subscription, set()).add(client)
+
+    def leave(self, client: Client) -> bool:
+        """A client wants nothing any more; whether there is nobody left who asked for the same."""
+        members = self._classes.get(client.subscription, set())
+        members.discard(client)
+        if members:
+            return False
+        return self._classes.pop(client.subscription, None) is not None
+
+    def of(self, event: Event) -> list[Client]:
+        """Who is to hear an event: who asks for it, and whoever was sent the provisional event that it answers."""
+        wanted = [client for asked, clients in self._classes.items() if asked.matches(event) for client in clients]
+        if isinstance(event, Provisional):
+            self._owed[event.sensor, event.id] = set(wanted)
+        elif self._owed and isinstance(event, Gesture | Unknown | Cancelled):
+            owed = self._owed.pop((event.sensor, event.id), set())
+            wanted += [client for client in owed if self._is_here(client) and not client.subscription.matches(event)]
+        return wanted
+
+    def foresees(self) -> tuple[frozenset[str], bool]:
+        """The sensors whose provisional events somebody asks for by name, and whether somebody asks for all."""
+        named = [asked.sensors for asked in self._classes if asked.foresees]
+        return frozenset().union(*(names for names in named if names is not None)), None in named
+
+    def _is_here(self, client: Client) -> bool:
+        return client in self._classes.get(client.subscription, ())
