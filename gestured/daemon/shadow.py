@@ -1,6 +1,6 @@
 """A candidate model beside the active one: it sees the same segments, and publishes nothing.
 
-It runs in a process of its own (`model_process`), and a thread of ours waits for its answers. Nothing else waits for
+It runs in a process of its own (`model.process`), and a thread of ours waits for its answers. Nothing else waits for
 it: segments for which it has no time are dropped and counted, and where it never answers it is ended.
 """
 

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from gestured.core.features import feature_names
 from gestured.core.foresight import Certainty
 from gestured.core.prototypes import Space
 from gestured.core.window import Window
@@ -18,6 +19,7 @@ from gestured.model.file import SelfTest
 
 MAX_ITEMS = 50_000  # of the lists and objects in one value; each costs a hundred times as much memory as text
 MAX_NESTING = 16  # lists and objects inside each other in one value
+USUAL_THRESHOLD = 0.5  # of a model whose calibration has none: more probably right than wrong
 GESTURE_NAME = re.compile(r"[a-z0-9_]{1,64}")
 
 
@@ -34,6 +36,7 @@ class Metadata:
     window: Window
     features: tuple[str, ...] | None  # names, where the model takes features instead of frames
     calibration: Mapping[str, Any]
+    threshold: float  # the confidence from which an answer is published, unless a setting says another
     training_data: str  # sha256
     quantiles: Mapping[str, Any]  # what the training data looked like
     self_test: SelfTest
@@ -67,6 +70,7 @@ class Metadata:
             with _naming("own"):
                 own = Space.from_json(told, len(gestures))
         _check_grid(properties, window)
+        calibration = _json(properties["calibration"], "calibration", dict)
         return cls(
             gestures=gestures,
             kind=properties["kind"],
@@ -75,8 +79,9 @@ class Metadata:
             columns=window.columns,
             rate_hz=window.rate_hz,
             window=window,
-            features=_names(properties, "features", 1, 10_000) if "features" in properties else None,
-            calibration=_json(properties["calibration"], "calibration", dict),
+            features=_features(properties, window) if "features" in properties else None,
+            calibration=calibration,
+            threshold=_threshold(calibration),
             training_data=properties["training_data"],
             quantiles=_json(properties["quantiles"], "quantiles", dict),
             self_test=SelfTest.from_json(_json(properties["self_test"], "self_test", dict)),
@@ -127,6 +132,17 @@ def _names(properties: Mapping[str, str], key: str, least: int, most: int) -> tu
     return tuple(names)
 
 
+def _features(properties: Mapping[str, str], window: Window) -> tuple[str, ...]:
+    """The names of what a model takes instead of frames: all touch-pattern features of its grid, in their order."""
+    expected = feature_names(window.rows, window.columns)
+    if _names(properties, "features", 1, 10_000) != expected:
+        raise ValueError(
+            f"metadata 'features': expected the {len(expected)} touch-pattern features of a "
+            f"{window.rows} x {window.columns} grid in their order"
+        )
+    return expected
+
+
 def _json(text: str, key: str, kind: type) -> Any:
     def refuse(constant: str) -> None:
         raise ValueError(constant)  # NaN and Infinity are no JSON
@@ -138,3 +154,11 @@ def _json(text: str, key: str, kind: type) -> Any:
     if not isinstance(value, kind):
         raise ValueError(f"metadata {key!r}: expected a JSON {'list' if kind is list else 'object'}")
     return value
+
+
+def _threshold(calibration: Mapping[str, Any]) -> float:
+    """The calibration's `threshold`."""
+    value = calibration.get("threshold", USUAL_THRESHOLD)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
+        raise ValueError(f"metadata 'calibration': threshold: expected a number from 0 to 1, found {value!r}")
+    return float(value)

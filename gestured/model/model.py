@@ -1,7 +1,7 @@
-"""Open, verify and self-test an .onnx file -> Classifier.
+"""A model: an .onnx file, found, verified, self-tested and opened as a classifier.
 
 A file is read once, checked against the manifest (where it is a shipped one) or opened in a process of its own
-first (where it is not: `model_process`), inspected without onnxruntime, opened from those bytes, held against its own
+first (where it is not: `process`), inspected without onnxruntime, opened from those bytes, held against its own
 metadata and made to reproduce its self-test. Whatever is wrong is one `ModelError`: the file, what is wrong, what was
 expected.
 """
@@ -9,8 +9,6 @@ expected.
 import hashlib
 import json
 import os
-import re
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -19,18 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.errors import ModelError
-from gestured.core.features import feature_names, touch_pattern
+from gestured.core.features import touch_pattern
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Scores
 from gestured.model.file import inspect, read_bytes
-from gestured.model.limit import limited
 from gestured.model.metadata import Metadata
 from gestured.model.process import ModelProcess, try_out
+from gestured.model.session import Session
 
 LADDER = ("cnn_lstm", "lstm", "touch_pattern_rf")  # the shipped models, best first
 TOLERANCE = 1e-3  # of the self-test: other processors round differently, another model is further off
+ROUNDING = 1e-4  # by which a probability may lie outside of 0 to 1
+SUM_ROUNDING = 1e-3  # by which probabilities may miss 1 together
 RUN_S = 1.5  # for one segment; it takes some milliseconds
-SELF_TEST_S = 10.0
+SELF_TEST_S = 10.0  # for the self-test's few segments, on a machine that is busy starting
 BATCH_S = 3600.0  # for any number of segments at once
 
 
@@ -46,18 +46,11 @@ class Model:
         self.gestures = self.metadata.gestures
         self.rows = self.metadata.rows
         self.columns = self.metadata.columns
-        self.threshold = _threshold(self.metadata.calibration)
+        self.threshold = self.metadata.threshold
         self.certainty = self.metadata.provisional
-        if self.metadata.features is not None:
-            expected = feature_names(self.rows, self.columns)
-            if self.metadata.features != expected:
-                raise ValueError(
-                    f"metadata 'features': expected the {len(expected)} touch-pattern features of a "
-                    f"{self.rows} x {self.columns} grid in their order"
-                )
-        self._session = _open_session(data)
-        self._input = self._check_shapes()
-        self.embeds = any(output.name == "embedding" for output in self._session.get_outputs())
+        self._session = Session(data)
+        self._input = self._session.check(self.metadata)
+        self.embeds = "embedding" in self._session.outputs
         self.space = self.metadata.own if self.embeds else None
         self.self_test_error = self._self_test()
 
@@ -95,7 +88,7 @@ class Model:
 
         ValueError where the model fails, takes longer than `limit_s`, or what it gives are no probabilities.
         """
-        scores, unknown = self._outputs(("scores", "unknown"), batch, limit_s)
+        scores, unknown = self._session.run(("scores", "unknown"), {self._input: batch}, limit_s)
         expected = (len(batch), len(self.gestures))
         if scores.shape != expected or unknown.shape != expected[:1]:
             found = f"{scores.shape} and {unknown.shape}"
@@ -103,31 +96,16 @@ class Model:
         both = np.concatenate([scores, unknown[:, np.newaxis]], axis=1)
         sums = scores.sum(axis=1)
         # Written so that NaN fails every comparison.
-        if not (both.min() >= -1e-4 and both.max() <= 1.0 + 1e-4 and np.abs(sums - 1.0).max() <= 1e-3):
+        if not (both.min() >= -ROUNDING and both.max() <= 1.0 + ROUNDING and np.abs(sums - 1.0).max() <= SUM_ROUNDING):
             raise ValueError("outputs are not probabilities: expected 0 to 1, scores that add up to 1")
         return np.clip(scores, 0.0, 1.0), np.clip(unknown, 0.0, 1.0)
 
     def embed(self, batch: NDArray[np.float32], limit_s: float = BATCH_S) -> NDArray[np.float32]:
         """(B, T, R, C) windows -> (B, E) embedding, of a model that has one (`embeds`). ValueError as for `run`."""
-        (embedding,) = self._outputs(("embedding",), batch, limit_s)
+        (embedding,) = self._session.run(("embedding",), {self._input: batch}, limit_s)
         if embedding.ndim != 2 or len(embedding) != len(batch) or not np.isfinite(embedding).all():
             raise ValueError(f"embedding has the shape {embedding.shape}, expected ({len(batch)}, E), all finite")
         return embedding
-
-    def _outputs(self, names: Sequence[str], batch: NDArray[np.float32], limit_s: float) -> list[NDArray[np.float32]]:
-        """The graph's outputs of these names for a batch; ValueError where it fails or takes too long."""
-        import onnxruntime
-
-        options = onnxruntime.RunOptions()
-        options.log_severity_level = 4
-        try:
-            with limited(options, limit_s):
-                found: list[NDArray[np.float32]] = self._session.run(names, {self._input: batch}, options)
-        except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
-            if options.terminate:
-                raise ValueError(f"was ended after {limit_s:g} s, in which it did not answer") from error
-            raise ValueError(f"onnxruntime cannot run it: {_brief(error)}") from error
-        return found
 
     def report(self) -> dict[str, Any]:
         """What is known of it, as JSON values."""
@@ -146,35 +124,6 @@ class Model:
             "self_test": {"largest_difference": self.self_test_error, "tolerance": TOLERANCE},
         }
 
-    def _check_shapes(self) -> str:
-        """The input's name, once names, types and shapes agree with the metadata."""
-        inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
-        names = [i.name for i in inputs]
-        takes = "frames" if self.metadata.features is None else "features"
-        if names != [takes]:
-            raise ValueError(f"has inputs {names}, expected ['{takes}'] as its metadata say")
-        if [o.name for o in outputs] not in (["scores", "unknown"], ["scores", "unknown", "embedding"]):
-            found_names = [o.name for o in outputs]
-            raise ValueError(f"has outputs {found_names}, expected 'scores', 'unknown' and perhaps 'embedding'")
-        count = len(self.gestures)
-        own: tuple[int, ...] = (self.rows, self.columns)
-        if self.metadata.features is not None:
-            own = (len(self.metadata.features),)
-        free = 1 if takes == "features" else 2  # the dimensions that must be open: B, or B and T
-        shapes = {takes: (None,) * free + own, "scores": (None, count), "unknown": (None,), "embedding": (None, None)}
-        for value in (*inputs, *outputs):
-            expected = shapes[value.name]
-            if value.type != "tensor(float)":
-                raise ValueError(f"{value.name!r} is {value.type}, expected tensor(float)")
-            # What the file leaves open is a name or None; outputs are held to their size when it runs.
-            loose = value.name != takes
-            found = [d if isinstance(d, int) else None for d in value.shape]
-            if len(found) != len(expected) or not all(
-                f == e or (loose and (f is None or e is None)) for f, e in zip(found, expected, strict=True)
-            ):
-                raise ValueError(f"{value.name!r} has the shape {_shape(found)}, expected {_shape(expected)}")
-        return takes
-
     def _self_test(self) -> float:
         """The largest difference from the stored outputs; ValueError where it is above `TOLERANCE`."""
         test = self.metadata.self_test
@@ -190,42 +139,6 @@ class Model:
         if not difference <= TOLERANCE:
             raise ValueError(f"self-test: {difference:.3g} from the stored outputs, expected {TOLERANCE} at most")
         return difference
-
-
-def _threshold(calibration: Mapping[str, Any]) -> float:
-    """The confidence from which an answer is published: the calibration's `threshold`, else 0.5."""
-    value = calibration.get("threshold", 0.5)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
-        raise ValueError(f"metadata 'calibration': threshold: expected a number from 0 to 1, found {value!r}")
-    return float(value)
-
-
-def _open_session(data: bytes) -> Any:
-    # Its Linux builds send telemetry otherwise, and only the environment before the import stops all of it.
-    os.environ["ORT_DISABLE_TELEMETRY"] = "1"
-    import onnxruntime
-
-    onnxruntime.set_default_logger_severity(4)  # what is wrong comes as an exception; stderr is for the log
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    options.inter_op_num_threads = 1
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idling burns cores otherwise
-    options.enable_mem_reuse = False  # planning it is slow, and makes no run faster or smaller
-    options.log_severity_level = 4
-    try:
-        return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"], enable_fallback=0)
-    except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
-        raise ValueError(f"onnxruntime cannot open it: {_brief(error)}") from error
-
-
-def _brief(error: BaseException) -> str:
-    text = " ".join(str(error).split()) or type(error).__name__
-    text = re.sub(r"^\[ONNXRuntimeError\] : \d+ : ", "", text)
-    return text if len(text) <= 200 else text[:197] + "..."
-
-
-def _shape(dimensions: Sequence[int | None]) -> str:
-    return "(" + ", ".join("any" if d is None else str(d) for d in dimensions) + ")"
 
 
 def shipped() -> dict[str, Path]:

@@ -2,7 +2,7 @@
 
 A graph of some kilobytes can ask onnxruntime for hours, for all memory, or for what crashes it; and a run that does
 not return cannot be ended from within a process. So a file that nobody has vouched for is opened, tested, and as a
-candidate also run, by `model_worker` in a child that has bounds for memory and for time.
+candidate also run, by `worker` in a child that has bounds for memory and for time.
 
 The protocol: the parent writes messages: 8 bytes of length, a byte of seconds that the answer may take, the content.
 The first content is the model file, each other a segment (`numpy.savez`). The child answers each with one line of JSON.
@@ -28,7 +28,7 @@ from gestured.core.frames import Segment
 from gestured.core.recognizer import Scores
 
 OPEN_S = 8  # s to start, to open a model and to test it; half a second is usual, and an operator's client waits for 20
-CHILD_RUN_S = 5  # s for a segment, after which the child ends; what can be ended otherwise is ended after models.RUN_S
+CHILD_RUN_S = 5  # s for a segment, after which the child ends; what can be ended otherwise is ended after model.RUN_S
 MAX_ANSWER = 16 << 20  # bytes of a line; a report holds some of the metadata, which are bounded
 # The folders of our own interpreter, wherever we were started, and nothing from the environment or the current folder.
 START = "import sys; sys.path[:] = sys.argv[1:]; from gestured.model.worker import main; main()"

@@ -1,4 +1,4 @@
-"""The child of `model_process`: opens a model and runs it, within bounds, and answers in lines of JSON."""
+"""The child of `process`: opens a model and runs it, within bounds, and answers in lines of JSON."""
 
 import io
 import json

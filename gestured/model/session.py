@@ -1,0 +1,96 @@
+"""A model's graph, opened and run by onnxruntime. But for the lab nothing else imports that."""
+
+import os
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.model.limit import limited
+from gestured.model.metadata import Metadata
+
+FATAL = 4  # onnxruntime's severity below which it logs nothing
+LONGEST = 200  # characters of its errors that are repeated
+
+
+class Session:
+    """One graph; its inputs and outputs by name."""
+
+    def __init__(self, data: bytes) -> None:
+        """Opens a file's bytes. ValueError where onnxruntime cannot."""
+        # Its Linux builds send telemetry otherwise, and only the environment before the import stops all of it.
+        os.environ["ORT_DISABLE_TELEMETRY"] = "1"
+        import onnxruntime
+
+        onnxruntime.set_default_logger_severity(FATAL)  # what is wrong comes as an exception; stderr is for the log
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        options.inter_op_num_threads = 1
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idling burns cores otherwise
+        options.enable_mem_reuse = False  # planning it is slow, and makes no run faster or smaller
+        options.log_severity_level = FATAL
+        try:
+            self._session: Any = onnxruntime.InferenceSession(
+                data, options, providers=["CPUExecutionProvider"], enable_fallback=0
+            )
+        except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
+            raise ValueError(f"onnxruntime cannot open it: {_brief(error)}") from error
+        self.outputs: list[str] = [output.name for output in self._session.get_outputs()]
+
+    def check(self, metadata: Metadata) -> str:
+        """The input's name, once names, types and shapes agree with the metadata; ValueError where they do not."""
+        inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
+        names = [i.name for i in inputs]
+        takes = "frames" if metadata.features is None else "features"
+        if names != [takes]:
+            raise ValueError(f"has inputs {names}, expected ['{takes}'] as its metadata say")
+        if self.outputs not in (["scores", "unknown"], ["scores", "unknown", "embedding"]):
+            raise ValueError(f"has outputs {self.outputs}, expected 'scores', 'unknown' and perhaps 'embedding'")
+        count = len(metadata.gestures)
+        own: tuple[int, ...] = (metadata.rows, metadata.columns)
+        if metadata.features is not None:
+            own = (len(metadata.features),)
+        free = 1 if takes == "features" else 2  # the dimensions that must be open: B, or B and T
+        shapes = {takes: (None,) * free + own, "scores": (None, count), "unknown": (None,), "embedding": (None, None)}
+        for value in (*inputs, *outputs):
+            expected = shapes[value.name]
+            if value.type != "tensor(float)":
+                raise ValueError(f"{value.name!r} is {value.type}, expected tensor(float)")
+            # What the file leaves open is a name or None; outputs are held to their size when it runs.
+            loose = value.name != takes
+            found = [d if isinstance(d, int) else None for d in value.shape]
+            if len(found) != len(expected) or not all(
+                f == e or (loose and (f is None or e is None)) for f, e in zip(found, expected, strict=True)
+            ):
+                raise ValueError(f"{value.name!r} has the shape {_shape(found)}, expected {_shape(expected)}")
+        return takes
+
+    def run(
+        self, names: Sequence[str], inputs: Mapping[str, NDArray[np.float32]], limit_s: float
+    ) -> list[NDArray[np.float32]]:
+        """The graph's outputs of these names; ValueError where it fails, or takes longer than `limit_s`."""
+        import onnxruntime
+
+        options = onnxruntime.RunOptions()
+        options.log_severity_level = FATAL
+        try:
+            with limited(options, limit_s):
+                found: list[NDArray[np.float32]] = self._session.run(names, inputs, options)
+        except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
+            if options.terminate:
+                raise ValueError(f"was ended after {limit_s:g} s, in which it did not answer") from error
+            raise ValueError(f"onnxruntime cannot run it: {_brief(error)}") from error
+        return found
+
+
+def _brief(error: BaseException) -> str:
+    """What onnxruntime says, in one line of at most LONGEST characters."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    text = re.sub(r"^\[ONNXRuntimeError\] : \d+ : ", "", text)
+    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+
+
+def _shape(dimensions: Sequence[int | None]) -> str:
+    return "(" + ", ".join("any" if d is None else str(d) for d in dimensions) + ")"
