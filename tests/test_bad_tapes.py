@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from gestured.control.cli import main
-from gestured.record import tape
+from gestured.record import tape_reader
 from tests.opening import in_bounds, refused
 
 pytest.importorskip("mcap", reason="recordings need the extra [record]")
@@ -78,7 +78,7 @@ def events(path: Path, *lines: object) -> Path:
 @pytest.mark.parametrize("written", ["[fd00::7]:5", "fd00::7:5"])
 def test_a_sender_is_known_with_brackets_and_without(tmp_path: Path, written: str) -> None:
     path = write(tmp_path / "a.mcap", channel(1, "/gestured/packets", source=written), message(1, 10**9, b""))
-    assert tape.read(path).packets[0].source == ("fd00::7", 5)
+    assert tape_reader.read(path).packets[0].source == ("fd00::7", 5)
 
 
 @pytest.mark.parametrize("number", [1, 3], ids=["packets", "pictures"])
@@ -106,7 +106,7 @@ def test_a_chunk_unpacks_to_what_it_says(tmp_path: Path, compression: str, says:
     data = bytes(1 << 29) if compression else bytes(1 << 16)
     path = write(tmp_path / "a.mcap", chunk(packed(data, compression) if compression else data, compression, says))
     _, mib = in_bounds("mcap", path, MIB)
-    found = tape.read(path)
+    found = tape_reader.read(path)
     assert mib < 64 and not found.whole and not found.packets
 
 
@@ -132,7 +132,7 @@ def test_records_that_lie_about_their_sizes_end_what_is_read(tmp_path: Path, ins
         file.write(START + CHANNELS + PACKET + inside)
         file.truncate(8 << 30)  # whoever believes a size finds that much
     _, mib = in_bounds("mcap", path, MIB)
-    found = tape.read(path)
+    found = tape_reader.read(path)
     assert mib < 64 and not found.whole and len(found.packets) == 1
 
 
@@ -202,7 +202,7 @@ def test_sensors_are_as_many_as_the_daemon_would_have_taken(tmp_path: Path) -> N
     from tests import encoding
 
     packets = [message(1, k * 10**7, encoding.message(f"/s{k}/pressure", "b", [bytes(81)])) for k in range(1000)]
-    found = tape.read(write(tmp_path / "a.mcap", CHANNELS, *packets))
+    found = tape_reader.read(write(tmp_path / "a.mcap", CHANNELS, *packets))
     replay = Replay(found, maker(found.scene).scene, Mute(["one_tap"]))
     list(replay.events())
     assert len(replay.played) == 64

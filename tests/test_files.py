@@ -9,7 +9,7 @@ import pytest
 
 from gestured.core.errors import RecordingError
 from gestured.record import arrays as recording
-from gestured.record import tape
+from gestured.record import tape_writer
 from gestured.record.files import PUBLIC, atomic_write, open_regular
 from tests.small_recording import example, session
 
@@ -83,7 +83,7 @@ def test_a_recording_is_not_written_through_a_planted_link(tmp_path: Path) -> No
 def test_recordings_and_tapes_are_their_owners_alone(tmp_path: Path) -> None:
     pytest.importorskip("mcap", reason="recordings need the extra [record]")
     recording.write(tmp_path / "07.npz", session())
-    with tape.Writer(tmp_path / "a.mcap", {}, 1 << 20):
+    with tape_writer.Writer(tmp_path / "a.mcap", {}, 1 << 20):
         assert mode(tmp_path / "a.mcap") == 0o600
     assert mode(tmp_path / "07.npz") == 0o600
 
@@ -92,7 +92,7 @@ def test_a_tape_is_not_written_through_a_link(tmp_path: Path) -> None:
     pytest.importorskip("mcap", reason="recordings need the extra [record]")
     (tmp_path / "a.mcap").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(RecordingError, match=r"a\.mcap: cannot be made"):
-        tape.Writer(tmp_path / "a.mcap", {}, 1 << 20)
+        tape_writer.Writer(tmp_path / "a.mcap", {}, 1 << 20)
     assert not (tmp_path / "elsewhere").exists()
 
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from gestured.core.facts import Taken
 from gestured.core.hub import Hub
 from gestured.record.replay import Mute, maker
-from gestured.record.tape import Tape, read
+from gestured.record.tape import Tape
+from gestured.record.tape_reader import read
 
 STOPS = (
     "00204d",

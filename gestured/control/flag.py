@@ -11,7 +11,8 @@ from gestured.client.lines import Unreachable
 from gestured.client.say import tell
 from gestured.control.address import add_sockets, connect
 from gestured.control.record import Keeper
-from gestured.record.tape import Writer, library
+from gestured.record.tape import library
+from gestured.record.tape_writer import Writer
 
 LIMIT_BYTES = 2 << 30  # more than the ring may hold
 

@@ -17,7 +17,8 @@ from gestured.client.say import say, say_json
 from gestured.control.address import add_sockets, connect, finish_on_signals
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
-from gestured.record.tape import Writer, library
+from gestured.record.tape import library
+from gestured.record.tape_writer import Writer
 
 FLUSH_S = 1.0  # what a crash or a power cut costs
 WAITING_LINES = 50_000  # lines; the daemon counts what finds no room

@@ -20,7 +20,8 @@ from gestured.core.recognizer import Classifier, Decided, Scores
 from gestured.core.scene import Scene, Setup
 from gestured.core.timing import Timing
 from gestured.core.wire import Addresses
-from gestured.record.tape import Tape, read
+from gestured.record.tape import Tape
+from gestured.record.tape_reader import read
 
 SENSORS = 4096  # that a daemon's settings allow, at most
 MAX_SENSORS = 64  # where a tape does not say

@@ -22,7 +22,7 @@ from gestured.control.sight import Sight
 from gestured.core.errors import RecordingError
 from gestured.core.wire import Addresses, is_sensor
 from gestured.record import arrays as recording
-from gestured.record import tape
+from gestured.record import tape_reader, tape_writer
 from tests.control.conftest import HELLO, ROOT, FakeDaemon, gestures
 from tests.control.test_listen import GESTURE
 from tests.daemon.harness import Hand, floats
@@ -294,8 +294,8 @@ def test_an_error_about_a_file_is_one_line(run, tmp_path: Path) -> None:
 def test_replay_shows_what_was_recorded(recorded, run, daemon, tmp_path: Path) -> None:
     pytest.importorskip("mcap", reason="recordings need the extra [record]")
     path, _ = recorded(gestures(daemon, "tape", "left", "tap"))
-    found = tape.read(path)
-    with tape.Writer(tmp_path / "hostile.mcap", found.scene, 1 << 30) as writer:
+    found = tape_reader.read(path)
+    with tape_writer.Writer(tmp_path / "hostile.mcap", found.scene, 1 << 30) as writer:
         for packet in found.packets:
             writer.packet(packet.t_ns, f"{packet.source[0]}:{packet.source[1]}", packet.data)
         for event in found.events:

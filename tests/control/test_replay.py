@@ -11,7 +11,7 @@ import pytest
 
 from gestured.control.cli import main
 from gestured.record import arrays as recording
-from gestured.record import tape
+from gestured.record import tape_reader
 from gestured.record.recordings import Recordings
 from tests.control.conftest import gestures
 from tests.daemon import tiny_model
@@ -211,7 +211,7 @@ def test_what_was_said_before_an_answer_is_on_the_tape_and_can_be_said_again(sta
     plain.events("release", "arm", 2)
     recorder.send_signal(signal.SIGINT)
     assert recorder.wait(30) == daemon.stop() == 0
-    events = tape.read(path).events
+    events = tape_reader.read(path).events
     assert [event["id"] for event in events if event["type"] == "provisional"] == [1]
     answers = [event["provisional"] for event in events if event["type"] == "gesture"]
     assert answers == ["confirmed", None, None]

@@ -15,7 +15,7 @@ from gestured.control.cli import main
 from gestured.control.diff import Answer, Difference, differences
 from gestured.core.errors import RecordingError
 from gestured.record import arrays as recording
-from gestured.record import tape
+from gestured.record import tape_reader, tape_writer
 from tests.control.conftest import gestures
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor
@@ -35,7 +35,7 @@ def test_a_recording_holds_every_packet_and_replays_to_the_same_events(recorded,
         patch.setattr(Sensor, "packet", packet)
         path, said = recorded(gestures(daemon, "rec", "left", "tap", "up"))
     assert json.loads(said) == {"file": str(path), "packets": len(sent), "events": 9, "lost": 0, "ended": "as asked"}
-    found = tape.read(path)
+    found = tape_reader.read(path)
     assert found.whole and [p.data for p in found.packets] == sent
     assert found.scene["model"]["name"] == "tiny" and found.scene["settings"]["clock"] == "sensor"
     names = [e["gesture"] for e in found.events if e["type"] == "gesture"]
@@ -70,23 +70,23 @@ def test_a_killed_recorder_leaves_what_was_flushed(start, daemon: Daemon, tmp_pa
     recorder = start("record", path, "--control", daemon.ready["control"])
     assert b"recording into" in recorder.stderr.readline()
     gestures(daemon, "kill", "left")()
-    while "swipe_left" not in {e.get("gesture") for e in tape.read(path).events}:
+    while "swipe_left" not in {e.get("gesture") for e in tape_reader.read(path).events}:
         pass  # a reader sees what was flushed, while it is being written
     recorder.kill()
     recorder.wait(30)
-    found = tape.read(path)
+    found = tape_reader.read(path)
     assert not found.whole and "swipe_left" in {e.get("gesture") for e in found.events}
 
 
 def test_whatever_is_cut_off_the_rest_is_read(recorded, daemon: Daemon, tmp_path: Path) -> None:
     path, _ = recorded(gestures(daemon, "cut", "left"))
-    data, whole = path.read_bytes(), tape.read(path)
+    data, whole = path.read_bytes(), tape_reader.read(path)
     short = tmp_path / "short.mcap"
     read = []
     for size in range(0, len(data), 97):
         short.write_bytes(data[:size])
         try:
-            found = tape.read(short)
+            found = tape_reader.read(short)
         except RecordingError as error:
             assert str(short) in str(error)
             continue
@@ -100,7 +100,7 @@ def test_whatever_is_cut_off_the_rest_is_read(recorded, daemon: Daemon, tmp_path
             damaged[at] = random.integers(256)
         short.write_bytes(damaged)
         try:
-            tape.read(short)
+            tape_reader.read(short)
         except RecordingError as error:
             assert str(short) in str(error)
 
@@ -123,7 +123,7 @@ def test_a_recording_ends_at_its_size_and_never_replaces_a_file(run, start, floo
             sender.send(os.urandom(8000))  # nonsense is recorded, too
     summary = json.loads(recorder.communicate()[0])
     assert summary["ended"] == "the file is as large as it may be"
-    assert path.stat().st_size < 1.5 * (1 << 20) and tape.read(path).whole
+    assert path.stat().st_size < 1.5 * (1 << 20) and tape_reader.read(path).whole
     status, _, err = run("record", path, "--control", flooded.ready["control"])
     assert status == 1 and str(path) in err and "File exists" in err
 
@@ -138,7 +138,7 @@ def test_a_recording_whose_daemon_goes_is_good_and_says_so(start, tmp_path: Path
     assert daemon.stop() == 0
     _, err = recorder.communicate(timeout=30)
     assert recorder.returncode == 1 and b"the daemon closed the connection" in err
-    found = tape.read(path)
+    found = tape_reader.read(path)
     assert found.whole and "swipe_left" in {e.get("gesture") for e in found.events}
 
 
@@ -146,7 +146,7 @@ def test_flag_keeps_the_flight_recorder(ctl, run, daemon: Daemon, tmp_path: Path
     gestures(daemon, "flag", "left")()
     path = tmp_path / "wrong.mcap"
     status, out, _ = ctl("flag", path, "--note", "it was a tap")
-    found = tape.read(path)
+    found = tape_reader.read(path)
     assert status == 0 and f"{path}: {len(found.packets)} packets" in out
     assert found.scene["note"] == "it was a tap" and len(found.scene["model"]["sha256"]) == 64
     assert "swipe_left" in {e.get("gesture") for e in found.events}
@@ -189,7 +189,7 @@ def test_a_scene_that_says_something_else_is_one_sentence(capsys, tmp_path: Path
     }
     for name, content, status in (("good", scene, 0), ("bad", scene | {key: value}, 1)):
         path = tmp_path / f"{name}.mcap"
-        with tape.Writer(path, content, 1 << 20) as writer:
+        with tape_writer.Writer(path, content, 1 << 20) as writer:
             writer.packet(10**18, "127.0.0.1:5", b"rubbish!")
         assert main(["replay", str(path), "--model", str(model)]) == status
         out, err = capsys.readouterr()
@@ -250,7 +250,7 @@ def test_an_export_for_ros_2_is_read_by_a_library_that_knows_nothing_of_ours(rec
     assert (status, err) == (0, "")
     assert json.loads(said) == {"file": str(out), "sessions": ["ros"], "frames": len(sent), "events": 2}
     types = get_typestore(Stores.ROS2_HUMBLE)
-    known = {event["gesture"]: event for event in tape.read(path).events if event["type"] == "gesture"}
+    known = {event["gesture"]: event for event in tape_reader.read(path).events if event["type"] == "gesture"}
     images, texts, times = [], [], []
     with rosbags.Reader(out) as reader:
         assert {(c.topic, c.msgtype) for c in reader.connections} == {

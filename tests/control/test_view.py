@@ -15,7 +15,7 @@ import pytest
 
 from gestured.control.view.server import BODY_BYTES, FILES, PAGE
 from gestured.core.address import Address
-from gestured.record.tape import read
+from gestured.record.tape_reader import read
 from tests.control.browser import PROGRAM, Browser
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor

@@ -17,7 +17,7 @@ from gestured.core.hub import FORGET_S, Hub
 from gestured.core.recognizer import Scores
 from gestured.core.scene import Scene, Setup
 from gestured.lab.recordings.live import LiveSensor
-from gestured.record import tape
+from gestured.record import tape_reader, tape_writer
 from gestured.record.replay import Replay, maker
 from tests.daemon.harness import Frame, Hand, floats
 
@@ -82,7 +82,7 @@ def write(path: Path, arrived: list[Arrived], **settings: object) -> Path:
             "addresses": {"pressure": "/{sensor}/pressure", "trajectory": "/{sensor}/trajectory"},
         } | settings,
     }  # fmt: skip
-    with tape.Writer(path, told, 1 << 30) as writer:
+    with tape_writer.Writer(path, told, 1 << 30) as writer:
         for t, packet, source in sorted(arrived):
             writer.packet(round((t + 1e9) * 1e9), f"{source[0]}:{source[1]}", packet)
     return path
@@ -106,7 +106,7 @@ def test_a_replay_knows_who_may_send_and_how_many(tmp_path: Path) -> None:
         ({"max_sensors": 2, "sensors": {"door": {}}}, {"arm", "door"}),
     ):
         path = write(tmp_path / f"{len(sensors)}{len(settings)}.mcap", arrived, **settings)
-        found = tape.read(path)
+        found = tape_reader.read(path)
         replay = Replay(found, maker(found.scene).scene, Sure())
         list(replay.events())
         assert set(replay.played) == sensors

@@ -26,14 +26,14 @@ def _npz(folder: Path) -> list[bytes]:
 
 def _mcap(folder: Path) -> list[bytes]:
     pytest.importorskip("mcap", reason="recordings need the extra [record]")
-    from gestured.record import tape
+    from gestured.record import tape_writer
     from tests import encoding
     from tests import test_bad_tapes as tapes
 
     path = folder / "seed.mcap"
     packets = [encoding.message("/arm/pressure", "b", [bytes(81 * [k % 3])]) for k in range(8)]
     scene = tapes.SCENE | {"settings": tapes.SETTINGS | {"sensors": {"leg": {"rotate": 90, "clock": "sensor"}}}}
-    with tape.Writer(path, scene, 1 << 20) as writer:
+    with tape_writer.Writer(path, scene, 1 << 20) as writer:
         for k, packet in enumerate(packets):
             writer.packet(10**18 + k * 10**8, "127.0.0.1:5", packet)
         writer.event(10**18, tapes.ONSET | {"onset": 1e9})

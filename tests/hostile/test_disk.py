@@ -12,7 +12,7 @@ import pytest
 
 from gestured.core.errors import RecordingError
 from gestured.record import arrays as recording
-from gestured.record import tape
+from gestured.record import tape_reader, tape_writer
 from tests.daemon.harness import Sensor
 from tests.small_recording import example
 
@@ -43,7 +43,7 @@ def test_a_disk_that_is_full_ends_a_recording_with_a_sentence_and_costs_the_daem
     _, said = recorder.communicate()
     assert recorder.returncode == 1
     assert len(said.splitlines()) == 1 and str(path) in said and os.strerror(errno.EFBIG) in said
-    found = tape.read(path)
+    found = tape_reader.read(path)
     assert not found.whole and found.packets  # good up to there
     sensor.perform("left")
     assert client.line()["gesture"] == "swipe_left"
@@ -53,13 +53,13 @@ def test_a_disk_that_is_full_ends_a_recording_with_a_sentence_and_costs_the_daem
 def test_a_tape_whose_disk_fails_says_so_and_is_closed(tmp_path: Path, monkeypatch, number: int) -> None:
     pytest.importorskip("mcap", reason="recordings need the extra [record]")
     path = tmp_path / "a.mcap"
-    with pytest.raises(RecordingError, match=os.strerror(number)), tape.Writer(path, SCENE, 1 << 30) as writer:
+    with pytest.raises(RecordingError, match=os.strerror(number)), tape_writer.Writer(path, SCENE, 1 << 30) as writer:
         writer.packet(1, "127.0.0.1:1", b"one")
         writer.flush()
         writer.packet(2, "127.0.0.1:1", b"two")
         monkeypatch.setattr(os, "fsync", refuses(number))
         writer.flush()
-    assert tape.read(path).packets[0].data == b"one"
+    assert tape_reader.read(path).packets[0].data == b"one"
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
@@ -79,4 +79,4 @@ def test_a_place_where_nothing_can_be_written_is_named(tmp_path: Path) -> None:
         recording.write(place, example())
     with pytest.raises(RecordingError, match="cannot be made"):
         pytest.importorskip("mcap", reason="recordings need the extra [record]")
-        tape.Writer(place, SCENE, 1 << 20)
+        tape_writer.Writer(place, SCENE, 1 << 20)

@@ -1,0 +1,151 @@
+"""A tape that is read; the file may be cut off, damaged or hostile."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gestured.core.address import Address
+from gestured.core.errors import RecordingError
+from gestured.record.files import open_regular
+from gestured.record.mcap import CHANNEL, MESSAGE, METADATA, Budget, CutOff, Damaged, Fields, TooLarge, records
+from gestured.record.tape import EVENT_SCHEMA, EVENTS, PACKETS, SCENE, Packet, Tape, library
+
+TEXT_BYTES = 8 << 20  # of one channel or metadata record that is read; a scene may hold a user's own gestures
+ITEM_COSTS = 250  # bytes of memory for a packet or an event, besides what it holds
+EVENT_COSTS = 24  # bytes of memory for a byte of JSON, where it is all empty lists
+NOBODY = Address("", 0)  # the source of a channel that holds no packets
+HOST_CHARACTERS = 255  # of a sender's name; the DNS allows no more
+LARGEST_NUMBER = 1e11  # of any number in an event; as seconds since 1970 it is a date that Python can print
+FORMS: dict[str, str] = {key: form["type"] for key, form in EVENT_SCHEMA["properties"].items()}
+# What an event of a type says at least.
+NEEDED = {
+    "onset": ("sensor", "id", "onset"),
+    "provisional": ("sensor", "id", "gesture", "confidence", "onset", "decided"),
+    "gesture": ("sensor", "id", "gesture", "confidence", "onset", "offset"),
+    "unknown": ("sensor", "id", "confidence", "onset", "offset"),
+    "cancelled": ("sensor", "id", "reason"),
+    "release": ("sensor", "id"),
+}
+
+
+def read(path: str | Path) -> Tape:
+    """Read a file, as far as it is good. Raises RecordingError for what is no tape, and for what wants to be larger."""
+    library()
+    reading = _Reading()
+    whole = True
+    try:
+        with open_regular(path) as file:
+            budget = Budget(file)
+            for opcode, content in records(file, budget):
+                reading.take(opcode, content, budget)
+    except CutOff:
+        whole = False
+    except Damaged as error:
+        if reading.scene is None:
+            raise RecordingError(f"{path}: is no recording of gesturectl (MCAP): {error}") from error
+        whole = False
+    except (_Wrong, TooLarge) as error:
+        raise RecordingError(f"{path}: {error}") from error
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
+    if reading.scene is None:
+        raise RecordingError(f"{path}: has no metadata {SCENE!r}, expected a recording of gesturectl (MCAP)")
+    return Tape(reading.scene, tuple(reading.packets), tuple(reading.events), whole)
+
+
+class _Wrong(Exception):
+    """What a tape says that no tape of ours does."""
+
+
+class _Reading:
+    """What was found so far."""
+
+    def __init__(self) -> None:
+        self.scene: Mapping[str, Any] | None = None
+        self.packets: list[Packet] = []
+        self.events: list[Mapping[str, Any]] = []
+        self._channels: dict[int, tuple[str, Address]] = {}  # topic, "" where we do not know it; source
+
+    def take(self, opcode: int, content: bytes, budget: Budget) -> None:
+        """One record; what we do not know is passed over."""
+        if opcode == MESSAGE:
+            self._message(content, budget)
+        elif opcode in (CHANNEL, METADATA):
+            if len(content) > TEXT_BYTES:
+                raise Damaged(f"a channel or metadata of {len(content)} bytes, expected at most {TEXT_BYTES}")
+            fields = Fields(content)
+            if opcode == CHANNEL:
+                self._channel(fields)
+            elif fields.text() == SCENE:
+                self.scene = _scene(fields.pairs())
+
+    def _channel(self, fields: Fields) -> None:
+        number, _ = fields.take("<HH")
+        topic, _ = fields.text(), fields.text()
+        topic = topic if topic in (PACKETS, EVENTS) else ""
+        source = fields.pairs().get("source") if topic == PACKETS else None
+        self._channels[number] = topic, NOBODY if source is None else _source(source)
+
+    def _message(self, content: bytes, budget: Budget) -> None:
+        fields = Fields(content)
+        number, _, t_ns, _ = fields.take("<HIQQ")
+        if number not in self._channels:
+            raise Damaged(f"a message of channel {number}, which there is not")
+        topic, source = self._channels[number]
+        data = fields.rest() if topic else b""
+        if topic == PACKETS:
+            budget.keep(ITEM_COSTS + len(data))
+            self.packets.append(Packet(t_ns, source, data))
+        elif topic == EVENTS:
+            budget.keep(ITEM_COSTS + EVENT_COSTS * len(data))
+            self.events.append(_event(data, len(self.events) + 1))
+
+
+def _scene(metadata: Mapping[str, str]) -> Mapping[str, Any]:
+    try:
+        found = json.loads(metadata["json"])
+    except (KeyError, ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        raise _Wrong(f"metadata {SCENE!r}: expected a JSON object, as gesturectl record writes it")
+    return found
+
+
+def _event(line: bytes, number: int) -> Mapping[str, Any]:
+    """A line of the event stream, held against what is asked of events later; what it says besides is left alone."""
+    try:
+        event = json.loads(line)
+    except (ValueError, RecursionError):
+        event = None
+    if not isinstance(event, dict):
+        raise _Wrong(f"event {number}: expected a JSON object")
+    needed = ("type", *NEEDED.get(str(event.get("type")), ()))
+    for key, form in FORMS.items():
+        if (key in event or key in needed) and not _right(form, event.get(key)):
+            raise _Wrong(f"event {number}: expected {key} to be of the type {form}, found {_brief(event.get(key))}")
+    return event
+
+
+def _right(form: str, value: object) -> bool:
+    if form == "string":
+        return isinstance(value, str)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= LARGEST_NUMBER and (form == "number" or isinstance(value, int))  # so NaN is none
+
+
+def _brief(value: object) -> str:
+    return repr(value)[:40]
+
+
+def _source(text: str) -> Address:
+    host, _, port = text.rpartition(":")
+    if ":" in host and not host.startswith("["):  # as it stands in tapes of before 0.1.0
+        text = f"[{host}]:{port}"
+    try:
+        if len(host) <= HOST_CHARACTERS:
+            return Address.parse(text)
+    except ValueError:
+        pass
+    raise Damaged(f"a source {text[:40]!r}, expected HOST:PORT")
