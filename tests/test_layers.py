@@ -18,7 +18,7 @@ ONLY_IN = {
     "onnxruntime": {"gestured/model/session.py"},
     "mcap": {"gestured/record/tape.py"},
     "pythonosc": {"gestured/client/osc_out.py"},
-    "prometheus_client": {"gestured/daemon/metrics.py", "gestured/daemon/http.py", "gestured/bridge/counts.py"},
+    "prometheus_client": {"gestured/daemon/exposition.py", "gestured/bridge/counts.py"},
     "aiomqtt": {"gestured/bridge/broker.py"},
     "paho": {"gestured/bridge/broker.py"},
     "zenoh": {"gestured/bridge/zenoh_session.py"},

@@ -11,6 +11,7 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 
+from gestured.daemon.exposition import exposition
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.snapshot import Snapshot
 from gestured.daemon.sockets import AddressError
@@ -38,13 +39,13 @@ def as_json(status: int, body: Mapping[str, object]) -> Response:
 def serve_pages(sock: socket.socket, snapshot: Callable[[], Snapshot], metrics: Metrics) -> "HttpThread":
     """Serve the daemon's pages on a listening socket; each request takes a snapshot of its own."""
 
-    def exposition() -> Response:
-        return 200, "text/plain; version=0.0.4; charset=utf-8", metrics.exposition(snapshot())
+    def counted() -> Response:
+        return 200, "text/plain; version=0.0.4; charset=utf-8", exposition(metrics, snapshot())
 
     return HttpThread(
         sock,
         {
-            "/metrics": exposition,
+            "/metrics": counted,
             "/healthz": lambda: as_json(*snapshot().healthz()),
             "/readyz": lambda: as_json(*snapshot().readyz()),
         },

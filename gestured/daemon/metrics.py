@@ -1,27 +1,21 @@
-"""What is counted.
+"""What is counted: plain integers, whether or not anybody asks for them.
 
-Plain integers, always; prometheus_client only formats them, and only where `--metrics` is set.
-
-The loop's thread counts, the HTTP thread reads copies. The number of series is bounded whatever arrives:
-labels that a peer can choose (sensors) are folded together after the first few.
+The loop's thread counts, the HTTP thread reads copies (exposition.py). The number of series is bounded whatever
+arrives: labels that a peer can choose (sensors) are folded together after the first few.
 """
 
 import time
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
 
-from gestured import __version__
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
-from gestured.core.reading import STATES, Reading
-from gestured.daemon.snapshot import Snapshot
 
 # At most 200 series, whatever arrives; a test counts them.
 NAMED_SENSORS = 8  # further sensors are counted together as "other"
 NAMED_MODELS = 3
 NAMED_GESTURES = 12
 OTHER = "other"
+# Upper bounds of histograms' buckets. A segment takes some milliseconds; an answer waits at least `release_s`.
 INFERENCE_S = (0.0005, 0.001, 0.005, 0.025, 0.1)
 LATENCY_S = (0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0)
 LEAD_S = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0)
@@ -139,116 +133,3 @@ class Metrics:
             self._named.add(sensor)
             return sensor
         return OTHER
-
-    def exposition(self, snapshot: Snapshot) -> bytes:
-        """Everything in the Prometheus text format; imports prometheus_client."""
-        from prometheus_client import CollectorRegistry, generate_latest
-
-        registry = CollectorRegistry()
-        registry.register(_Collector(self, snapshot))
-        return generate_latest(registry)
-
-
-@dataclass(frozen=True, slots=True)
-class Gauges:
-    """What the metrics show of one sensor, or of several together."""
-
-    state: str
-    rate_hz: float
-    jitter_s: float
-    bad_taxels: int
-    drift: float
-
-
-def by_label(readings: Mapping[str, Reading], label_of: Callable[[str], str]) -> dict[str, Gauges]:
-    """Readings by sensor -> by label. Where several sensors share one: the worst of each, and all bad taxels."""
-    found: dict[str, list[Reading]] = {}
-    for sensor, reading in readings.items():
-        found.setdefault(label_of(sensor), []).append(reading)
-    return {
-        label: Gauges(
-            max((r.state for r in each), key=STATES.index),
-            min(r.rate_hz for r in each),
-            max(r.jitter_s for r in each),
-            sum(r.bad_taxels for r in each),
-            max(r.drift for r in each),
-        )
-        for label, each in found.items()
-    }
-
-
-_OF_SENSORS: tuple[tuple[str, str, Callable[[Gauges], float]], ...] = (
-    ("gestured_sensor_rate_hertz", "Frames a second", lambda r: r.rate_hz),
-    ("gestured_sensor_jitter_seconds", "Interarrival jitter of packets", lambda r: r.jitter_s),
-    ("gestured_sensor_bad_taxels", "Taxels that are bridged from their neighbours", lambda r: r.bad_taxels),
-    (
-        "gestured_sensor_drift_ratio",
-        "How far the baseline has gone, in units of noise",
-        lambda r: r.drift,
-    ),
-)
-
-
-_OF_THE_DAEMON: tuple[tuple[str, str, Callable[[Snapshot], float]], ...] = (
-    ("gestured_sensors", "Sensors that were heard", lambda s: sum(r.source is not None for r in s.sensors.values())),
-    ("gestured_clients", "Clients of the event socket", lambda s: s.clients),
-    ("gestured_backlog_bytes", "Bytes that wait for slow clients", lambda s: s.backlog_bytes),
-    ("gestured_kernel_drops_total", "Packets that found no room", lambda s: s.kernel_drops),
-    ("gestured_loop_lag_seconds", "How late the event loop is", lambda s: s.loop_lag_s),
-    ("gestured_model_rung", "How far down the ladder stands what answers", lambda s: s.models.rung),
-    ("gestured_model_failures_total", "Models put aside since the last reload", lambda s: s.models.failures),
-    ("gestured_start_time_seconds", "When the daemon started", lambda s: s.started),
-)
-
-
-class _Collector:
-    def __init__(self, metrics: Metrics, snapshot: Snapshot) -> None:
-        self._metrics, self._snapshot = metrics, snapshot
-
-    def collect(self) -> Iterator[Any]:
-        from prometheus_client.core import (
-            CounterMetricFamily,
-            GaugeMetricFamily,
-            HistogramMetricFamily,
-            InfoMetricFamily,
-        )
-
-        for metric in vars(self._metrics).values():
-            if isinstance(metric, Counter):
-                counter = CounterMetricFamily(metric.name, metric.text, labels=metric.labels)
-                values = dict(metric.values)
-                for labels, value in (values or ({(): 0} if not metric.labels else {})).items():
-                    counter.add_metric(labels, value)
-                yield counter
-            elif isinstance(metric, Histogram):
-                histogram = HistogramMetricFamily(metric.name, metric.text, labels=metric.labels)
-                empty = ([0] * (len(metric.bounds) + 1), [0.0])
-                for labels, (buckets, total) in (dict(metric.values) or ({} if metric.labels else {(): empty})).items():
-                    bounds = [*map(str, metric.bounds), "+Inf"]
-                    cumulated = [sum(buckets[: i + 1]) for i in range(len(buckets))]
-                    histogram.add_metric(labels, list(zip(bounds, cumulated, strict=True)), sum_value=total[0])
-                yield histogram
-        snapshot = self._snapshot
-        for name, text, read in _OF_THE_DAEMON:
-            if name.endswith("_total"):
-                yield CounterMetricFamily(name.removesuffix("_total"), text, value=read(snapshot))
-            else:
-                yield GaugeMetricFamily(name, text, value=read(snapshot))
-        readings = by_label(snapshot.sensors, self._metrics.sensor_label)
-        for name, text, value_of in _OF_SENSORS:
-            family = GaugeMetricFamily(name, text, labels=["sensor"])
-            for sensor, reading in readings.items():
-                family.add_metric([sensor], value_of(reading))
-            yield family
-        state = GaugeMetricFamily("gestured_sensor_state", "1 for the state of a sensor", labels=["sensor", "state"])
-        for sensor, reading in readings.items():
-            state.add_metric([sensor, reading.state], 1)
-        yield state
-        text = "Share of the last gestures outside of what the model was trained on"
-        shift = GaugeMetricFamily("gestured_shift_ratio", text, labels=["quantity"])
-        for quantity, share in snapshot.models.shift.items():
-            shift.add_metric([quantity], share)
-        yield shift
-        info = InfoMetricFamily("gestured_active_model", "The model that answers")
-        info.add_metric([], {"model": snapshot.models.active, "version": __version__})
-        yield info

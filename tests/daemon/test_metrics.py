@@ -19,7 +19,8 @@ from gestured.core.reading import STATES, Reading
 from gestured.core.recognizer import Decided, Scores
 from gestured.core.vitals import Vitals, faulty
 from gestured.core.window import Window
-from gestured.daemon.metrics import Gauges, Metrics, by_label
+from gestured.daemon.exposition import Gauges, by_label, exposition
+from gestured.daemon.metrics import Metrics
 from gestured.daemon.shadow import Comparison, Shadow
 from gestured.daemon.shift import LAST, LEAST_GESTURES, Shift, measured
 from gestured.daemon.watch import Watch
@@ -76,7 +77,7 @@ def test_there_are_at_most_200_series_whatever_arrives() -> None:
     )
     real = (Path(__file__).parent / "metrics.txt").read_text()
     gauges = set(re.findall(r"^# TYPE (\S+) ", real, re.MULTILINE))
-    text = metrics.exposition(snapshot).decode()
+    text = exposition(metrics, snapshot).decode()
     assert set(re.findall(r"^# TYPE (\S+) ", text, re.MULTILINE)) == gauges
     series = [line for line in text.splitlines() if not line.startswith("#")]
     assert len(series) == len({line.rsplit(" ", 1)[0] for line in series}) <= 200
