@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from gestured.bridge.counts import Counts
 from gestured.client.subscriber import Subscriber
 
 NOTICE_S = 0.25  # after which a daemon that went is noticed
@@ -36,8 +37,9 @@ def follow(subscriber: Subscriber) -> Iterator[Line]:
 class Daemon:
     """How a daemon is, from the lines that it said."""
 
-    def __init__(self, sensors: Sequence[str] | None, gestures: Sequence[str] | None) -> None:
-        """`sensors` and `gestures` are the subscription's filters, None for all."""
+    def __init__(self, sensors: Sequence[str] | None, gestures: Sequence[str] | None, counts: Counts) -> None:
+        """`sensors` and `gestures`: the subscription's filters, None for all. `counts` learns whether it is there."""
+        self._counts = counts
         self.hello: Line = {}  # empty while it is away
         self.states: dict[str, str] = {}  # sensor -> how it is; what was known before it went is kept
         self.gestures: list[str] | None = None  # None until it has said them
@@ -52,6 +54,7 @@ class Daemon:
                 self._gestures(line["gestures"])
                 for name in line["sensors"]:
                     self._state(name, self.states.get(name, "no_data"))
+                self._counts.daemon(True)
             case "gestures":
                 self._gestures(line["gestures"])
             case "status":
@@ -59,6 +62,7 @@ class Daemon:
                     self._state(name, state)
             case "gone":
                 self.hello = {}
+                self._counts.daemon(False)
 
     def age(self, event: Line, now: float) -> float:
         """How many seconds ago an event was decided; `now` is in seconds since the epoch.

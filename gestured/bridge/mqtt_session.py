@@ -43,7 +43,7 @@ class Mqtt:
         self._host = host_name(args.host)
         self._broker = Broker(args, self._host)
         self._counts = counts
-        self._daemon = Daemon(args.sensors, args.gestures)
+        self._daemon = Daemon(args.sensors, args.gestures, counts)
         self._outbox = Outbox(counts)
         self._retained = Retained(self._daemon, self._host, args.discovery, discovers=not args.no_discovery)
         self._stop = asyncio.Event()
@@ -52,15 +52,12 @@ class Mqtt:
 
     def take(self, line: Line) -> None:
         """One line of `follow`."""
-        kind = line.get("type")
         self._daemon.take(line)
-        if kind in ("hello", GONE):
-            self._counts.daemon(kind == "hello")
         if "sensor" in line:  # an event: the daemon knows what was asked for, and which answers belong to it
             decided = time.monotonic() - self._daemon.age(line, time.time())
             topic = topic_of(self._host, line["sensor"], line["type"])
             self._outbox.put(Outgoing(decided, topic, self._daemon.payload(line)))
-        if kind in ("hello", "gestures", STATUS, GONE):
+        if line.get("type") in ("hello", "gestures", STATUS, GONE):
             self._changed.set()
 
     def stop(self) -> None:

@@ -8,7 +8,7 @@ import time
 from typing import Any
 
 from gestured.bridge.counts import Counts
-from gestured.bridge.daemon import GONE, MOST_SENSORS, OLD_S, Daemon, Line
+from gestured.bridge.daemon import MOST_SENSORS, OLD_S, Daemon, Line
 from gestured.bridge.forward import Forward
 from gestured.bridge.options import BridgeError, host_name
 
@@ -31,7 +31,7 @@ class Zenoh:
             raise BridgeError(f"--site {self._site}: expected letters, digits, _ and -, at most 64")
         self._config = _configuration(args)
         self._is_called = bool(args.listen or args.scout)  # nobody has to be there
-        self._daemon = Daemon(args.sensors, args.gestures)
+        self._daemon = Daemon(args.sensors, args.gestures, counts)
         self._counts = counts
         self._forward = Forward(args.to, counts) if args.frames else None
         self._session: Any = None
@@ -48,10 +48,7 @@ class Zenoh:
 
     def take(self, line: Line) -> None:
         """One line of `follow`."""
-        kind = line.get("type")
         self._daemon.take(line)
-        if kind in ("hello", GONE):
-            self._counts.daemon(kind == "hello")
         if "sensor" in line:  # an event: the daemon knows what was asked for, and which answers belong to it
             self._publish(line)
         self._hold_tokens()

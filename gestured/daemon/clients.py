@@ -19,7 +19,7 @@ from gestured.daemon.client import Client
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 
-CLIENTS = 1024
+CLIENTS = 1024  # at a time; each costs a descriptor, and at most BACKLOG_BYTES of memory
 STALLED_S = 30.0  # a client that takes nothing for this long is cut off
 END, TEST = b"}\n", b',"test":true}\n'  # how a line ends
 LINES = 16  # of all clients that are answered before the loop looks after its frames again
