@@ -97,11 +97,6 @@ class FrontEnd:
         return int(np.count_nonzero(self.conditioner.taxels.bad))
 
     @property
-    def kept(self) -> int:
-        """How many frames are kept, for the contact that goes on or may begin."""
-        return len(self._cutter)
-
-    @property
     def interval_s(self) -> float:
         """Seconds from frame to frame as they come, 0 before it is known."""
         return self._pace.interval_s
