@@ -1,37 +1,31 @@
-"""One daemon: it puts the parts together, and runs timers and reloads from start to end."""
+"""One daemon: it puts the parts together, and runs their timers from start to end."""
 
 import asyncio
-import os
 import secrets
 import time
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from gestured import __version__
 from gestured.client.notify import notify
 from gestured.core import messages
-from gestured.core.errors import GesturedError
 from gestured.core.events import Status
 from gestured.core.hub import Hub
-from gestured.core.own import Examples
 from gestured.daemon import log as logging
-from gestured.daemon import own_file, systemd
+from gestured.daemon import systemd
 from gestured.daemon.bound import Bound
 from gestured.daemon.canary import Canary
 from gestured.daemon.clients import EventServer
 from gestured.daemon.control import ControlServer
 from gestured.daemon.desk import Desk
 from gestured.daemon.health import TICK_S, Pulse
-from gestured.daemon.ladder import open_ladder
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.operations import Operations
 from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
+from gestured.daemon.reload import Fresh, Loader, Reload, destinations, own_file_of
 from gestured.daemon.scene import scene_of
 from gestured.daemon.settings import Settings
-from gestured.daemon.sinks import OscSink
 from gestured.daemon.snapshot import Models, Snapshot
 from gestured.daemon.sockets import kernel_drops
 from gestured.daemon.tap import Taps
@@ -39,13 +33,10 @@ from gestured.daemon.udp import Receiver
 from gestured.daemon.watch import Watch
 from gestured.model.ladder import Ladder
 
-STATUS_S = 1.0
-DRAIN_S = 0.5
+STATUS_S = 1.0  # from one status to the next
+DRAIN_S = 0.5  # for clients to read what waits for them, when the daemon ends
 SHOWN = 4  # sensors in systemd's status line
 AT_A_RESTART = ("listen", "socket", "control", "metrics", "flight_recorder")  # settings that a reload cannot change
-
-Loader = Callable[[], Settings]
-OwnFile = tuple[Path | None, tuple[Examples, str | None]]  # where it is, what is in it, and what is wrong with it
 
 
 class Service:
@@ -53,17 +44,17 @@ class Service:
 
     def __init__(self, settings: Settings, ladder: Ladder, bound: Bound, load: Loader) -> None:
         """Serves from now on. `load` reads the configuration again, for a reload."""
-        self._settings, self._ladder, self._bound, self._load = settings, ladder, bound, load
+        self._settings, self._ladder, self._bound = settings, ladder, bound
         self._instance, self._started, self._stopping = secrets.token_hex(8), time.time(), False
         self._begun = time.monotonic()
         self._tasks: set[asyncio.Future[Any]] = set()  # a task that nobody holds may be collected
         self._said = ""  # to systemd
-        self._reloading = asyncio.Lock()
         self._pulse, self._metrics = Pulse(), Metrics()
+        self._reload = Reload(load, self._swap, self._metrics)
         for name in settings.sensors:
             self._metrics.sensor_label(name)  # those in the file are named first
         self._own = OwnGestures(self._own_changed)
-        self._own.follow(ladder, *_own_file(settings))
+        self._own.follow(ladder, *own_file_of(settings))
         self._hub = Hub(scene_of(settings, ladder), ladder)
         self._watch, self._taps = Watch(ladder), Taps(settings.flight_recorder << 20)
         self._clients = EventServer(
@@ -73,14 +64,14 @@ class Service:
             gestures=self._gestures,
             changed=self._foresee,
         )
-        self._osc = self._destinations(settings)
+        self._osc = destinations(settings, self._metrics)
         self._foresee()
         self._publisher = Publisher(self._metrics, (self._clients, self._taps, *self._osc))
         self._desk = Desk(self._metrics, self._publisher, self._watch, self._own)
         self._receiver = Receiver(bound.udp, self._hub, self._desk, self._taps)
         operations = Operations(
             self._hub, self._desk, self._publisher, self._watch, self._taps, self._metrics, self._own,
-            self.snapshot, self.reload,
+            self.snapshot, self._reload.run,
         )  # fmt: skip
         self._control = ControlServer(bound.control.sock, operations.verbs())
         self._http: Any = None
@@ -138,11 +129,6 @@ class Service:
         every = every or bool(self._settings.publish_provisional and self._osc)
         self._hub.foresee(lambda sensor: every or sensor in named)
 
-    def _destinations(self, settings: Settings) -> list[OscSink]:
-        """Where OSC is sent."""
-        provisional = settings.publish_provisional
-        return [OscSink(address, self._metrics, provisional=provisional) for address in settings.publish]
-
     async def start(self) -> None:
         """Take what needs a loop that turns: the operators' connections."""
         await self._control.start()
@@ -164,9 +150,9 @@ class Service:
                 self._every_second(now)
             if watchdog and canary.sings():
                 notify("WATCHDOG=1")
-            if reload.is_set() and not self._reloading.locked():
+            if reload.is_set() and not self._reload.running:
                 reload.clear()
-                self._spawn(self.reload())  # a task: frames and timers go on
+                self._spawn(self._reload.run())  # a task: frames and timers go on
             wait = min(period, status_at - now)
             due = time.monotonic() + wait
             try:
@@ -211,30 +197,9 @@ class Service:
             self._http.close()
         log.info("ended")
 
-    def _open(self, settings: Settings) -> tuple[Ladder, list[OscSink], OwnFile]:
-        """What may take long: models, names of hosts, and the file of own gestures."""
-        return open_ladder(settings, insist=True), self._destinations(settings), _own_file(settings)
-
-    async def reload(self) -> str | None:
-        """Read everything anew, and only where all of it is valid, change anything; else the reason."""
-        async with self._reloading:
-            notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
-            try:
-                settings = await asyncio.to_thread(self._load)  # a long file, or a slow disk
-                ladder, osc, own = await asyncio.to_thread(self._open, settings)  # frames are served meanwhile
-            except Exception as error:
-                bug = not isinstance(error, GesturedError)
-                said = log.exception if bug else log.error
-                said("reload refused, nothing has changed", reason=str(error))
-                self._metrics.reloads.add("refused")
-                return f"a bug: {error!r}" if bug else str(error)
-            else:
-                self._swap(settings, ladder, osc, own)
-                return None
-            finally:
-                notify("READY=1")
-
-    def _swap(self, settings: Settings, ladder: Ladder, osc: list[OscSink], own: OwnFile) -> None:
+    def _swap(self, fresh: Fresh) -> None:
+        """Go on with what a reload has opened."""
+        settings, ladder = fresh.settings, fresh.ladder
         for key in AT_A_RESTART:
             if getattr(settings, key) != getattr(self._settings, key):
                 log.warning("this setting changes at a restart only", key=key)
@@ -242,20 +207,13 @@ class Service:
         self._settings, self._ladder = settings, ladder
         self._watch.follow(ladder)
         before = self._gestures()
-        self._own.follow(ladder, *own)
+        self._own.follow(ladder, *fresh.own)
         self._desk.take(self._hub.change(scene_of(settings, ladder), ladder, time.monotonic()))
         if self._gestures() != before:
             self._clients.tell(messages.gestures_json(self._gestures()))
         for sink in self._osc:
             sink.close()
-        self._osc = osc
-        self._publisher.sinks = (self._clients, self._taps, *osc)
+        self._osc = fresh.osc
+        self._publisher.sinks = (self._clients, self._taps, *self._osc)
         self._foresee()
-        self._metrics.reloads.add("done")
         log.info("reloaded", model=ladder.active)
-
-
-def _own_file(settings: Settings) -> OwnFile:
-    """Find the file of own gestures, and read it."""
-    path = own_file.where(settings.own_gestures, os.environ)
-    return path, own_file.load(path)

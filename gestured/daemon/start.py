@@ -22,7 +22,8 @@ from gestured.daemon import systemd
 from gestured.daemon.bound import Bound, bind_all
 from gestured.daemon.ladder import open_ladder
 from gestured.daemon.log import Throttle, log
-from gestured.daemon.service import Loader, Service
+from gestured.daemon.reload import Loader
+from gestured.daemon.service import Service
 from gestured.daemon.settings import Settings
 from gestured.daemon.sockets import AddressError
 from gestured.model.process import end_all
