@@ -38,18 +38,23 @@ class Connection:
     def __init__(self, writer: asyncio.StreamWriter) -> None:
         self._writer = writer
         self.lost = 0  # lines that found no room
-        self.tap = False  # it is sent packets and events, and need not ask for anything
+        self.streams = False  # it is sent lines as they come, and need not ask for anything
         self._over = False
 
     def send(self, line: bytes) -> bool:
         """Send a line, or count it as lost where too much waits already; never blocks."""
         if self.closed:
             return False
-        if self._writer.transport.get_write_buffer_size() > TAP_BACKLOG_BYTES:
+        if self.unread > TAP_BACKLOG_BYTES:
             self.lost += 1
             return False
         self._writer.write(line)
         return True
+
+    @property
+    def unread(self) -> int:
+        """Bytes that wait to be read, but for what the kernel keeps."""
+        return 0 if self.closed else self._writer.transport.get_write_buffer_size()
 
     @property
     def closed(self) -> bool:
@@ -114,7 +119,7 @@ class ControlServer:
         connection = Connection(writer)
         while True:
             try:
-                async with asyncio.timeout(None if connection.tap else IDLE_S):
+                async with asyncio.timeout(None if connection.streams else IDLE_S):
                     line = await reader.readline()
             except TimeoutError:
                 writer.write(_refusal(f"nothing was asked for {IDLE_S:g} s; connect again"))

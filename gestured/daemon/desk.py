@@ -9,6 +9,7 @@ from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
+from gestured.daemon.views import Views
 from gestured.daemon.watch import Watch
 
 CHANGES = {"silent": "sensor is silent", "restarted": "sensor restarted"}
@@ -17,8 +18,8 @@ CHANGES = {"silent": "sensor is silent", "restarted": "sensor restarted"}
 class Desk:
     """Takes facts, and the complaints of those who read packets."""
 
-    def __init__(self, metrics: Metrics, publisher: Publisher, watch: Watch, own: OwnGestures) -> None:
-        self._metrics, self._publisher, self._watch, self._own = metrics, publisher, watch, own
+    def __init__(self, metrics: Metrics, publisher: Publisher, watch: Watch, own: OwnGestures, views: Views) -> None:
+        self._metrics, self._publisher, self._watch, self._own, self._views = metrics, publisher, watch, own, views
         self._throttle = Throttle()
 
     def take(self, facts: Sequence[Fact]) -> None:
@@ -42,6 +43,7 @@ class Desk:
             self._watch.see(one)
         if self._own.enrolling:
             self._enrol(facts)
+        self._views.see(facts)
 
     def drop(self, reason: str, count: int = 1, **fields: object) -> None:
         """Count what was dropped; say so at a bounded rate."""

@@ -1,7 +1,6 @@
 """What an operator may ask of a running daemon: the table of the control socket's verbs."""
 
 import asyncio
-import math
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -18,13 +17,12 @@ from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.request import Parameter, Refusal, Reply, ReplyStream, Verb
 from gestured.daemon.snapshot import Snapshot
-from gestured.daemon.status import scene, status, viewed
+from gestured.daemon.status import scene, status
 from gestured.daemon.tap import Taps, as_lines
+from gestured.daemon.views import Views
 from gestured.daemon.watch import Watch
 from gestured.model.model import open_apart
 
-VIEW_S = 1 / 30  # between two views of one sensor: nobody sees more
-VIEWS = 16  # sensors that are looked at
 TEST_SENSORS = 64  # names of sensors that are not there
 TEST_S = 0.4  # how long a made-up gesture took
 TEST_FRAMES = 6  # of it, at 15 Hz
@@ -33,6 +31,7 @@ SENSOR = Parameter(
     (str, type(None)), "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", check=lambda name: name is None or is_sensor(name)
 )
 NAMED = Parameter(str, "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", required=True, check=is_sensor)
+SENSORS = Parameter(list, "a list of sensors' names", required=True, check=lambda names: all(map(is_sensor, names)))
 RAW = Parameter(bool, "true or false")
 COUNT = Parameter(int, "a number of examples")
 LABEL = Parameter(str, "a gesture's name", required=True)
@@ -50,9 +49,9 @@ class Operations:
     taps: Taps
     metrics: Metrics
     own: OwnGestures
+    views: Views
     snapshot: Callable[[], Snapshot]
     reload_all: Callable[[], Awaitable[str | None]]  # None, or why nothing has changed
-    _views: dict[tuple[str, bool], tuple[float, Reply]] = field(default_factory=dict)  # s, and the answer
     _tested: set[str] = field(default_factory=set)  # names of sensors that were not there
 
     def verbs(self) -> dict[str, Verb]:
@@ -64,6 +63,7 @@ class Operations:
             "emit": Verb(self.emit, {"gesture": LABEL, "sensor": SENSOR}),
             "shadow": Verb(self.shadow, {"model": MODEL}, slow=True),
             "view": Verb(self.view, {"sensor": NAMED, "raw": RAW}, changes=False),
+            "follow": Verb(self.follow, {"sensors": SENSORS, "raw": RAW}, changes=False),
             "enrol": Verb(self.enrol, {"name": LABEL, "sensor": NAMED, "examples": COUNT}),
             "gestures": Verb(self.gestures, changes=False),
             "forget": Verb(self.forget, {"name": LABEL}, slow=True),
@@ -129,26 +129,23 @@ class Operations:
         return {"shadow": self.watch.compare(candidate).report()}
 
     async def view(self, connection: Connection, sensor: str, raw: bool = False) -> Reply:
-        """One sensor as it is felt now; who asks again within VIEW_S, is answered the same."""
-        now = time.monotonic()
-        made, answer = self._views.get((sensor, raw), (-math.inf, {}))
-        if now - made < VIEW_S:
-            return answer
-        found = self.hub.view(sensor, now, raw=raw)
+        """One sensor as it is felt now."""
+        found = self.views.view(sensor, raw=raw)
         if found is None:
             raise Refusal(f"no sensor {sensor!r}, expected one of {', '.join(self.hub.sequences()) or 'none'}")
-        if len(self._views) >= VIEWS:
-            self._views.clear()
-        answer = viewed(sensor, *found) | {"time": time.time()}
-        self._views[sensor, raw] = now, answer
-        return answer
+        return found
+
+    async def follow(self, connection: Connection, sensors: list[str], raw: bool = False) -> Reply:
+        """Stream the views of sensors over this connection from now on; one may be named before it comes."""
+        _not_yet(connection)
+        self.views.follow(connection, sensors, raw=raw)
+        return {"sensors": sensors}
 
     async def enrol(self, connection: Connection, name: str, sensor: str, examples: int = 3) -> Reply:
         """Learn a gesture from what is performed on a sensor; a line follows for each example, and one at the end."""
         snapshot = self.snapshot()
         _heard(snapshot, sensor)
-        if connection.tap:
-            raise Refusal("this connection is a tap already")
+        _not_yet(connection)
         self.own.begin(connection, name, sensor, examples, snapshot.gestures)
         return {"name": name, "sensor": sensor, "examples": examples}
 
@@ -164,8 +161,7 @@ class Operations:
 
     async def tap(self, connection: Connection) -> Reply:
         """Stream packets and events over this connection from now on."""
-        if connection.tap:
-            raise Refusal("this connection is a tap already")
+        _not_yet(connection)
         self.taps.join(connection)
         return self._scene()
 
@@ -178,6 +174,12 @@ class Operations:
 
     def _scene(self) -> Reply:
         return scene(self.snapshot(), time.time_ns() - time.monotonic_ns(), self.own.gestures)
+
+
+def _not_yet(connection: Connection) -> None:
+    """Raises Refusal where lines are streamed over it already: they could not be told apart."""
+    if connection.streams:
+        raise Refusal("this connection is a tap already, or another stream; open one more")
 
 
 def _heard(snapshot: Snapshot, sensor: str | None) -> dict[str, Reading]:

@@ -99,7 +99,7 @@ class OwnGestures:
         judge = Examiner(model, model.space, self._ladder.own, in_use)
         self._enrolment, self._connection = Enrolment(name, sensor, examples, judge), connection
         self._heard = time.monotonic()
-        connection.tap = True  # it need not ask for anything meanwhile
+        connection.streams = True  # it need not ask for anything meanwhile
 
     def see(self, fact: Fact) -> None:
         """Look at what the hub found: an answer on the sensor is an attempt."""
@@ -189,7 +189,7 @@ class OwnGestures:
 
     def _end(self) -> None:
         if self._connection is not None:
-            self._connection.tap = False
+            self._connection.streams = False
         self._enrolment = self._connection = None
 
 

@@ -30,6 +30,7 @@ from gestured.daemon.snapshot import Models, Snapshot
 from gestured.daemon.sockets import kernel_drops
 from gestured.daemon.tap import Taps
 from gestured.daemon.udp import Receiver
+from gestured.daemon.views import Views
 from gestured.daemon.watch import Watch
 from gestured.model.ladder import Ladder
 
@@ -67,11 +68,12 @@ class Service:
         self._osc = destinations(settings, self._metrics)
         self._foresee()
         self._publisher = Publisher(self._metrics, (self._clients, self._taps, *self._osc))
-        self._desk = Desk(self._metrics, self._publisher, self._watch, self._own)
+        views = Views(self._hub)
+        self._desk = Desk(self._metrics, self._publisher, self._watch, self._own, views)
         self._receiver = Receiver(bound.udp, self._hub, self._desk, self._taps)
         operations = Operations(
             self._hub, self._desk, self._publisher, self._watch, self._taps, self._metrics, self._own,
-            self.snapshot, self._reload.run,
+            views, self.snapshot, self._reload.run,
         )  # fmt: skip
         self._control = ControlServer(bound.control.sock, operations.verbs())
         self._http: Any = None

@@ -43,7 +43,7 @@ class Taps:
 
     def join(self, connection: Connection) -> None:
         """Stream to this connection from now on."""
-        connection.tap = True
+        connection.streams = True
         self._live.append(connection)
 
     def packets(self, waiting: Sequence[tuple[bytes, Source]], now: float) -> None:

@@ -5,6 +5,7 @@ import json
 import os
 import re
 import socket
+import subprocess
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,6 +14,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from gestured.control.view import NICE
 from gestured.control.view.server import BODY_BYTES, FILES, PAGE
 from gestured.core.address import Address
 from gestured.record.tape_reader import read
@@ -86,15 +88,21 @@ class Stream:
 @pytest.fixture
 def real(tmp_path: Path) -> Iterator[Daemon]:
     """A daemon that the test alone looks at, without a flight recorder."""
-    daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"), "--clock", "sensor", "--stale-s", 30)
+    model = tiny_model.make(tmp_path / "tiny.onnx", provisional=tiny_model.PROVISIONAL)
+    daemon = Daemon.start(tmp_path, model, "--clock", "sensor", "--stale-s", 30)
     yield daemon
     assert daemon.stop() == 0, daemon.stderr()
     assert "Traceback" not in daemon.stderr()
 
 
 @pytest.fixture
-def view(start, real: Daemon, tmp_path: Path) -> Page:
-    process = start("view", "--control", real.ready["control"], "--listen", "127.0.0.1:0", "--folder", tmp_path)
+def process(start, real: Daemon, tmp_path: Path) -> "subprocess.Popen[bytes]":
+    return start("view", "--control", real.ready["control"], "--listen", "127.0.0.1:0", "--folder", tmp_path)
+
+
+@pytest.fixture
+def view(process: "subprocess.Popen[bytes]") -> Page:
+    assert process.stdout is not None
     return Page(process.stdout.readline().decode())
 
 
@@ -202,6 +210,42 @@ def test_a_browser_that_stalls_is_back_in_the_present_and_holds_up_nobody(view: 
         seen.append(stalled.until("frame")[1]["t"])
     assert len(seen) < 200  # what was on its way, and then the newest: the rest it was spared
     assert seen == sorted(set(seen))
+
+
+def test_the_daemon_foresees_nothing_of_sensors_that_nobody_looks_at(view: Page, real: Daemon) -> None:
+    plain = real.client().subscribe("gesture")
+    view.come_in()
+    stream = view.stream("seen")
+    seen, unseen = Sensor(real, "seen").begin(), Sensor(real, "unseen").begin()
+    stream.until("frame")
+    told: list[tuple[str, str, str | None]] = []
+    for sensor in (seen, unseen):
+        sensor.perform("left")
+        while not told or told[-1][:2] != (sensor.name, "gesture"):
+            _, event = stream.until("event")
+            told.append((event["sensor"], event["type"], event.get("provisional")))
+    answers = [(name, given) for name, kind, given in told if kind == "gesture"]
+    assert answers == [("seen", "confirmed"), ("unseen", None)]  # events of all sensors are listed
+    assert [name for name, kind, _ in told if kind == "provisional"] == ["seen"]
+    assert len(told) == len(set(told))
+    assert [plain.events("gesture", name, 1)[0]["provisional"] for name in ("seen", "unseen")] == ["confirmed", None]
+
+
+def test_whoever_looks_elsewhere_sees_that_and_what_is_silent_is_seen_too(view: Page, real: Daemon) -> None:
+    view.come_in()
+    Sensor(real, "one").begin().send([])
+    two = Sensor(real, "two").begin()
+    for name in ("one", "two", "one", "one"):  # the last one finds it looked at already
+        assert view.stream(name).until("frame")[1]["sensor"] == name
+    stream = view.stream("two")
+    two.send([two.hand.frame(4, 4), two.hand.frame(4, 4)])
+    while stream.until("frame")[1]["activity"] < 5:
+        pass
+
+
+def test_it_stands_back_for_the_daemon(process: "subprocess.Popen[bytes]", view: Page) -> None:
+    niceness = os.getpriority(os.PRIO_PROCESS, process.pid)
+    assert niceness == min(os.getpriority(os.PRIO_PROCESS, 0) + NICE, 19)
 
 
 def test_it_waits_for_a_daemon_that_starts_again(start, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from gestured.daemon.publisher import Publisher
 from gestured.daemon.scene import scene_of
 from gestured.daemon.snapshot import Models, Snapshot
 from gestured.daemon.tap import Taps
+from gestured.daemon.views import Views
 from gestured.daemon.watch import Watch
 from gestured.model.ladder import ladder_for
 from tests.daemon.harness import Frame, floats
@@ -44,8 +45,9 @@ class Parts:
         ladder = ladder_for(model)
         self.metrics, self.watch, self.taps, kept = Metrics(), Watch(ladder), Taps(0), Kept()
         self.events = kept.events
-        self.desk = Desk(self.metrics, Publisher(self.metrics, (kept,)), self.watch, OwnGestures(lambda: None))
         self.hub = Hub(scene_of(load_settings({"model": str(model), **given}, {})[0], ladder), ladder)
+        self.views, publisher = Views(self.hub), Publisher(self.metrics, (kept,))
+        self.desk = Desk(self.metrics, publisher, self.watch, OwnGestures(lambda: None), self.views)
 
     def feed(self, name: str, frames: list[Frame], t: float) -> float:
         """Frames of a sensor at 15 Hz, from `t` s on; when the last one came."""

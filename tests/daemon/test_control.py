@@ -325,7 +325,7 @@ DOCUMENT = (Path(__file__).resolve().parents[2] / "docs" / "control.md").read_te
 def test_the_table_of_verbs_in_the_documents(daemon: Daemon) -> None:
     rows = re.findall(r"^\| `(\w+)` \| (.*?) \|", DOCUMENT, re.MULTILINE)
     described = {verb: tuple(re.findall(r"`(\w+)`", keys)) for verb, keys in rows}
-    assert described == {name: tuple(verb.parameters) for name, verb in Operations(*[None] * 9).verbs().items()}
+    assert described == {name: tuple(verb.parameters) for name, verb in Operations(*[None] * 10).verbs().items()}
 
 
 def test_the_example_in_the_documents(daemon: Daemon) -> None:

@@ -38,7 +38,7 @@ class Desk:
         return {}
 
     async def tap(self, connection: Connection) -> Reply:
-        connection.tap = True
+        connection.streams = True
         return {}
 
     async def stream(self, connection: Connection) -> ReplyStream:

@@ -1,6 +1,7 @@
 """The control verb `view`: one sensor as it is felt now."""
 
 import asyncio
+import json
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,7 @@ import pytest
 
 from gestured.client.control import Control
 from gestured.client.lines import Refused
-from gestured.daemon import operations
+from gestured.daemon import operations, views
 from tests.daemon.harness import Daemon, Hand, Sensor
 from tests.daemon.parts import SNAPSHOT, Parts
 
@@ -47,9 +48,9 @@ def test_it_is_made_at_most_thirty_times_a_second_and_only_when_somebody_asks(mo
 
     monkeypatch.setattr(parts.hub, "view", counted)
     clock: Any = SimpleNamespace(now=100.0, monotonic=lambda: clock.now, time=lambda: 1.7e9 + clock.now)
-    monkeypatch.setattr(operations, "time", clock)
+    monkeypatch.setattr(views, "time", clock)
     verbs = operations.Operations(
-        parts.hub, parts.desk, None, parts.watch, parts.taps, parts.metrics, None, lambda: SNAPSHOT, None
+        parts.hub, parts.desk, None, parts.watch, parts.taps, parts.metrics, None, parts.views, lambda: SNAPSHOT, None
     ).verbs()
     parts.feed("arm", Hand().idle(2.0), 90.0)
     assert made == []
@@ -57,6 +58,66 @@ def test_it_is_made_at_most_thirty_times_a_second_and_only_when_somebody_asks(mo
         asyncio.run(verbs["view"].run(None, sensor="arm"))
         clock.now += 1 / 300
     assert 20 < len(made) <= 31
+
+
+def test_who_follows_is_shown_each_sensor_as_it_is_and_then_each_frame(shared: Daemon) -> None:
+    path = Path(shared.ready["control"])
+    sensor = Sensor(shared, "followed").begin()
+    with Control(path) as control, Control(path) as other:
+        while "followed" not in control.ask("status")["sensors"]:
+            pass
+        assert control.ask("follow", sensors=["followed", "later"])["sensors"] == ["followed", "later"]
+        views = control.lines()
+        newest = next(views)["t"]
+        for n in range(9):
+            sensor.send([sensor.hand.frame(4.0, n)])
+            while (found := next(views))["t"] <= newest:
+                pass
+            newest = found["t"]
+            assert (found["type"], found["sensor"], found["raw"]) == ("view", "followed", None)
+            assert np.array(found["values"]).reshape(9, 9)[4].argmax() == n
+        Sensor(shared, "later").begin()
+        while next(views)["sensor"] != "later":
+            pass
+        with pytest.raises(Refused, match="follow.sensors: expected a list of sensors' names"):
+            other.ask("follow", sensors=["no name!"])
+        other.ask("follow", sensors=[])
+        with pytest.raises(Refused, match="a tap already, or another stream"):
+            other.ask("tap")
+    sensor.send(sensor.hand.idle(1.0))
+
+
+class Follower:
+    """A connection whose other end reads, or does not."""
+
+    def __init__(self) -> None:
+        self.streams, self.closed, self.unread = False, False, 0
+        self.seen: list[float] = []  # s, on the stream's clock
+
+    def send(self, line: bytes) -> bool:
+        """Take a line."""
+        self.seen.append(json.loads(line)["t"])
+        return True
+
+
+def test_who_does_not_read_is_shown_the_newest_when_he_does(model) -> None:
+    parts = Parts(model)
+
+    async def main() -> tuple[Follower, Follower]:
+        quick, slow = Follower(), Follower()
+        t = parts.feed("arm", Hand().idle(2.0), 90.0)
+        for follower in (quick, slow):
+            parts.views.follow(follower, ["arm"], raw=False)
+        for n in range(6):
+            slow.unread = views.UNREAD_BYTES + 1 if 0 < n < 5 else 0
+            while len(quick.seen) == n:
+                await asyncio.sleep(0)
+            t = parts.feed("arm", [Hand().frame()], t)
+        quick.closed = slow.closed = True
+        return quick, slow
+
+    quick, slow = asyncio.run(main())
+    assert len(set(quick.seen)) == 6 and slow.seen == [quick.seen[0], quick.seen[5]]
 
 
 def test_a_tap_that_goes_without_a_word_leaves_no_traceback(shared: Daemon) -> None:

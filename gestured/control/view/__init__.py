@@ -2,6 +2,7 @@
 
 import argparse
 import ipaddress
+import os
 import signal
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from gestured.control.address import add_sockets, connect, control_path
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
+NICE = 10  # steps: a picture for the eye waits for the daemon, and for whoever sends to it
 DEFAULT = Address("127.0.0.1", 9109)
 
 
@@ -46,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
     if not _loopback(args.listen.host):
         raise GesturedError(f"--listen {args.listen}: expected a loopback address, such as {DEFAULT}")
     connect(args).close()  # who has no daemon, is told so at once
+    os.nice(NICE)
     source = Source(control_path(args), args.folder)
     door = Door()
     with Server(args.listen, source, door) as server:

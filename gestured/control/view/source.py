@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from gestured.client.control import Control
-from gestured.client.lines import Refused
 from gestured.client.subscriber import Subscriber
 from gestured.control.flag import flag, flag_lines, flag_path
 from gestured.control.view.outbox import Outbox
@@ -16,11 +15,11 @@ from gestured.core.errors import GesturedError
 from gestured.core.messages import EVENT_TYPES
 
 SENSORS_S = 1.0
-LOOK_S = 1 / 30  # the daemon makes no more
 AGAIN_S = 0.5  # before a daemon that has gone is asked again
 KEPT_S = 30.0  # of packets, where the daemon has no flight recorder
 LINE_BYTES = 500  # that Python takes for a line, its packet not counted
 KEPT_BYTES = 64 << 20  # of them at the most, as base64
+OF_ALL = tuple(kind for kind in EVENT_TYPES if kind not in ("provisional", "status"))  # events of sensors not looked at
 
 
 class Source:
@@ -34,6 +33,9 @@ class Source:
         self._closed = threading.Event()
         self._status: dict[str, Any] = {}
         self._subscriber: Subscriber | None = None
+        self._looking: Control | None = None  # it streams what is looked at,
+        self._looked_at: tuple[list[str], bool] = [], False  # which is this,
+        self._latest: dict[str, dict[str, Any]] = {}  # and the last frame of each sensor
         self._tap: Control | None = None  # where there is no flight recorder: the view keeps packets itself
         self._scene: dict[str, Any] = {}
         self._kept: deque[tuple[float, int, dict[str, Any]]] = deque()  # s, bytes, a tap's line
@@ -45,14 +47,17 @@ class Source:
         """Somebody looks."""
         if self._status:
             outbox.put("sensors", self._sensors())
+        if outbox.sensor in self._latest:
+            outbox.frame(self._latest[outbox.sensor])
         with self._changed:
             self._open.append(outbox)
-            self._changed.notify_all()
+            self._look_anew()
 
     def leave(self, outbox: Outbox) -> None:
         """And looks no more."""
         with self._changed:
             self._open.remove(outbox)
+            self._look_anew()
 
     def recalibrate(self, sensor: str) -> str:
         """Have the daemon learn a sensor anew; what was done, in words. Raises GesturedError."""
@@ -78,7 +83,7 @@ class Source:
         for outbox in list(self._open):
             outbox.close()
         with self._changed:
-            self._changed.notify_all()
+            self._look_anew()
         for one in (self._subscriber, self._tap):
             if one is not None:
                 one.close()
@@ -103,8 +108,8 @@ class Source:
             self._wait_for_somebody()
             self._status = control.ask("status")
             if self._subscriber is None:
-                self._subscriber = Subscriber(self._status["addresses"]["socket"], types=EVENT_TYPES)
-                threading.Thread(target=self._tell_events, args=(self._subscriber,), daemon=True).start()
+                self._subscriber = Subscriber(self._status["addresses"]["socket"], types=OF_ALL)
+                self._hear(self._subscriber, looked_at=False)
             if self._tap is None and not self._status["flight_recorder"]["limit_bytes"]:
                 self._tap = Control(self._control)
                 threading.Thread(target=self._keep, args=(self._tap,), daemon=True).start()
@@ -117,33 +122,45 @@ class Source:
         return told | {"model": status["model"]["active"], "gestures": status["model"]["gestures"]}
 
     def _tell_frames(self, control: Control) -> None:
-        """Whatever is looked at, as often as the daemon makes it; one that is not new is not told."""
-        told: dict[tuple[str, bool], float] = {}
-        while not self._closed.is_set():
-            self._wait_for_somebody()
-            began = time.monotonic()
-            wanted = {(outbox.sensor, outbox.raw) for outbox in list(self._open)}
-            for sensor, raw in wanted & {(name, raw) for name in self._heard() for raw in (False, True)}:
-                try:
-                    frame = control.ask("view", sensor=sensor, raw=raw)
-                except Refused:  # it was forgotten since
-                    continue
-                if told.get((sensor, raw)) != frame["t"]:
-                    told[sensor, raw] = frame["t"]
-                    for outbox in list(self._open):
-                        if (outbox.sensor, outbox.raw) == (sensor, raw):
-                            outbox.frame(frame)
-            self._closed.wait(max(0.0, began + LOOK_S - time.monotonic()))
+        """Whatever is looked at, and all events of it, until somebody looks at something else.
 
-    def _heard(self) -> list[str]:
-        sensors = self._status.get("sensors", {})
-        return [name for name, sensor in sensors.items() if "source" in sensor]
+        Provisional events are asked for here alone: for each sensor that they are asked of the daemon runs its model.
+        """
+        self._latest = {}
+        sensors, raw = looked_at = self._wanted()
+        path = control.ask("status")["addresses"]["socket"]
+        control.ask("follow", sensors=sensors, raw=raw)
+        with self._changed:
+            self._looking, self._looked_at = control, looked_at
+            self._look_anew()
+        with Subscriber(path, types=EVENT_TYPES, sensors=sensors) as subscriber:
+            self._hear(subscriber, looked_at=True)
+            for frame in control.lines():
+                self._latest[frame["sensor"]] = frame
+                for outbox in list(self._open):
+                    if outbox.sensor == frame["sensor"]:
+                        outbox.frame(frame)
 
-    def _tell_events(self, subscriber: Subscriber) -> None:
+    def _wanted(self) -> tuple[list[str], bool]:
+        """The sensors that somebody looks at, and whether somebody wants their counts as they were sent."""
+        looks = list(self._open)
+        return sorted({outbox.sensor for outbox in looks if outbox.sensor}), any(outbox.raw for outbox in looks)
+
+    def _look_anew(self) -> None:
+        self._changed.notify_all()
+        if self._looking is not None and self._looked_at != self._wanted():
+            self._looking.finish()
+
+    def _hear(self, subscriber: Subscriber, *, looked_at: bool) -> None:
+        threading.Thread(target=self._tell_events, args=(subscriber, looked_at), daemon=True).start()
+
+    def _tell_events(self, subscriber: Subscriber, looked_at: bool) -> None:
+        """Tell each browser the events of the sensor that it looks at, or those of all others."""
         try:
             for event in subscriber:
-                if event["type"] != "status":
-                    self._tell("event", event)
+                for outbox in list(self._open):
+                    if "sensor" in event and (event["sensor"] == outbox.sensor) is looked_at:
+                        outbox.put("event", event)
         except GesturedError as error:
             self._tell("gone", {"reason": str(error)})
 

@@ -67,7 +67,6 @@ function frame(told) {
 }
 
 function event(told) {
-  if (!("sensor" in told)) return; // that lines were lost, or that there are other gestures now
   const mine = told.sensor === state.sensor;
   const latency = "decided" in told && "offset" in told ? `${Math.round(1000 * (told.decided - told.offset))} ms` : "";
   let what = told.type;
