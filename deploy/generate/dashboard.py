@@ -53,6 +53,12 @@ PANELS = (
     Panel("Release to event", quantiles("gestured_latency_seconds"), unit="s"),
     Panel("Inference", quantiles("gestured_inference_seconds"), unit="s"),
     Panel("Confidence of what was published", quantiles("gestured_confidence"), unit="percentunit"),
+    Panel("Provisional events, a minute", (
+        (f"60 * sum by (result) (rate(gestured_provisional_total{RATE}))", "{{result}}"),)),
+    Panel("Provisional events that were confirmed", (
+        (f'sum(rate(gestured_provisional_total{{result="confirmed"}}{RATE})) / '
+         f'sum(rate(gestured_provisional_total{{result=~"confirmed|revoked"}}{RATE}))', "share"),), unit="percentunit"),
+    Panel("Provisional event to answer", quantiles("gestured_provisional_lead_seconds"), unit="s"),
     Panel("Sensor state", (("gestured_sensor_state", "{{sensor}}: {{state}}"),)),
     Panel("Frames a second", (("gestured_sensor_rate_hertz", "{{sensor}}"),), unit="hertz"),
     Panel("Jitter", (("gestured_sensor_jitter_seconds", "{{sensor}}"),), unit="s"),
