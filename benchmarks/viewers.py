@@ -1,6 +1,5 @@
 """What the daemon notices of those who look on: the delay of its events with three viewers, and without."""
 
-import http.client
 import socket
 import subprocess
 import sys
@@ -8,9 +7,9 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from urllib.parse import urlsplit
 
-from benchmarks.timing import Row, interleaved, percentile, ratio
+from benchmarks.process import Program
+from benchmarks.timing import Row, cpu_s_of, interleaved, percentile, ratio
 from benchmarks.traffic import RATE_HZ, touched
 from gestured.client.engine import Engine
 from gestured.client.sensor import Form
@@ -26,42 +25,26 @@ TYPES = ["onset", "gesture", "unknown", "cancelled", "release"]
 
 
 @contextmanager
-def viewer(control: str, sensor: str) -> Iterator[None]:
-    """`gesturectl view` with one browser that looks at a sensor, and reads all that comes."""
+def viewer(control: str, sensor: str) -> Iterator[int]:
+    """`gesturectl view`, its process, with one browser that looks at a sensor."""
     command = [sys.executable, "-m", "gestured.control", "view", "--control", control, "--listen", "127.0.0.1:0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         try:
-            address = urlsplit(process.stdout.readline().strip())
-            page = http.client.HTTPConnection(address.netloc)
-            page.request("GET", f"/?{address.query}")
-            answer = page.getresponse()
-            cookie = answer.headers["Set-Cookie"].partition(";")[0]
-            answer.read()
-            page.request("GET", f"/stream?sensor={sensor}", headers={"Cookie": cookie})
-            stream = page.getresponse()
-            while not stream.readline().startswith(b"event: frame"):
-                pass  # it sees what it looks at
-            threading.Thread(target=_read, args=(stream,), daemon=True).start()
-            yield
+            with Program("browser", process.stdout.readline().strip(), sensor):
+                yield process.pid
         finally:
             process.terminate()
 
 
-def _read(stream: http.client.HTTPResponse) -> None:
-    try:
-        while stream.readline():
-            pass
-    except (OSError, ValueError, AttributeError):
-        pass  # the viewer has ended
-
-
-def viewers(model: str) -> Row:
-    """Delays of all events in the same daemon, in turn with three viewers and with none."""
+def viewers(model: str) -> list[Row]:
+    """Delays of all events, and processor time, in the same daemon: in turn with three viewers and with none."""
     forms = [Form(f"bench{n}") for n in range(SENSORS)]
     takes = [touched(40 + n, SECONDS).frames for n in range(SENSORS)]
     sent = [0.0] * SENSORS  # monotonic s, the last frame of each
     count = 0
+    daemon_ms: dict[int, list[float]] = {0: [], VIEWERS: []}  # of processor time in a second, by the number of viewers
+    viewers_ms: list[float] = []  # the same of all viewers together
 
     def play(sender: socket.socket, frames: int) -> None:
         nonlocal count
@@ -81,8 +64,7 @@ def viewers(model: str) -> Row:
             delays: list[float] = []
             with ExitStack() as stack:
                 play(sender, 1)  # so that there is something to look at
-                for _ in range(watchers):
-                    stack.enter_context(viewer(control, "bench0"))
+                looking = [stack.enter_context(viewer(control, "bench0")) for _ in range(watchers)]
                 play(sender, WARM)  # what the pause has left behind is over
                 stream = stack.enter_context(Stream(engine.socket, {"types": TYPES}))
 
@@ -92,13 +74,30 @@ def viewers(model: str) -> Row:
 
                 listener = threading.Thread(target=hear, daemon=True)
                 listener.start()
+                began, before = time.monotonic(), [cpu_s_of(pid) for pid in (engine.pid, *looking)]
                 play(sender, min(len(frames) for frames in takes))  # a sensor misses a frame now and then
+                after, took = [cpu_s_of(pid) for pid in (engine.pid, *looking)], time.monotonic() - began
+                ours, *theirs = (1e3 * (b - a) / took for a, b in zip(before, after, strict=True))
+                daemon_ms[watchers].append(ours)
+                viewers_ms.append(sum(theirs))
                 stream.socket.shutdown(socket.SHUT_RDWR)
                 listener.join()
             return percentile(delays, 0.99)
 
         watched, alone = interleaved(lambda: measure(VIEWERS), lambda: measure(0), ROUNDS)
-    found = ratio(watched, alone)
-    ours, against = (f"p99 {percentile(values, 0.5):.2f} ms" for values in (watched, alone))
+    found, busy = ratio(watched, alone), ratio(daemon_ms[VIEWERS][1:], daemon_ms[0][1:])
     what = f"events of {SENSORS} touched sensors, {VIEWERS} viewers looking at one of them"
-    return Row(what, ours, f"{against} (nobody looks)", str(found), "<= 1.1", found.median <= 1.1)
+    delays = [f"p99 {percentile(values, 0.5):.2f} ms" for values in (watched, alone)]
+    spent = [f"{percentile(daemon_ms[watchers][1:], 0.5):.0f} ms a second" for watchers in (VIEWERS, 0)]
+    theirs = f"{percentile([ms for ms in viewers_ms if ms][1:], 0.5):.0f} ms a second"
+    return [
+        Row(what, delays[0], f"{delays[1]} (nobody looks)", str(found), "<= 1.1", found.median <= 1.1),
+        Row(
+            f"the same: CPU of the daemon; the viewers use {theirs}",
+            spent[0],
+            f"{spent[1]} (nobody looks)",
+            str(busy),
+            "",
+            None,
+        ),
+    ]
