@@ -20,7 +20,7 @@ from gestured.core.address import Address
 from gestured.record.tape_reader import read
 from tests.control.browser import PROGRAM, Browser
 from tests.daemon import tiny_model
-from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
+from tests.daemon.harness import DEADLINE_S, Daemon, Frame, Sensor
 
 pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
 
@@ -284,7 +284,12 @@ def follow(page: Page, browser: Browser, name: str, real: Daemon) -> Sensor:
 
 def perform(sensor: Sensor, browser: Browser, direction: str) -> None:
     """A swipe, of which the page sees each frame."""
-    for frame in [*sensor.hand.swipe(direction), *sensor.hand.idle(1.0)]:
+    show(sensor, browser, [*sensor.hand.swipe(direction), *sensor.hand.idle(1.0)])
+
+
+def show(sensor: Sensor, browser: Browser, frames: list[Frame]) -> None:
+    """Frames, each of which the page sees before the next one comes."""
+    for frame in frames:
         before = browser.run("state.frames.length ? state.frames[state.frames.length - 1].t : 0")
         sensor.send([frame])
         browser.until(f"state.frames[state.frames.length - 1].t > {before}")
@@ -315,6 +320,46 @@ def test_a_swipe_is_drawn_named_and_flagged(view: Page, real: Daemon, browser: B
     assert browser.complaints() == []
     if folder := os.environ.get("PYTEST_PICTURES"):
         browser.picture(Path(folder) / f"view-{width}.png")
+
+
+@pytest.mark.parametrize("width", [400, 1400])
+def test_a_provisional_answer_is_shown_as_such_and_then_confirmed_or_revoked(
+    view: Page, real: Daemon, browser: Browser, width: int
+) -> None:
+    browser.size(width, 900)
+    sensor = follow(view, browser, "arm", real)
+    hand = sensor.hand
+
+    def said(name: str) -> str:
+        return browser.run(f"document.getElementById('{name}').textContent")
+
+    def picture(name: str) -> None:
+        if folder := os.environ.get("PYTEST_PICTURES"):
+            browser.picture(Path(folder) / f"view-{name}-{width}.png")
+
+    show(sensor, browser, hand.swipe("right"))
+    browser.until("document.getElementById('provisional').className === 'waiting'")
+    assert said("provisional").startswith("swipe right, ") and said("answer") == "..."
+    picture("provisional")
+    show(sensor, browser, hand.idle(0.5))
+    browser.until("document.getElementById('provisional').className === 'confirmed'")
+    assert re.fullmatch(r"swipe right, \d+ %: confirmed; said \d+ ms before the answer", said("provisional"))
+    assert said("answer").startswith("swipe right, ")
+    show(sensor, browser, [*hand.idle(1.0), *hand.tap(), *hand.idle(0.2)])
+    browser.until("document.getElementById('provisional').className === 'waiting'")
+    assert said("provisional").startswith("one tap, ") and said("answer") == "..."
+    show(sensor, browser, [*hand.tap(), *hand.idle(1.0)])
+    browser.until("document.getElementById('provisional').className === 'revoked'")
+    assert re.fullmatch(r"one tap, \d+ %: revoked; said \d+ ms before the answer", said("provisional"))
+    assert said("answer").startswith("double tap, ")
+    rows = browser.run("[...document.querySelectorAll('#events tbody tr')].map(row => row.cells[2].textContent)")
+    assert [row for row in reversed(rows) if row not in ("onset", "release")] == [
+        "probably swipe right", "swipe right; provisional confirmed",
+        "probably one tap", "double tap; provisional revoked",
+    ]  # fmt: skip
+    assert browser.run("document.documentElement.scrollWidth <= innerWidth")
+    picture("revoked")
+    assert browser.complaints() == []
 
 
 def test_pause_step_back_and_keys(view: Page, real: Daemon, browser: Browser) -> None:

@@ -6,7 +6,7 @@ const STEPS = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000, 50000,
 const PHASES = { IDLE: "idle", CONTACT: "contact", RELEASING: "releasing", GAP: "waiting for a second tap", SPENT: "held too long" };
 const SHADES = { IDLE: "#8a94a0", CONTACT: "#e69f00", RELEASING: "#56b4e9", GAP: "#009e73", SPENT: "#cc79a7" }; // Okabe and Ito
 const at = id => document.getElementById(id);
-const state = { token: "", stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0 };
+const state = { token: "", stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0, early: null };
 
 history.replaceState(null, "", "/"); // the address's token has done its work
 for (const step of STEPS.slice(0, -2)) at("scale").append(new Option(`0 to ${step}`, step));
@@ -74,20 +74,33 @@ function event(told) {
   if (told.type === "provisional") what = `probably ${words(told.gesture)}`;
   if (told.type === "unknown") what = told.reason ? `unknown: ${told.reason}` : "unknown";
   if (told.type === "cancelled") what = `cancelled: ${told.reason}`;
+  const verdict = told.provisional ? `; provisional ${told.provisional}` : ""; // confirmed, or revoked
   const time = told.decided ?? told.offset ?? told.onset ?? Date.now() / 1000;
   const body = at("events").tBodies[0];
-  body.prepend(row([clock(time), told.sensor, what + (told.test ? " (test)" : ""), told.confidence === undefined ? "" : percent(told.confidence), latency]));
+  body.prepend(row([clock(time), told.sensor, what + verdict + (told.test ? " (test)" : ""), told.confidence === undefined ? "" : percent(told.confidence), latency]));
   while (body.rows.length > ROWS) body.deleteRow(-1);
   if (!mine) return;
-  if (told.type === "onset") { at("provisional").textContent = "-"; at("answer").textContent = "..."; }
-  if (told.type === "provisional") at("provisional").textContent = `${words(told.gesture)}, ${percent(told.confidence)}`;
+  if (told.type === "onset") { provisional("-", ""); at("answer").textContent = "..."; }
+  if (told.type === "provisional") {
+    state.early = told;
+    provisional(`${words(told.gesture)}, ${percent(told.confidence)}`, "waiting");
+  }
+  if (told.provisional && state.early?.id === told.id) {
+    const after = "decided" in told ? `; said ${Math.round(1000 * (told.decided - state.early.decided))} ms before the answer` : "";
+    provisional(`${at("provisional").textContent}: ${told.provisional}${after}`, told.provisional);
+  }
   if (told.type === "cancelled") at("answer").textContent = what;
   if (told.type === "gesture" || told.type === "unknown") {
-    if (told.provisional) at("provisional").append(`, ${told.provisional}`); // confirmed, or revoked
-    at("answer").textContent = `${what}, ${percent(told.confidence)}`;
-    at("said").textContent = `${what}, ${percent(told.confidence)}, after ${latency}`;
+    const answer = `${what}, ${percent(told.confidence)}`;
+    at("answer").textContent = answer;
+    at("said").textContent = `${answer}, after ${latency}`;
     scores(told.scores, told.type === "gesture" ? told.gesture : "");
   }
+}
+
+function provisional(text, how) {
+  at("provisional").textContent = text;
+  at("provisional").className = how;
 }
 
 function scores(found, answer) {
