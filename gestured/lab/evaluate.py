@@ -119,6 +119,14 @@ def by_kind(given: Answers, samples: Samples, least: float) -> dict[str, float]:
     return {str(kind): round(float(good[samples.kinds == kind].mean()), 3) for kind in np.unique(samples.kinds)}
 
 
+def without(calibrated: Calibrated, real: Samples, held: NDArray[np.bool_]) -> Calibrated:
+    """What is calibrated on without some of the real samples; those that have a class stand at its end."""
+    left = ~held[targets(real) >= 0]
+    keep = np.concatenate([np.ones(len(calibrated.labels) - len(left), bool), left])
+    found = {name: x[torch.from_numpy(keep)] for name, x in calibrated.logits.items()}
+    return Calibrated(found, calibrated.labels[keep], calibrated.sets[keep])
+
+
 def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -> dict[str, Any]:
     """Real subjects, each by the networks that have not seen them, calibrated without them."""
     real = data.real
@@ -127,19 +135,12 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
         return {}
     labels = targets(real)
     found: dict[str, Any] = {}
-    simulated_rows = len(calibrated.labels) - int((labels >= 0).sum())
     for name in ("cnn_lstm", "lstm"):
         scores = np.zeros((len(real), len(GESTURES)), np.float32)
         unknown = np.zeros(len(real), np.float32)
         levels = []
         for held in folds(real):
-            keep = np.concatenate([np.ones(simulated_rows, bool), ~held[labels >= 0]])
-            part = Calibrated(
-                {n: x[torch.from_numpy(keep)] for n, x in calibrated.logits.items()},
-                calibrated.labels[keep],
-                calibrated.sets[keep],
-            )
-            module, calibration, _ = judged(trained, name, part)
+            module, calibration, _ = judged(trained, name, without(calibrated, real, held))
             with torch.no_grad():
                 out = module.decision(*(trained.held_out[n][torch.from_numpy(held)] for n in (name, "trajectory")))
             scores[held], unknown[held] = out[0].numpy(), out[1].numpy()

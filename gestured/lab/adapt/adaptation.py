@@ -8,7 +8,6 @@ that is written has learned from all, and takes its decision and its threshold f
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,42 +17,20 @@ from torch import Tensor, nn
 
 from gestured.lab.adapt.judging import Answers, Shares
 from gestured.lab.adapt.learning import Course, between, classes_of, learned, opinions
-from gestured.lab.adapt.material import Own, held_out
+from gestured.lab.adapt.material import Groups, Own, held_out
 from gestured.lab.adapt.refitting import refitted
+from gestured.lab.adapt.takes import Simulated
 from gestured.lab.adapt.weights import Base
-from gestured.lab.dataset import OTHER_TRIALS, Samples, join, simulated
+from gestured.lab.dataset import Samples
 from gestured.lab.fit import FitConfig
 from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Decision, Judged
-from gestured.simulator import GESTURES, NONE
+from gestured.simulator import GESTURES
 
 WAYS = (0.25, 0.5, 0.75, 1.0)  # of the way from the old weights to the new ones
 LOSS = 0.01  # of the simulated gestures that may be answered rightly no more
-PEOPLE = 6  # of the nominal simulated set, whom no training has met
-SEED = 31  # of all that is simulated here
 
 Opinions = tuple[Tensor, Tensor]  # (G, K) logits of the network and of its second opinion
-
-
-@dataclass(frozen=True)
-class Simulated:
-    """Simulated takes of people whom no training has met."""
-
-    teach: Samples
-    check: Samples  # to fit the decision
-    nominal: Samples  # to judge
-    missed: NDArray[np.int64]  # people of the nominal gestures that were never cut out
-
-
-def simulate(cache: Path, jobs: int) -> Simulated:
-    """A few thousand takes, from a seed; cut once, then from the cache."""
-    teach = simulated(cache, "wide", SEED, 4_000, jobs)
-    check = simulated(cache, "wide", SEED + 1, 1_500, jobs)
-    performed = 90 * PEOPLE
-    others = len(OTHER_TRIALS) // 34 * PEOPLE
-    nominal = join([simulated(cache, "cohort", SEED, performed, jobs), simulated(cache, "others", SEED, others, jobs)])
-    lost = max(performed - int((nominal.labels != NONE).sum()), 0)
-    return Simulated(teach, check, nominal, np.full(lost, nominal.people[0]))
 
 
 @dataclass(frozen=True)
@@ -92,9 +69,35 @@ class Adapted:
         return found
 
 
+@dataclass(frozen=True)
+class Settled:
+    """Networks that went on, their decision and their threshold, and what they are worth on own recordings."""
+
+    judged: Judged
+    least: float  # its threshold
+    before: Shares
+    after: Shares
+    way: float  # of the way to the new weights
+    groups: Groups
+    answers: Answers  # of the new model, to those held out
+    apart: Sequence[tuple[Judged, Samples]]  # the networks that left out a group, and that group
+
+
 def adapt(base: Base, own: Own, takes: Simulated, course: Course) -> Adapted:
     """Learn, hold out, fit, judge."""
     start, least = base.judged, base.model.threshold
+    new = settled(start, least, own, takes, course)
+    return Adapted(
+        new.judged, new.least,
+        _early([(new.judged, takes.check), *new.apart], new.judged.decision, new.least, course),
+        Outcome(new.before, _nominal(start, least, takes, course)),
+        Outcome(new.after, _nominal(new.judged, new.least, takes, course)),
+        new.way, new.groups.unit, new.groups.count, new.answers,
+    )  # fmt: skip
+
+
+def settled(start: Judged, least: float, own: Own, takes: Simulated, course: Course) -> Settled:
+    """Go on from networks that publish from `least` on, with own recordings."""
     groups = held_out(own)
     run = _Run(start, own, groups.of_samples, takes, course)
     ends = [
@@ -121,13 +124,8 @@ def adapt(base: Base, own: Own, takes: Simulated, course: Course) -> Adapted:
     judged = between(start, end, way)
     judged.decision = decision
     chosen = _least(answers(decided(decision, run.said[way])), before)
-    held = [(between(start, ends[k], way), own.samples.take(groups.of_samples == k)) for k in range(groups.count)]
-    return Adapted(
-        judged, chosen, _early([(judged, takes.check), *held], decision, chosen, course),
-        Outcome(before, _nominal(start, least, takes, course)),
-        Outcome(new.shares(_least(new, before)), _nominal(judged, chosen, takes, course)),
-        way, groups.unit, groups.count, new,
-    )  # fmt: skip
+    apart = [(between(start, ends[k], way), own.samples.take(groups.of_samples == k)) for k in range(groups.count)]
+    return Settled(judged, chosen, before, new.shares(_least(new, before)), way, groups, new, apart)
 
 
 class _Run:

@@ -12,10 +12,11 @@ import torch
 
 from gestured.client.say import say, say_json
 from gestured.core.errors import GesturedError
-from gestured.lab.adapt.adaptation import Adapted, adapt, simulate
+from gestured.lab.adapt.adaptation import Adapted, adapt
 from gestured.lab.adapt.judging import Shares
 from gestured.lab.adapt.learning import Course
 from gestured.lab.adapt.material import Own, own_recordings
+from gestured.lab.adapt.takes import simulate
 from gestured.lab.adapt.weights import Base, base_of
 from gestured.lab.dataset import WINDOW, Samples
 from gestured.lab.export import Facts, export_net

@@ -9,7 +9,7 @@ pytest.importorskip("torch")
 
 import torch
 
-from gestured.lab.adapt.adaptation import Simulated
+from gestured.lab.adapt.takes import Simulated
 from gestured.lab.adapt.weights import untrained
 from gestured.lab.dataset import WINDOW, Samples, collect, from_take
 from gestured.lab.export import Facts, export_net
