@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,15 @@ from gestured.lab.adapt.weights import Base, base_of
 from gestured.lab.dataset import WINDOW, Samples
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
+from gestured.lab.own.command import PEOPLE, teach
 from gestured.lab.recordings.origin import KEY, origins
 from gestured.lab.train import answer_figures, quantiles
 from gestured.model.model import shipped_name
+from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES, NONE
 
 MOST_STEPS = 10_000
+JOBS = 2  # processes that simulate
 WORTH = {
     "people": "Each person was judged by networks that had not learned from that person.",
     "sessions": "All recordings are of one person, so sessions were held out in turn: that says how the model will do "
@@ -54,12 +58,13 @@ def run(args: argparse.Namespace) -> int:
     torch.set_num_threads(1)  # networks this small are slower on two, above all where something else computes
     base = base_of(args.base)
     own = own_recordings(args.recordings, args.as_none)
-    takes = simulate(args.cache or cache_folder(), jobs=2)
+    cache = args.cache or cache_folder()
+    takes = simulate(cache, JOBS)
     found = adapt(base, own, takes, Course(steps=args.steps))
     reasons = found.reasons()
     written = not reasons or args.force
     if written:
-        export_net(found.judged, out, _facts(base, own, found, takes.teach, args.recordings))
+        _write(found, out, _facts(base, own, found, takes.teach, args.recordings), cache)
     if args.json:
         say_json(_figures(own, found) | {"written": str(out) if written else None, "reasons": reasons})
     else:
@@ -67,6 +72,16 @@ def run(args: argparse.Namespace) -> int:
         why = f": {'; '.join(reasons)}" if reasons else ""
         say(f"{out}: {'written' if written else 'not written'}{why}", to=sys.stdout if written else sys.stderr)
     return 1 if reasons else 0
+
+
+def _write(found: Adapted, out: Path, facts: Facts, cache: Path) -> None:
+    """All of the model or nothing: what it needs for gestures of its user's own depends on the new weights."""
+    with tempfile.TemporaryDirectory() as folder:
+        made = Path(folder) / out.name
+        export_net(found.judged, made, facts)
+        teach(made, cache, PEOPLE, JOBS)
+        with atomic_write(out, PUBLIC) as file:
+            file.write(made.read_bytes())
 
 
 def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, recordings: list[Path]) -> Facts:

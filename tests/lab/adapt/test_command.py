@@ -12,12 +12,15 @@ pytest.importorskip("torch")
 
 from gestured.lab.adapt import command
 from gestured.lab.cli import main
+from gestured.lab.own import command as own
+from gestured.lab.own.learn import Seen
 from gestured.lab.recordings.origin import said
 from gestured.model.file import inspect
 from gestured.model.model import open_model, shipped
 from gestured.record.arrays import write
 from gestured.simulator import GESTURES
 from tests.lab.adapt.recorded import CONSENT, cut_gestures, whole_session
+from tests.lab.test_own import drawn
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -31,6 +34,7 @@ def run(
     tmp_path: Path,
 ) -> Run:
     monkeypatch.setattr(command, "simulate", lambda *_, **__: request.getfixturevalue("small_world"))
+    monkeypatch.setattr(own, "played", lambda *_, **__: drawn())
     monkeypatch.chdir(tmp_path)
 
     def adapt(*arguments: object) -> tuple[int, str, str]:
@@ -74,6 +78,20 @@ def test_a_model_that_is_written_says_whom_it_learned_from(
     main(["forget", "07", str(path), "--models", str(tmp_path), "--dry-run"])
     out = capsys.readouterr().out
     assert f"was trained with 07: it learned from {path} as it is now; its weights cannot forget" in out
+
+
+def test_an_adapted_model_still_learns_gestures_of_its_users_own(run: Run, tmp_path: Path) -> None:
+    write(tmp_path / "mine.npz", cut_gestures(("07", "08"), GESTURES))
+    run("mine.npz", "--out", "my.onnx", "--steps", "1", "--force")
+    said_of = inspect((tmp_path / "my.onnx").read_bytes())
+    assert json.loads(said_of["classes"])[: len(GESTURES)] == list(GESTURES)
+    assert json.loads(said_of["provisional"])["elapsed_s"][0] == 0
+    model = open_model(tmp_path / "my.onnx")
+    assert model.space is not None
+    seen = Seen.by(model, drawn())
+    plan, _ = seen.plans()
+    np.testing.assert_allclose(model.space.mean, seen.embedding[plan].mean(axis=0), atol=1e-4)  # of the new weights
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.npz", "my.onnx"]
 
 
 @pytest.mark.hostile
