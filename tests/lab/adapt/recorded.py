@@ -1,6 +1,7 @@
 """Somebody's recordings, as `gestured-lab collect` and a session write them: simulated people on any sensor."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,6 +10,13 @@ from gestured.record.recordings import Recordings
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, gesture_take, session
 
 CONSENT = "2026-01-31"
+
+
+def unknown_sensor(seed: int) -> SimulatedSensor:
+    """Another grid, gain, noise and lag than any nominal sensor's."""
+    usual = SimulatedSensor.nominal(day=seed)
+    return replace(usual, rows=12, columns=10, gain=2 * usual.gain, noise=3 * usual.noise,
+                   relaxation=(0.4, 0.2), taus_s=(0.08, 0.6))  # fmt: skip
 
 
 def cut_gestures(

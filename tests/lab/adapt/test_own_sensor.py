@@ -1,7 +1,6 @@
-"""docs/own-sensor.md: its commands run, in its order, on a sensor that no model knows."""
+"""docs/own-sensor.md: what it does with recordings runs, in its order; `test_own_sensor_live` runs the other steps."""
 
 import shlex
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,19 +11,14 @@ pytest.importorskip("torch")
 from gestured.control.cli import main as gesturectl
 from gestured.lab.adapt import command
 from gestured.lab.cli import main as lab
+from gestured.lab.own import command as own
 from gestured.model.file import inspect
-from gestured.model.model import shipped
+from gestured.model.model import open_model, shipped
 from gestured.record.arrays import write
-from gestured.simulator import GESTURES, SimulatedSensor
+from gestured.simulator import GESTURES
 from tests.documents.blocks import blocks
-from tests.lab.adapt.recorded import cut_gestures
-
-
-def unknown_sensor(seed: int) -> SimulatedSensor:
-    """Another grid, gain, noise and lag than any nominal sensor's."""
-    usual = SimulatedSensor.nominal(day=seed)
-    return replace(usual, rows=12, columns=10, gain=2 * usual.gain, noise=3 * usual.noise,
-                   relaxation=(0.4, 0.2), taus_s=(0.08, 0.6))  # fmt: skip
+from tests.lab.adapt.recorded import cut_gestures, unknown_sensor
+from tests.lab.test_own import drawn
 
 
 @pytest.mark.hostile
@@ -35,6 +29,7 @@ def test_the_document_leads_to_a_model(
     if "classes" not in inspect(shipped()["cnn_lstm"].read_bytes()):
         pytest.skip("the shipped models were trained by a version before this one, which reads a network elsewhere")
     monkeypatch.setattr(command, "simulate", lambda *_, **__: request.getfixturevalue("small_world"))
+    monkeypatch.setattr(own, "played", lambda *_, **__: drawn())
     monkeypatch.chdir(tmp_path)
     Path("recordings").mkdir()
     for k, name in enumerate(("07", "08")):
@@ -52,4 +47,4 @@ def test_the_document_leads_to_a_model(
         assert status == 0 or (arguments[0] == "adapt" and "written: " in said.out), said.err
         ran.append(arguments[0])
     assert ran == ["inspect", "tune", "adapt", "check"]
-    assert Path("my.onnx").exists()
+    assert open_model(Path("my.onnx")).space is not None  # it can learn gestures of its user's own

@@ -1,14 +1,10 @@
 """`gestured-lab collect` in a real pseudo-terminal, with the simulated sensor over UDP: a whole session and its end."""
 
 import os
-import pty
-import select
 import signal
 import socket
 import subprocess
 import sys
-import termios
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -21,65 +17,14 @@ from gestured.lab.cli import main
 from gestured.lab.recordings.collect import already
 from gestured.lab.recordings.protocol import order
 from gestured.record.arrays import read, write
+from tests.lab.recordings.person import KEYS, Person
 from tests.small_recording import example
 
-PATIENCE_S = 60.0
-KEYS = "r repeat  d discard"
-GOOD = "Enter keep  " + KEYS
 
-
-class Person:
-    """Someone at a terminal in front of `gestured-lab collect`."""
-
-    def __init__(self, folder: Path, port: int, *more: str) -> None:
-        self.master, self.terminal = pty.openpty()
-        self.before = termios.tcgetattr(self.terminal)
-        self.seen, self.read = "", 0
-        command = [sys.executable, "-m", "gestured.lab.cli", "collect", "--participant", "07", "--out", str(folder)]
-        command += ["--listen", f"127.0.0.1:{port}", "--gestures", "one_tap", "--countdown", "0", *more]
-        self.process = subprocess.Popen(
-            command,
-            stdin=self.terminal,
-            stdout=self.terminal,
-            stderr=self.terminal,
-            env=os.environ | {"PYTHONUNBUFFERED": "1"},
-        )
-
-    def sees(self, *texts: str) -> str:
-        """Wait until one of the texts is shown; gives it."""
-        end = time.monotonic() + PATIENCE_S
-        while True:
-            found = {self.seen.find(text, self.read): text for text in texts}
-            found.pop(-1, None)
-            if found:
-                first = min(found)
-                self.read = first + len(found[first])
-                return found[first]
-            assert time.monotonic() < end, f"{texts} not in: {self.seen[self.read :]}"
-            if select.select([self.master], [], [], 1.0)[0]:
-                self.seen += os.read(self.master, 65536).decode()
-
-    def types(self, text: str) -> None:
-        os.write(self.master, text.encode())
-
-    def keeps_one(self) -> None:
-        """Repeats until a take is good, as a person does."""
-        while self.sees(GOOD, "  " + KEYS) != GOOD:
-            self.types("r")
-        self.types("\n")
-        self.sees("kept, ")
-
-    def ends(self) -> int:
-        """The exit status; the terminal must be as it was."""
-        status = self.process.wait(PATIENCE_S)
-        assert termios.tcgetattr(self.terminal) == self.before
-        return status
-
-    def leave(self) -> None:
-        self.process.kill()
-        self.process.wait()
-        for fd in (self.master, self.terminal):
-            os.close(fd)
+def person_at(folder: Path, port: int, *more: str) -> Person:
+    """Collects taps."""
+    flags = ("--participant", "07", "--out", str(folder), "--listen", f"127.0.0.1:{port}")
+    return Person(*flags, "--gestures", "one_tap", "--countdown", "0", *more)
 
 
 @pytest.fixture
@@ -102,7 +47,7 @@ def sensor(port: int) -> Iterator[None]:
 def test_a_session_that_is_ended_and_goes_on(tmp_path: Path, port: int, sensor: None) -> None:
     trials = order("07", 0, ["one_tap"], 1)
     path = tmp_path / "07.npz"
-    person = Person(tmp_path, port)
+    person = person_at(tmp_path, port)
     try:
         person.sees("Do you agree?")
         person.types("yes\n")
@@ -130,7 +75,7 @@ def test_a_session_that_is_ended_and_goes_on(tmp_path: Path, port: int, sensor: 
     finally:
         person.leave()
 
-    person = Person(tmp_path, port)
+    person = person_at(tmp_path, port)
     try:
         person.sees("gave consent on")
         person.sees("2 of 9 are done already")
@@ -162,7 +107,7 @@ def test_a_session_that_is_ended_and_goes_on(tmp_path: Path, port: int, sensor: 
 
 
 def test_without_consent_nothing_is_recorded(tmp_path: Path, port: int) -> None:
-    person = Person(tmp_path, port)
+    person = person_at(tmp_path, port)
     try:
         person.sees("Do you agree?")
         person.types("no\n")
@@ -174,7 +119,7 @@ def test_without_consent_nothing_is_recorded(tmp_path: Path, port: int) -> None:
 
 
 def test_a_silent_sensor_is_told_and_ctrl_c_leaves_the_terminal_as_it_was(tmp_path: Path, port: int) -> None:
-    person = Person(tmp_path, port, "--sensor", "door")
+    person = person_at(tmp_path, port, "--sensor", "door")
     try:
         person.sees("Do you agree?")
         person.types("yes\n")
