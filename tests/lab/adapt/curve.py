@@ -46,7 +46,10 @@ class Said:
     def add(self, model: Judged, least: float, judges: Own) -> None:
         """Ask a model that publishes from a confidence of `least` on."""
         scores, unknown = decided(model.decision, opinions(model, judges.samples, Course().longest))
-        found = Answers.of(judges.samples, scores, unknown, judges.missed[:, 0])
+        self.take(Answers.of(judges.samples, scores, unknown, judges.missed[:, 0]), least)
+
+    def take(self, found: Answers, least: float) -> None:
+        """One group's answers."""
         self.every.append(found)
         self.published.append(replace(found, confidence=(found.confidence >= least).astype(np.float64)))
 

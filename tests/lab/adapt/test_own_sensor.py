@@ -21,8 +21,8 @@ from tests.lab.adapt.recorded import cut_gestures, unknown_sensor
 from tests.lab.test_own import drawn
 
 
-@pytest.mark.hostile
-@pytest.mark.timeout(1800)
+@pytest.mark.slow
+@pytest.mark.timeout(600)
 def test_the_document_leads_to_a_model(
     tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
