@@ -190,6 +190,7 @@ def collected(lines: Lines, place: Address, names: tuple[str, ...]) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(600)
 def test_the_live_steps_lead_to_an_own_gesture(
     tmp_path: Path, sensor: Hasty, place: Address, monkeypatch: pytest.MonkeyPatch
 ) -> None:
