@@ -21,8 +21,13 @@ from gestured.lab.study.protocols import LENGTH, PAPER, PARTICIPANTS, Task
 from gestured.lab.study.shifting import THRESHOLD
 from gestured.lab.study.tables import right, task
 from gestured.lab.study.views import Values
+from gestured.lab.study.wavelets import POOLED, TAXELS
 
 WAVELET_NAMES, WAVELET_LEVELS = ("haar", "db2", "db4", "sym4"), (1, 2, 3, 4)
+READINGS = {
+    TAXELS: "statistics of each taxel, and over all taxels",
+    POOLED: "mean, maximum and variance over all taxels",
+}
 DECAYS_S = {0.0: "the whole gesture", 0.5: "0.5 s", 1.0: "1 s", 2.0: "2 s"}
 CHANNELS = (4, 8)
 AVERAGES = (1, 2, 3, 5)
@@ -70,6 +75,8 @@ def wanted_choices(plan: Plan, tuned: Mapping[str, Values]) -> Iterator[Choice]:
 
     yield Choice("wavelet", "haar", "st_rf", {name: alone("st_rf", wavelet=name) for name in WAVELET_NAMES})
     yield Choice("wavelet level", "3", "st_rf", {str(n): alone("st_rf", level=n) for n in WAVELET_LEVELS})
+    readings = {words: alone("st_rf", reading=name) for name, words in READINGS.items()}
+    yield Choice("what the wavelet features are", READINGS[TAXELS], "st_rf", readings)
     decays = {name: alone("mhi_cnn", decay_s=s) for s, name in DECAYS_S.items()}
     yield Choice("decay of the motion history image", DECAYS_S[0.0], "mhi_cnn", decays)
     widths = {f"{n} and {2 * n} channels": alone("cnn_lstm", channels=n) for n in CHANNELS}

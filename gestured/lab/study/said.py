@@ -53,7 +53,9 @@ def _row(answers: list[tuple[float, bool, int]]) -> dict[str, Any]:
 
 def _answers(model: Model, take: Take) -> Iterator[tuple[str, str, float, bool]]:
     """(kind, what was performed, seconds after its last touched frame, wrong or not) of each answer to a gesture."""
-    recognizer = Recognizer(FrontEnd("said", *take.frames.shape[1:]), model)
+    front_end = FrontEnd("said", *take.frames.shape[1:])
+    front_end.previews = True  # somebody asks for provisional events
+    recognizer = Recognizer(front_end, model)
     events: list[Any] = []
     for t, values in zip(take.sensor_times, take.frames, strict=True):
         events += recognizer.push(Frame(float(t), values))

@@ -17,11 +17,15 @@ class Choice(NamedTuple):
 
 
 CHOICES = (
-    Choice("cnn_lstm", "shipped", "you want what the daemon runs unless told otherwise"),
-    Choice("lstm", "shipped", "the first cannot be used: it is its fallback"),
-    Choice("tp_rf", "shipped", "nothing else can be used, and silence is better than a guess"),
-    Choice("trajectory_gb", "tuned", "you train for clean sensors, and nothing but the ten gestures is ever done"),
-    Choice("mhi_cnn", "tuned", "you compare with the paper's fastest network"),
+    Choice("cnn_lstm", "shipped", "you have no reason to take another: `gestured` runs it unless told otherwise"),
+    Choice("lstm", "shipped", "the first cannot be used; it is its fallback"),
+    Choice("tp_rf", "shipped", "neither network can be used; it mostly says `unknown`, so that it is seldom wrong"),
+    Choice(
+        "trajectory_gb",
+        "tuned",
+        "you train your own, and nothing but the ten gestures is ever done: it rejects nothing",
+    ),
+    Choice("cnn_gru", "tuned", "the same, and a decision must take a third of the time"),
 )
 HEAD = (
     "| take | if | % wrong: simulated, another generator, real | % wrong or lost "

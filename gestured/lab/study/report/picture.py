@@ -84,8 +84,7 @@ def _run_time(study: Study, drawing: Drawing, axes: Axes, rows: list[Row], field
     axes.loglog()
     axes.minorticks_off()
     axes.grid(axis="x")
-    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda error, _: f"{100 * error:g}"))
+    _percent(axes)
     axes.xaxis.set_major_formatter(FuncFormatter(lambda time, _: formats.duration(time)))
     for row in rows:
         of, ships = row["fields"][field], row["settings"] == "shipped"
@@ -119,23 +118,31 @@ def _legend(study: Study, figure: FigureBase, rows: list[Row]) -> None:
 
 def _said(drawing: Drawing, axes: Axes, said: list[Row]) -> None:
     axes.set_title("B  the model that ships: error of what it says, per cent", color=INK, fontweight="bold")
+    axes.semilogy()
+    axes.minorticks_off()
     axes.grid(axis="x")
     axes.axvline(0.0, color=SOFT, linewidth=1)
     axes.set_xlabel("seconds after the last touched frame: median, and a line from the first to the last tenth")
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda error, _: f"{100 * error:g}"))
+    _percent(axes)
     for row in said:
         mark = GROUP_MARKS[row["group"]]._replace(filling=KINDS[row["kind"]])
-        axes.plot([row["p10_s"], row["p90_s"]], [row["wrong"]] * 2, color=mark.hue, linewidth=1.4, alpha=0.5)
-        axes.plot([row["p50_s"]] * 2, [row["low"], row["high"]], color=mark.hue, linewidth=1.4, alpha=0.5)
+        wrong, low, high = (max(LEAST, row[name]) for name in ("wrong", "low", "high"))
+        axes.plot([row["p10_s"], row["p90_s"]], [wrong] * 2, color=mark.hue, linewidth=1.4, alpha=0.5)
+        axes.plot([row["p50_s"]] * 2, [low, high], color=mark.hue, linewidth=1.4, alpha=0.5)
         words = (
             f"{row['group']}, {row['kind']}: {formats.with_unit(row['wrong'])} of {row['n']} wrong, "
             f"{row['p50_s']:+.2f} s after the last touched frame"
         )
-        drawing.point(axes, row["p50_s"], row["wrong"], mark, words)
-    axes.set_ylim(bottom=-0.005)
+        drawing.point(axes, row["p50_s"], wrong, mark, words)
     groups = [group for group in GROUP_MARKS if any(row["group"] == group for row in said)]
     kinds = [kind for kind in KINDS if any(row["kind"] == kind for row in said)]
     marks = {f"{group}, {kind}": GROUP_MARKS[group]._replace(filling=KINDS[kind]) for kind in kinds for group in groups}
     lines = [Line2D([], [], **mark.style | {"linestyle": ""}) for mark in marks.values()]
-    axes.set_ylim(top=1.4 * axes.get_ylim()[1])  # room for the legend
+    axes.set_ylim(top=8.0)  # room for the legend
     axes.legend(lines, list(marks), loc="upper center", ncols=4, frameon=False)
+
+
+def _percent(axes: Axes) -> None:
+    """Write shares on a logarithmic axis as per cent."""
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g}" if share <= 1 else ""))
