@@ -13,9 +13,9 @@ import torch
 from numpy.typing import NDArray
 
 from gestured.lab.dataset import WINDOW
-from gestured.lab.stability.extremes import segment_cases
-from gestured.lab.stability.models import NET_CLASSES, ScoreTable, Way, WindowList, by_onnxruntime, by_reference, loaded
+from gestured.lab.stability.segments import segment_cases
 from gestured.lab.stability.table import Table, Value
+from gestured.lab.stability.ways import NET_CLASSES, ScoreTable, Way, WindowList, by_onnxruntime, by_reference, loaded
 from gestured.lab.study.onnx_form import Graph, quantised
 from gestured.model.model import shipped
 

@@ -8,16 +8,10 @@ pytest.importorskip("torch", reason="needs the extra [lab]")
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Segment
 from gestured.core.recognizer import Scores
-from gestured.lab.stability.extremes import (
-    Case,
-    month_table,
-    parts_table,
-    streams,
-    swipes,
-    swipes_found,
-    whole_path_table,
-)
+from gestured.lab.stability.extremes import month_table, parts_table, swipes_found, whole_path_table
+from gestured.lab.stability.made import swipes
 from gestured.lab.stability.path import Series, fault
+from gestured.lab.stability.streams import Case, streams
 from gestured.model.model import LADDER, Model, open_model, shipped
 
 

@@ -1,4 +1,4 @@
-"""The shipped models by every way to run them; and that the references are what they claim to be."""
+"""The ways to run a shipped model agree; and the references are what they claim to be."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,8 @@ import onnx
 from onnx import TensorProto
 
 from gestured.lab.dataset import cuts
-from gestured.lab.stability.models import (
+from gestured.lab.stability.path import simulated_series
+from gestured.lab.stability.ways import (
     NET_CLASSES,
     by_frames,
     by_onnxruntime,
@@ -20,7 +21,6 @@ from gestured.lab.stability.models import (
     loaded,
     widened,
 )
-from gestured.lab.stability.path import simulated_series
 from gestured.model.model import LADDER, open_model, shipped
 
 TOLERANCE = 2e-6

@@ -1,0 +1,182 @@
+"""Every way to run a shipped model, and the reference: the same graph in float64.
+
+The reference evaluates the .onnx file itself with `onnx.reference` (numpy, operator by operator), all its weights,
+constants and casts widened to float64. The torch modules get their weights from the file's initialisers.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import onnx
+import torch
+from numpy.typing import NDArray
+from onnx import TensorProto, numpy_helper
+from onnx.reference import ReferenceEvaluator
+from onnx.reference.op_run import OpRun
+
+from gestured.lab.nets import CnnLstm, Decision, Judged, Lstm, read_at
+from gestured.lab.trajectory import TrajectoryNet
+from gestured.model.model import Model
+
+WindowList = Sequence[NDArray[np.float32]]  # (T, R, C) each
+ScoreTable = NDArray[np.float64]  # (B, G + 1): the gestures' scores, then unknown
+ModelRun = Callable[[NDArray[np.float32]], ScoreTable]  # (B, T, R, C) or (B, F)
+Way = Callable[[WindowList], ScoreTable]
+
+NET_CLASSES = {"cnn_lstm": CnnLstm, "lstm": Lstm}
+ONNX_GATES = (0, 2, 3, 1)  # torch's order i f g o, by ONNX's i o f c
+
+
+class GatherElements(OpRun):  # type: ignore[misc, unused-ignore]
+    """onnx's own (1.23) bears 64 elements at most."""
+
+    def _run(self, data: NDArray[Any], indices: NDArray[Any], axis: int) -> tuple[NDArray[Any]]:
+        return (np.take_along_axis(data, indices, axis),)
+
+
+def widened(data: bytes) -> onnx.ModelProto:
+    """The graph with float64 wherever it has float32."""
+    proto = onnx.load_from_string(data)
+
+    def wide(tensor: onnx.TensorProto) -> onnx.TensorProto:
+        if tensor.data_type != TensorProto.FLOAT:
+            return tensor
+        return numpy_helper.from_array(numpy_helper.to_array(tensor).astype(np.float64), tensor.name)
+
+    for tensor in proto.graph.initializer:
+        tensor.CopyFrom(wide(tensor))
+    for node in proto.graph.node:
+        for attribute in node.attribute:
+            if attribute.type == onnx.AttributeProto.TENSOR:
+                attribute.t.CopyFrom(wide(attribute.t))
+            if node.op_type == "Cast" and attribute.name == "to" and attribute.i == TensorProto.FLOAT:
+                attribute.i = TensorProto.DOUBLE
+    for value in (*proto.graph.input, *proto.graph.output, *proto.graph.value_info):
+        if value.type.tensor_type.elem_type == TensorProto.FLOAT:
+            value.type.tensor_type.elem_type = TensorProto.DOUBLE
+    return proto
+
+
+def loaded(name: str, data: bytes) -> Judged:
+    """The torch module with the file's weights; those of the LSTM are stored under names of the tracer's."""
+    proto = onnx.load_from_string(data)
+    found = {tensor.name: numpy_helper.to_array(tensor) for tensor in proto.graph.initializer}
+    (lstm,) = [node for node in proto.graph.node if node.op_type == "LSTM"]
+    inputs, hidden, bias = (found[key][0] for key in lstm.input[1:4])
+
+    def gates(values: NDArray[Any]) -> NDArray[Any]:
+        return np.concatenate([np.split(values, 4)[gate] for gate in ONNX_GATES])
+
+    state = {
+        "net.lstm.weight_ih_l0": gates(inputs),
+        "net.lstm.weight_hh_l0": gates(hidden),
+        "net.lstm.bias_ih_l0": gates(np.split(bias, 2)[0]),
+        "net.lstm.bias_hh_l0": gates(np.split(bias, 2)[1]),
+        "decision.share": np.array(_shares(proto, found), np.float32),
+    }
+    classes = len(found["net.head.bias"])
+    gestures = proto.graph.output[0].type.tensor_type.shape.dim[1].dim_value
+    rows, columns = (dim.dim_value for dim in proto.graph.input[0].type.tensor_type.shape.dim[2:])
+    module = Judged(
+        NET_CLASSES[name](rows, columns, classes), TrajectoryNet(rows, columns, classes), Decision(gestures)
+    )
+    state |= {key: found[key] for key in module.state_dict() if key in found}
+    module.load_state_dict({key: torch.from_numpy(np.array(value)) for key, value in state.items()})
+    return module.eval()
+
+
+def _shares(proto: onnx.ModelProto, found: dict[str, NDArray[Any]]) -> list[float]:
+    """The two opinions' weights: nameless scalars, in the order in which the graph multiplies by them."""
+    scalars = [key for node in proto.graph.node if node.op_type == "Mul" for key in node.input if key in found]
+    return [float(found[key]) for key in scalars if found[key].ndim == 0 and key != "decision.bias"]
+
+
+def by_reference(data: bytes) -> Way:
+    """One after the other, in float64."""
+    runner = ReferenceEvaluator(widened(data), new_ops=[GatherElements])
+    (name,) = runner.input_names
+    return _each(lambda batch: _joined(*runner.run(["scores", "unknown"], {name: batch.astype(np.float64)})))
+
+
+def by_onnxruntime(data: bytes, threads: int = 1, batch: bool = False) -> Way:
+    """As the daemon does; or on more threads, or all at once."""
+    model = Model(data, "stability")  # also sees to it that onnxruntime is imported without its telemetry
+    if threads == 1:
+
+        def run(values: NDArray[np.float32]) -> ScoreTable:
+            return _joined(*model.run(values))
+    else:
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = threads
+        session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+        (name,) = (value.name for value in session.get_inputs())
+
+        def run(values: NDArray[np.float32]) -> ScoreTable:
+            return _joined(*session.run(("scores", "unknown"), {name: values}))
+
+    return _whole(run) if batch else _each(run)
+
+
+def by_torch(module: Judged, dtype: torch.dtype = torch.float32, threads: int = 1, batch: bool = False) -> Way:
+    """The modules that were exported."""
+
+    def run(values: NDArray[np.float32]) -> ScoreTable:
+        with torch.no_grad():
+            scores, unknown, _ = module.to(dtype)(torch.from_numpy(values).to(dtype))
+        return _joined(scores.numpy(), unknown.numpy())
+
+    limited = _on_threads(threads, run)
+    return _whole(limited) if batch else _each(limited)
+
+
+def by_frames(module: Judged) -> Way:
+    """The recurrent net one frame at a time, its state carried from frame to frame; the second opinion at the end."""
+    net: Any = module.net
+
+    def run(values: NDArray[np.float32]) -> ScoreTable:
+        with torch.no_grad():
+            frames = torch.from_numpy(values)
+            state, last = None, int(read_at(frames))
+            kept = torch.zeros(1, net.head.in_features)
+            for k in range(last + 1):
+                kept, state = net.lstm(net.features(frames[:, k : k + 1]), state)
+            scores, unknown = module.decision(net.head(kept.reshape(1, -1)), module.trajectory(frames))
+        return _joined(scores.numpy(), unknown.numpy())
+
+    module.to(torch.float32)
+    return _each(_on_threads(1, run))
+
+
+def _on_threads(threads: int, run: ModelRun) -> ModelRun:
+    def limited(values: NDArray[np.float32]) -> ScoreTable:
+        before = torch.get_num_threads()
+        torch.set_num_threads(threads)
+        try:
+            return run(values)
+        finally:
+            torch.set_num_threads(before)
+
+    return limited
+
+
+def _each(run: ModelRun) -> Way:
+    return lambda windows: np.concatenate([run(window[None]) for window in windows])
+
+
+def _whole(run: ModelRun) -> Way:
+    return lambda windows: run(_stacked(windows))
+
+
+def _joined(scores: NDArray[Any], unknown: NDArray[Any]) -> ScoreTable:
+    return np.concatenate([scores, unknown[:, None]], axis=1).astype(np.float64)
+
+
+def _stacked(windows: WindowList) -> NDArray[np.float32]:
+    """(B, T, R, C); shorter ones end in zeros. Features (B, F) have one length."""
+    out = np.zeros((len(windows), max(map(len, windows)), *windows[0].shape[1:]), np.float32)
+    for row, window in zip(out, windows, strict=True):
+        row[: len(window)] = window
+    return out
