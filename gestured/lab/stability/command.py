@@ -12,6 +12,9 @@ import numpy as np
 
 from gestured.lab.dataset import cuts
 from gestured.lab.made_of import made_of, models_and_manifest
+from gestured.lab.stability.coarse import coarse_table
+from gestured.lab.stability.denormals import denormals_table
+from gestured.lab.stability.exactness import exactness_table, short_windows
 from gestured.lab.stability.extremes import month_table, parts_table, whole_path_table
 from gestured.lab.stability.figure import svg
 from gestured.lab.stability.metamorphic import metamorphic_table
@@ -19,8 +22,10 @@ from gestured.lab.stability.models import models_table
 from gestured.lab.stability.path import simulated_series
 from gestured.lab.stability.precision import precision_table, state_table
 from gestured.lab.stability.relaxation import filters_table
+from gestured.lab.stability.seeds import seeds_table
 from gestured.lab.stability.table import Table
 from gestured.lab.stability.textbook import RANGES, points, textbook_table
+from gestured.lab.stability.wavelet_features import wavelets_table
 from gestured.model.model import LADDER, open_model
 
 
@@ -41,9 +46,14 @@ def all_tables(quick: bool, out: Path | None) -> Iterator[Table]:
     window = best.metadata.window
     some = simulated_series(10 if quick else 60)
     windows = [window.apply(segment) for _, stream in some for segment in cuts(stream.frames, stream.times)]
+    yield exactness_table(quick)
     yield models_table(windows, quick)
-    yield precision_table(windows, quick)
+    yield precision_table(windows)
     yield state_table(windows)
+    yield denormals_table(windows)
+    yield coarse_table(models, 10 if quick else 60)
+    yield wavelets_table(windows, short_windows(quick))
+    yield seeds_table(*((40, 1) if quick else (300, 12)))
     yield metamorphic_table(models, 10 if quick else 150)
 
 

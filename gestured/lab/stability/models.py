@@ -16,6 +16,7 @@ from gestured.lab.stability.ways import (
     by_onnxruntime,
     by_reference,
     by_torch,
+    difference,
     loaded,
 )
 from gestured.model.model import LADDER, Model, shipped
@@ -56,8 +57,7 @@ def models_table(windows: WindowList, quick: bool) -> Table:
                 if len(some) == 1 and "batch" in way:
                     continue
                 found, seconds = _timed(run, some, 1 if quick or len(some) == 1 else 3)
-                changed = int((found[:, :-1].argmax(axis=1) != right[:, :-1].argmax(axis=1)).sum())
-                rows.append((name, title, way, float(np.abs(found - right).max()), changed, 1e3 * seconds))
+                rows.append((name, title, way, *difference(found, right), 1e3 * seconds))
     return Table(
         "Models: largest error of any score against float64",
         ("model", "input", "way", "error", "labels changed", "ms a window"),

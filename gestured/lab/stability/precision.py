@@ -1,61 +1,53 @@
-"""What fewer digits cost the shipped networks: in arithmetic, windows and counts; and what a state becomes.
+"""What fewer digits cost the shipped networks, in windows and in weights; and what a state becomes that never ends.
 
-Float64 is the same graph, operator by operator, as in `models`. The recurrent state is that of the torch modules, which
-carry the file's weights.
+The recurrent state is that of the torch modules, which carry the file's weights.
 """
 
-import time
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from gestured.lab.dataset import WINDOW
-from gestured.lab.stability.segments import segment_cases
 from gestured.lab.stability.table import Table, Value
-from gestured.lab.stability.ways import NET_CLASSES, ScoreTable, Way, WindowList, by_onnxruntime, by_reference, loaded
+from gestured.lab.stability.ways import (
+    NET_CLASSES,
+    ScoreTable,
+    Way,
+    WindowList,
+    by_onnxruntime,
+    difference,
+    loaded,
+)
 from gestured.lab.study.onnx_form import Graph, quantised
 from gestured.model.model import shipped
 
-STEPS = (2, 3, 4, 6, 10)  # of counts between nothing and the peak
+STEPS = (2, 3, 4, 6, 10)  # between nothing and the peak
 STATE_FRAMES = (100, 1_000, 10_000)
-LONGEST_REFERENCE = 12  # frames of an extreme window that float64 is asked for; longer ones take minutes
-DENORMAL = 1e-41  # of the peak: below float32's least normal number, as a scale
 
 
-def precision_table(windows: WindowList, quick: bool) -> Table:
+def precision_table(windows: WindowList) -> Table:
     """Every comparison, net by net."""
     rows: list[tuple[Value, ...]] = []
     for name in NET_CLASSES:
         data = shipped()[name].read_bytes()
-        run, reference = by_onnxruntime(data), by_reference(data)
+        run = by_onnxruntime(data)
         plain = run(windows)
-
-        def compared(what: str, some: WindowList, of: Any = run, to: ScoreTable = plain, net: str = name) -> None:
-            found = of(some)
-            changed = int((found[:, :-1].argmax(axis=1) != to[:, :-1].argmax(axis=1)).sum())
-            rows.append((net, what, len(some), float(np.abs(found - to).max()), changed))
-
-        extreme = _extreme(quick)
-        compared("float64 against float32, extreme windows", extreme, run, reference(extreme))
-        compared("float16 windows, as in training", [w.astype(np.float16).astype(np.float32) for w in windows])
+        half = [window.astype(np.float16).astype(np.float32) for window in windows]
+        rows.append((name, "float16 windows, as in training", len(windows), *difference(run(half), plain)))
         for steps in STEPS:
-            coarse = [(np.rint(w * steps) / steps).astype(np.float32) for w in windows]
-            compared(f"counts of {steps} steps at the peak", coarse)
+            coarse = [(np.rint(window * steps) / steps).astype(np.float32) for window in windows]
+            rows.append((name, f"windows of {steps} steps", len(windows), *difference(run(coarse), plain)))
         smaller = quantised(Graph(data))
         if smaller is not None:
-            compared("int8 weights", windows, _unchecked(smaller.data))
-        denormal = [np.where(w > 0, w, np.float32(DENORMAL)).astype(np.float32) for w in windows]
-        compared(f"denormals in the place of zeros, {_price(run, windows, denormal):.2f} times the run time", denormal)
+            what = f"int8 weights, {len(smaller.data) / len(data):.2f} of the bytes"
+            rows.append((name, what, len(windows), *difference(_unchecked(smaller.data)(windows), plain)))
     return Table(
-        "Precision: largest change of any score",
+        "Fewer digits: largest change of any score against float32",
         ("model", "what", "windows", "change", "labels changed"),
         rows,
         (
-            "Against the same windows as they are, in onnxruntime as the daemon runs it; the first row of each model",
-            "against the graph in float64. `labels changed`: the best gesture is another one. An int8 model fails its",
+            "Windows of simulated gestures in onnxruntime, against the same windows as the daemon runs them.",
+            "Scores are from 0 to 1. `labels changed`: the best gesture is another one. An int8 model fails its",
             "self-test, and the daemon would refuse it.",
         ),
     )
@@ -67,18 +59,22 @@ def state_table(windows: WindowList) -> Table:
     row = np.concatenate(list(windows) * (max(STATE_FRAMES) // sum(map(len, windows)) + 1))[: max(STATE_FRAMES)]
     for name in NET_CLASSES:
         net: Any = loaded(name, shipped()[name].read_bytes()).net
-        state = None
+        state, most = None, 0.0
         with torch.no_grad():
             for k in range(len(row)):
                 _, state = net.lstm(net.features(torch.from_numpy(row[None, k : k + 1])), state)
+                said, kept = (float(part.norm()) for part in state)
+                most = max(most, kept)
                 if k + 1 in STATE_FRAMES:
-                    said, kept = (float(part.norm()) for part in state)
-                    rows.append((name, k + 1, kept, said))
+                    rows.append((name, k + 1, kept, most, said))
     return Table(
-        "Recurrent state: its norm while a contact never ends",
-        ("model", "frames", "cell", "output"),
+        "Recurrent state: its Euclidean norm while a contact never ends",
+        ("model", "frames", "cell", "the cell's largest so far", "output"),
         rows,
-        ("Windows of simulated gestures one after the other. The output is bounded by its gate, the cell by nothing.",),
+        (
+            "Windows of simulated gestures one after the other, in torch. The output's elements lie between -1",
+            "and 1; the cell's are bounded by nothing.",
+        ),
     )
 
 
@@ -93,21 +89,3 @@ def _unchecked(data: bytes) -> Way:
         return np.stack([np.append(scores[0], unknown[0]) for scores, unknown in found]).astype(np.float64)
 
     return run
-
-
-def _extreme(quick: bool) -> WindowList:
-    """The windows of the extreme segments that are finite and short enough, every seventh of them in a quick run."""
-    found = [WINDOW.apply(segment) for _, segment in segment_cases(quick) if len(segment.frames) <= LONGEST_REFERENCE]
-    usable = [window for window in found if len(window) and np.isfinite(window).all()]
-    return usable[:: 7 if quick else 1]
-
-
-def _price(run: Any, one: Sequence[NDArray[np.float32]], other: Sequence[NDArray[np.float32]]) -> float:
-    """How many times as long `other` takes as `one`, in turns."""
-    took = {0: [0.0], 1: [0.0]}
-    for _ in range(5):
-        for k, some in enumerate((one, other)):
-            start = time.process_time()
-            run(some)
-            took[k].append(time.process_time() - start)
-    return float(np.median(took[1][1:]) / np.median(took[0][1:]))

@@ -180,3 +180,9 @@ def _stacked(windows: WindowList) -> NDArray[np.float32]:
     for row, window in zip(out, windows, strict=True):
         row[: len(window)] = window
     return out
+
+
+def difference(found: ScoreTable, right: ScoreTable) -> tuple[float, int]:
+    """(largest change of any score, windows whose best gesture is another one)."""
+    changed = found[:, :-1].argmax(axis=1) != right[:, :-1].argmax(axis=1)
+    return float(np.abs(found - right).max()), int(changed.sum())

@@ -3,26 +3,34 @@
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
+pytest.importorskip("sklearn")
 
 from gestured.lab.nets import CnnLstm
 from gestured.lab.stability import precision
+from gestured.lab.study.onnx_form import Graph, quantised
+from gestured.model.model import Model, shipped
 from tests.lab.made import gestures
 
 WINDOWS = [gestures()["swipe_up"], gestures()["circle_clockwise"]]
 
 
-def test_what_no_sensor_shows_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fewer_steps_a_window_has_the_more_changes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(precision, "NET_CLASSES", {"lstm": None})
-    rows: dict[str, Any] = {str(row[1]): row for row in precision.precision_table(WINDOWS, quick=True).rows}
-    (extreme,) = [row for what, row in rows.items() if what.startswith("float64")]
-    assert extreme[2] > 5 and extreme[3] < 1e-4 and extreme[4] == 0
-    halves, tenths = rows["counts of 2 steps at the peak"], rows["counts of 10 steps at the peak"]
-    assert rows["float16 windows, as in training"][3] < tenths[3] < halves[3]
-    assert sum(what.startswith("denormals") for what in rows) == 1
+    rows: dict[str, Any] = {str(row[1]): row for row in precision.precision_table(WINDOWS).rows}
+    assert rows["float16 windows, as in training"][3] < rows["windows of 10 steps"][3] < rows["windows of 2 steps"][3]
+    assert sum(what.startswith("int8 weights") for what in rows) == 1
+
+
+def test_a_model_of_int8_fails_its_self_test() -> None:
+    smaller = quantised(Graph(shipped()["lstm"].read_bytes()))
+    assert smaller is not None
+    with pytest.raises(ValueError, match="self-test"):
+        Model(smaller.data, "int8")
 
 
 def test_the_states_norm_is_told_at_each_length(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,7 +40,11 @@ def test_the_states_norm_is_told_at_each_length(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(precision, "STATE_FRAMES", (3, 40))
     rows: list[Any] = precision.state_table(WINDOWS).rows
     assert [row[1] for row in rows] == [3, 40, 3, 40]
-    frames = torch.from_numpy(WINDOWS[0][None, :3])
+    kept: list[float] = []
+    state, frames = None, torch.from_numpy(np.concatenate(WINDOWS * 2)[None, :40])
     with torch.no_grad():
-        _, (said, kept) = net.lstm(net.features(frames))
-    assert rows[0][2:] == (pytest.approx(float(kept.norm()), rel=1e-4), pytest.approx(float(said.norm()), rel=1e-4))
+        for k in range(40):
+            _, state = net.lstm(net.features(frames[:, k : k + 1]), state)
+            kept.append(float(state[1].norm()))
+    assert [row[2] for row in rows[:2]] == pytest.approx([kept[2], kept[39]], rel=1e-4)
+    assert [row[3] for row in rows[:2]] == pytest.approx([max(kept[:3]), max(kept)], rel=1e-4)

@@ -1,0 +1,45 @@
+"""Sensors with few counts: a gesture's peak in 2 to 100 steps, through the whole path."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gestured.core.recognizer import Classifier
+from gestured.lab.stability.path import Series, events, labels, simulated_series
+from gestured.lab.stability.table import Table, Value
+
+PEAKS = (2, 3, 4, 6, 10, 30, 100)  # counts
+
+
+def with_peak(stream: Series, counts: int) -> Series:
+    """The same in whole counts, of which its peak above the idle sensor has so many."""
+    idle = np.median(stream.frames, axis=0)
+    unit = float((stream.frames - idle).max()) / counts
+    return Series(stream.times, np.rint(stream.frames / unit))
+
+
+def coarse_table(models: Mapping[str, Classifier], count: int) -> Table:
+    """Each peak on so many simulated gestures: share of takes that are named rightly, by model."""
+    takes = list(simulated_series(count))
+    changes = {"as it is": [stream for _, stream in takes]}
+    changes |= {f"{peak} counts": [with_peak(stream, peak) for _, stream in takes] for peak in PEAKS}
+    rows: list[tuple[Value, ...]] = []
+    for title, streams in changes.items():
+        cells: list[Value] = []
+        for model in models.values():
+            said = [labels(events(stream, model)) for stream in streams]
+            right = sum(found == (kind,) for found, (kind, _) in zip(said, takes, strict=True))
+            wrong = sum(any(label in model.gestures and label != kind for label in found)
+                        for found, (kind, _) in zip(said, takes, strict=True))  # fmt: skip
+            cells.append(f"{100 * right / count:.1f} % ({100 * wrong / count:.1f} %)")
+        rows.append((title, *cells))
+    return Table(
+        "Few counts: gestures named rightly, and wrongly, through the whole path",
+        ("peak of the gesture", *models),
+        rows,
+        (
+            f"{count} simulated gestures of ten kinds, their counts divided and rounded to whole numbers before",
+            "the front end. Rightly: one answer, the gesture that was performed; in brackets the share with any",
+            "other gesture.",
+        ),
+    )
