@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from gestured.lab.dataset import cuts
-from gestured.lab.made_of import made_of, models_and_manifest
+from gestured.lab.made_of import made_of
 from gestured.lab.stability.coarse import coarse_table
 from gestured.lab.stability.denormals import denormals_table
 from gestured.lab.stability.exactness import exactness_table, short_windows
@@ -26,7 +26,7 @@ from gestured.lab.stability.seeds import seeds_table
 from gestured.lab.stability.table import Table
 from gestured.lab.stability.textbook import RANGES, points, textbook_table
 from gestured.lab.stability.wavelet_features import wavelets_table
-from gestured.model.model import LADDER, open_model
+from gestured.model.model import LADDER, open_model, shipped
 
 
 def all_tables(quick: bool, out: Path | None) -> Iterator[Table]:
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     where = f"{date.today()}, {platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
     where += f", numpy {np.__version__}"
     if not args.json:
-        print(f"{where}\n{made_of('gestured-lab stability --out docs', models_and_manifest())}\n")
+        print(f"{where}\n{made_of('gestured-lab stability --out docs', shipped().values())}\n")
     done = []
     for table in all_tables(args.quick, args.out):
         done.append(table.plain())
