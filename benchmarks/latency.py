@@ -34,16 +34,17 @@ def _listen(
     return sock, thread
 
 
-def play(port: int, stream: list[bytes]) -> list[float]:
+def play(port: int, stream: list[bytes], rate_hz: float = RATE_HZ) -> list[float]:
+    """Send a stream at its pace; returns when each packet was sent, in monotonic seconds."""
     sent = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.connect(("127.0.0.1", port))
         begin = time.monotonic() + 0.05
         for k, packet in enumerate(stream):
-            time.sleep(max(begin + k / RATE_HZ - time.monotonic(), 0.0))
+            time.sleep(max(begin + k / rate_hz - time.monotonic(), 0.0))
             sent.append(time.monotonic())
             sock.send(packet)
-    time.sleep(1 / RATE_HZ)
+    time.sleep(1 / rate_hz)
     return sent
 
 

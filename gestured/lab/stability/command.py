@@ -53,7 +53,7 @@ def all_tables(quick: bool, out: Path | None) -> Iterator[Table]:
     yield denormals_table(windows)
     yield coarse_table(models, 10 if quick else 60)
     yield wavelets_table(windows, short_windows(quick))
-    yield seeds_table(*((40, 1) if quick else (300, 12)))
+    yield seeds_table(*((40, 1) if quick else (200, 8)))
     yield metamorphic_table(models, 10 if quick else 150)
 
 

@@ -30,6 +30,7 @@ WINDOWS = (
     Window(5, 7, 60.0, 1, 1 / 15, 1 / 15, 4.0),
     Window(27, 15, 5.0, 1, 1 / 15, 1 / 15, 0.0),
 )
+LONG = 1000  # frames: more than any front end gives, and for a model without the daemon's limit of time
 FOUND = "swipe_right"  # what all swipes of `swipes` are
 
 
@@ -118,8 +119,13 @@ def _window(window: Window, segment: Segment) -> bool:
 
 
 def _scores(model: Model, segment: Segment) -> bool:
-    answer = model.classify(segment)
-    return bool(abs(float(answer.values.sum()) - 1.0) < 1e-3 and 0.0 <= answer.unknown <= 1.0)
+    if len(segment.frames) < LONG:
+        answer = model.classify(segment)
+        return bool(abs(float(answer.values.sum()) - 1.0) < 1e-3 and 0.0 <= answer.unknown <= 1.0)
+    window = model.metadata.window.apply(segment)
+    features = model.metadata.features is not None
+    scores, unknown = model.run((touch_pattern(window, model.metadata.rate_hz) if features else window)[np.newaxis])
+    return bool(abs(float(scores.sum()) - 1.0) < 1e-3 and 0.0 <= unknown[0] <= 1.0)
 
 
 def month_table(classifier: Classifier, days: float) -> Table:
