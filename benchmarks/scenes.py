@@ -1,13 +1,17 @@
-"""What each scene pays for: start, memory, CPU of a frame, and which packages its daemon has loaded."""
+"""What each scene pays for, beside the scene that has least: counted, and measured side by side."""
 
 import os
+import socket
 import time
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from statistics import median
 
-import numpy as np
-
+from benchmarks import scenes_counted
 from benchmarks.latency import play
 from benchmarks.timing import Ratio, Row, cpu_s_of, cpu_us, interleaved, percentile, ratio, resident_kib
-from benchmarks.traffic import touched
+from benchmarks.traffic import RATE_HZ, touched
 from gestured.client.engine import Engine
 from gestured.client.osc_out import dated
 from gestured.client.sensor import Form
@@ -17,47 +21,120 @@ from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.values import Grid
 from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
 
+OSC = "osc://127.0.0.1:{port}"  # where somebody listens
 SCENES: dict[str, tuple[str, ...]] = {
     "minimal": (),
-    "metrics": ("--metrics", "127.0.0.1:0"),
-    "OSC out": ("--publish", "osc://127.0.0.1:9"),
+    "metrics": ("--metrics", "127.0.0.1:0"),  # which nobody reads
+    "OSC out": ("--publish", OSC),
+    "flight recorder": ("--flight-recorder", "4"),
     "forest alone": (),
     "trajectories": (),  # the sensor sends finger positions beside its frames; nothing in the daemon asks for them
     "swipes alone": ("--gestures", "swipe_left,swipe_right"),
-    "everything": ("--metrics", "127.0.0.1:0", "--publish", "osc://127.0.0.1:9", "--log-level", "debug"),
+    "everything": ("--metrics", "127.0.0.1:0", "--publish", OSC, "--flight-recorder", "4", "--log-level", "debug"),
 }
-REPEATS = 5
+SECONDS = 15.0  # of touching
+ROUNDS = 5
 TOUCHES = tuple(Touch(finger, 4.0, 1.0 + 3.0 * finger) for finger in range(3))
 
 
+@dataclass(frozen=True)
+class Scene:
+    """A daemon's model and flags, and what its sensor sends."""
+
+    model: str
+    flags: tuple[str, ...]
+    stream: list[bytes]
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of one daemon in one round."""
+
+    start_s: float
+    resident_kib: int
+    cpu_s: float
+    threads: int
+    descriptors: int
+
+
 def table(model: str) -> None:
-    """Print the table of scenes, and what finger positions add to the decoding of a frame."""
-    frames = touched(40, 15.0).frames
-    plain, bundle = Form("bench", plain=True), Form("bench")
-    streams = {"trajectories": [bundle.packet(Frame(0.0, f, TOUCHES), k, k / 15) for k, f in enumerate(frames)]}
-    matrices = [plain.packet(Frame(0.0, f), 0, 0.0) for f in frames]
-    print("| scene | start to ready | resident | CPU a frame | threads | descriptors |\n|---|---|---|---|---|---|")
-    for name, flags in SCENES.items():
-        used = "touch_pattern_rf" if name == "forest alone" else model
-        seconds, kib = [], []
-        for _ in range(REPEATS):
-            begin = time.monotonic()
-            with Engine(used, 9, 9, *flags) as engine:
-                seconds.append(time.monotonic() - begin)
-                kib.append(resident_kib(engine.pid))
-        with Engine(used, 9, 9, *flags) as engine:
-            before = cpu_s_of(engine.pid)
-            play(engine.listen[1], streams.get(name, matrices))
-            cpu = 1e6 * (cpu_s_of(engine.pid) - before) / len(frames)
-            threads = len(os.listdir(f"/proc/{engine.pid}/task"))
-            descriptors = len(os.listdir(f"/proc/{engine.pid}/fd"))
-        print(
-            f"| {name} | {np.median(seconds):.2f} s ({min(seconds):.2f} to {max(seconds):.2f}) "
-            f"| {np.median(kib) / 1024:.1f} MiB | {cpu:.0f} us | {threads} | {descriptors} |",
-            flush=True,
-        )
+    """Print both tables of scenes, and what finger positions add to the decoding of a frame."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", 0))
+        found = _scenes(model, listener.getsockname()[1])
+        counts = {name: scenes_counted.counted(one.model, one.flags, one.stream) for name, one in found.items()}
+        print(scenes_counted.table(counts) + "\n", flush=True)
+        print(_beside([_round(found) for _ in range(ROUNDS + 1)][1:]))  # the first one warms up
     passed, parsed = (_decoding(keep_touches) for keep_touches in (False, True))
     print(f"\ndecode of a bundle, with three finger positions against without: {passed}; if they were kept: {parsed}")
+
+
+def _scenes(model: str, port: int) -> dict[str, Scene]:
+    """Each scene; all sensors do the same and send bundles with time tags."""
+    frames, plain, bundle = touched(40, SECONDS).frames, Form("bench", plain=True), Form("bench")
+    epoch = time.time()
+    alone = [dated(epoch + k / RATE_HZ, plain.packet(Frame(0.0, f), 0, 0.0)) for k, f in enumerate(frames)]
+    fingers = [bundle.packet(Frame(0.0, f, TOUCHES), k, epoch + k / RATE_HZ) for k, f in enumerate(frames)]
+    return {
+        name: Scene(
+            "touch_pattern_rf" if name == "forest alone" else model,
+            tuple(flag.format(port=port) for flag in flags),
+            fingers if name in ("trajectories", "everything") else alone,
+        )
+        for name, flags in SCENES.items()
+    }
+
+
+def _round(found: Mapping[str, Scene]) -> dict[str, Cost]:
+    """All scenes started one after the other, then fed in turn, so that the machine is as busy for each."""
+    with ExitStack() as stack:
+        engines: dict[str, tuple[Engine, float]] = {}
+        for name, scene in found.items():
+            begin = time.monotonic()
+            engine = stack.enter_context(Engine(scene.model, 9, 9, "--clock", "sensor", *scene.flags))
+            engines[name] = engine, time.monotonic() - begin
+        before = {name: cpu_s_of(engine.pid) for name, (engine, _) in engines.items()}
+        sock = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+        begin = time.monotonic()
+        for k in range(len(next(iter(found.values())).stream)):
+            for n, (name, (engine, _)) in enumerate(engines.items()):
+                time.sleep(max(begin + (k + n / len(engines)) / RATE_HZ - time.monotonic(), 0.0))
+                sock.sendto(found[name].stream[k], ("127.0.0.1", engine.listen[1]))
+        return {
+            name: Cost(
+                start_s,
+                resident_kib(engine.pid),
+                cpu_s_of(engine.pid) - before[name],
+                len(os.listdir(f"/proc/{engine.pid}/task")),
+                len(os.listdir(f"/proc/{engine.pid}/fd")),
+            )
+            for name, (engine, start_s) in engines.items()
+        }
+
+
+def _beside(rounds: list[dict[str, Cost]]) -> str:
+    """Each scene beside the first, round by round: the median, the least and the most."""
+    first = next(iter(rounds[0]))
+    lines = [
+        "| scene | start, times minimal | CPU, times minimal | resident, MiB more | threads | descriptors |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name in rounds[0]:
+        ours, least = [one[name] for one in rounds], [one[first] for one in rounds]
+        start = ratio([cost.start_s for cost in ours], [cost.start_s for cost in least])
+        cpu = ratio([cost.cpu_s for cost in ours], [cost.cpu_s for cost in least])
+        more = sorted((a.resident_kib - b.resident_kib) / 1024 for a, b in zip(ours, least, strict=True))
+        lines.append(
+            f"| {name} | {start} | {cpu} | {median(more):+.2f} ({more[0]:+.2f} to {more[-1]:+.2f}) "
+            f"| {ours[0].threads} | {ours[0].descriptors} |"
+        )
+    plain = [one[first] for one in rounds]
+    lines.append(
+        f"\nminimal: {median(cost.start_s for cost in plain):.2f} s to start, "
+        f"{median(cost.resident_kib for cost in plain) / 1024:.1f} MiB, "
+        f"{1e3 * median(cost.cpu_s for cost in plain) / SECONDS:.1f} ms of CPU a second at {RATE_HZ:g} Hz"
+    )
+    return "\n".join(lines)
 
 
 def _decoding(keep_touches: bool) -> Ratio:
