@@ -16,10 +16,13 @@ from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
 from gestured.model.ladder import Ladder, gestures_in_use
 
+JITTERED = 0.1  # of a frame: a wait this near to whole frames is one more or not, by how the frames fall
 
-def _felt(wait_s: float, rate_hz: float) -> float:
+
+def _felt(wait_s: float, rate_hz: float) -> str:
     """Seconds from the last touched frame to the answer: the first quiet frame, and those that the wait takes then."""
-    return (1 + math.ceil(wait_s * rate_hz - 1e-9)) / rate_hz
+    ends = (1 + math.ceil(wait_s * rate_hz + slack) for slack in (-JITTERED, JITTERED))
+    return " to ".join(dict.fromkeys(f"{frames / rate_hz:.2g}" for frames in ends)) + " s"
 
 
 def explain(settings: Settings, sources: Mapping[str, str]) -> str:
@@ -67,8 +70,8 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     computes = [
         "decode, check, stamp; subtract the baseline, compare with the noise; no smoothing, no inference",
         f"after a contact: {'touch-pattern features' if forest else 'its frames as a window'}, one inference",
-        f"at {rate_hz:g} Hz a contact is answered {_felt(timing.release_s, rate_hz):.2g} s after its last touched frame"
-        + (f", a tap {_felt(timing.tap_gap_s, rate_hz):.2g} s after it, since a second one may come" if waits else ""),
+        f"at {rate_hz:g} Hz a contact is answered {_felt(timing.release_s, rate_hz)} after its last touched frame"
+        + (f", a tap {_felt(timing.tap_gap_s, rate_hz)} after it, since a second one may come" if waits else ""),
     ]
     leaves = [
         "finger positions (trajectory): nothing uses them, they are passed over at their address",
