@@ -27,7 +27,7 @@ def svg(panels: Mapping[str, Sequence[Point]]) -> str:
             axes.set_yticks([*map(float, TICKS), WORST], [*TICKS, "diverges"])
             axes.xaxis.set_major_formatter(FuncFormatter(lambda seconds, _: formats.duration(seconds, 1)))
             axes.set_title(title, color=INK, fontweight="bold")
-            axes.set_xlabel("run time a frame; up: largest error")
+            axes.set_xlabel("processor time a frame; up: largest error")
             axes.grid(axis="x")
             for method, mark in marks.items():
                 own = [(point, min(max(point.error, BEST), WORST)) for point in points if point.method == method]

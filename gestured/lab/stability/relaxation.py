@@ -70,14 +70,14 @@ def error(filter_: Filter, decade: float | None, dtype: Any, count: int) -> tupl
 
 
 def _seconds(filter_: Filter, count: int) -> float:
-    """Seconds a step, the best of five runs, the code that holds the filter alone."""
+    """Seconds of processor time a step, the best of five runs, the code that holds the filter alone."""
     times = steps(count, 7, -1, filter_.tau_s, even=filter_.even)
     inputs = np.zeros(count + 1)
     best = math.inf
     for _ in range(5):
-        start = time.perf_counter()
+        start = time.process_time()
         filter_.run(times, inputs)
-        best = min(best, time.perf_counter() - start)
+        best = min(best, time.process_time() - start)
     return best / count
 
 
@@ -106,7 +106,7 @@ def filters_table(quick: bool) -> Table:
         (
             "Errors are shares of the largest exact output. `mixed`: steps of 1e-9 to 1e9 tau in disorder,",
             "repeated times and gaps of a day. `in range`: finite, never below nor above what came in. `us a",
-            "step`: of the code that holds the filter. The noise is looked at every 0.5 s:",
+            "step`: processor time of the code that holds the filter. The noise is looked at every 0.5 s:",
             f"smaller steps add up. The after-effect ends after {AFTER_S:g} s; remanence below 1e-5 is taken for",
             "nothing, which is its error at 1 tau.",
         ),
