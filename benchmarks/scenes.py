@@ -19,6 +19,8 @@ from gestured.client.stream import Stream
 from gestured.core.frames import Frame, Touch
 from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.values import Grid
+from gestured.lab.made_of import made_of
+from gestured.model.model import shipped
 from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
 
 OSC = "osc://127.0.0.1:{port}"  # where somebody listens
@@ -62,6 +64,7 @@ def table(model: str) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind(("127.0.0.1", 0))
         found = _scenes(model, listener.getsockname()[1])
+        print(made_of("make bench ARGS=--scenes", shipped().values()) + "\n")
         counts = {name: scenes_counted.counted(one.model, one.flags, one.stream) for name, one in found.items()}
         print(scenes_counted.table(counts) + "\n", flush=True)
         print(_beside([_round(found) for _ in range(ROUNDS + 1)][1:]))  # the first one warms up
