@@ -49,7 +49,7 @@ def denormals_table(windows: WindowList) -> Table:
         (
             f"Processor time, the median of {ROUNDS} pairs in turns; `times`: the median of their ratios. The",
             f"models run windows of simulated gestures with {DENORMAL:g} of the peak in the place of 0, the front",
-            "end a made finger.",
+            "end frames of an idle sensor.",
         ),
     )
 
