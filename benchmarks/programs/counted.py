@@ -39,7 +39,7 @@ def counted(receiver: Receiver) -> None:
         print(json.dumps([receiver._found, receiver._again is not None, count]), flush=True)
 
 
-Receiver.read = counted  # type: ignore[method-assign]
+setattr(Receiver, "read", counted)  # noqa: B010
 try:
     runpy.run_module("gestured.daemon", run_name="__main__", alter_sys=True)
 except SystemExit:
