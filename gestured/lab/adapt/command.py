@@ -127,11 +127,11 @@ def _tell(own: Own, found: Adapted) -> None:
     say(f"{len(own.names)} people, {shares.gestures} gestures, {shares.others} non-gestures")
     for name, count in sorted(own.left_out.items()):
         say(f"left out: {name} ({count}), neither taught nor rejected, so that it can be enrolled")
-    say(f"{'':<18}{'right':>15}{'wrong':>15}{'unknown':>15}{'others taken':>15}")
+    say(f"{'':<16}{'right':>16}{'wrong':>16}{'unknown':>16}{'others taken':>16}")
     for title, before, after in (
         ("own", found.before.own, found.after.own), ("simulated", found.before.simulated, found.after.simulated),
     ):  # fmt: skip
-        say(_row(f"{title}, before", before), _row(f"{title}, after", after))
+        say(_row(f"{title} before", before), _row(f"{title} after", after))
     say(f"threshold {found.least:.3f}, where no more are wrong than before", WORTH[found.unit])
 
 
@@ -139,4 +139,4 @@ def _row(title: str, shares: Shares) -> str:
     cells = []
     for share, low, high in (shares.right, shares.wrong, shares.unknown, shares.accepted):
         cells.append(f"{share:.3f} {low:.2f}-{high:.2f}" if share == share else "-")
-    return f"{title:<18}" + "".join(f"{cell:>15}" for cell in cells)
+    return f"{title:<16}" + "".join(f"{cell:>16}" for cell in cells)

@@ -1,6 +1,7 @@
 """`gestured-lab adapt`: what it writes, what it says, and that it writes nothing where that is no better."""
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -114,7 +115,10 @@ def test_where_it_is_no_better_nothing_is_written(run: Run, tmp_path: Path) -> N
     assert status == 1
     assert "my.onnx: not written: right does not go up" in err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz"]
-    assert max(map(len, out.splitlines()[:6])) <= 80
+    head, *rows = out.splitlines()[1:6]
+    assert max(map(len, (head, *rows))) <= 80
+    for row in rows:  # no column runs into the next
+        assert re.fullmatch(r"\w+ (before|after)(?: +(?:\d\.\d{3} \d\.\d\d-\d\.\d\d|-)){4}", row), row
 
 
 @pytest.mark.hostile
