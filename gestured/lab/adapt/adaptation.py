@@ -28,7 +28,7 @@ from gestured.lab.nets import Decision, Judged
 from gestured.simulator import GESTURES
 
 WAYS = (0.25, 0.5, 0.75, 1.0)  # of the way from the old weights to the new ones
-LOSS = 0.01  # of the simulated gestures that may be answered rightly no more
+LOSS = 0.01  # of the simulated gestures that may be answered rightly no more, and of the others that may be taken
 
 Opinions = tuple[Tensor, Tensor]  # (G, K) logits of the network and of its second opinion
 
@@ -66,6 +66,12 @@ class Adapted:
         lost = self.before.simulated.right[0] - self.after.simulated.right[0]
         if lost > LOSS:
             found.append(f"{100 * lost:.1f} points of the simulated gestures are lost, expected 1 at most")
+        taken = self.after.simulated.accepted[0] - self.before.simulated.accepted[0]
+        if taken > LOSS:
+            remedy = "" if new.others else "; record non-gestures of your own, too (gestured-lab collect)"
+            found.append(
+                f"{100 * taken:.1f} points more of the simulated non-gestures are accepted, expected 1{remedy}"
+            )
         return found
 
 
