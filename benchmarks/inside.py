@@ -68,7 +68,7 @@ def recognise(model: str) -> Row:
     segments = [c for c in cuts if isinstance(c, Cut)]
     opened = open_model(model)
     windows = [opened.metadata.window.apply(c.segment)[np.newaxis] for c in segments]
-    session: Any = opened._session
+    session: Any = opened._session._session
     name = session.get_inputs()[0].name
     recognizer = Recognizer(FrontEnd("bench", 9, 9), opened)
 
