@@ -31,7 +31,12 @@ SENSOR = Parameter(
     (str, type(None)), "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", check=lambda name: name is None or is_sensor(name)
 )
 NAMED = Parameter(str, "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", required=True, check=is_sensor)
-SENSORS = Parameter(list, "a list of sensors' names", required=True, check=lambda names: all(map(is_sensor, names)))
+SENSORS = Parameter(
+    list,
+    "a list of sensors' names",
+    required=True,
+    check=lambda names: all(isinstance(name, str) and is_sensor(name) for name in names),
+)
 RAW = Parameter(bool, "true or false")
 COUNT = Parameter(int, "a number of examples")
 LABEL = Parameter(str, "a gesture's name", required=True)

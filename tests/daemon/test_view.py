@@ -79,8 +79,9 @@ def test_who_follows_is_shown_each_sensor_as_it_is_and_then_each_frame(shared: D
         Sensor(shared, "later").begin()
         while next(views)["sensor"] != "later":
             pass
-        with pytest.raises(Refused, match="follow.sensors: expected a list of sensors' names"):
-            other.ask("follow", sensors=["no name!"])
+        for wrong in (["no name!"], [1], [["followed"]], [None], "followed"):
+            with pytest.raises(Refused, match="follow.sensors: expected a list of sensors' names"):
+                other.ask("follow", sensors=wrong)
         other.ask("follow", sensors=[])
         with pytest.raises(Refused, match="a tap already, or another stream"):
             other.ask("tap")
