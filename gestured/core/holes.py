@@ -21,7 +21,7 @@ SLOWEST = 0.75  # times the speed beside the hole: who got less far has turned a
 
 
 def bearable_s(interval_s: float) -> float:
-    """The longest hole in s that says nothing against a contact, of a sensor with so many s from frame to frame."""
+    """Seconds that a hole may last before it counts against a contact, where frames are `interval_s` apart."""
     return max(HOLE_S, HOLE_FRAMES * interval_s)
 
 

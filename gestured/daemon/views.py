@@ -16,7 +16,7 @@ from gestured.daemon.status import viewed
 VIEW_S = 1 / 30  # between two views of one sensor: nobody sees more
 SOON_S = 0.01  # after a frame: what came together with it is answered by then, and no eye sees the difference
 VIEWS = 16  # sensors whose last view is kept for who asks again
-UNREAD_BYTES = 32 << 10  # some views: who has more to read is shown the sensor again when that is read
+UNREAD_BYTES = 32 << 10  # that a connection may still have to read: with more it misses views until it has read
 
 
 @dataclass(frozen=True, slots=True)

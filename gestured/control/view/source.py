@@ -33,9 +33,9 @@ class Source:
         self._closed = threading.Event()
         self._status: dict[str, Any] = {}
         self._subscriber: Subscriber | None = None
-        self._looking: Control | None = None  # it streams what is looked at,
-        self._looked_at: tuple[list[str], bool] = [], False  # which is this,
-        self._latest: dict[str, dict[str, Any]] = {}  # and the last frame of each sensor
+        self._looking: Control | None = None  # the connection over which the daemon streams views
+        self._looked_at: tuple[list[str], bool] = [], False  # sensors that it streams, and whether with raw counts
+        self._latest: dict[str, dict[str, Any]] = {}  # the last view of each sensor that is looked at
         self._tap: Control | None = None  # where there is no flight recorder: the view keeps packets itself
         self._scene: dict[str, Any] = {}
         self._kept: deque[tuple[float, int, dict[str, Any]]] = deque()  # s, bytes, a tap's line
@@ -124,7 +124,8 @@ class Source:
     def _tell_frames(self, control: Control) -> None:
         """Whatever is looked at, and all events of it, until somebody looks at something else.
 
-        Provisional events are asked for here alone: for each sensor that they are asked of the daemon runs its model.
+        Provisional events are asked of these sensors alone: the daemon runs its model for every sensor whose
+        provisional events somebody asks for.
         """
         self._latest = {}
         sensors, raw = looked_at = self._wanted()

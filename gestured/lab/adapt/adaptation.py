@@ -28,7 +28,7 @@ from gestured.lab.nets import Decision, Judged
 from gestured.simulator import GESTURES
 
 WAYS = (0.25, 0.5, 0.75, 1.0)  # of the way from the old weights to the new ones
-LOSS = 0.01  # of the simulated gestures that may be answered rightly no more, and of the others that may be taken
+LOSS = 0.01  # share of the simulated gestures that may be lost, and of simulated non-gestures that may be accepted more
 
 Opinions = tuple[Tensor, Tensor]  # (G, K) logits of the network and of its second opinion
 
@@ -70,7 +70,7 @@ class Adapted:
         if taken > LOSS:
             remedy = "" if new.others else "; record non-gestures of your own, too (gestured-lab collect)"
             found.append(
-                f"{100 * taken:.1f} points more of the simulated non-gestures are accepted, expected 1{remedy}"
+                f"{100 * taken:.1f} points more of the simulated non-gestures are accepted, expected 1 at most{remedy}"
             )
         return found
 
