@@ -52,8 +52,9 @@ def viewers(model: str) -> list[Row]:
         for k in range(frames):
             time.sleep(max(begin + k / RATE_HZ - time.monotonic(), 0.0))
             for n, form in enumerate(forms):
-                sender.send(form.packet(Frame(0.0, takes[n][k]), count, time.time()))
-                sent[n] = time.monotonic()
+                packet = form.packet(Frame(0.0, takes[n][k]), count, time.time())
+                sent[n] = time.monotonic()  # before: an event may be heard before this thread goes on
+                sender.send(packet)
             count += 1
 
     with Engine(model, 9, 9) as engine, socket.socket(type=socket.SOCK_DGRAM) as sender:

@@ -17,8 +17,8 @@ EVENT_TYPES = tuple(cls.__name__.lower() for cls in get_args(Event))
 _STREAM_TIMES = frozenset(("onset", "offset", "decided"))
 
 
-def to_json(event: Event, epoch: float) -> bytes:
-    """One JSON line; stream time + `epoch` s = time since the Unix epoch.
+def to_json(event: Event, epoch: float, *, test: bool = False) -> bytes:
+    """One JSON line; stream time + `epoch` s = time since the Unix epoch. A test's has one key more: `"test":true`.
 
     Raises ValueError for a NaN or an infinity, which no event may hold.
     """
@@ -28,6 +28,8 @@ def to_json(event: Event, epoch: float) -> bytes:
         if value is False and field.name == "own":
             continue  # said of the user's own gestures alone
         line[field.name] = value + epoch if field.name in _STREAM_TIMES else value
+    if test:
+        line["test"] = True
     return _line(line)
 
 

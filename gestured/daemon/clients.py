@@ -21,7 +21,6 @@ from gestured.daemon.metrics import Metrics
 
 CLIENTS = 1024  # at a time; each costs a descriptor, and at most BACKLOG_BYTES of memory
 STALLED_S = 30.0  # a client that takes nothing for this long is cut off
-END, TEST = b"}\n", b',"test":true}\n'  # how a line ends
 LINES = 16  # of all clients that are answered before the loop looks after its frames again
 ACCEPTED = 64  # clients at most before the loop does so
 AGAIN_S = 1.0  # until the next one is accepted after there was no descriptor for one
@@ -63,13 +62,10 @@ class EventServer:
         return sum(client.backlog for client in tuple(self._clients))
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
-        """Send an event to everyone who wants it; it is encoded once, and only if somebody does.
-
-        A test's events have one key more: `"test":true`.
-        """
+        """Send an event to everyone who wants it; it is encoded once, and only if somebody does."""
         line = None
         for client in self._audience.of(event):
-            line = line or messages.to_json(event, epoch)[: -len(END)] + (TEST if test else END)
+            line = line or messages.to_json(event, epoch, test=test)
             client.send(line)
 
     def foresees(self) -> tuple[frozenset[str], bool]:

@@ -41,14 +41,14 @@ class Connection:
         self.streams = False  # it is sent lines as they come, and need not ask for anything
         self._over = False
 
-    def send(self, line: bytes) -> bool:
-        """Send a line, or count it as lost where too much waits already; never blocks."""
+    def send(self, text: bytes, *, lines: int = 1) -> bool:
+        """Send a line, or several, or count them as lost where too much waits already; never blocks."""
         if self.closed:
             return False
         if self.unread > TAP_BACKLOG_BYTES:
-            self.lost += 1
+            self.lost += lines
             return False
-        self._writer.write(line)
+        self._writer.write(text)
         return True
 
     @property

@@ -12,12 +12,11 @@ from gestured.core.reading import Reading
 from gestured.core.wire import is_sensor
 from gestured.daemon.control import Connection
 from gestured.daemon.desk import Desk
-from gestured.daemon.metrics import Metrics
 from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.request import Parameter, Refusal, Reply, ReplyStream, Verb
 from gestured.daemon.snapshot import Snapshot
-from gestured.daemon.status import scene, status
+from gestured.daemon.status import scene
 from gestured.daemon.tap import Taps, as_lines
 from gestured.daemon.views import Views
 from gestured.daemon.watch import Watch
@@ -52,10 +51,10 @@ class Operations:
     publisher: Publisher
     watch: Watch
     taps: Taps
-    metrics: Metrics
     own: OwnGestures
     views: Views
     snapshot: Callable[[], Snapshot]
+    state: Callable[[], Reply]
     reload_all: Callable[[], Awaitable[str | None]]  # None, or why nothing has changed
     _tested: set[str] = field(default_factory=set)  # names of sensors that were not there
 
@@ -78,7 +77,7 @@ class Operations:
 
     async def status(self, connection: Connection) -> Reply:
         """How the daemon is."""
-        return status(self.snapshot(), self.metrics)
+        return self.state()
 
     async def reload(self, connection: Connection) -> Reply:
         """Read configuration and model anew; the old ones stay where the new ones are bad."""
@@ -141,7 +140,7 @@ class Operations:
         return found
 
     async def follow(self, connection: Connection, sensors: list[str], raw: bool = False) -> Reply:
-        """Stream the views of sensors over this connection from now on; one may be named before it comes."""
+        """Stream views of sensors, all events and the state from now on; a sensor may be named before it comes."""
         _not_yet(connection)
         self.views.follow(connection, sensors, raw=raw)
         return {"sensors": sensors}

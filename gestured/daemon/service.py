@@ -26,8 +26,10 @@ from gestured.daemon.publisher import Publisher
 from gestured.daemon.reload import Fresh, Loader, Reload, destinations, own_file_of
 from gestured.daemon.scene import scene_of
 from gestured.daemon.settings import Settings
+from gestured.daemon.sinks import Sink
 from gestured.daemon.snapshot import Models, Snapshot
 from gestured.daemon.sockets import kernel_drops
+from gestured.daemon.status import status
 from gestured.daemon.tap import Taps
 from gestured.daemon.udp import Receiver
 from gestured.daemon.views import Views
@@ -66,14 +68,14 @@ class Service:
             changed=self._foresee,
         )
         self._osc = destinations(settings, self._metrics)
+        self._views = Views(self._hub, self._state, self._foresee)
         self._foresee()
-        self._publisher = Publisher(self._metrics, (self._clients, self._taps, *self._osc))
-        views = Views(self._hub)
-        self._desk = Desk(self._metrics, self._publisher, self._watch, self._own, views)
+        self._publisher = Publisher(self._metrics, self._sinks())
+        self._desk = Desk(self._metrics, self._publisher, self._watch, self._own, self._views)
         self._receiver = Receiver(bound.udp, self._hub, self._desk, self._taps)
         operations = Operations(
-            self._hub, self._desk, self._publisher, self._watch, self._taps, self._metrics, self._own,
-            views, self.snapshot, self._reload.run,
+            self._hub, self._desk, self._publisher, self._watch, self._taps, self._own,
+            self._views, self.snapshot, self._state, self._reload.run,
         )  # fmt: skip
         self._control = ControlServer(bound.control.sock, operations.verbs())
         self._http: Any = None
@@ -111,6 +113,14 @@ class Service:
             settings=self._settings.model_dump(mode="json"),
         )
 
+    def _state(self) -> dict[str, Any]:
+        """Everything that an operator may see of the daemon now."""
+        return status(self.snapshot(), self._metrics)
+
+    def _sinks(self) -> tuple[Sink, ...]:
+        """Where events go. Who acts on them comes before who looks on."""
+        return (self._clients, *self._osc, self._taps, self._views)
+
     def _hello(self) -> bytes:
         """The first line to a client."""
         sequences = self._hub.sequences()
@@ -128,6 +138,7 @@ class Service:
     def _foresee(self) -> None:
         """Have the hub give provisional events where somebody asks for them now."""
         named, every = self._clients.foresees()
+        named |= self._views.sensors
         every = every or bool(self._settings.publish_provisional and self._osc)
         self._hub.foresee(lambda sensor: every or sensor in named)
 
@@ -174,6 +185,7 @@ class Service:
     def _every_second(self, now: float) -> None:
         self._clients.tick()
         self._taps.tick()
+        self._views.tick()
         self._own.tick()
         snapshot = self.snapshot()
         self._metrics.kernel(snapshot.kernel_drops)
@@ -190,6 +202,7 @@ class Service:
         notify("STOPPING=1")
         self._receiver.drain()
         self._receiver.close()
+        self._taps.flush()
         self._control.close()
         self._desk.take(self._hub.flush(time.monotonic()))
         await self._clients.close(DRAIN_S)
@@ -216,6 +229,6 @@ class Service:
         for sink in self._osc:
             sink.close()
         self._osc = fresh.osc
-        self._publisher.sinks = (self._clients, self._taps, *self._osc)
+        self._publisher.sinks = self._sinks()
         self._foresee()
         log.info("reloaded", model=ladder.active)

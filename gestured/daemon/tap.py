@@ -2,14 +2,16 @@
 
 A packet is kept as the bytes that came, before anything looked at them, with the time that the hub gave it: so
 a recording replays through the same code to the same events. Nothing is kept and nothing is copied as long as nobody
-taps and no flight recorder is set.
+taps and no flight recorder is set. A live tap is sent its lines soon after, so that no event waits for them.
 """
 
+import asyncio
 import base64
 import json
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
+from itertools import islice
 
 from gestured.core import messages
 from gestured.core.events import Event, Status
@@ -18,6 +20,8 @@ from gestured.daemon.control import Connection
 
 KEPT_S = 30.0  # of the flight recorder
 OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps
+SOON_S = 0.01  # after a packet: what it led to has been said by then
+TURN_LINES = 32  # of a live tap that are made in one turn: less than a millisecond's work
 Remembered = tuple[int, Source, bytes] | bytes  # a packet with its time in ns (monotonic), or an event's line
 
 
@@ -28,6 +32,8 @@ class Taps:
         """Remember the last KEPT_S seconds, but never more than `ring_bytes` (0: nothing)."""
         self.ring_bytes = ring_bytes
         self._live: list[Connection] = []
+        self._waiting: deque[Remembered] = deque()  # to be streamed, soon
+        self._timer: asyncio.Handle | None = None
         self._ring: deque[tuple[int, int, Remembered]] = deque()  # ns, bytes, what
         self._size = 0
 
@@ -43,6 +49,7 @@ class Taps:
 
     def join(self, connection: Connection) -> None:
         """Stream to this connection from now on."""
+        self.flush()
         connection.streams = True
         self._live.append(connection)
 
@@ -50,18 +57,18 @@ class Taps:
         """What was read in one go at `now` (monotonic s)."""
         t_ns = round(now * 1e9)
         for packet, source in waiting:
-            if self._live:
-                self._stream(packet_line(t_ns, source, packet))
-            if self.ring_bytes:
-                self._keep(t_ns, len(packet) + OVERHEAD_BYTES, (t_ns, source, packet))
+            self._remember(t_ns, len(packet), (t_ns, source, packet))
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
         """A sink: events as they come of the packets. The status and a test come of none."""
         if self.active and not test and not isinstance(event, Status):
             line = messages.to_json(event, epoch)
-            self._stream(line)
-            if self.ring_bytes:
-                self._keep(time.monotonic_ns(), len(line) + OVERHEAD_BYTES, line)
+            self._remember(time.monotonic_ns(), len(line), line)
+
+    def flush(self) -> None:
+        """Stream what waits, now."""
+        while self._waiting:
+            self._stream()
 
     def flight(self) -> deque[Remembered]:
         """What the ring holds now, oldest first: the packets themselves, not copies of them."""
@@ -82,14 +89,27 @@ class Taps:
                 connection.lost += lost - 1  # the line that says so was no packet
         self._forget(time.monotonic_ns())
 
-    def _stream(self, line: bytes) -> None:
-        for connection in self._live:
-            connection.send(line)
+    def _remember(self, t_ns: int, size: int, what: Remembered) -> None:
+        if self._live:
+            self._waiting.append(what)
+            if self._timer is None:
+                self._timer = asyncio.get_running_loop().call_later(SOON_S, self._turn)
+        if self.ring_bytes:
+            self._ring.append((t_ns, size + OVERHEAD_BYTES, what))
+            self._size += size + OVERHEAD_BYTES
+            self._forget(t_ns)
 
-    def _keep(self, t_ns: int, size: int, what: Remembered) -> None:
-        self._ring.append((t_ns, size, what))
-        self._size += size
-        self._forget(t_ns)
+    def _turn(self) -> None:
+        if self._waiting:
+            self._stream()
+        self._timer = asyncio.get_running_loop().call_soon(self._turn) if self._waiting else None
+
+    def _stream(self) -> None:
+        """Send all live taps the next few lines, at once: a write for each would cost more than what is written."""
+        lines = list(islice(as_lines(self._waiting), TURN_LINES))
+        text = b"".join(lines)
+        for connection in self._live:
+            connection.send(text, lines=len(lines))
 
     def _forget(self, now_ns: int) -> None:
         oldest = now_ns - round(KEPT_S * 1e9)
@@ -103,8 +123,8 @@ def packet_line(t_ns: int, source: Source, packet: bytes) -> bytes:
     return json.dumps(line, separators=(",", ":")).encode() + b"\n"
 
 
-def as_lines(flight: deque[Remembered]) -> Iterator[bytes]:
-    """The ring's content as a tap would have streamed it. It is taken out of `flight`: what was sent is let go."""
-    while flight:
-        what = flight.popleft()
+def as_lines(remembered: deque[Remembered]) -> Iterator[bytes]:
+    """Packets and events as lines of the control socket. Each is taken out of `remembered`: what was sent is let go."""
+    while remembered:
+        what = remembered.popleft()
         yield what if isinstance(what, bytes) else packet_line(*what)

@@ -1,14 +1,20 @@
-"""Sensors that somebody looks at: a view is made once for all who look, soon after its frame has been answered."""
+"""Those who look on: views of the sensors they look at, all events and the daemon's state, made once for all of them.
+
+Nothing is made where nobody looks. What is made is made soon after the frames that it shows have been answered, and
+is sent in few writes: who acts on an event waits neither for a picture nor for who looks at one.
+"""
 
 import asyncio
 import json
 import math
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
+from gestured.core.events import Event, Provisional, Status
 from gestured.core.facts import Arrived, Fact
 from gestured.core.hub import Hub
+from gestured.core.messages import to_json
 from gestured.daemon.control import Connection
 from gestured.daemon.request import Reply
 from gestured.daemon.status import viewed
@@ -26,17 +32,29 @@ class Look:
     sensors: frozenset[str]
     raw: bool  # counts as they were sent, too
 
+    def hears(self, event: Event) -> bool:
+        """Whether it is told of an event: of all, but of provisional ones only where it looks."""
+        return not isinstance(event, Provisional) or event.sensor in self.sensors
+
 
 class Views:
-    """Views for those who ask, and for those who look on. Nothing is made where nobody looks."""
+    """Views for those who ask, and for those who look on."""
 
-    def __init__(self, hub: Hub) -> None:
-        self._hub = hub
+    def __init__(self, hub: Hub, state: Callable[[], Reply], changed: Callable[[], None]) -> None:
+        """`state` tells all about the daemon; `changed` hears when others are looked at than before."""
+        self._hub, self._state, self._changed = hub, state, changed
         self._made: dict[tuple[str, bool], tuple[float, Reply | None]] = {}  # s, and the view
         self._looks: dict[Connection, Look] = {}
         self._due: set[str] = set()  # sensors that are looked at, with something new
+        self._said: list[tuple[Event, float, bool]] = []  # events that those who look have not been told, as published
+        self._state_due = False
         self._timer: asyncio.Handle | None = None
         self._shown = -math.inf  # s, when a round of views began
+
+    @property
+    def sensors(self) -> frozenset[str]:
+        """Those that somebody looks at."""
+        return frozenset().union(*(look.sensors for look in self._looks.values()))
 
     def view(self, sensor: str, *, raw: bool) -> Reply | None:
         """A sensor as it is felt now, the same for who asks again within VIEW_S; None where it was not heard."""
@@ -44,10 +62,12 @@ class Views:
         return view if time.monotonic() - made < VIEW_S else self._make(sensor, raw)
 
     def follow(self, connection: Connection, sensors: Collection[str], *, raw: bool) -> None:
-        """Stream the views of these sensors to a connection: as they are now, and then whenever there is a frame."""
+        """Stream to a connection: the state and the views of sensors as they are now, and then what is new."""
         connection.streams = True
-        self._looks = {one: look for one, look in self._looks.items() if not one.closed}
         self._looks[connection] = Look(frozenset(sensors), raw)
+        self._forget_gone()
+        self._changed()
+        self._state_due = True
         self._expect(sensors)
 
     def see(self, facts: Sequence[Fact]) -> None:
@@ -56,34 +76,71 @@ class Views:
             arrived = {fact.sensor for fact in facts if isinstance(fact, Arrived)}
             self._expect({name for look in self._looks.values() for name in look.sensors & arrived})
 
+    def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
+        """A sink: what was published is told to who looks. The status is not: the state says more."""
+        if self._looks and not isinstance(event, Status):
+            self._said.append((event, epoch, test))
+            self._expect(())
+
+    def tick(self) -> None:
+        """Tell the state; call it once a second."""
+        if self._looks:
+            self._forget_gone()
+            self._state_due = True
+            self._expect(())
+
     def _expect(self, sensors: Collection[str]) -> None:
         self._due.update(sensors)
-        if self._due and self._timer is None:
+        if self._timer is None and (self._due or self._said or self._state_due):
             wait = max(SOON_S, self._shown + VIEW_S - time.monotonic())
             self._timer = asyncio.get_running_loop().call_later(wait, self._begin)
 
     def _begin(self) -> None:
         self._shown = time.monotonic()
-        self._looks = {one: look for one, look in self._looks.items() if not one.closed}
-        self._show(sorted(self._due))
+        self._tell_events()
+        self._go_on(sorted(self._due))
 
-    def _show(self, sensors: list[str]) -> None:
-        """Show a sensor to all who look at it; the next one has its turn after the frames that wait."""
+    def _go_on(self, sensors: list[str]) -> None:
+        """Show one more thing to all who look; the next one has its turn after the frames that wait."""
         self._timer = None
-        sensor = sensors.pop()
+        if sensors:
+            self._show(sensors.pop())
+        elif self._state_due:
+            self._state_due = False
+            self._send(_line({"type": "state"} | self._state()), self._looks)
+        if sensors or self._state_due:
+            self._timer = asyncio.get_running_loop().call_soon(self._go_on, sensors)
+        else:
+            self._expect(())
+
+    def _tell_events(self) -> None:
+        """Tell each connection what happened, in one write."""
+        said, self._said = self._said, []
+        lines = [(event, to_json(event, epoch, test=test)) for event, epoch, test in said]
+        for connection, look in self._looks.items():
+            heard = [line for event, line in lines if look.hears(event)]
+            if heard:
+                connection.send(b"".join(heard), lines=len(heard))
+
+    def _show(self, sensor: str) -> None:
         self._due.discard(sensor)
         for raw in (False, True):
             lookers = [one for one, look in self._looks.items() if sensor in look.sensors and look.raw is raw]
             view = self._make(sensor, raw) if lookers else None
             if view is not None:
-                line = json.dumps({"type": "view"} | view, separators=(",", ":"), allow_nan=False).encode() + b"\n"
-                for connection in lookers:
-                    if connection.unread <= UNREAD_BYTES:
-                        connection.send(line)
-        if sensors:
-            self._timer = asyncio.get_running_loop().call_soon(self._show, sensors)
-        else:
-            self._expect(())
+                self._send(_line({"type": "view"} | view), lookers)
+
+    def _send(self, line: bytes, connections: Collection[Connection]) -> None:
+        """Send what is replaced by the next one: who has not read the last ones misses it."""
+        for connection in connections:
+            if connection.unread <= UNREAD_BYTES:
+                connection.send(line)
+
+    def _forget_gone(self) -> None:
+        before = self.sensors
+        self._looks = {one: look for one, look in self._looks.items() if not one.closed}
+        if self.sensors != before:
+            self._changed()
 
     def _make(self, sensor: str, raw: bool) -> Reply | None:
         now = time.monotonic()
@@ -95,3 +152,7 @@ class Views:
         view = viewed(sensor, *found) | {"time": time.time()}
         self._made[sensor, raw] = now, view
         return view
+
+
+def _line(what: Reply) -> bytes:
+    return json.dumps(what, separators=(",", ":"), allow_nan=False).encode() + b"\n"

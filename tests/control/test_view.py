@@ -440,17 +440,17 @@ def fake_control(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
     def begin(name: str) -> Path:
         sensor = {"state": name, "rate_hz": 15.0, "jitter_s": 0.0, "lost": 0, "bad_taxels": 0, "source": "a:1"}
         status = {
-            "ok": True, "version": name, "state": "ok", "sensors": {name: sensor},
+            "type": "state", "version": name, "state": "ok", "sensors": {name: sensor},
             "flight_recorder": {"limit_bytes": 1},
-            "model": {"active": name, "gestures": [name]}, "addresses": {"socket": str(tmp_path / "none.sock")},
+            "model": {"active": name, "gestures": [name]},
         }  # fmt: skip
 
         def answer(client: socket.socket) -> None:
             with client, client.makefile("rb") as file:
                 for line in file:
                     asked = json.loads(line)["verb"]
-                    reply = status if asked == "status" else {"ok": False, "reason": name}
-                    client.sendall(json.dumps(reply).encode() + b"\n")
+                    told = [{"ok": True}, status] if asked == "follow" else [{"ok": False, "reason": name}]
+                    client.sendall(b"".join(json.dumps(line).encode() + b"\n" for line in told))
 
         def serve() -> None:
             while True:

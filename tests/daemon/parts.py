@@ -46,7 +46,8 @@ class Parts:
         self.metrics, self.watch, self.taps, kept = Metrics(), Watch(ladder), Taps(0), Kept()
         self.events = kept.events
         self.hub = Hub(scene_of(load_settings({"model": str(model), **given}, {})[0], ladder), ladder)
-        self.views, publisher = Views(self.hub), Publisher(self.metrics, (kept,))
+        self.views = Views(self.hub, dict, lambda: None)
+        publisher = Publisher(self.metrics, (kept,))
         self.desk = Desk(self.metrics, publisher, self.watch, OwnGestures(lambda: None), self.views)
 
     def feed(self, name: str, frames: list[Frame], t: float) -> float:

@@ -150,7 +150,9 @@ def test_more_clients_than_there_is_room_for_are_told_so(listener, monkeypatch) 
 def test_an_event_is_encoded_once_for_all(listener, monkeypatch) -> None:
     calls = []
     encode = messages.to_json
-    monkeypatch.setattr(messages, "to_json", lambda event, epoch: calls.append(event) or encode(event, epoch))
+    monkeypatch.setattr(
+        messages, "to_json", lambda event, *rest, **more: calls.append(event) or encode(event, *rest, **more)
+    )
 
     async def main() -> None:
         server = EventServer(listener, lambda: b"", Metrics(), gestures=tuple, changed=lambda: None)

@@ -21,7 +21,7 @@ from gestured.client.lines import Refused, Unreachable
 from gestured.daemon.operations import Operations
 from gestured.daemon.request import Parameter, Refusal, Verb, parse_request
 from tests.daemon import tiny_model
-from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
+from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor
 
 SLOW = ("--stale-s", 30)  # on a busy machine no sensor is stale
 
@@ -232,6 +232,17 @@ def test_a_tap_shows_packets_as_they_came_and_events(daemon: Daemon) -> None:
                 break
     assert packets == sent and times == sorted(times)
     assert events == ["onset", "gesture", "release"]
+
+
+def test_a_tap_is_sent_all_that_came_before_the_daemon_ended(start) -> None:
+    daemon = start("--clock", "sensor")
+    with Control(Path(daemon.ready["control"])) as control:
+        control.ask("tap")
+        sensor = Sensor(daemon, "arm").begin().send(Hand().swipe("up"))
+        assert daemon.stop() == 0
+        lines = list(control.lines())
+    assert sum(line["type"] == "packet" for line in lines) == sensor.count
+    assert "onset" in [line["type"] for line in lines]
 
 
 def test_the_flight_recorder_gives_what_it_held(daemon: Daemon, start) -> None:

@@ -50,7 +50,7 @@ def test_it_is_made_at_most_thirty_times_a_second_and_only_when_somebody_asks(mo
     clock: Any = SimpleNamespace(now=100.0, monotonic=lambda: clock.now, time=lambda: 1.7e9 + clock.now)
     monkeypatch.setattr(views, "time", clock)
     verbs = operations.Operations(
-        parts.hub, parts.desk, None, parts.watch, parts.taps, parts.metrics, None, parts.views, lambda: SNAPSHOT, None
+        parts.hub, parts.desk, None, parts.watch, parts.taps, None, parts.views, lambda: SNAPSHOT, dict, None
     ).verbs()
     parts.feed("arm", Hand().idle(2.0), 90.0)
     assert made == []
@@ -67,14 +67,14 @@ def test_who_follows_is_shown_each_sensor_as_it_is_and_then_each_frame(shared: D
         while "followed" not in control.ask("status")["sensors"]:
             pass
         assert control.ask("follow", sensors=["followed", "later"])["sensors"] == ["followed", "later"]
-        views = control.lines()
+        views = (line for line in control.lines() if line["type"] == "view")
         newest = next(views)["t"]
         for n in range(9):
             sensor.send([sensor.hand.frame(4.0, n)])
             while (found := next(views))["t"] <= newest:
                 pass
             newest = found["t"]
-            assert (found["type"], found["sensor"], found["raw"]) == ("view", "followed", None)
+            assert (found["sensor"], found["raw"]) == ("followed", None)
             assert np.array(found["values"]).reshape(9, 9)[4].argmax() == n
         Sensor(shared, "later").begin()
         while next(views)["sensor"] != "later":
@@ -88,6 +88,29 @@ def test_who_follows_is_shown_each_sensor_as_it_is_and_then_each_frame(shared: D
     sensor.send(sensor.hand.idle(1.0))
 
 
+def test_who_follows_hears_the_state_and_every_event_once(shared: Daemon) -> None:
+    path = Path(shared.ready["control"])
+    sensors = [Sensor(shared, name).begin() for name in ("looked", "elsewhere")]
+    with Control(path) as control, Control(path) as other:
+        control.ask("follow", sensors=["looked"])
+        lines = control.lines()
+        state = next(line for line in lines if line["type"] == "state")
+        asked = other.ask("status")
+        assert state.keys() - {"type"} == asked.keys() - {"ok"}
+        assert (state["instance"], state["version"]) == (asked["instance"], asked["version"])
+        for sensor in sensors:
+            sensor.perform("left")
+        other.ask("emit", gesture="swipe_up", sensor="made_up")
+        events: list[dict[str, Any]] = []
+        while [event["type"] for event in events].count("release") < 3:
+            events += [line for line in [next(lines)] if line["type"] not in ("state", "view")]
+    told = {name: [event for event in events if event["sensor"] == name] for name in ("looked", "elsewhere", "made_up")}
+    for name in ("looked", "elsewhere"):
+        assert [event["type"] for event in told[name]] == ["onset", "gesture", "release"]
+        assert not any("test" in event for event in told[name])
+    assert all(event["test"] is True for event in told["made_up"])
+
+
 class Follower:
     """A connection whose other end reads, or does not."""
 
@@ -95,9 +118,11 @@ class Follower:
         self.streams, self.closed, self.unread = False, False, 0
         self.seen: list[float] = []  # s, on the stream's clock
 
-    def send(self, line: bytes) -> bool:
+    def send(self, text: bytes, *, lines: int = 1) -> bool:
         """Take a line."""
-        self.seen.append(json.loads(line)["t"])
+        line = json.loads(text)
+        if line["type"] == "view":
+            self.seen.append(line["t"])
         return True
 
 

@@ -1,29 +1,26 @@
-"""What the page shows, as the daemon tells it: sensors each second, frames that somebody looks at, events."""
+"""What the page shows, as the daemon tells who looks on: its state each second, frames of what is looked at, events."""
 
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from gestured.client.control import Control
-from gestured.client.subscriber import Subscriber
 from gestured.control.flag import flag, flag_lines, flag_path
 from gestured.control.view.outbox import Outbox
 from gestured.core.errors import GesturedError
-from gestured.core.messages import EVENT_TYPES
 
-SENSORS_S = 1.0
 AGAIN_S = 0.5  # before a daemon that has gone is asked again
 KEPT_S = 30.0  # of packets, where the daemon has no flight recorder
 LINE_BYTES = 500  # that Python takes for a line, its packet not counted
 KEPT_BYTES = 64 << 20  # of them at the most, as base64
-OF_ALL = tuple(kind for kind in EVENT_TYPES if kind not in ("provisional", "status"))  # events of sensors not looked at
+
+Looked = tuple[list[str], bool] | None  # sensors, and whether with their counts as they were sent; None: nobody looks
 
 
 class Source:
-    """One daemon, for any number of browsers. Its threads ask for nothing as long as nobody looks."""
+    """One daemon, for any number of browsers. It is asked for nothing as long as nobody looks."""
 
     def __init__(self, control: Path, folder: Path) -> None:
         """What is flagged is put into `folder`."""
@@ -32,16 +29,14 @@ class Source:
         self._changed = threading.Condition()
         self._closed = threading.Event()
         self._status: dict[str, Any] = {}
-        self._subscriber: Subscriber | None = None
-        self._looking: Control | None = None  # the connection over which the daemon streams views
-        self._looked_at: tuple[list[str], bool] = [], False  # sensors that it streams, and whether with raw counts
+        self._looking: Control | None = None  # the connection over which the daemon streams
+        self._looked_at: Looked = None
         self._latest: dict[str, dict[str, Any]] = {}  # the last view of each sensor that is looked at
         self._tap: Control | None = None  # where there is no flight recorder: the view keeps packets itself
         self._scene: dict[str, Any] = {}
         self._kept: deque[tuple[float, int, dict[str, Any]]] = deque()  # s, bytes, a tap's line
         self._size = 0  # bytes that are kept
-        for work in (self._tell_sensors, self._tell_frames):
-            threading.Thread(target=self._again_and_again, args=(work,), daemon=True).start()
+        threading.Thread(target=self._look_again_and_again, daemon=True).start()
 
     def join(self, outbox: Outbox) -> None:
         """Somebody looks."""
@@ -84,86 +79,68 @@ class Source:
             outbox.close()
         with self._changed:
             self._look_anew()
-        for one in (self._subscriber, self._tap):
-            if one is not None:
-                one.close()
+        if self._tap is not None:
+            self._tap.close()
 
-    def _again_and_again(self, work: Callable[[Control], None]) -> None:
-        """Work on a connection to the daemon, and on the next one once it is back."""
+    def _look_again_and_again(self) -> None:
+        """Look on over a connection to the daemon, and over the next one once it is back or something else is asked."""
         while not self._closed.is_set():
+            with self._changed:
+                self._changed.wait_for(lambda: self._open or self._closed.is_set())
             try:
-                self._wait_for_somebody()
                 with Control(self._control) as control:
-                    work(control)
+                    self._look(control)
             except (GesturedError, OSError) as error:
                 self._tell("gone", {"reason": str(error)})
                 self._closed.wait(AGAIN_S)
 
-    def _wait_for_somebody(self) -> None:
+    def _look(self, control: Control) -> None:
+        """Tell what the daemon streams, until somebody looks at something else."""
+        self._latest = {}
+        looked_at = self._wanted()
+        if looked_at is None:
+            return
+        sensors, raw = looked_at
+        control.ask("follow", sensors=sensors, raw=raw)
         with self._changed:
-            self._changed.wait_for(lambda: self._open or self._closed.is_set())
-
-    def _tell_sensors(self, control: Control) -> None:
-        while not self._closed.is_set():
-            self._wait_for_somebody()
-            self._status = control.ask("status")
-            if self._subscriber is None:
-                self._subscriber = Subscriber(self._status["addresses"]["socket"], types=OF_ALL)
-                self._hear(self._subscriber, looked_at=False)
-            if self._tap is None and not self._status["flight_recorder"]["limit_bytes"]:
-                self._tap = Control(self._control)
-                threading.Thread(target=self._keep, args=(self._tap,), daemon=True).start()
-            self._tell("sensors", self._sensors())
-            self._closed.wait(SENSORS_S)
+            self._looking, self._looked_at = control, looked_at
+            self._look_anew()
+        for line in control.lines():
+            if line["type"] == "view":
+                self._latest[line["sensor"]] = line
+                for outbox in self._lookers(line["sensor"]):
+                    outbox.frame(line)
+            elif line["type"] == "state":
+                self._status = line
+                self._tell("sensors", self._sensors())
+                if self._tap is None and not line["flight_recorder"]["limit_bytes"]:
+                    self._tap = Control(self._control)
+                    threading.Thread(target=self._keep, args=(self._tap,), daemon=True).start()
+            elif line["type"] == "provisional":
+                for outbox in self._lookers(line["sensor"]):
+                    outbox.put("event", line)
+            else:
+                self._tell("event", line)
 
     def _sensors(self) -> dict[str, Any]:
         status = self._status
         told = {key: status[key] for key in ("version", "state", "sensors")}
         return told | {"model": status["model"]["active"], "gestures": status["model"]["gestures"]}
 
-    def _tell_frames(self, control: Control) -> None:
-        """Whatever is looked at, and all events of it, until somebody looks at something else.
+    def _lookers(self, sensor: str) -> list[Outbox]:
+        return [outbox for outbox in list(self._open) if outbox.sensor == sensor]
 
-        Provisional events are asked of these sensors alone: the daemon runs its model for every sensor whose
-        provisional events somebody asks for.
-        """
-        self._latest = {}
-        sensors, raw = looked_at = self._wanted()
-        path = control.ask("status")["addresses"]["socket"]
-        control.ask("follow", sensors=sensors, raw=raw)
-        with self._changed:
-            self._looking, self._looked_at = control, looked_at
-            self._look_anew()
-        with Subscriber(path, types=EVENT_TYPES, sensors=sensors) as subscriber:
-            self._hear(subscriber, looked_at=True)
-            for frame in control.lines():
-                self._latest[frame["sensor"]] = frame
-                for outbox in list(self._open):
-                    if outbox.sensor == frame["sensor"]:
-                        outbox.frame(frame)
-
-    def _wanted(self) -> tuple[list[str], bool]:
-        """The sensors that somebody looks at, and whether somebody wants their counts as they were sent."""
+    def _wanted(self) -> Looked:
         looks = list(self._open)
+        if not looks or self._closed.is_set():
+            return None
         return sorted({outbox.sensor for outbox in looks if outbox.sensor}), any(outbox.raw for outbox in looks)
 
     def _look_anew(self) -> None:
+        """Have the connection ended where the daemon is to stream something else, or nothing."""
         self._changed.notify_all()
         if self._looking is not None and self._looked_at != self._wanted():
             self._looking.finish()
-
-    def _hear(self, subscriber: Subscriber, *, looked_at: bool) -> None:
-        threading.Thread(target=self._tell_events, args=(subscriber, looked_at), daemon=True).start()
-
-    def _tell_events(self, subscriber: Subscriber, looked_at: bool) -> None:
-        """Tell each browser the events of the sensor that it looks at, or those of all others."""
-        try:
-            for event in subscriber:
-                for outbox in list(self._open):
-                    if "sensor" in event and (event["sensor"] == outbox.sensor) is looked_at:
-                        outbox.put("event", event)
-        except GesturedError as error:
-            self._tell("gone", {"reason": str(error)})
 
     def _keep(self, tap: Control) -> None:
         """Keep what a tap says, until the daemon goes or nobody looks any more."""
