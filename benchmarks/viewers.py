@@ -19,7 +19,7 @@ from gestured.core.frames import Frame
 VIEWERS = 3
 SENSORS = 20  # all of them are touched: so many events that a 99th percentile says something
 SECONDS = 12.0
-ROUNDS = 3
+ROUNDS = 6
 WARM = 30  # frames
 TYPES = ["onset", "gesture", "unknown", "cancelled", "release"]
 

@@ -18,9 +18,9 @@ from gestured.core.messages import to_json
 from gestured.daemon.control import Connection
 from gestured.daemon.request import Reply
 from gestured.daemon.status import viewed
+from gestured.daemon.tap import SOON_S
 
 VIEW_S = 1 / 30  # between two views of one sensor: nobody sees more
-SOON_S = 0.01  # after a frame: what came together with it is answered by then, and no eye sees the difference
 VIEWS = 16  # sensors whose last view is kept for who asks again
 UNREAD_BYTES = 32 << 10  # that a connection may still have to read: with more it misses views until it has read
 
