@@ -1,7 +1,8 @@
 """A run of a model that takes too long is ended: onnxruntime looks at its options' `terminate` between two operators.
 
-One thread for all models of the process, asleep unless something runs. A single operator that never ends is not
-ended by this; that is the business of the watchdog outside.
+One thread for all models of the process. It looks now and then by itself as long as models are run, and is woken only
+for a limit that ends before its next look: to wake it for each run makes every run slower. A single operator that never
+ends is not ended by this; that is the business of the watchdog outside.
 """
 
 import threading
@@ -10,21 +11,29 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+LOOK_S = 1.0  # from one look to the next: less than what a segment's run may take
+AWAKE_S = 60.0  # without any run, until it sleeps
+ASLEEP_S = 3600.0
+
 _running: dict[int, tuple[float, Any]] = {}  # when its time is over (s, monotonic), and its options
 _changed = threading.Condition()
 _thread: threading.Thread | None = None
+_used = 0.0  # s, when a model was last run
+_looks = 0.0  # s, when the thread looks next
 
 
 @contextmanager
 def limited(options: Any, seconds: float) -> Iterator[None]:
     """Sets `options.terminate` (of onnxruntime's RunOptions, new for each run) when the block takes longer."""
-    global _thread
+    global _thread, _used
     with _changed:
         if _thread is None:
             _thread = threading.Thread(target=_watch, name="run limit", daemon=True)
             _thread.start()
-        _running[id(options)] = time.monotonic() + seconds, options
-        _changed.notify()
+        _used = time.monotonic()
+        _running[id(options)] = _used + seconds, options
+        if _used + seconds < _looks:
+            _changed.notify()
     try:
         yield
     finally:
@@ -33,6 +42,7 @@ def limited(options: Any, seconds: float) -> Iterator[None]:
 
 
 def _watch() -> None:
+    global _looks
     with _changed:
         while True:
             now = time.monotonic()
@@ -40,4 +50,6 @@ def _watch() -> None:
                 if end <= now:
                     options.terminate = True
                     del _running[key]
-            _changed.wait(min((end for end, _ in _running.values()), default=now + 3600.0) - now)
+            _looks = now + (LOOK_S if now - _used < AWAKE_S else ASLEEP_S)
+            _looks = min([_looks, *(end for end, _ in _running.values())])
+            _changed.wait(_looks - now)
