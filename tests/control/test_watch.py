@@ -8,9 +8,12 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
+from gestured.client.control import Control
+from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
 
 ARROWS = set("→↘↓↙←↖↑↗")
@@ -84,6 +87,19 @@ def test_a_sensor_is_drawn_as_it_is_touched(terminal, daemon: Daemon) -> None:
     watch.process.send_signal(signal.SIGINT)
     watch.until("\x1b[?25h")
     assert watch.process.wait(DEADLINE_S) == 0
+
+
+def test_a_sensor_that_falls_silent_and_a_daemon_that_ends_are_told(terminal, tmp_path: Path) -> None:
+    daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"))
+    Sensor(daemon, "drawn").begin()
+    with Control(Path(daemon.ready["control"])) as control:
+        while "drawn" not in control.ask("status")["sensors"]:
+            pass
+    watch = terminal("watch", "drawn", "--control", daemon.ready["control"])
+    watch.until("drawn  stale")
+    daemon.stop()
+    watch.until("closed the connection")
+    assert watch.process.wait(DEADLINE_S) == 1
 
 
 def test_without_a_terminal_or_a_sensor_it_says_what_to_do(run, terminal, daemon: Daemon) -> None:
