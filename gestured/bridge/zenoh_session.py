@@ -153,7 +153,11 @@ def _configuration(args: argparse.Namespace) -> Any:
         connect = [ROUTER]
     try:
         config = zenoh.Config() if args.config is None else zenoh.Config.from_file(str(args.config))
-        settings: dict[str, object] = {"scouting/multicast/enabled": args.scout, "scouting/gossip/enabled": args.scout}
+        settings: dict[str, object] = {
+            "scouting/multicast/enabled": args.scout,
+            "scouting/gossip/enabled": args.scout,
+            "transport/shared_memory/enabled": False,  # the unit's filter denies it, and then Zenoh opens no session
+        }
         if args.config is None:
             settings["mode"] = "peer" if listen or args.scout else "client"
         if connect or args.config is None:

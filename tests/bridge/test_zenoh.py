@@ -4,6 +4,7 @@ import json
 import queue
 import socket
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -93,6 +94,13 @@ def test_a_real_daemons_events_arrive(bridge, site, daemon: Daemon):
         assert site.event() == ("gestured/car/armrest/gesture", line | {"instance": client.hello["instance"]})
     client.close()
     assert process.stop() == 0, process.said()
+
+
+def test_no_memory_is_shared(bridge, site, daemon: Daemon):
+    """The unit's filter on system calls does not let a process make such memory, and events need none."""
+    process = begin(bridge, site, daemon)
+    process.ready()
+    assert "/dev/shm/" not in Path(f"/proc/{process.process.pid}/maps").read_text()
 
 
 def test_other_types_and_unknown_keys_are_passed_on(bridge, site, fake):
