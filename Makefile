@@ -75,7 +75,7 @@ uninstall:  ## remove what `make install` has put there; settings and account st
 	@deploy/uninstall.sh "$(DESTDIR)" "$(PREFIX)"
 
 system-test: .venv-dev/.dev  ## install, boot a real systemd (root, systemd-nspawn), and treat the daemon badly
-	@.venv-dev/bin/python -m pytest -rs -s tests/systemd/system.py
+	@.venv-dev/bin/python -m pytest -rs -s tests/systemd/fleet.py tests/systemd/system.py
 
 clean:  ## remove the environments and what tools left behind
 	rm -rf .venv .venv-dev build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache

@@ -14,15 +14,16 @@ from typing import Any
 
 CLONE_NEWNET = 0x40000000
 DEADLINE_S = 60.0
+NETWORK = "192.168.7.2"  # the container's address that is not its loopback's; whoever sends to it sends from it
 
 
 def missing() -> str | None:
     """Why no container can be booted here, or None."""
     if os.geteuid() != 0:
         return "only root can boot a container"
-    for program in ("systemd-nspawn", "nsenter", "mount", "systemctl"):
+    for program in ("systemd-nspawn", "nsenter", "mount", "systemctl", "ip"):
         if shutil.which(program) is None:
-            return f"{program} is not installed (apt install systemd-container util-linux)"
+            return f"{program} is not installed (apt install systemd-container util-linux iproute2)"
     if not Path("/usr/lib/systemd/systemd").exists():
         return "systemd itself is not installed"
     return None
@@ -57,13 +58,16 @@ class Container:
         subprocess.run(["mount", "-t", "overlay", "overlay", "-o", lower, self.root / "usr"], check=True)
         command = [
             "systemd-nspawn", "--boot", f"--directory={self.root}", f"--machine=gestured-{os.getpid()}",
-            "--register=no", "--keep-unit", "--private-network", "--console=pipe", "systemd.unit=multi-user.target",
+            "--register=no", "--keep-unit", "--private-network", "--console=pipe",
+            "--system-call-filter=bpf",  # without it systemd inside cannot keep what IPAddressDeny= promises
+            "systemd.unit=multi-user.target",
         ]  # fmt: skip
         try:
             with self._log.open("wb") as log:
                 self._nspawn = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
             self.leader = wait("the container's first process", self._leader)
             wait("the end of the boot", lambda: self._state() in ("running", "degraded"))
+            self.run("ip", "address", "add", f"{NETWORK}/32", "dev", "lo")
         except BaseException:
             self.__exit__()
             raise
@@ -95,6 +99,10 @@ class Container:
         done = subprocess.run([*enter, *command], capture_output=True, text=True, timeout=DEADLINE_S, env=ENVIRONMENT)
         assert not check or done.returncode == 0, f"{' '.join(command)}: {done.stdout}{done.stderr}"
         return done
+
+    def follow(self, text: str) -> str:
+        """Do as an example in the documents says; what it printed."""
+        return self.run("bash", "-euo", "pipefail", "-c", text.replace("sudo ", "")).stdout
 
     def path(self, path: str) -> Path:
         """A path inside, as seen from outside."""

@@ -9,31 +9,22 @@ import shutil
 import socket
 import subprocess
 import sys
-import threading
 import time
-import urllib.request
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
-from gestured.client.stream import Stream
 from tests.daemon import tiny_model
-from tests.daemon.harness import Sensor
 from tests.documents.blocks import blocks
 from tests.hostile import bad_models
-from tests.systemd.container import DEADLINE_S, Container, missing, wait
+from tests.systemd.conftest import ROOT, report
+from tests.systemd.container import Container, missing, wait
+from tests.systemd.vehicle import Vehicle, steady
 
-ROOT = Path(__file__).resolve().parents[2]
-EVENTS = "/run/gestured/events.sock"
 METRICS = "http://127.0.0.1:9108/metrics"
 CONFIGURATION = "/etc/gestured/gestured.toml"
 SOCKETS = ("gestured-osc.socket", "gestured-events.socket", "gestured-metrics.socket")
-BUSY = 1.5  # processes that want to run, for each core
-FRAMES = 800  # 8 s: longer than the reloads take
-RATE_HZ = 100.0
 RELOADS = (  # a configuration, and why it is refused
     ('model = "lstm"\nmodle = 1\n', "did you mean model?"),
     ('model = "/nowhere.onnx"\n', "/nowhere.onnx"),
@@ -44,87 +35,6 @@ pytestmark = [
     pytest.mark.skipif(missing() is not None, reason=f"no container here: {missing()}"),
     pytest.mark.timeout(600),
 ]
-
-
-@pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What `make install` makes of an empty folder."""
-    root = tmp_path_factory.mktemp("install") / "root"
-    begin = time.monotonic()
-    done = subprocess.run(["make", "install", f"DESTDIR={root}"], cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
-    report("make install", time.monotonic() - begin)
-    return root
-
-
-@pytest.fixture(scope="module")
-def box(installed: Path) -> Iterator[Container]:
-    """The booted container."""
-    begin = time.monotonic()
-    with Container(installed) as container:
-        report("boot", time.monotonic() - begin)
-        yield container
-
-
-def report(what: str, seconds: float, limit: float | None = None) -> None:
-    """Print a measured time. Above its limit it is an error, unless others want more of the machine than there is."""
-    busy = os.getloadavg()[0] > BUSY * (os.cpu_count() or 1)
-    above = limit is not None and seconds > limit
-    words = f"  (at most {limit:g} s)" if limit else ""
-    words += f"  NOT JUDGED: load {os.getloadavg()[0]:.1f}" if above and busy else ""
-    print(f"{what:44} {seconds:7.2f} s{words}", file=sys.stderr)
-    assert not above or busy, f"{what}: {seconds:.2f} s, at most {limit} s"
-
-
-class Vehicle:
-    """The installed daemon, as those around it see it."""
-
-    def __init__(self, box: Container) -> None:
-        self.box = box
-
-    def stream(self, *types: str) -> Stream:
-        """A new subscriber; it waits until the daemon answers."""
-        stream = Stream(self.box.path(EVENTS), {"types": list(types or ("gesture",))})
-        stream.socket.settimeout(DEADLINE_S)
-        return stream
-
-    def instance(self) -> str:
-        """Which start of the daemon answers."""
-        with closing(self.stream()) as stream:
-            return str(stream.hello["instance"])
-
-    def sensor(self, name: str) -> Sensor:
-        """A sensor in the container's network."""
-        found: Sensor = self.box.call(lambda: Sensor(SimpleNamespace(address=("127.0.0.1", 9000)), name))  # type: ignore[arg-type]
-        return found
-
-    def frames(self, sensor: str) -> int:
-        """Frames of a sensor that this start of the daemon has seen, whatever became of them."""
-        text = self.box.call(lambda: urllib.request.urlopen(METRICS, timeout=20).read().decode())
-        lines = [line for line in text.splitlines() if line.startswith("gestured_frames_total{")]
-        return round(sum(float(line.split()[-1]) for line in lines if f'sensor="{sensor}"' in line))
-
-    def configure(self, text: str) -> None:
-        """Replace the configuration."""
-        self.box.path(CONFIGURATION).write_text(text)
-
-    def log(self) -> str:
-        """What the service has said."""
-        return self.box.run("journalctl", "-u", "gestured", "-o", "cat").stdout
-
-
-def steady(sensor: Sensor, count: int = FRAMES) -> threading.Thread:
-    """Send idle frames at a steady rate, in a thread."""
-
-    def send() -> None:
-        begin = time.monotonic()
-        for i in range(count):
-            time.sleep(max(begin + i / RATE_HZ - time.monotonic(), 0))
-            sensor.send([sensor.hand.frame()])
-
-    thread = threading.Thread(target=send)
-    thread.start()
-    return thread
 
 
 def harmed(vehicle: Vehicle, number: str) -> float:
@@ -153,13 +63,8 @@ def test_installed_enabled_used_killed_hung_reloaded_and_stopped(box: Container)
     box.run("systemctl", "enable", "--now", "gestured.service")
     report("enable --now, until ready", time.monotonic() - begin)
 
-    with closing(vehicle.stream()) as stream:
-        simulate = "gesturectl simulate --to 127.0.0.1:9000 --sensor armrest --kinds swipe_left --seconds 10"
-        sender = threading.Thread(target=box.run, args=simulate.split())
-        sender.start()
-        _, event = next(stream.raw())
-        assert (event["type"], event["sensor"]) == ("gesture", "armrest")
-        sender.join()
+    with closing(vehicle.client()) as client, vehicle.swiped("armrest"):
+        client.events("gesture", "armrest")
 
     killed = [harmed(vehicle, "SIGKILL") for _ in range(3)]
     report("kill -9, until it answers again, best of 3", min(killed), 2.0)
@@ -170,16 +75,16 @@ def test_installed_enabled_used_killed_hung_reloaded_and_stopped(box: Container)
 
     # A bad reload changes nothing, a good one the model; neither loses a frame or a subscriber.
     instance, sensor = vehicle.instance(), vehicle.sensor("reload")
-    with closing(vehicle.stream("status")) as stream:
+    with closing(vehicle.client().subscribe("status")) as client:
         sender = steady(sensor)
         for text, refusal in RELOADS:
-            vehicle.configure(text)
+            box.path(CONFIGURATION).write_text(text)
             begin = time.monotonic()
             done = box.run("systemctl", "reload", "gestured", check=False)
             report(f"reload, {'refused' if refusal else 'done'}", time.monotonic() - begin)
             assert (done.returncode != 0) == (refusal != "") and refusal in vehicle.log()
         sender.join()
-        wait("the new model", lambda: next(stream.raw())[1]["model"] == "lstm")
+        client.until(lambda line: line["model"] == "lstm")
     assert vehicle.instance() == instance
     wait("every frame sent during the reloads", lambda: vehicle.frames("reload") == sensor.count)
 
@@ -195,8 +100,7 @@ def test_what_the_documents_say_is_so(box: Container):
     box.run("systemctl", "start", "gestured.service")
     for block in blocks("run", "container"):
         begin = time.monotonic()
-        done = box.run("bash", "-euo", "pipefail", "-c", block.text.replace("sudo ", ""), check=False)
-        assert done.returncode == 0, f"{block}: {done.stdout}{done.stderr}"
+        box.follow(block.text)
         if " mask " in block.text:
             assert box.run("curl", "--silent", METRICS, check=False).returncode != 0
         report(str(block), time.monotonic() - begin)
@@ -247,15 +151,15 @@ def test_a_foreign_model_is_opened_apart_inside_the_units_sandbox(box: Container
         begin = time.monotonic()
         done = box.run("gesturectl", "shadow", f"/etc/gestured/{name}.onnx", check=False)
         assert done.returncode == 1 and f"{name}.onnx" in done.stderr and why in done.stderr
-        vehicle.configure(f'model = "/etc/gestured/{name}.onnx"\n')
+        box.path(CONFIGURATION).write_text(f'model = "/etc/gestured/{name}.onnx"\n')
         assert box.run("systemctl", "reload", "gestured", check=False).returncode != 0
         report(f"a model that is refused, twice: {name}", time.monotonic() - begin)
-    vehicle.configure('model = "/etc/gestured/tiny.onnx"\n')
+    box.path(CONFIGURATION).write_text('model = "/etc/gestured/tiny.onnx"\n')
     box.run("systemctl", "reload", "gestured")
     assert vehicle.instance() == instance
     box.run("systemctl", "restart", "gestured")
-    with closing(vehicle.stream()) as stream:
-        assert stream.hello["model"] == "tiny"
+    with closing(vehicle.client()) as client:
+        assert client.hello["model"] == "tiny"
     box.path(CONFIGURATION).write_text("")
     box.run("systemctl", "restart", "gestured.service")
 
@@ -283,7 +187,7 @@ def test_with_its_drop_in_the_service_sends_osc(box: Container):
     (block,) = [block for block in blocks("run", "container") if "osc-output.conf" in block.text]
     with box.call(lambda: bound(9001)) as receiver:
         box.path(CONFIGURATION).write_text('publish = ["osc://127.0.0.1:9001"]\n')
-        box.run("bash", "-euo", "pipefail", "-c", block.text.replace("sudo ", ""))
+        box.follow(block.text)
         box.run("gesturectl", "emit", "swipe_left")
         wait("the event over OSC", lambda: b"swipe_left" in receiver.recv(65536))
 

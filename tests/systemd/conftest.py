@@ -1,0 +1,45 @@
+"""What the tests of `make system-test` share: gestured installed, and the container that it is booted in."""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.systemd.container import Container
+
+ROOT = Path(__file__).resolve().parents[2]
+BUSY = 1.5  # processes that want to run, for each core
+
+
+@pytest.fixture(scope="session")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What `make install` makes of an empty folder."""
+    root = tmp_path_factory.mktemp("install") / "root"
+    begin = time.monotonic()
+    done = subprocess.run(["make", "install", f"DESTDIR={root}"], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    report("make install", time.monotonic() - begin)
+    return root
+
+
+@pytest.fixture(scope="session")
+def box(installed: Path) -> Iterator[Container]:
+    """The booted container."""
+    begin = time.monotonic()
+    with Container(installed) as container:
+        report("boot", time.monotonic() - begin)
+        yield container
+
+
+def report(what: str, seconds: float, limit: float | None = None) -> None:
+    """Print a measured time. Above its limit it is an error, unless others want more of the machine than there is."""
+    busy = os.getloadavg()[0] > BUSY * (os.cpu_count() or 1)
+    above = limit is not None and seconds > limit
+    words = f"  (at most {limit:g} s)" if limit else ""
+    words += f"  NOT JUDGED: load {os.getloadavg()[0]:.1f}" if above and busy else ""
+    print(f"{what:44} {seconds:7.2f} s{words}", file=sys.stderr)
+    assert not above or busy, f"{what}: {seconds:.2f} s, at most {limit} s"
