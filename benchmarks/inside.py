@@ -15,8 +15,9 @@ from benchmarks.traffic import touched
 from gestured.client.sensor import Form
 from gestured.core import messages, osc
 from gestured.core.events import Gesture
+from gestured.core.found import Cut
 from gestured.core.frames import Frame
-from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Recognizer
 from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.clients import EventServer

@@ -22,9 +22,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Decided, Recognizer
+from gestured.core.recognizer import Recognizer
 from gestured.model.model import open_model
 from gestured.simulator import Participant, SimulatedSensor, generator, session
 from tests import foreign

@@ -35,9 +35,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.events import Cancelled, Onset, Release
+from gestured.core.found import Contact, Cut, Draft, Found
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Contact, Cut, Found, FrontEnd
-from gestured.core.unfinished import Draft
+from gestured.core.front_end import FrontEnd
 
 Finger = tuple[float, float, float]  # row, column, amplitude
 Fingers = Callable[[float], list[Finger]]  # by the share of a step's time that has passed

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
-from gestured.core.recognizer import Scores
 from gestured.model.ladder import Ladder, ladder_for
 from gestured.model.model import LADDER, open_model
 from tests.small_model import GESTURES, build, segment

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from gestured.core.activity import hardly_ever
 from gestured.core.contact import AfterEffect
 from gestured.core.events import Cancelled, Onset, Release
+from gestured.core.found import Contact, Cut
 from gestured.core.frames import Frame
-from gestured.core.front_end import Contact, Cut
 from tests.scenario import Player, Scenario, ScenarioError, load, parse
 
 SCENARIOS = sorted((Path(__file__).parent / "scenarios").glob("*.txt"))

@@ -1,11 +1,21 @@
 """What a hub found: small facts in a plain union, for those who publish, count, compare or keep them."""
 
+from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
+from gestured.core.classifier import Scores
 from gestured.core.events import Event
-from gestured.core.frames import Frame
+from gestured.core.frames import Frame, Segment
 from gestured.core.owner import Source
-from gestured.core.recognizer import Decided
+
+
+class Decided(NamedTuple):
+    """A segment that was classified, and whether the model's answer was enough for a gesture; it follows its event."""
+
+    sensor: str
+    segment: Segment
+    scores: Scores
+    known: bool
 
 
 class Arrived(NamedTuple):
@@ -53,3 +63,8 @@ class Fault(NamedTuple):
 
 
 Fact = Event | Decided | Arrived | Taken | Dropped | Changed | Fault
+
+
+def events_of(found: Iterable[Event | Decided]) -> list[Event]:
+    """The events among what a recognizer found."""
+    return [one for one in found if not isinstance(one, Decided)]

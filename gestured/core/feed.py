@@ -2,14 +2,15 @@
 
 from collections.abc import Callable, Sequence
 
+from gestured.core.classifier import Classifier
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
-from gestured.core.facts import Arrived, Changed, Fact, Fault, Taken
+from gestured.core.facts import Arrived, Changed, Decided, Fact, Fault, Taken
 from gestured.core.foresight import Foresight
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.owner import Owner, Source
 from gestured.core.reading import Reading
-from gestured.core.recognizer import Classifier, Decided, Recognizer
+from gestured.core.recognizer import Recognizer
 from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
 from gestured.core.view import View, view_of

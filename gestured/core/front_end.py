@@ -1,35 +1,20 @@
 """One sensor's way from frame to segment: frames in, what was found in them out."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.conditioning import Conditioner, Look
 from gestured.core.cutter import LARGEST, Cutter
 from gestured.core.events import Cancelled, Onset, Release
-from gestured.core.frames import Frame, Segment
+from gestured.core.found import Contact, Cut, Found
+from gestured.core.frames import Frame
 from gestured.core.habits import Habits
 from gestured.core.mounting import Mounting
 from gestured.core.pace import Pace
 from gestured.core.phases import Action
 from gestured.core.segmentation import Deed, Segmenter
 from gestured.core.timing import Timing
-from gestured.core.unfinished import Draft, Preview, Unfinished
-
-
-@dataclass(frozen=True, slots=True)
-class Cut:
-    """A segment that is complete and waits for its name."""
-
-    id: int
-    segment: Segment  # the same object as in the last draft, unless more has become known since
-    decided: float  # s, the frame that completed it
-    hole_s: float = 0.0  # the longest time until then in which the finger may have done anything unseen
-
-
-Contact = Onset | Cut | Cancelled | Release  # what happens to a contact, in this order
-Found = Contact | Draft | Preview
+from gestured.core.unfinished import Unfinished
 
 
 class FrontEnd:

@@ -10,11 +10,11 @@ a bug does not end the program: a daemon in a vehicle that dies of one sensor's 
 
 from collections.abc import Callable, Sequence
 
+from gestured.core.classifier import Classifier
 from gestured.core.facts import Changed, Dropped, Fact, Fault
 from gestured.core.feed import Feed
 from gestured.core.owner import Source
 from gestured.core.reading import Reading
-from gestured.core.recognizer import Classifier
 from gestured.core.scene import Scene
 from gestured.core.view import View
 from gestured.core.wire import Arrival, Decoder

@@ -1,78 +1,21 @@
 """The one path from frames to events: conditioning, segmentation, classification, decision."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, Protocol, runtime_checkable
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gestured.core.classifier import Classifier, Foreseer, Scores
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
-from gestured.core.foresight import Certainty, Foresight
+from gestured.core.facts import Decided
+from gestured.core.foresight import Foresight
+from gestured.core.found import Cut, Draft, Found, Preview
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, Found, FrontEnd
+from gestured.core.front_end import FrontEnd
 from gestured.core.holes import bearable_s
 from gestured.core.pace import outside
 from gestured.core.prototypes import NEAR, Match
-from gestured.core.unfinished import Draft, Preview
-
-
-@dataclass(frozen=True, slots=True)
-class Scores:
-    """What a classifier says of a segment."""
-
-    values: NDArray[np.float32]  # (G,) probabilities given that it is one of the gestures, in the classifier's order
-    unknown: float  # probability that it is none of them
-    model: str
-    degraded: bool = False  # a fallback answered
-    threshold: float = 0.5  # confidence from which the model's calibration has it published
-    took_s: float = 0.0  # s that the model ran
-    own: Match | None = None  # the nearest gesture of the user's own, where there are any
-
-    @property
-    def confidence(self) -> float:
-        """Of the best gesture."""
-        return float(self.values.max()) * (1.0 - self.unknown)
-
-
-class Classifier(Protocol):
-    """Anything that scores segments: a model, or a ladder of them."""
-
-    gestures: tuple[str, ...]
-
-    def classify(self, segment: Segment) -> Scores:
-        """Score one segment; raises ModelError where it cannot."""
-        ...
-
-
-@runtime_checkable
-class Foreseer(Classifier, Protocol):
-    """A classifier that can be asked about contacts that are not over."""
-
-    @property
-    def certainty(self) -> Certainty | None:
-        """How sure it must be of them; None where it was not made for that."""
-        ...
-
-    def preview(self, segment: Segment) -> Scores | None:
-        """Score the beginning of a segment, None where that fails: no later answer may depend on it."""
-        ...
-
-
-class Decided(NamedTuple):
-    """A segment that was classified, and whether the model's answer was enough for a gesture; it follows its event."""
-
-    sensor: str
-    segment: Segment
-    scores: Scores
-    known: bool
-
-
-def events_of(found: Iterable[Event | Decided]) -> list[Event]:
-    """The events among what a recognizer found."""
-    return [one for one in found if not isinstance(one, Decided)]
 
 
 class Recognizer:

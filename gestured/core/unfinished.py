@@ -1,8 +1,7 @@
 """What a front end shows of a contact that is not over: drafts of its segment, and previews of what has come so far."""
 
-from dataclasses import dataclass
-
 from gestured.core.cutter import Cutter
+from gestured.core.found import Draft, Preview
 from gestured.core.frames import Segment
 from gestured.core.pace import Pace
 from gestured.core.segmentation import Segmenter
@@ -11,25 +10,6 @@ from gestured.core.timing import Timing
 PREVIEW_S = 0.0666  # from one preview to the next: 15 a second, a little less than 1/15 because times are rounded
 EACH_FRAME_S = 0.0635  # a sensor this slow is shown with each frame: at 15 Hz its rate is known to some per cent
 DRAFT_S = 0.085  # quiet for so long, all that a window takes in is there; the wait goes on to see the finger stay off
-
-
-@dataclass(frozen=True, slots=True)
-class Draft:
-    """A segment as it will be cut if the finger stays off; its name may be looked for meanwhile."""
-
-    segment: Segment
-
-
-@dataclass(frozen=True, slots=True)
-class Preview:
-    """A contact that is not over: what of it has come so far."""
-
-    id: int
-    segment: Segment  # to the last touched frame; once the finger has left, the same object as in the draft
-    t: float  # s, now
-    down: bool  # whether the finger is on the sensor; else it has left, perhaps for good
-    second: bool  # whether the second contact of the segment has begun: the first was a tap
-    hole_s: float  # the longest time from one frame to the next so far
 
 
 class Unfinished:

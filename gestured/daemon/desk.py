@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 from gestured.core.address import Address
-from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
-from gestured.core.recognizer import Decided
+from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.own import OwnGestures

@@ -10,10 +10,9 @@ from typing import Any
 from gestured.core.enrolment import Enrolment
 from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled
-from gestured.core.facts import Fact
+from gestured.core.facts import Decided, Fact
 from gestured.core.own import MOST, Examples, is_name
 from gestured.core.prototypes import EXAMPLES
-from gestured.core.recognizer import Decided
 from gestured.daemon import own_file
 from gestured.daemon.control import Connection
 from gestured.daemon.log import log

@@ -9,8 +9,8 @@ import threading
 from collections import Counter
 from typing import Any
 
+from gestured.core.classifier import Classifier, Scores
 from gestured.core.frames import Segment
-from gestured.core.recognizer import Classifier, Scores
 from gestured.model.process import ModelProcess
 
 PAIRS = 10  # disagreements that a report names

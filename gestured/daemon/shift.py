@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from gestured.core.classifier import Scores
 from gestured.core.frames import Segment
 from gestured.core.measures import MEASURES, measures
-from gestured.core.recognizer import Scores
 from gestured.core.window import Window
 
 LAST = 100  # gestures

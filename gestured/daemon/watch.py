@@ -5,7 +5,7 @@ after the answer went out, and cannot change or prevent it.
 """
 
 from gestured.core.errors import ModelError
-from gestured.core.recognizer import Decided
+from gestured.core.facts import Decided
 from gestured.daemon.log import Throttle
 from gestured.daemon.shadow import Shadow
 from gestured.daemon.shift import Shift

@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from gestured.core.classifier import Classifier
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
+from gestured.core.facts import events_of
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Classifier, Recognizer, events_of
+from gestured.core.recognizer import Recognizer
 from gestured.lab.dataset import Truth, truths
 from gestured.lab.online import NON_GESTURE_SHARE, SESSION_S
 from gestured.lab.progress import progress

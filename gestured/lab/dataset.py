@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
 from gestured.core.features import touch_pattern
+from gestured.core.found import Cut
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.front_end import FrontEnd
 from gestured.core.window import Window
 from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress

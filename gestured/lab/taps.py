@@ -7,10 +7,11 @@ from dataclasses import asdict
 from statistics import median
 from typing import Any
 
+from gestured.core.classifier import Classifier
 from gestured.core.events import Gesture
 from gestured.core.feed import front_end_of
 from gestured.core.frames import Frame
-from gestured.core.recognizer import Classifier, Recognizer
+from gestured.core.recognizer import Recognizer
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
 from gestured.lab.made_of import made_of
 from gestured.lab.online import tallied

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 
 from gestured.core.errors import SettingsError
 from gestured.core.events import Event
+from gestured.core.facts import events_of
 from gestured.core.feed import front_end_of
 from gestured.core.frames import Frame, Touch
 from gestured.core.mounting import Mounting
-from gestured.core.recognizer import Recognizer, events_of
+from gestured.core.recognizer import Recognizer
 from gestured.core.scene import Scene, Setup
 from gestured.core.timing import Timing
 from gestured.core.wire import is_sensor

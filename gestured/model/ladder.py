@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from gestured.core.certainty import Certainty
+from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import ModelError, SettingsError
-from gestured.core.foresight import Certainty
 from gestured.core.frames import Segment
-from gestured.core.recognizer import Classifier, Scores
 from gestured.model.model import LADDER, shipped, shipped_name
 from gestured.model.own import Own
 from gestured.model.rung import Rung

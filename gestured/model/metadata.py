@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from gestured.core.certainty import Certainty
 from gestured.core.features import feature_names
-from gestured.core.foresight import Certainty
 from gestured.core.prototypes import Space
 from gestured.core.window import Window
 from gestured.model.file import SelfTest

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Segment
-from gestured.core.recognizer import Scores
 from gestured.model.file import inspect, read_bytes
 from gestured.model.metadata import Metadata
 from gestured.model.process import ModelProcess, try_out

@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
+from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
-from gestured.core.recognizer import Scores
 
 OPEN_S = 8  # s to start, to open a model and to test it; half a second is usual, and an operator's client waits for 20
 CHILD_RUN_S = 5  # s for a segment, after which the child ends; what can be ended otherwise is ended after model.RUN_S

@@ -3,8 +3,8 @@
 import math
 from pathlib import Path
 
+from gestured.core.classifier import Classifier
 from gestured.core.errors import ModelError
-from gestured.core.recognizer import Classifier
 from gestured.model.model import look_at, open_model, shipped_name
 
 

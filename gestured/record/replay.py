@@ -9,14 +9,14 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import ModelError, RecordingError
 from gestured.core.events import Event, Onset
-from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
+from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
 from gestured.core.frames import Segment
 from gestured.core.hub import Hub
 from gestured.core.mounting import Mounting
 from gestured.core.own import Examples, from_dict
-from gestured.core.recognizer import Classifier, Decided, Scores
 from gestured.core.scene import Scene, Setup
 from gestured.core.timing import Timing
 from gestured.core.wire import Addresses

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from gestured.core.activity import BLOB, BLOB_GAIN, COMMON, Activity
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.features import touch_pattern
+from gestured.core.found import Contact, Cut, Draft, Preview
 from gestured.core.frames import Frame, Segment, Touch
-from gestured.core.front_end import Contact, Cut, FrontEnd
+from gestured.core.front_end import FrontEnd
 from gestured.core.mounting import Mounting
-from gestured.core.unfinished import Draft, Preview
 from gestured.core.window import Window
 
 Array = NDArray[np.float64]

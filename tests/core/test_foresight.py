@@ -12,15 +12,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gestured.core.certainty import Certainty
+from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, Unknown
-from gestured.core.facts import Fault
-from gestured.core.foresight import Certainty, Foresight
+from gestured.core.facts import Fault, events_of
+from gestured.core.foresight import Foresight
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.hub import Hub
 from gestured.core.prototypes import Match
-from gestured.core.recognizer import Recognizer, Scores, events_of
+from gestured.core.recognizer import Recognizer
 from gestured.core.scene import Scene
 from gestured.model.ladder import Ladder
 from tests.daemon.harness import Hand, floats

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from gestured.control.export import sessions_of
+from gestured.core.classifier import Scores
 from gestured.core.events import Cancelled, Event, Onset, Release
 from gestured.core.facts import Changed, Dropped, Taken
 from gestured.core.frames import Segment
 from gestured.core.hub import FORGET_S, Hub
-from gestured.core.recognizer import Scores
 from gestured.core.scene import Scene, Setup
 from gestured.lab.recordings.live import LiveSensor
 from gestured.record import tape_reader, tape_writer

@@ -14,13 +14,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
+from gestured.core.facts import Decided, events_of
+from gestured.core.found import Contact, Cut, Draft, Preview
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Contact, Cut, FrontEnd
-from gestured.core.recognizer import Decided, Recognizer, Scores, events_of
+from gestured.core.front_end import FrontEnd
+from gestured.core.recognizer import Recognizer
 from gestured.core.timing import Timing
-from gestured.core.unfinished import Draft, Preview
 from gestured.core.window import Window
 from tests.scenario import Player, parse
 

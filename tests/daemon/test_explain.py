@@ -5,8 +5,9 @@ import re
 import numpy as np
 import pytest
 
+from gestured.core.found import Cut
 from gestured.core.frames import Frame
-from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.front_end import FrontEnd
 from gestured.core.timing import Timing
 from gestured.daemon.cli import parser
 from gestured.daemon.explain import explain

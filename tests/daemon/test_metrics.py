@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gestured.core.classifier import Scores
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
+from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.measures import MEASURES
 from gestured.core.reading import STATES, Reading
-from gestured.core.recognizer import Decided, Scores
 from gestured.core.vitals import Vitals, faulty
 from gestured.core.window import Window
 from gestured.daemon.exposition import Gauges, by_label, exposition

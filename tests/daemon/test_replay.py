@@ -9,10 +9,11 @@ import pytest
 
 import gestured
 from gestured.core.events import Event
+from gestured.core.facts import events_of
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.messages import event_type
-from gestured.core.recognizer import Recognizer, events_of
+from gestured.core.recognizer import Recognizer
 from gestured.model.model import open_model
 from tests.daemon import harness
 from tests.daemon.harness import Daemon, Hand, Sensor

@@ -19,9 +19,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gestured.core.events import Cancelled, Gesture, Onset, Unknown
+from gestured.core.facts import events_of
+from gestured.core.found import Cut
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, FrontEnd
-from gestured.core.recognizer import Recognizer, events_of
+from gestured.core.front_end import FrontEnd
+from gestured.core.recognizer import Recognizer
 from gestured.lab.ahead import Ahead, heard, table
 from gestured.lab.dataset import Truth
 from gestured.lab.made_of import made_of

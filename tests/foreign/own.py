@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gestured.core.found import Cut
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.front_end import FrontEnd
 from gestured.core.prototypes import EXAMPLES, NEAR, Array, Prototype, Space, nearest
 from gestured.model.model import Model, open_model
 from gestured.model.own import place, taken_for

@@ -14,8 +14,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from gestured.core.classifier import Classifier, Scores
 from gestured.core.frames import Segment
-from gestured.core.recognizer import Classifier, Scores
 from gestured.model.model import open_model, shipped
 from tests.foreign import GESTURES, NON_GESTURES, take
 from tests.foreign.judge import Outcome, Take, judge, summary, visible

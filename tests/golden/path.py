@@ -13,15 +13,14 @@ from types import SimpleNamespace
 from typing import Any
 
 from gestured.core.events import Cancelled, Event, Gesture, Unknown
-from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
+from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
 from gestured.core.feed import front_end_of
+from gestured.core.found import Contact, Draft, Preview
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Contact, FrontEnd
+from gestured.core.front_end import FrontEnd
 from gestured.core.hub import Hub
 from gestured.core.reading import Reading
-from gestured.core.recognizer import Decided
 from gestured.core.stamping import Stamp, Stamper
-from gestured.core.unfinished import Draft, Preview
 from gestured.core.wire import Decoder
 from gestured.daemon.scene import scene_of
 from gestured.daemon.settings import Settings

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gestured.core.front_end import Contact, Cut
+from gestured.core.found import Contact, Cut
 from gestured.model.ladder import Ladder
 from tests.golden import path
 from tests.golden.path import Line

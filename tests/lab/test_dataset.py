@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gestured.core.classifier import Scores
 from gestured.core.events import Event
+from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Decided, Recognizer, Scores
+from gestured.core.recognizer import Recognizer
 from gestured.lab.dataset import (
     OTHER_TRIALS,
     STREAMS,

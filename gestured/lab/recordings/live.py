@@ -9,14 +9,14 @@ import numpy as np
 
 from gestured.client.say import shown
 from gestured.core.address import Address
+from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled, Event, Onset, Release, Status
-from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault, Taken
+from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
 from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
 from gestured.core.owner import Source
 from gestured.core.reading import Reading
-from gestured.core.recognizer import Classifier, Decided, Scores
 from gestured.core.scene import DOUBLE_TAP, Scene
 from gestured.lab.recordings.quality import Captured
 

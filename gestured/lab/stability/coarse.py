@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gestured.core.recognizer import Classifier
+from gestured.core.classifier import Classifier
 from gestured.lab.stability.path import Series, events, labels, simulated_series
 from gestured.lab.stability.table import Table, Value
 

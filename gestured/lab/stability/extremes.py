@@ -10,11 +10,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gestured.core.classifier import Classifier
 from gestured.core.events import Event, Gesture, Onset
+from gestured.core.facts import events_of
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Classifier, Recognizer, events_of
+from gestured.core.recognizer import Recognizer
 from gestured.core.window import Window
 from gestured.lab.dataset import WINDOW
 from gestured.lab.stability.made import IDLE_LEVEL, NOISE, swipes

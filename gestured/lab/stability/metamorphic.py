@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from gestured.core.classifier import Classifier
 from gestured.core.frames import Segment
-from gestured.core.recognizer import Classifier
 from gestured.lab.dataset import cuts
 from gestured.lab.stability.path import Array, Series, events, labels, simulated_series
 from gestured.lab.stability.table import Table, Value

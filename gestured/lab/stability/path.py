@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.classifier import Classifier
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
+from gestured.core.facts import events_of
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.mounting import Mounting
-from gestured.core.recognizer import Classifier, Recognizer, events_of
+from gestured.core.recognizer import Recognizer
 from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
 
 Array = NDArray[Any]

@@ -5,9 +5,9 @@ import pytest
 
 pytest.importorskip("torch", reason="needs the extra [lab]")
 
+from gestured.core.classifier import Scores
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Segment
-from gestured.core.recognizer import Scores
 from gestured.lab.stability.extremes import month_table, parts_table, swipes_found, whole_path_table
 from gestured.lab.stability.made import swipes
 from gestured.lab.stability.path import Series, fault

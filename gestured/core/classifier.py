@@ -1,0 +1,53 @@
+"""What scores segments: a model, or a ladder of them; and what it says of one."""
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.certainty import Certainty
+from gestured.core.frames import Segment
+from gestured.core.prototypes import Match
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """What a classifier says of a segment."""
+
+    values: NDArray[np.float32]  # (G,) probabilities given that it is one of the gestures, in the classifier's order
+    unknown: float  # probability that it is none of them
+    model: str
+    degraded: bool = False  # a fallback answered
+    threshold: float = 0.5  # confidence from which the model's calibration has it published
+    took_s: float = 0.0  # s that the model ran
+    own: Match | None = None  # the nearest gesture of the user's own, where there are any
+
+    @property
+    def confidence(self) -> float:
+        """Of the best gesture."""
+        return float(self.values.max()) * (1.0 - self.unknown)
+
+
+class Classifier(Protocol):
+    """Anything that scores segments: a model, or a ladder of them."""
+
+    gestures: tuple[str, ...]
+
+    def classify(self, segment: Segment) -> Scores:
+        """Score one segment; raises ModelError where it cannot."""
+        ...
+
+
+@runtime_checkable
+class Foreseer(Classifier, Protocol):
+    """A classifier that can be asked about contacts that are not over."""
+
+    @property
+    def certainty(self) -> Certainty | None:
+        """How sure it must be of them; None where it was not made for that."""
+        ...
+
+    def preview(self, segment: Segment) -> Scores | None:
+        """Score the beginning of a segment, None where that fails: no later answer may depend on it."""
+        ...
