@@ -23,7 +23,7 @@ from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.clients import EventServer
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.values import Grid
-from gestured.model.model import open_model
+from gestured.model.opening import open_model
 
 CLIENTS = 1000
 STALLED = 50

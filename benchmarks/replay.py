@@ -11,7 +11,8 @@ from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Recognizer
 from gestured.lab.online import play
-from gestured.model.model import Model, open_model
+from gestured.model.model import Model
+from gestured.model.opening import open_model
 from gestured.simulator import Take
 
 SECONDS = 300.0

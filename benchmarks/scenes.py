@@ -20,7 +20,7 @@ from gestured.core.frames import Frame, Touch
 from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.values import Grid
 from gestured.lab.made_of import made_of
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
 
 OSC = "osc://127.0.0.1:{port}"  # where somebody listens

@@ -11,7 +11,8 @@ from gestured.client.engine import Engine
 from gestured.client.sensor import Form, Sensor
 from gestured.client.stream import Stream
 from gestured.core.frames import Frame
-from gestured.model.model import open_model, shipped
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
 
 REPEATS = 7
 MORE = 200  # further sensors

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from gestured.model import model as models
-from gestured.model.model import LADDER
+from gestured.model.shipped import LADDER
 from tests.small_model import build
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -67,7 +66,7 @@ def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         build(directory / f"{name}.onnx", takes="features" if name == "touch_pattern_rf" else "frames")
     files = {p.name: {"sha256": hashlib.sha256(p.read_bytes()).hexdigest()} for p in directory.iterdir()}
     (directory / "manifest.json").write_text(json.dumps({"models": files}))
-    monkeypatch.setattr(models, "_shipped_directory", lambda: directory)
+    monkeypatch.setattr("gestured.model.shipped._shipped_directory", lambda: directory)
     empty = tmp_path / "empty"
     empty.mkdir()
     monkeypatch.chdir(empty)

@@ -26,7 +26,7 @@ from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Recognizer
-from gestured.model.model import open_model
+from gestured.model.opening import open_model
 from gestured.simulator import Participant, SimulatedSensor, generator, session
 from tests import foreign
 

@@ -212,10 +212,10 @@ def test_sensors_are_as_many_as_the_daemon_would_have_taken(tmp_path: Path) -> N
 def test_a_model_that_only_the_tape_names_is_not_opened(
     tmp_path: Path, how: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from gestured.model import model as models
+    from gestured.model import shipped
 
     opened = []
-    monkeypatch.setattr(models, "read_bytes", lambda path: opened.append(str(path)) or b"")
+    monkeypatch.setattr(shipped, "read_bytes", lambda path: opened.append(str(path)) or b"")
     planted = tmp_path / "planted.onnx"
     planted.write_bytes(b"")
     named = {"model": str(planted)} if how == "model" else {"model": "cnn_lstm", "fallback": [str(planted)]}

@@ -15,7 +15,7 @@ from gestured.bridge.cli import parser as bridge_parser
 from gestured.control.cli import parser as gesturectl_parser
 from gestured.daemon.cli import parser as gestured_parser
 from gestured.lab.cli import parser as lab_parser  # imports no torch
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()

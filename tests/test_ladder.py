@@ -12,7 +12,8 @@ from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
 from gestured.model.ladder import Ladder, ladder_for
-from gestured.model.model import LADDER, open_model
+from gestured.model.opening import open_model
+from gestured.model.shipped import LADDER
 from tests.small_model import GESTURES, build, segment
 
 
@@ -202,7 +203,7 @@ def test_a_fallback_of_ones_own_is_tried_before_and_opened_without_delay(
 ) -> None:
     one, other = build(tmp_path / "one.onnx"), build(tmp_path / "other.onnx")
     ladder = ladder_for(one, [other])
-    monkeypatch.setattr("gestured.model.model.try_out", lambda data: pytest.fail("while something waits for an answer"))
+    monkeypatch.setattr("gestured.model.opening.try_out", lambda data: pytest.fail("while an answer is waited for"))
     ladder.rungs[0].model = Fake("one", Clock(), error=ModelError("broken"))
     assert ladder.classify(segment()).model == "other"
 
@@ -228,7 +229,7 @@ def test_a_file_of_ones_own_that_was_refused_is_not_tried_again_before_a_reload(
     bad.write_bytes(b"damaged")
     ladder = ladder_for(str(bad), [good], clock=clock, report=said.append)
     assert said[0].startswith("bad is put aside until a reload")
-    monkeypatch.setattr("gestured.model.model.try_out", lambda data: pytest.fail("while something waits for an answer"))
+    monkeypatch.setattr("gestured.model.opening.try_out", lambda data: pytest.fail("while an answer is waited for"))
     build(bad)
     clock.now += 1000.0
     assert ladder.classify(segment()).model == "good"

@@ -26,7 +26,9 @@ from gestured.lab.stability.metamorphic import (
     upside_down,
 )
 from gestured.lab.stability.path import Series, events, labels, simulated_series
-from gestured.model.model import LADDER, Model, open_model, shipped
+from gestured.model.model import Model
+from gestured.model.opening import open_model
+from gestured.model.shipped import LADDER, shipped
 
 COUNT = 60  # enough that LEAST lets one label differ
 LEAST = 0.98  # of the labels, where a learned net decides

@@ -18,9 +18,10 @@ from hypothesis import strategies as st
 from gestured.core.errors import ModelError
 from gestured.core.features import touch_pattern
 from gestured.model import file as model_file
-from gestured.model import model as models
 from gestured.model import process as model_process
-from gestured.model.model import LADDER, open_model
+from gestured.model.model import Model
+from gestured.model.opening import check, open_model
+from gestured.model.shipped import LADDER, shipped
 from tests.bounds import little_memory
 from tests.daemon import tiny_model
 from tests.hostile import bad_models
@@ -71,7 +72,7 @@ def test_values_that_are_not_finite_are_unknown(tmp_path: Path, takes: str, leve
 
 def test_report_is_json_and_says_what_the_file_is(tmp_path: Path) -> None:
     path = build(tmp_path / "m.onnx")
-    report = json.loads(json.dumps(models.check(str(path))))
+    report = json.loads(json.dumps(check(str(path))))
     assert report["file"] == str(path)
     assert report["kind"] == "test_net"
     assert report["gestures"] == list(GESTURES)
@@ -86,7 +87,8 @@ def test_opening_writes_nothing_prints_nothing_and_loads_no_lab(tmp_path: Path) 
     home.mkdir()
     good, bad = build(tmp_path / "good.onnx"), build(tmp_path / "bad.onnx", extra="bomb")
     script = (
-        "import sys\nfrom gestured.model.model import open_model, ModelError\nopen_model(sys.argv[1])\n"
+        "import sys\nfrom gestured.core.errors import ModelError\nfrom gestured.model.opening import open_model\n"
+        "open_model(sys.argv[1])\n"
         "try: open_model(sys.argv[2])\nexcept ModelError: pass\nelse: sys.exit('opened the bad one')\n"
         "sys.exit(str({'torch', 'onnx', 'sklearn'} & set(sys.modules) or ''))"
     )
@@ -244,7 +246,8 @@ def test_a_large_file_of_metadata_costs_little_more_than_its_size(tmp_path: Path
     path = bad_models.verbose(build(tmp_path / "good.onnx"), tmp_path / "bad.onnx")
     # The largest size of the process itself is read from /proc: getrusage's would be ours, from before the exec.
     script = (
-        "import re, resource, sys\nfrom gestured.model.model import check, ModelError\n"
+        "import re, resource, sys\nfrom gestured.core.errors import ModelError\n"
+        "from gestured.model.opening import check\n"
         "try: check(sys.argv[1])\nexcept ModelError as error: print(error)\n"
         "print(max(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss,"
         " int(re.search(r'VmHWM:\\s+(\\d+)', open('/proc/self/status').read())[1])))"
@@ -342,7 +345,7 @@ def test_altered_bytes_open_or_are_refused(good_bytes: bytes, changes: list[tupl
         data[place % len(data)] = value
     try:
         with little_memory():
-            model = models.Model(bytes(data), "altered")
+            model = Model(bytes(data), "altered")
     except ValueError:
         return
     scores = model.classify(segment())  # what still opens has passed its self-test and gives probabilities
@@ -355,13 +358,13 @@ def test_altered_bytes_open_or_are_refused(good_bytes: bytes, changes: list[tupl
 @pytest.mark.parametrize("source", ["lstm", "lstm.onnx"])
 def test_bare_name_is_the_shipped_model(shelf: Path, source: str) -> None:
     assert open_model(source).name == "lstm"
-    assert models.check(source)["shipped"]
+    assert check(source)["shipped"]
 
 
 def test_a_name_without_a_suffix_is_a_shipped_models_always(shelf: Path) -> None:
     build(Path("lstm"), version="mine")
     assert open_model("lstm").metadata.version == "3"
-    assert models.check("lstm")["shipped"]
+    assert check("lstm")["shipped"]
     assert open_model("./lstm").metadata.version == "mine"
 
 
@@ -397,7 +400,7 @@ def test_shipped_file_without_its_manifest_is_refused(shelf: Path, manifest: str
 
 @pytest.mark.parametrize("name", LADDER)
 def test_models_that_ship(name: str) -> None:
-    if not models.shipped()[name].exists():
+    if not shipped()[name].exists():
         pytest.skip(f"models/{name}.onnx has not been trained yet")
     model = open_model(name)
     assert model.gestures == (

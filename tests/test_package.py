@@ -136,7 +136,7 @@ def test_the_wheel_holds_models_types_and_licences_and_nothing_else(installed: P
 
 
 def test_shipped_models_are_found_where_they_are_installed(installed: Path, tmp_path: Path):
-    code = "from gestured.model.model import shipped\nfor path in shipped().values(): print(path)"
+    code = "from gestured.model.shipped import shipped\nfor path in shipped().values(): print(path)"
     done = python_without(EXTRAS, code, installed, tmp_path)
     assert done.returncode == 0, done.stderr
     assert {Path(line).parent for line in done.stdout.splitlines()} == {installed / "gestured_models"}
@@ -203,10 +203,10 @@ def test_the_version_is_the_packages():
 
 
 BESIDE = """
-import gestured, gestured.model.model
+import gestured, gestured.model.shipped
 from gestured.core import recognizer
 print(gestured.__file__, gestured.open.__name__)
-print(gestured.model.model.shipped()["cnn_lstm"].is_file())
+print(gestured.model.shipped.shipped()["cnn_lstm"].is_file())
 """
 
 

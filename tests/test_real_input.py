@@ -16,7 +16,7 @@ import pytest
 
 from gestured.client.stream import Stream
 from gestured.core.address import Address
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 from tests import encoding
 
 ROOT = Path(__file__).resolve().parents[1]

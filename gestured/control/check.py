@@ -5,7 +5,7 @@ import sys
 
 from gestured.client.say import say, say_json
 from gestured.core.errors import ModelError
-from gestured.model.model import check
+from gestured.model.opening import check
 
 UNUSABLE = 3
 

@@ -9,7 +9,7 @@ import gestured
 from gestured.control.status import RATES, span
 from gestured.core.errors import ModelError
 from gestured.core.pace import outside as rate_is_outside
-from gestured.model.model import check
+from gestured.model.opening import check
 
 BUFFER_BYTES = 4 << 20  # what the daemon asks of the kernel
 SLOW_S = 0.1

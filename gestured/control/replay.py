@@ -21,8 +21,8 @@ from gestured.core.errors import GesturedError, RecordingError
 from gestured.core.scene import Scene
 from gestured.core.wire import is_sensor
 from gestured.model.ladder import Ladder, ladder_for
-from gestured.model.model import shipped
 from gestured.model.own import Own
+from gestured.model.shipped import shipped
 from gestured.record.replay import Maker, Mute, Replay
 
 DEFAULT_MODEL = "cnn_lstm"  # for a file that names none

@@ -14,7 +14,8 @@ from gestured.control.labelled import Labelled
 from gestured.control.tuning import ENOUGH, THRESHOLDS, Counts, Played, counted, for_each, proposed
 from gestured.core import messages
 from gestured.core.errors import GesturedError, RecordingError
-from gestured.model.model import Model, open_model
+from gestured.model.model import Model
+from gestured.model.opening import open_model
 from gestured.record.replay import Replay
 
 BAR = 36  # characters

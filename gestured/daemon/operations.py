@@ -20,7 +20,7 @@ from gestured.daemon.status import scene
 from gestured.daemon.tap import Taps, as_lines
 from gestured.daemon.views import Views
 from gestured.daemon.watch import Watch
-from gestured.model.model import open_apart
+from gestured.model.opening import open_apart
 
 TEST_SENSORS = 64  # names of sensors that are not there
 TEST_S = 0.4  # how long a made-up gesture took

@@ -21,7 +21,7 @@ from gestured.core.recognizer import Recognizer
 from gestured.lab.dataset import Truth, truths
 from gestured.lab.online import NON_GESTURE_SHARE, SESSION_S
 from gestured.lab.progress import progress
-from gestured.model.model import open_model
+from gestured.model.opening import open_model
 from gestured.simulator import NONE, Participant, SimulatedSensor, Take, generator, session
 
 TAPS = ("one_tap", "double_tap")

@@ -8,7 +8,7 @@ from typing import Any
 from gestured.lab.made_of import made_of, models_and_manifest, renew
 from gestured.lab.recordings.origin import said
 from gestured.lab.train import TrainingPlan
-from gestured.model.model import open_model
+from gestured.model.opening import open_model
 
 WHAT = {
     "cnn_lstm": "Two convolutions with ReLU and max-pooling on each frame, an LSTM of 32 units over the frames (the paper's "

@@ -17,7 +17,8 @@ from gestured.lab.networks import compare, compare_rules
 from gestured.lab.own import command as own
 from gestured.lab.own.command import open_file, teach
 from gestured.lab.train import TrainingPlan, calibration_set, learn, load_data, train
-from gestured.model.model import LADDER, open_model
+from gestured.model.opening import open_model
+from gestured.model.shipped import LADDER
 
 
 def _plan(args: argparse.Namespace) -> tuple[TrainingPlan, Path | None]:

@@ -21,7 +21,8 @@ from gestured.lab.fit import CLASSES, lengths_of, padded, targets
 from gestured.lab.nets import Perceptron, Recurrent
 from gestured.lab.train import REAL_SETS, Calibrated, Trained, TrainingData, TrainingPlan, folds, is_of, judged
 from gestured.lab.trajectory import trajectory_features
-from gestured.model.model import Model, open_model
+from gestured.model.model import Model
+from gestured.model.opening import open_model
 from gestured.simulator import GESTURES, NONE
 
 GROUPS = 3  # of kinds of non-gestures held out

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gestured.core.errors import GesturedError
 from gestured.lab.digest import file_digest
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 
 SHOWN = 12  # digits of a SHA-256 that are written: no two files of a project share them
 LINE = re.compile(r"<!-- made by `([^`]+)` of ((?:\S+ [0-9a-f]{12}(?:, )?)+) -->")

@@ -22,7 +22,8 @@ from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Decision, Judged, Opinion
 from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan, judged
 from gestured.model.file import inspect
-from gestured.model.model import Model, open_model
+from gestured.model.model import Model
+from gestured.model.opening import open_model
 from gestured.simulator import GESTURES
 
 SECOND = "trajectory"

@@ -16,7 +16,8 @@ from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
 from gestured.lab.made_of import made_of
 from gestured.lab.online import tallied
 from gestured.lab.progress import progress
-from gestured.model.model import open_model, shipped, shipped_name
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped, shipped_name
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 
 WAITS_S = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)

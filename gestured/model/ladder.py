@@ -13,9 +13,9 @@ from gestured.core.certainty import Certainty
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import ModelError, SettingsError
 from gestured.core.frames import Segment
-from gestured.model.model import LADDER, shipped, shipped_name
 from gestured.model.own import Own
 from gestured.model.rung import Rung
+from gestured.model.shipped import LADDER, shipped, shipped_name
 
 
 class Ladder:

@@ -1,16 +1,10 @@
-"""A model: an .onnx file, found, verified, self-tested and opened as a classifier.
+"""A model: the bytes of an .onnx file, verified, self-tested and opened as a classifier.
 
-A file is read once, checked against the manifest (where it is a shipped one) or opened in a process of its own
-first (where it is not: `process`), inspected without onnxruntime, opened from those bytes, held against its own
-metadata and made to reproduce its self-test. Whatever is wrong is one `ModelError`: the file, what is wrong, what was
-expected.
+They are inspected without onnxruntime, opened, held against their own metadata and made to reproduce their self-test.
 """
 
 import hashlib
-import json
-import os
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,12 +14,10 @@ from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Segment
-from gestured.model.file import inspect, read_bytes
+from gestured.model.file import inspect
 from gestured.model.metadata import Metadata
-from gestured.model.process import ModelProcess, try_out
 from gestured.model.session import Session
 
-LADDER = ("cnn_lstm", "lstm", "touch_pattern_rf")  # the shipped models, best first
 TOLERANCE = 1e-3  # of the self-test: other processors round differently, another model is further off
 ROUNDING = 1e-4  # by which a probability may lie outside of 0 to 1
 SUM_ROUNDING = 1e-3  # by which probabilities may miss 1 together
@@ -139,119 +131,3 @@ class Model:
         if not difference <= TOLERANCE:
             raise ValueError(f"self-test: {difference:.3g} from the stored outputs, expected {TOLERANCE} at most")
         return difference
-
-
-def shipped() -> dict[str, Path]:
-    """The models that come with the package, best first: name -> where its file belongs."""
-    return {name: _shipped_directory() / f"{name}.onnx" for name in LADDER}
-
-
-def _shipped_directory() -> Path:
-    """Beside the package, installed or in a checkout."""
-    return Path(__file__).resolve().parents[2] / "gestured_models"
-
-
-def shipped_name(source: str | Path) -> str | None:
-    """The shipped model's name where `source` is one, by path or by name."""
-    try:
-        return _locate(source)[1]
-    except ModelError:
-        return None  # opening it says why
-
-
-def _locate(source: str | Path) -> tuple[Path, str | None]:
-    """(path, the shipped model's name where it is one).
-
-    A text without a slash is a shipped model's name. With `.onnx` at its end it is a file, too, where there is one.
-    """
-    path = Path(source)
-    known = shipped()
-    if isinstance(source, str) and os.sep not in source and not (path.suffix == ".onnx" and os.path.lexists(source)):
-        name = source.removesuffix(".onnx")
-        if name not in known:
-            missing = "no such file, and " if path.suffix == ".onnx" else ""
-            raise ModelError(
-                f"{source}: {missing}no shipped model (these are {', '.join(known)}); "
-                f"a file of another name is given with its folder, as ./{source}"
-            )
-        return known[name], name
-    try:
-        if path.resolve() == known[path.stem].resolve():
-            return path, path.stem
-    except (KeyError, OSError, ValueError, RuntimeError):
-        pass  # not one of them, or no path at all: reading says it
-    return path, None
-
-
-def _read(source: str | Path) -> tuple[Path, str | None, bytes]:
-    """As `_locate`, and the file's bytes; a shipped file's are those that its manifest knows."""
-    path, name = _locate(source)
-    try:
-        data = read_bytes(path)
-        if name is not None:
-            expected = _manifest_sha256(path)
-            if hashlib.sha256(data).hexdigest() != expected:
-                raise ValueError(f"is not the shipped file: expected the sha256 {expected} of manifest.json")
-    except ValueError as error:
-        raise ModelError(f"{path}: {error}") from error
-    return path, name, data
-
-
-def _manifest_sha256(path: Path) -> str:
-    try:
-        manifest = json.loads((path.parent / "manifest.json").read_text())
-        return str(manifest["models"][path.name]["sha256"])
-    except (OSError, ValueError, KeyError, TypeError):
-        raise ValueError("is a shipped model, expected its sha256 in the manifest.json beside it") from None
-
-
-def open_model(source: str | Path, tried: str | None = None) -> Model:
-    """Open and verify a model: a path, or the bare name of a shipped one. Raises ModelError.
-
-    What does not ship is tried in a process of its own first, which takes about half a second, at most some seconds;
-    not where its sha256 is that of a file that was `tried` before.
-    """
-    path, name, data = _read(source)
-    try:
-        if name is None and tried is None:
-            try_out(data)
-        elif name is None and hashlib.sha256(data).hexdigest() != tried:
-            raise ValueError("is not the file that was tried any more; a reload takes the new one")
-        return Model(data, path.stem)
-    except ValueError as error:
-        raise ModelError(f"{path}: {error}") from error
-
-
-def look_at(source: str | Path) -> tuple[tuple[str, ...], str]:
-    """(gestures, sha256) of a model that `open_model` will open at once, because it ships or was tried here.
-
-    Raises ModelError.
-    """
-    path, name, data = _read(source)
-    try:
-        if name is None:
-            report = try_out(data)
-            return tuple(report["gestures"]), report["sha256"]
-        return Metadata.parse(inspect(data)).gestures, hashlib.sha256(data).hexdigest()
-    except ValueError as error:
-        raise ModelError(f"{path}: {error}") from error
-
-
-def open_apart(source: str | Path) -> ModelProcess:
-    """Open and verify a model in a process of its own, and leave it there. Raises ModelError."""
-    path, _, data = _read(source)
-    try:
-        return ModelProcess(data, path.stem)
-    except ValueError as error:
-        raise ModelError(f"{path}: {error}") from error
-
-
-def check(source: str | Path) -> dict[str, Any]:
-    """What `gesturectl check` reports of a good model, as JSON values; raises ModelError for any other."""
-    path, name, data = _read(source)
-    try:
-        report = try_out(data) if name is None else Model(data, path.stem).report()
-    except ValueError as error:
-        raise ModelError(f"{path}: {error}") from error
-    first = {key: report[key] for key in ("kind", "version")}
-    return {"file": str(path), "name": path.stem, **first, "shipped": name is not None} | report

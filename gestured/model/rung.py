@@ -5,7 +5,8 @@ from pathlib import Path
 
 from gestured.core.classifier import Classifier
 from gestured.core.errors import ModelError
-from gestured.model.model import look_at, open_model, shipped_name
+from gestured.model.opening import look_at, open_model
+from gestured.model.shipped import shipped_name
 
 
 class Rung:

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not a model", b"\x08\x08" * 1000])

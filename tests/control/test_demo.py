@@ -9,7 +9,7 @@ import pytest
 
 import gestured
 from gestured.client.engine import Engine
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 
 pytestmark = [
     pytest.mark.e2e,

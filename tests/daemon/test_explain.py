@@ -12,7 +12,7 @@ from gestured.core.timing import Timing
 from gestured.daemon.cli import parser
 from gestured.daemon.explain import explain
 from gestured.daemon.merge import load_settings
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 
 RATE_HZ = 15.0
 JITTER_S = 0.003

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from gestured.core import wire
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 from tests import encoding
 from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor, floats
 from tests.daemon.parts import SOURCE, Parts

@@ -26,7 +26,7 @@ from gestured.daemon.shadow import Comparison, Shadow
 from gestured.daemon.shift import LAST, LEAST_GESTURES, Shift, measured
 from gestured.daemon.watch import Watch
 from gestured.model.ladder import ladder_for
-from gestured.model.model import open_apart
+from gestured.model.opening import open_apart
 from tests.daemon.harness import Daemon, Hand, Sensor
 from tests.daemon.parts import SNAPSHOT, Parts
 

@@ -14,7 +14,7 @@ from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.messages import event_type
 from gestured.core.recognizer import Recognizer
-from gestured.model.model import open_model
+from gestured.model.opening import open_model
 from tests.daemon import harness
 from tests.daemon.harness import Daemon, Hand, Sensor
 

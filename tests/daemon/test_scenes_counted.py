@@ -11,7 +11,7 @@ from gestured.client.osc_out import dated
 from gestured.client.sensor import Form
 from gestured.core.frames import Frame
 from gestured.lab.stability.made import swipes
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 
 
 def test_every_packet_is_counted_and_a_scene_brings_its_packages() -> None:

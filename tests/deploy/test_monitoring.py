@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from gestured.daemon.metrics import Counter, Metrics
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 from tests.daemon.harness import Daemon, Sensor
 
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy"

@@ -16,7 +16,7 @@ import pytest
 from pythonosc.osc_message import OscMessage
 
 from gestured.client.control import Control
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 from tests.daemon.harness import RATE_HZ, Daemon, Hand, Sensor
 from tests.documents.blocks import ROOT, Block, blocks
 

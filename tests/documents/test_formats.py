@@ -13,7 +13,7 @@ import pytest
 from gestured.core import messages
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.subscription import parse_subscription
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 from tests.daemon.harness import Daemon, Sensor
 from tests.documents.blocks import ROOT, Block, blocks
 

@@ -7,7 +7,7 @@ import pytest
 
 from gestured.lab.made_of import LINE, OLDER, made_of, models_and_manifest, stale
 from gestured.lab.recordings.origin import said
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 from tests.documents.blocks import ROOT, documents
 
 # The tables that speak of the shipped models, and the beginning of the command that makes them.

@@ -27,7 +27,7 @@ from gestured.core.recognizer import Recognizer
 from gestured.lab.ahead import Ahead, heard, table
 from gestured.lab.dataset import Truth
 from gestured.lab.made_of import made_of
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 from tests.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
 
 SEEN = 4.0  # times the noise
@@ -144,7 +144,7 @@ def judge(recording: Take, seed: int, level: str, classifier: Any | None) -> Out
 def _open(source: str | None) -> Any | None:
     if source is None:
         return None
-    from gestured.model.model import open_model
+    from gestured.model.opening import open_model
 
     return open_model(source)
 

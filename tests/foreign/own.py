@@ -17,7 +17,8 @@ from gestured.core.found import Cut
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.prototypes import EXAMPLES, NEAR, Array, Prototype, Space, nearest
-from gestured.model.model import Model, open_model
+from gestured.model.model import Model
+from gestured.model.opening import open_model
 from gestured.model.own import place, taken_for
 from tests.foreign import GESTURES, LEVELS, NON_GESTURES
 from tests.foreign.hands import Performance, draw_person, perform

@@ -16,7 +16,8 @@ import pytest
 
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.frames import Segment
-from gestured.model.model import open_model, shipped
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
 from tests.foreign import GESTURES, NON_GESTURES, take
 from tests.foreign.judge import Outcome, Take, judge, summary, visible
 

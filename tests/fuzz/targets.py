@@ -19,7 +19,7 @@ from gestured.core.stamping import Stamper
 from gestured.core.subscription import parse_subscription
 from gestured.core.wire import Addresses, Arrival, Decoder
 from gestured.daemon.client import Client, Server
-from gestured.model import model as models
+from gestured.model.model import Model
 from tests.bounds import little_memory
 
 CORPUS = Path(__file__).with_name("corpus")
@@ -164,7 +164,7 @@ def model(data: bytes) -> None:
     """A file opens, and then gives probabilities, or is refused with a reason."""
     try:
         with little_memory():
-            opened = models.Model(data, "fuzzed")
+            opened = Model(data, "fuzzed")
     except ValueError as error:
         assert str(error)
         return

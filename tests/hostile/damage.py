@@ -34,7 +34,7 @@ from gestured.daemon.merge import load_settings
 from gestured.daemon.scene import scene_of
 from gestured.lab.made_of import made_of
 from gestured.model.ladder import ladder_for
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 from tests.hostile.faults import FAULTS, Fault, Stall
 from tests.hostile.grammar import violations

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 from gestured.simulator import Take
 from tests.hostile import damage
 from tests.hostile.faults import FAULTS, Fault

@@ -11,7 +11,7 @@ import pytest
 from gestured.client.control import Control
 from gestured.client.lines import Refused
 from gestured.core.errors import ModelError
-from gestured.model.model import open_model
+from gestured.model.opening import open_model
 from tests.daemon.harness import Daemon, Sensor, counted, lines_of
 from tests.hostile import bad_models
 from tests.hostile.grammar import TYPES, violations

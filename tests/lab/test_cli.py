@@ -14,7 +14,8 @@ import pytest
 
 from gestured.lab import cli, progress
 from gestured.lab.cli import main, parser
-from gestured.model.model import LADDER, open_model
+from gestured.model.opening import open_model
+from gestured.model.shipped import LADDER
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = next(action.choices for action in parser()._actions if isinstance(action, argparse._SubParsersAction))

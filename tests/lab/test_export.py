@@ -29,7 +29,7 @@ from gestured.lab.export import Facts, export_forest, export_net, write_manifest
 from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.recordings.origin import Origin, said
 from gestured.model.file import inspect
-from gestured.model.model import open_model
+from gestured.model.opening import open_model
 
 GESTURES = ("one_tap", "swipe_up", "swipe_left")
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=0.1, tail_s=0.1, floor=4.0)
@@ -317,7 +317,7 @@ def test_manifest_refuses_a_file_that_says_nothing_of_itself(net: Any, tmp_path:
 def test_exported_file_opens_without_the_lab(net: tuple[Net, Path, dict[str, float]]) -> None:
     script = (
         "import sys\nfor name in ('torch', 'onnx', 'sklearn'): sys.modules[name] = None\n"
-        "from gestured.model.model import open_model\nprint(open_model(sys.argv[1]).gestures[0])"
+        "from gestured.model.opening import open_model\nprint(open_model(sys.argv[1]).gestures[0])"
     )
     done = subprocess.run(
         [sys.executable, "-c", script, net[1]],

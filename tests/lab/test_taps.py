@@ -6,7 +6,7 @@ import pytest
 
 from gestured.lab import taps
 from gestured.lab.cli import main
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 
 
 @pytest.mark.skipif(not shipped()["cnn_lstm"].exists(), reason=f"{shipped()['cnn_lstm']} is not there")

@@ -25,7 +25,7 @@ from gestured.lab.fit import CLASSES
 from gestured.lab.own.command import PEOPLE, teach
 from gestured.lab.recordings.origin import KEY, origins
 from gestured.lab.train import answer_figures, quantiles
-from gestured.model.model import shipped_name
+from gestured.model.shipped import shipped_name
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES, NONE
 

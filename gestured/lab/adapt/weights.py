@@ -23,7 +23,9 @@ from gestured.lab.export import PARITY
 from gestured.lab.fit import CLASSES, build
 from gestured.lab.nets import Decision, Judged, Opinion
 from gestured.model.file import inspect, read_bytes
-from gestured.model.model import Model, open_model, shipped
+from gestured.model.model import Model
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
 from gestured.simulator import GESTURES
 
 ADAPTABLE = ("cnn_lstm", "lstm")

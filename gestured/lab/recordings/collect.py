@@ -11,7 +11,7 @@ from gestured.lab.recordings.live import LiveSensor
 from gestured.lab.recordings.protocol import order
 from gestured.lab.recordings.session import Session
 from gestured.lab.recordings.terminal import Terminal
-from gestured.model.model import open_model
+from gestured.model.opening import open_model
 from gestured.record.arrays import read
 from gestured.record.recordings import Recordings
 

@@ -26,7 +26,8 @@ from gestured.lab.stability.seeds import seeds_table
 from gestured.lab.stability.table import Table
 from gestured.lab.stability.textbook import RANGES, points, textbook_table
 from gestured.lab.stability.wavelet_features import wavelets_table
-from gestured.model.model import LADDER, open_model, shipped
+from gestured.model.opening import open_model
+from gestured.model.shipped import LADDER, shipped
 
 
 def all_tables(quick: bool, out: Path | None) -> Iterator[Table]:

@@ -17,7 +17,7 @@ from gestured.lab.stability.made import IDLE_LEVEL, NOISE
 from gestured.lab.stability.path import Array
 from gestured.lab.stability.table import Table, Value
 from gestured.lab.stability.ways import NET_CLASSES, WindowList, by_onnxruntime, difference
-from gestured.model.model import LADDER, shipped
+from gestured.model.shipped import LADDER, shipped
 
 DENORMAL = 1e-41  # of the peak; float32's least normal number is 1.2e-38
 COUNTS = {"float32": 1e-42, "float64": 1e-312}  # a gain that leaves every count denormal

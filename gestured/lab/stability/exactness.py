@@ -8,7 +8,7 @@ from gestured.lab.dataset import WINDOW
 from gestured.lab.stability.segments import segment_cases
 from gestured.lab.stability.table import Table, Value
 from gestured.lab.stability.ways import NET_CLASSES, WindowList, by_onnxruntime, by_reference, difference
-from gestured.model.model import LADDER, shipped
+from gestured.model.shipped import LADDER, shipped
 
 LONGEST = 80  # frames; float64, operator by operator, takes minutes for more, and no front end gives more at 15 Hz
 

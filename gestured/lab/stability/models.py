@@ -19,7 +19,8 @@ from gestured.lab.stability.ways import (
     difference,
     loaded,
 )
-from gestured.model.model import LADDER, Model, shipped
+from gestured.model.model import Model
+from gestured.model.shipped import LADDER, shipped
 
 LONG = (80, 10_000)  # frames; no segment at 15 Hz is longer than the first
 

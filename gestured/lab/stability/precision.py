@@ -19,7 +19,7 @@ from gestured.lab.stability.ways import (
     loaded,
 )
 from gestured.lab.study.onnx_form import Graph, quantised
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 
 STEPS = (2, 3, 4, 6, 10)  # between nothing and the peak
 STATE_FRAMES = (100, 1_000, 10_000)

@@ -18,7 +18,8 @@ from gestured.lab.study.protocols import FOREIGN, REAL
 from gestured.lab.study.run_time import SHIPPED, told
 from gestured.lab.study.tables import TUNED, Cell
 from gestured.lab.train import REAL_SETS
-from gestured.model.model import open_model, shipped
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
 from gestured.simulator import GESTURES
 
 SEEN = {"foreign": (FOREIGN, SHIFT), "real": (REAL, UNCHANGED)}  # protocol and augmentation of the study's own cells

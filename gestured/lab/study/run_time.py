@@ -41,7 +41,9 @@ from gestured.lab.study.tables import TUNED, task
 from gestured.lab.study.training import Net
 from gestured.lab.study.trajectory_boosting import trajectory_row
 from gestured.lab.study.views import Values
-from gestured.model.model import Model, open_model, shipped
+from gestured.model.model import Model
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
 from gestured.simulator import GESTURES
 
 WARM = 20  # gestures that are answered before anything is timed

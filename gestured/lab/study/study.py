@@ -35,7 +35,8 @@ from gestured.lab.study.said import said
 from gestured.lab.study.sessions import online
 from gestured.lab.study.tuning import TUNING, tune
 from gestured.lab.study.views import Values
-from gestured.model.model import open_model, shipped
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES, NONE
 

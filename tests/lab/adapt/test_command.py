@@ -17,7 +17,8 @@ from gestured.lab.own import command as own
 from gestured.lab.own.learn import Seen
 from gestured.lab.recordings.origin import said
 from gestured.model.file import inspect
-from gestured.model.model import open_model, shipped
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
 from gestured.record.arrays import write
 from gestured.simulator import GESTURES
 from tests.lab.adapt.recorded import CONSENT, cut_gestures, whole_session

@@ -13,7 +13,8 @@ from gestured.lab.adapt import command
 from gestured.lab.cli import main as lab
 from gestured.lab.own import command as own
 from gestured.model.file import inspect
-from gestured.model.model import open_model, shipped
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
 from gestured.record.arrays import write
 from gestured.simulator import GESTURES
 from tests.documents.blocks import blocks

@@ -24,7 +24,7 @@ from gestured.core.frames import Frame
 from gestured.lab.own.play import repeated
 from gestured.lab.own.signs import sign
 from gestured.lab.recordings.protocol import order
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 from gestured.record.arrays import read
 from gestured.simulator import GESTURES, Participant, Performance, generator, perform
 from tests.daemon.harness import Daemon

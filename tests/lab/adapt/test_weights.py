@@ -14,7 +14,7 @@ from onnx import numpy_helper
 from gestured.core.errors import ModelError
 from gestured.lab.adapt.weights import base_of
 from gestured.model.file import inspect
-from gestured.model.model import shipped
+from gestured.model.shipped import shipped
 from tests.small_model import build
 
 

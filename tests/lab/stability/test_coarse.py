@@ -9,7 +9,7 @@ pytest.importorskip("torch", reason="needs the extra [lab]")
 
 from gestured.lab.stability import coarse
 from gestured.lab.stability.path import simulated_series
-from gestured.model.model import open_model
+from gestured.model.opening import open_model
 
 
 @pytest.mark.parametrize("counts", [2, 5, 100])

@@ -10,7 +10,7 @@ pytest.importorskip("onnx", reason="needs the extra [lab]")
 
 from gestured.lab.stability import denormals, exactness
 from gestured.lab.stability.ways import by_reference
-from gestured.model.model import LADDER, shipped
+from gestured.model.shipped import LADDER, shipped
 from tests.lab.made import gestures
 
 

@@ -12,7 +12,9 @@ from gestured.lab.stability.extremes import month_table, parts_table, swipes_fou
 from gestured.lab.stability.made import swipes
 from gestured.lab.stability.path import Series, fault
 from gestured.lab.stability.streams import Case, streams
-from gestured.model.model import LADDER, Model, open_model, shipped
+from gestured.model.model import Model
+from gestured.model.opening import open_model
+from gestured.model.shipped import LADDER, shipped
 
 
 @pytest.fixture(scope="module")

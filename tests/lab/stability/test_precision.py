@@ -13,7 +13,8 @@ pytest.importorskip("sklearn")
 from gestured.lab.nets import CnnLstm
 from gestured.lab.stability import precision
 from gestured.lab.study.onnx_form import Graph, quantised
-from gestured.model.model import Model, shipped
+from gestured.model.model import Model
+from gestured.model.shipped import shipped
 from tests.lab.made import gestures
 
 WINDOWS = [gestures()["swipe_up"], gestures()["circle_clockwise"]]

@@ -21,7 +21,8 @@ from gestured.lab.stability.ways import (
     loaded,
     widened,
 )
-from gestured.model.model import LADDER, open_model, shipped
+from gestured.model.opening import open_model
+from gestured.model.shipped import LADDER, shipped
 
 TOLERANCE = 2e-6
 

@@ -5,7 +5,8 @@ import pytest
 pytest.importorskip("torch")
 
 from gestured.lab.study.said import said
-from gestured.model.model import open_model, shipped
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
 
 
 def test_what_is_said_before_the_end_is_there_beside_the_answers() -> None:

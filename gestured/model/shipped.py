@@ -1,0 +1,78 @@
+"""Where a model's file is: at a path, or beside the package under a shipped model's name; and its bytes.
+
+Whatever is wrong is one `ModelError`: the file, what is wrong, what was expected.
+"""
+
+import hashlib
+import json
+import os
+from pathlib import Path
+
+from gestured.core.errors import ModelError
+from gestured.model.file import read_bytes
+
+LADDER = ("cnn_lstm", "lstm", "touch_pattern_rf")  # the shipped models, best first
+
+
+def shipped() -> dict[str, Path]:
+    """The models that come with the package, best first: name -> where its file belongs."""
+    return {name: _shipped_directory() / f"{name}.onnx" for name in LADDER}
+
+
+def _shipped_directory() -> Path:
+    """Beside the package, installed or in a checkout."""
+    return Path(__file__).resolve().parents[2] / "gestured_models"
+
+
+def shipped_name(source: str | Path) -> str | None:
+    """The shipped model's name where `source` is one, by path or by name."""
+    try:
+        return _locate(source)[1]
+    except ModelError:
+        return None  # opening it says why
+
+
+def _locate(source: str | Path) -> tuple[Path, str | None]:
+    """(path, the shipped model's name where it is one).
+
+    A text without a slash is a shipped model's name. With `.onnx` at its end it is a file, too, where there is one.
+    """
+    path = Path(source)
+    known = shipped()
+    if isinstance(source, str) and os.sep not in source and not (path.suffix == ".onnx" and os.path.lexists(source)):
+        name = source.removesuffix(".onnx")
+        if name not in known:
+            missing = "no such file, and " if path.suffix == ".onnx" else ""
+            raise ModelError(
+                f"{source}: {missing}no shipped model (these are {', '.join(known)}); "
+                f"a file of another name is given with its folder, as ./{source}"
+            )
+        return known[name], name
+    try:
+        if path.resolve() == known[path.stem].resolve():
+            return path, path.stem
+    except (KeyError, OSError, ValueError, RuntimeError):
+        pass  # not one of them, or no path at all: reading says it
+    return path, None
+
+
+def read(source: str | Path) -> tuple[Path, str | None, bytes]:
+    """(path, the shipped model's name where it is one, its bytes). A shipped file is held against its manifest."""
+    path, name = _locate(source)
+    try:
+        data = read_bytes(path)
+        if name is not None:
+            expected = _manifest_sha256(path)
+            if hashlib.sha256(data).hexdigest() != expected:
+                raise ValueError(f"is not the shipped file: expected the sha256 {expected} of manifest.json")
+    except ValueError as error:
+        raise ModelError(f"{path}: {error}") from error
+    return path, name, data
+
+
+def _manifest_sha256(path: Path) -> str:
+    try:
+        manifest = json.loads((path.parent / "manifest.json").read_text())
+        return str(manifest["models"][path.name]["sha256"])
+    except (OSError, ValueError, KeyError, TypeError):
+        raise ValueError("is a shipped model, expected its sha256 in the manifest.json beside it") from None
