@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.errors import ProtocolError
-from gestured.core.osc import Message, decode
+from gestured.core.osc import decode
+from gestured.core.osc_message import Message
 
 MOST_TAXELS = 64 * 64  # of the largest grid
 LINE_BYTES = 32 * MOST_TAXELS  # of the longest packet or line; numbers in text have up to some 25 characters

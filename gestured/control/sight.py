@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gestured.core import osc
 from gestured.core.errors import ProtocolError
+from gestured.core.osc_message import Message
 
 MOST_ADDRESSES = 256  # addresses; what comes after that is counted together
 LEAST_TAXELS = 4  # 2 x 2
@@ -115,7 +116,7 @@ class Sight:
             seen.frames.append((t, what))
 
 
-def short_types(message: osc.Message) -> str:
+def short_types(message: Message) -> str:
     """Type tags with runs written as a number, such as `i f*81`; a blob with its size, as `b[162]`."""
     words = []
     sizes = iter([len(a) for a in message.args if isinstance(a, bytes)])

@@ -9,14 +9,13 @@ known, a string that is not UTF-8), `truncated` (fewer bytes than the type tags 
 `bundle` (sizes that do not fit, nested too deep), `oversized` (packet, type tags or number of messages).
 """
 
-from collections.abc import Callable
 from struct import Struct
-from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gestured.core.errors import ProtocolError
+from gestured.core.layouts import Layouts, Place
+from gestured.core.osc_message import Argument, Message, timetag
 
 MAX_PACKET = 65_536  # bytes; no UDP datagram is longer
 MAX_ADDRESS = 255  # bytes
@@ -25,52 +24,12 @@ MAX_MESSAGES = 2_048  # in one packet
 MAX_DEPTH = 8  # bundles within bundles
 RUN = 4  # so many `i` or `f` in a row come as one array
 
-Argument = int | float | str | bytes | NDArray[np.generic]
-
 _BUNDLE = b"#bundle\0"
-_TIMETAG = Struct(">II").unpack_from  # seconds and their fraction
-_NTP_EPOCH = 2_208_988_800  # s, 1970 counted from 1900; the count begins anew in 2036, so we tell 1970 to 2106
 _SCALARS = {"i": "i", "f": "f", "d": "d", "h": "q", "t": "Q"}
 _ARRAYS = {"i": np.dtype(">i4"), "f": np.dtype(">f4")}
 _RUNS = tuple(tag * RUN for tag in _ARRAYS)
 _PLACED = ("", "s", "r", "sr", "b", "sb")  # what has a place in a layout: scalars, a run, a blob that is not empty
-_LAYOUTS_BYTES = 8 << 20  # for the layouts that are remembered: 8,000 sensors of 9 x 9 floats
-_PLACE_BYTES = 600  # that Python takes for a place, its head, address, type tags and scalars not counted
-_SCALAR_BYTES = 48  # that Python takes for a scalar in a place
-
-
-class Message(NamedTuple):
-    """One OSC message.
-
-    `args` holds int, float, str and bytes; but four or more `i` or `f` in a row are ONE big-endian, read-only
-    array, so `,iffff` has two arguments. `timetag` is that of the innermost bundle in seconds since the Unix
-    epoch, None without one or for "immediately". Messages with the same `bundle` stand in the same bundle.
-    """
-
-    address: str
-    types: str  # without the comma
-    args: tuple[Argument, ...]
-    timetag: float | None = None
-    bundle: int = -1  # the bundle's number in the packet; -1 is none
-
-
-# Where a packet of a known layout has one message: scalars, then a run or a blob; all may be missing.
-_Place = tuple[
-    int,  # where it starts
-    bytes,  # its head there: address and type tags, padded; in a bundle the size before them
-    str,  # address
-    str,  # types
-    Callable[[bytes, int], tuple[Any, ...]] | None,  # unpacks the scalars
-    int,  # where the scalars are
-    Any,  # the run's dtype; None for a blob
-    int,  # its length (a blob's in bytes), 0 for none
-    int,  # where it is
-]
-_new = tuple.__new__  # Message(...) takes twice the time
-_frombuffer = np.frombuffer
-# By bytes of the first head: a packet's length, and its messages. Bounded: hostile senders invent layouts.
-_layouts: dict[bytes, tuple[int, list[_Place]]] = {}
-_room = _LAYOUTS_BYTES  # that is left
+_layouts = Layouts()
 
 
 def decode(data: bytes, errors: list[ProtocolError] | None = None) -> list[Message]:
@@ -82,14 +41,11 @@ def decode(data: bytes, errors: list[ProtocolError] | None = None) -> list[Messa
     if type(data) is not bytes:
         data = bytes(data)  # arrays are views of it: it must not change under their reader
     bundled = data[:8] == _BUNDLE
-    key = data[16:48] if bundled else data[:32]
-    layout = _layouts.get(key)
-    if layout is not None and layout[0] == len(data):
-        messages = _read_places(data, layout[1], bundled)
-        if messages is not None:
-            return messages
-    messages = []
-    places: list[_Place] = []
+    known = _layouts.read(data, bundled)
+    if known is not None:
+        return known
+    messages: list[Message] = []
+    places: list[Place] = []
     try:
         if len(data) > MAX_PACKET:
             raise ProtocolError("oversized", f"{len(data)} bytes, at most {MAX_PACKET}")
@@ -102,43 +58,13 @@ def decode(data: bytes, errors: list[ProtocolError] | None = None) -> list[Messa
             raise
         errors.append(error)
     if 0 < len(places) == len(messages) and not errors:  # nothing else is in it: no string, no inner bundle
-        _remember(key, len(data), places)
+        _layouts.remember(data, places, bundled)
     return messages
 
 
-def _remember(key: bytes, size: int, places: list[_Place]) -> None:
-    global _room
-    cost = 0
-    for _, head, _, types, _, _, dtype, count, _ in places:
-        scalars = len(types) - (count if dtype is not None else count > 0)  # all but the run, or the blob
-        cost += _PLACE_BYTES + 3 * len(head) + _SCALAR_BYTES * scalars
-    if cost > _room:
-        _layouts.clear()
-        _room = _LAYOUTS_BYTES
-    _room -= cost
-    _layouts[key] = (size, places)
-
-
-def _read_places(data: bytes, places: list[_Place], bundled: bool) -> list[Message] | None:
-    timetag, bundle = (_timetag(data, 8, len(data)), 0) if bundled else (None, -1)
-    messages: list[Message] = []
-    for start, head, address, types, unpack, scalars, dtype, count, run in places:
-        if not data.startswith(head, start):
-            return None
-        args: tuple[Argument, ...] = () if unpack is None else unpack(data, scalars)
-        if dtype is not None:
-            args += (_frombuffer(data, dtype, count, run),)
-        elif count:
-            if int.from_bytes(data[run - 4 : run], "big") != count:
-                return None
-            args += (data[run : run + count],)
-        messages.append(_new(Message, (address, types, args, timetag, bundle)))
-    return messages
-
-
-def _bundle(data: bytes, messages: list[Message], places: list[_Place], errors: list[ProtocolError] | None) -> None:
+def _bundle(data: bytes, messages: list[Message], places: list[Place], errors: list[ProtocolError] | None) -> None:
     end = len(data)
-    timetag = _timetag(data, 8, end)
+    time = timetag(data, 8, end)
     number = bundles = seen = 0
     outer: list[tuple[int, float | None, int]] = []  # end, time tag and number of the bundles around this one
     at = 16
@@ -146,7 +72,7 @@ def _bundle(data: bytes, messages: list[Message], places: list[_Place], errors: 
         if at == end:  # an inner bundle ends where its sibling begins
             if not outer:
                 return
-            end, timetag, number = outer.pop()
+            end, time, number = outer.pop()
             continue
         size = int.from_bytes(data[at : at + 4], "big", signed=True)
         at += 4
@@ -155,9 +81,9 @@ def _bundle(data: bytes, messages: list[Message], places: list[_Place], errors: 
         if data.startswith(_BUNDLE, at):
             if len(outer) == MAX_DEPTH - 1:
                 raise ProtocolError("bundle", f"nested deeper than {MAX_DEPTH}")
-            outer.append((end, timetag, number))
+            outer.append((end, time, number))
             bundles += 1
-            end, timetag, number = at + size, _timetag(data, at + 8, at + size), bundles
+            end, time, number = at + size, timetag(data, at + 8, at + size), bundles
             places.clear()
             places = []  # such a packet is read anew each time
             at += 16
@@ -166,7 +92,7 @@ def _bundle(data: bytes, messages: list[Message], places: list[_Place], errors: 
         if seen > MAX_MESSAGES:
             raise ProtocolError("oversized", f"more than {MAX_MESSAGES} messages")
         try:
-            messages.append(_message(data, at - 4, at, at + size, timetag, number, places))
+            messages.append(_message(data, at - 4, at, at + size, time, number, places))
         except ProtocolError as error:
             if errors is None:
                 raise
@@ -174,17 +100,8 @@ def _bundle(data: bytes, messages: list[Message], places: list[_Place], errors: 
         at += size
 
 
-def _timetag(data: bytes, at: int, end: int) -> float | None:
-    if end - at < 8:
-        raise ProtocolError("bundle", "a bundle without its time tag")
-    seconds, fraction = _TIMETAG(data, at)
-    if seconds == 0 and fraction == 1:  # "immediately"
-        return None
-    return float((seconds - _NTP_EPOCH) % 2**32 + fraction * 2**-32)
-
-
 def _message(
-    data: bytes, begin: int, start: int, end: int, timetag: float | None, bundle: int, places: list[_Place]
+    data: bytes, begin: int, start: int, end: int, time: float | None, bundle: int, places: list[Place]
 ) -> Message:
     """The message at `start`; its size, where it has one, is at `begin`. Raises ProtocolError.
 
@@ -206,7 +123,7 @@ def _message(
             kinds += "r"
             dtype, count, run = _ARRAYS[tag], stop - i, at
             at = _after(at, 4 * count, end)
-            args += (_frombuffer(data, dtype, count, run),)
+            args += (np.frombuffer(data, dtype, count, run),)
         elif tag in _SCALARS:
             while stop < len(types) and types[stop] in _SCALARS and types[stop : stop + RUN] not in _RUNS:
                 stop += 1
@@ -226,7 +143,7 @@ def _message(
     if kinds in _PLACED:
         unpack = layout.unpack_from if "s" in kinds else None
         places.append((begin, head, address, types, unpack, scalars, dtype, count, run))
-    return Message(address, types, args, timetag, bundle)
+    return Message(address, types, args, time, bundle)
 
 
 def _head(data: bytes, start: int, end: int) -> tuple[str, str, int]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gestured.core import osc
 from gestured.core.errors import ProtocolError
 from gestured.core.frames import Touch
+from gestured.core.osc_message import Argument, Message
 
 MAX_TOUCHES = 3
 MAX_NAME = 64
@@ -193,7 +194,7 @@ class Decoder:
         return list(arrivals.values())
 
 
-def _frame(message: osc.Message, route: _Route) -> Arrival:
+def _frame(message: Message, route: _Route) -> Arrival:
     """Raises ProtocolError."""
     assert route.grid is not None
     rows, columns = route.grid
@@ -220,7 +221,7 @@ def _frame(message: osc.Message, route: _Route) -> Arrival:
     return Arrival(route.sensor, values.reshape(rows, columns), counter, message.timetag, ())
 
 
-def _touches(args: tuple[osc.Argument, ...]) -> tuple[Touch, ...]:
+def _touches(args: tuple[Argument, ...]) -> tuple[Touch, ...]:
     """Raises ProtocolError."""
     numbers: tuple[Any, ...] = args
     if not all(map(math.isfinite, numbers)):

@@ -16,6 +16,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 from gestured.core import osc
 from gestured.core.errors import ProtocolError
+from gestured.core.layouts import Layouts
 from tests import encoding
 
 REASONS = {"not_osc", "address", "types", "truncated", "trailing", "bundle", "oversized"}
@@ -198,9 +199,7 @@ def test_invented_layouts_take_no_more_memory_than_was_given_to_them(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given = 1 << 20
-    monkeypatch.setattr(osc, "_LAYOUTS_BYTES", given)
-    monkeypatch.setattr(osc, "_room", given)
-    osc._layouts.clear()
+    monkeypatch.setattr(osc, "_layouts", Layouts(given))
     held = 0
     tracemalloc.start()
     try:
@@ -214,7 +213,6 @@ def test_invented_layouts_take_no_more_memory_than_was_given_to_them(
             pytest.fail("not enough of them")
     finally:
         tracemalloc.stop()
-        osc._layouts.clear()
     assert held <= given
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from gestured.core import osc
 from gestured.core.errors import ModelError, ProtocolError
 from gestured.core.frames import Segment
+from gestured.core.layouts import Layouts
 from gestured.core.stamping import Stamper
 from gestured.core.subscription import parse_subscription
 from gestured.core.wire import Addresses, Arrival, Decoder
@@ -40,7 +41,7 @@ def decoder(data: bytes) -> None:
     global _now
     # The cache as other packets left it, against an empty one, against one that knows this packet alone.
     found = [_read(_one, data)]
-    osc._layouts, kept = {}, osc._layouts
+    osc._layouts, kept = Layouts(), osc._layouts
     try:
         found += [_read(_decoder(), data), _read(_decoder(), data)]
     finally:

@@ -1,0 +1,73 @@
+"""How packets were laid out that came before: one that is laid out the same is read without parsing it again."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gestured.core.osc_message import Argument, Message, timetag
+
+LAYOUTS_BYTES = 8 << 20  # for the layouts that are remembered: 8,000 sensors of 9 x 9 floats
+PLACE_BYTES = 600  # that Python takes for a place, its head, address, type tags and scalars not counted
+SCALAR_BYTES = 48  # that Python takes for a scalar in a place
+# The bytes of a packet by which its layout is found: those of its first address, in a bundle with the size before it.
+ALONE, BUNDLED = slice(32), slice(16, 48)
+
+# Where a packet of a known layout has one message: scalars, then a run or a blob; all may be missing.
+Place = tuple[
+    int,  # where it starts
+    bytes,  # its head there: address and type tags, padded; in a bundle the size before them
+    str,  # address
+    str,  # types
+    Callable[[bytes, int], tuple[Any, ...]] | None,  # unpacks the scalars
+    int,  # where the scalars are
+    Any,  # the run's dtype; None for a blob
+    int,  # its length (a blob's in bytes), 0 for none
+    int,  # where it is
+]
+_new = tuple.__new__  # Message(...) takes twice the time
+_frombuffer = np.frombuffer
+
+
+class Layouts:
+    """The layouts that are known. They are bounded, because hostile senders invent new ones: when full, all go."""
+
+    def __init__(self, most_bytes: int = LAYOUTS_BYTES) -> None:
+        self._most_bytes = self._room = most_bytes
+        self._known: dict[bytes, tuple[int, list[Place]]] = {}  # a packet's length in bytes, and its messages
+
+    def __len__(self) -> int:
+        """How many are known."""
+        return len(self._known)
+
+    def read(self, data: bytes, bundled: bool) -> list[Message] | None:
+        """The messages of a packet, None where its layout is not known."""
+        layout = self._known.get(data[BUNDLED if bundled else ALONE])
+        if layout is None or layout[0] != len(data):
+            return None
+        time, bundle = (timetag(data, 8, len(data)), 0) if bundled else (None, -1)
+        messages: list[Message] = []
+        for start, head, address, types, unpack, scalars, dtype, count, run in layout[1]:
+            if not data.startswith(head, start):
+                return None
+            args: tuple[Argument, ...] = () if unpack is None else unpack(data, scalars)
+            if dtype is not None:
+                args += (_frombuffer(data, dtype, count, run),)
+            elif count:
+                if int.from_bytes(data[run - 4 : run], "big") != count:
+                    return None
+                args += (data[run : run + count],)
+            messages.append(_new(Message, (address, types, args, time, bundle)))
+        return messages
+
+    def remember(self, data: bytes, places: list[Place], bundled: bool) -> None:
+        """A packet has just these messages, in these places, and nothing else is in it."""
+        cost = 0
+        for _, head, _, types, _, _, dtype, count, _ in places:
+            scalars = len(types) - (count if dtype is not None else count > 0)  # all but the run, or the blob
+            cost += PLACE_BYTES + 3 * len(head) + SCALAR_BYTES * scalars
+        if cost > self._room:
+            self._known.clear()
+            self._room = self._most_bytes
+        self._room -= cost
+        self._known[data[BUNDLED if bundled else ALONE]] = (len(data), places)
