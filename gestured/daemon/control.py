@@ -8,16 +8,14 @@ The event socket knows none of this: it stays read-only.
 
 import asyncio
 import json
-import os
 import socket
-import struct
 import time
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
 from typing import Any
 
 from gestured.core.errors import GesturedError
+from gestured.daemon.caller import Connection, Peer, peer_of
 from gestured.daemon.log import Throttle
 from gestured.daemon.request import MAX_REQUEST_BYTES, Refusal, Reply, ReplyStream, Verb, parse_request
 
@@ -28,42 +26,6 @@ UNREAD_S = 10.0  # the same for who does not read an answer
 LOGGED = 8  # lines of one verb and user in a log.PERIOD_S; what is more is counted
 TURN_BYTES = 16 << 10  # of a stream that are made in one turn: less than a millisecond's work
 TURN_PAUSE_S = 0.1  # the longest pause after a turn
-TAP_BACKLOG_BYTES = 8 << 20  # of a connection that packets are streamed to; what is above is lost, and counted
-SO_PEERGROUPS = 59  # Linux 4.13; not in Python's socket module
-
-
-class Connection:
-    """One operator's connection."""
-
-    def __init__(self, writer: asyncio.StreamWriter) -> None:
-        self._writer = writer
-        self.lost = 0  # lines that found no room
-        self.streams = False  # it is sent lines as they come, and need not ask for anything
-        self._over = False
-
-    def send(self, text: bytes, *, lines: int = 1) -> bool:
-        """Send a line, or several, or count them as lost where too much waits already; never blocks."""
-        if self.closed:
-            return False
-        if self.unread > TAP_BACKLOG_BYTES:
-            self.lost += lines
-            return False
-        self._writer.write(text)
-        return True
-
-    @property
-    def unread(self) -> int:
-        """Bytes that wait to be read, but for what the kernel keeps."""
-        return 0 if self.closed else self._writer.transport.get_write_buffer_size()
-
-    @property
-    def closed(self) -> bool:
-        """Whether the operator has gone, or wants no more."""
-        return self._over or self._writer.is_closing()
-
-    def end(self) -> None:
-        """Send nothing more; what is on its way still goes."""
-        self._over = True
 
 
 class ControlServer:
@@ -92,7 +54,7 @@ class ControlServer:
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._open.add(writer)
         try:
-            who = _peer(writer.get_extra_info("socket"))
+            who = peer_of(writer.get_extra_info("socket"))
             places = OPERATORS + (OPERATORS_KEPT if who.ours else 0)
             if not who.may:
                 self._throttle.warn("control refused", "peer", uid=who.uid, pid=who.pid)
@@ -115,7 +77,7 @@ class ControlServer:
             self._open.discard(writer)
             writer.close()
 
-    async def _answer_all(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, who: "Peer") -> None:
+    async def _answer_all(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, who: Peer) -> None:
         connection = Connection(writer)
         while True:
             try:
@@ -134,7 +96,7 @@ class ControlServer:
                 await self._answer(connection, writer, line, who)
                 await _drain(writer)
 
-    async def _answer(self, connection: Connection, writer: asyncio.StreamWriter, line: bytes, who: "Peer") -> None:
+    async def _answer(self, connection: Connection, writer: asyncio.StreamWriter, line: bytes, who: Peer) -> None:
         async with self._turn(self._quick):
             try:
                 name, parameters = parse_request(line, self._verbs)
@@ -210,26 +172,3 @@ def _line(answer: Mapping[str, Any]) -> bytes:
 
 def _refusal(reason: str) -> bytes:
     return _line({"ok": False, "reason": reason})
-
-
-@dataclass(frozen=True, slots=True)
-class Peer:
-    """Who is at the other end."""
-
-    pid: int
-    uid: int
-    ours: bool  # root, or the daemon's own user
-    may: bool
-
-
-def _peer(sock: Any) -> Peer:
-    """Root, our own user, or a member of our group; the kernel says who it is, whatever the peer claims."""
-    pid, uid, gid = struct.unpack("iII", sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))
-    groups = {gid}
-    try:
-        raw = sock.getsockopt(socket.SOL_SOCKET, SO_PEERGROUPS, 1024)
-        groups |= set(struct.unpack(f"{len(raw) // 4}I", raw))
-    except OSError:
-        pass  # an old kernel, or in more groups than fit: its first group counts
-    ours = uid in (0, os.geteuid())
-    return Peer(pid, uid, ours, ours or os.getegid() in groups)

@@ -10,7 +10,7 @@ from gestured.core.events import Gesture, Onset, Provisional, Release
 from gestured.core.hub import Hub
 from gestured.core.reading import Reading
 from gestured.core.wire import is_sensor
-from gestured.daemon.control import Connection
+from gestured.daemon.caller import Connection
 from gestured.daemon.desk import Desk
 from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher

@@ -14,7 +14,7 @@ from gestured.core.facts import Decided, Fact
 from gestured.core.own import MOST, Examples, is_name
 from gestured.core.prototypes import EXAMPLES
 from gestured.daemon import own_file
-from gestured.daemon.control import Connection
+from gestured.daemon.caller import Connection
 from gestured.daemon.log import log
 from gestured.daemon.request import Refusal
 from gestured.model.ladder import Ladder

@@ -16,7 +16,7 @@ from itertools import islice
 from gestured.core import messages
 from gestured.core.events import Event, Status
 from gestured.core.owner import Source
-from gestured.daemon.control import Connection
+from gestured.daemon.caller import Connection
 
 KEPT_S = 30.0  # of the flight recorder
 OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps

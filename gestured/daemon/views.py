@@ -15,7 +15,7 @@ from gestured.core.events import Event, Provisional, Status
 from gestured.core.facts import Arrived, Fact
 from gestured.core.hub import Hub
 from gestured.core.messages import to_json
-from gestured.daemon.control import Connection
+from gestured.daemon.caller import Connection
 from gestured.daemon.request import Reply
 from gestured.daemon.status import viewed
 from gestured.daemon.tap import SOON_S

@@ -16,7 +16,8 @@ import pytest
 from gestured.client.control import Control
 from gestured.client.lines import Refused
 from gestured.daemon import control, log
-from gestured.daemon.control import Connection, ControlServer
+from gestured.daemon.caller import Connection
+from gestured.daemon.control import ControlServer
 from gestured.daemon.request import Reply, ReplyStream, Verb
 from tests.daemon.harness import Daemon, Sensor, lines_of
 

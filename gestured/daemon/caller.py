@@ -1,0 +1,69 @@
+"""Who asks on the control socket: a connection, and the account at its other end."""
+
+import asyncio
+import os
+import socket
+import struct
+from dataclasses import dataclass
+
+from gestured.client.peer import CREDENTIALS
+
+TAP_BACKLOG_BYTES = 8 << 20  # of a connection that packets are streamed to; what is above is lost, and counted
+SO_PEERGROUPS = 59  # Linux 4.13; not in Python's socket module
+
+
+class Connection:
+    """One operator's connection."""
+
+    def __init__(self, writer: asyncio.StreamWriter) -> None:
+        self._writer = writer
+        self.lost = 0  # lines that found no room
+        self.streams = False  # it is sent lines as they come, and need not ask for anything
+        self._over = False
+
+    def send(self, text: bytes, *, lines: int = 1) -> bool:
+        """Send a line, or several, or count them as lost where too much waits already; never blocks."""
+        if self.closed:
+            return False
+        if self.unread > TAP_BACKLOG_BYTES:
+            self.lost += lines
+            return False
+        self._writer.write(text)
+        return True
+
+    @property
+    def unread(self) -> int:
+        """Bytes that wait to be read, but for what the kernel keeps."""
+        return 0 if self.closed else self._writer.transport.get_write_buffer_size()
+
+    @property
+    def closed(self) -> bool:
+        """Whether the operator has gone, or wants no more."""
+        return self._over or self._writer.is_closing()
+
+    def end(self) -> None:
+        """Send nothing more; what is on its way still goes."""
+        self._over = True
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """The account of an operator's program."""
+
+    pid: int
+    uid: int
+    ours: bool  # root, or the daemon's own user
+    may: bool  # whether it may control the daemon: root, our own user, or a member of our group
+
+
+def peer_of(sock: socket.socket) -> Peer:
+    """Who is at the other end of a connected Unix socket: the kernel says it, whatever the peer claims."""
+    pid, uid, gid = CREDENTIALS.unpack(sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size))
+    groups = {gid}
+    try:
+        raw = sock.getsockopt(socket.SOL_SOCKET, SO_PEERGROUPS, 1024)
+        groups |= set(struct.unpack(f"{len(raw) // 4}I", raw))
+    except OSError:
+        pass  # an old kernel, or in more groups than fit: its first group counts
+    ours = uid in (0, os.geteuid())
+    return Peer(pid, uid, ours, ours or os.getegid() in groups)
