@@ -18,8 +18,9 @@ from gestured.core.events import Gesture
 from gestured.core.found import Cut
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
+from gestured.core.osc_address import Addresses
 from gestured.core.recognizer import Recognizer
-from gestured.core.wire import Addresses, Decoder
+from gestured.core.wire import Decoder
 from gestured.daemon.clients import EventServer
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.values import Grid

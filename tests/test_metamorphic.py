@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gestured.core.mounting import Mounting
-from gestured.core.wire import Addresses, Decoder
+from gestured.core.osc_address import Addresses
+from gestured.core.wire import Decoder
 from gestured.lab.dataset import cuts
 from gestured.lab.stability.metamorphic import (
     Property,

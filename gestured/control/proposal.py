@@ -13,8 +13,8 @@ from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.habits import ALIKE, Habits, neighbours_alike
 from gestured.core.mounting import Mounting
+from gestured.core.osc_address import is_sensor
 from gestured.core.scene import SIDE
-from gestured.core.wire import is_sensor
 
 USUAL = "/{sensor}/pressure"
 LONGEST_ADDRESS = 255  # characters of an address that is proposed

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from gestured.core.mounting import Mounting
+from gestured.core.osc_address import Addresses
 from gestured.core.timing import Timing
-from gestured.core.wire import Addresses
 
 ONE_TAP, DOUBLE_TAP = "one_tap", "double_tap"
 TAP_GAP_S = (0.2, 0.6)  # s: shorter no hand taps twice through 15 Hz, longer no two taps belong together

@@ -1,8 +1,8 @@
 """The scene that the settings ask for."""
 
 from gestured.core.mounting import Mounting
+from gestured.core.osc_address import Addresses
 from gestured.core.scene import Scene, Setup
-from gestured.core.wire import Addresses
 from gestured.daemon.settings import Settings
 from gestured.model.ladder import Ladder, gestures_in_use
 

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gestured.core.wire import Addresses, Decoder
+from gestured.core.osc_address import Addresses
+from gestured.core.wire import Decoder
 from tests.bridge.conftest import Process, wait
 from tests.bridge.test_protocols import written
 from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, blob, floats

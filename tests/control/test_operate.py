@@ -138,7 +138,8 @@ def _status(daemon: Daemon) -> str:
     ],
 )
 def test_what_sniff_proposes_is_taken_by_the_daemon(address: str, encode, proposed: list[str]) -> None:
-    from gestured.core.wire import Addresses, Decoder
+    from gestured.core.osc_address import Addresses
+    from gestured.core.wire import Decoder
 
     sight = Sight()
     packets = [encode(address, Hand().frame(), n) for n in range(5)]

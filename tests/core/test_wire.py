@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from gestured.core import wire
 from gestured.core.frames import Touch
-from gestured.core.wire import Addresses, Arrival, Decoder
+from gestured.core.osc_address import Addresses, is_sensor
+from gestured.core.wire import Arrival, Decoder
 from tests import encoding
 
 GRID = (3, 4)
@@ -69,7 +70,7 @@ def test_a_sensors_name_is_read_from_its_address(name: str) -> None:
 @given(st.text("/{sensor}*?ap", max_size=20) | st.text(max_size=20))
 def test_an_address_that_is_not_ours_names_no_sensor(address: str) -> None:
     matched = Addresses().match(address)
-    assert matched is None or address == f"/{matched[1]}/{matched[0]}" and wire.is_sensor(matched[1])
+    assert matched is None or address == f"/{matched[1]}/{matched[0]}" and is_sensor(matched[1])
 
 
 @pytest.mark.parametrize(

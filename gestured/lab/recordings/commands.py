@@ -9,8 +9,8 @@ from pathlib import Path
 from gestured.client.address import host_port
 from gestured.client.grid import rows_by_columns
 from gestured.core.address import Address
+from gestured.core.osc_address import is_sensor
 from gestured.core.own import is_name
-from gestured.core.wire import is_sensor
 from gestured.lab.recordings.protocol import pseudonym
 from gestured.lab.recordings.sources import UNNAMED
 from gestured.record.check import SESSION
