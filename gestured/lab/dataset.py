@@ -4,26 +4,24 @@ Nothing here re-does the core's work: a take is pushed frame by frame through `F
 matched with what was performed. Simulated sets are cached, keyed by everything that makes them.
 """
 
-import hashlib
 import multiprocessing
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
-from gestured.core.features import touch_pattern
 from gestured.core.found import Cut
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
-from gestured.core.window import Window
 from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
+from gestured.lab.samples import WINDOW, Sample, Samples, collect, sample
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import (
     NON_GESTURES,
@@ -42,61 +40,7 @@ from gestured.simulator import (
 if TYPE_CHECKING:
     from gestured.record.recordings import Recordings
 
-WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 OVERLAP = 0.5  # of a performed gesture must lie in a segment for it to carry its label
-
-
-@dataclass(frozen=True, slots=True)
-class Samples:
-    """G windows of varying length with what is known of them."""
-
-    frames: NDArray[np.float16]  # (N, R, C), one after the other
-    offsets: NDArray[np.int64]  # (G + 1,)
-    labels: NDArray[np.str_]  # (G,) gesture or "none"
-    kinds: NDArray[np.str_]  # (G,) the finer name
-    people: NDArray[np.int64]  # (G,) participant or subject
-    strength: NDArray[np.float64]  # (G,) peak in units of the sensor's noise
-    first: NDArray[np.int64]  # (G,) index of the first touched frame in its window
-    last: NDArray[np.int64]  # (G,) and of the last one
-
-    def __len__(self) -> int:
-        return len(self.labels)
-
-    def window(self, index: int) -> NDArray[np.float32]:
-        """(T, R, C) window of one sample."""
-        return self.frames[self.offsets[index] : self.offsets[index + 1]].astype(np.float32)
-
-    def lengths(self) -> NDArray[np.int64]:
-        """(G,) frames of each."""
-        return np.diff(self.offsets)
-
-    def features(self) -> NDArray[np.float32]:
-        """(G, F) touch-pattern features."""
-        return np.stack([touch_pattern(self.window(i), WINDOW.rate_hz) for i in range(len(self))])
-
-    def take(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> "Samples":
-        """The chosen samples, in that order."""
-        index = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
-        parts = [self.frames[self.offsets[i] : self.offsets[i + 1]] for i in index]
-        return Samples(
-            np.concatenate(parts) if parts else self.frames[:0],
-            np.concatenate([[0], np.cumsum([len(p) for p in parts], dtype=np.int64)]).astype(np.int64),
-            self.labels[index], self.kinds[index], self.people[index], self.strength[index],
-            self.first[index], self.last[index],
-        )  # fmt: skip
-
-    def digest(self) -> str:
-        """SHA-256 over everything."""
-        total = hashlib.sha256()
-        for array in (
-            self.frames,
-            self.offsets,
-            self.labels.astype("U40"),
-            self.kinds.astype("U40"),
-            self.people,
-        ):
-            total.update(np.ascontiguousarray(array).tobytes())
-        return total.hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,59 +52,6 @@ class Truth:
     person: int
     onset: float
     offset: float
-
-
-class Sample(NamedTuple):
-    """One window, with what `Samples` holds of each."""
-
-    window: NDArray[np.float16]
-    label: str
-    kind: str
-    person: int
-    strength: float
-    first: int
-    last: int
-
-
-def sample(segment: Segment, label: str, kind: str, person: int, window: Window = WINDOW) -> Sample:
-    """What was cut, through a window."""
-    frames = window.apply(segment).astype(np.float16)
-    strength = float(segment.frames[segment.first : segment.last + 1].max()) / max(segment.noise, 1e-30)
-    begin = segment.times[window.span(segment)[0]]
-    first, last = (min(round((t - begin) * window.rate_hz), len(frames) - 1) for t in (segment.onset, segment.offset))
-    return Sample(frames, label, kind, person, strength, first, last)
-
-
-def collect(samples: Iterable[Sample]) -> Samples:
-    """Put single samples together."""
-    found = list(samples)
-    frames = [s[0] for s in found]
-    return Samples(
-        np.concatenate(frames) if frames else np.zeros((0, WINDOW.rows, WINDOW.columns), np.float16),
-        np.concatenate([[0], np.cumsum([len(f) for f in frames])]).astype(np.int64),
-        np.array([s[1] for s in found], dtype="U40"),
-        np.array([s[2] for s in found], dtype="U40"),
-        np.array([s[3] for s in found], dtype=np.int64),
-        np.array([s[4] for s in found], dtype=np.float64),
-        np.array([s[5] for s in found], dtype=np.int64),
-        np.array([s[6] for s in found], dtype=np.int64),
-    )
-
-
-def join(parts: Sequence[Samples]) -> Samples:
-    """Several sets as one."""
-    starts = np.cumsum([0] + [int(p.offsets[-1]) for p in parts])
-    offsets = [p.offsets[:-1] + start for p, start in zip(parts, starts, strict=False)]
-    return Samples(
-        np.concatenate([p.frames for p in parts]),
-        np.concatenate([*offsets, starts[-1:]]).astype(np.int64),
-        np.concatenate([p.labels for p in parts]),
-        np.concatenate([p.kinds for p in parts]),
-        np.concatenate([p.people for p in parts]),
-        np.concatenate([p.strength for p in parts]),
-        np.concatenate([p.first for p in parts]),
-        np.concatenate([p.last for p in parts]),
-    )
 
 
 def cuts(frames: NDArray[np.generic], times: NDArray[np.float64]) -> list[Segment]:

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.measures import ACTIVE
-from gestured.lab.dataset import Samples
 from gestured.lab.prefixes import floors
+from gestured.lab.samples import Samples
 
 CONFIRMED = 0.97  # share of the events that the answer must confirm, in every stretch
 DOUBT = 0.1  # probability that a threshold is let through although it does not

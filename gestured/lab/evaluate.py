@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from gestured.lab.augment import varied
-from gestured.lab.dataset import Samples
 from gestured.lab.decide import THRESHOLDS, curve, fit_decision, threshold
 from gestured.lab.fit import CLASSES, lengths_of, padded, targets
 from gestured.lab.nets import Perceptron, Recurrent
+from gestured.lab.samples import Samples
 from gestured.lab.train import REAL_SETS, Calibrated, Trained, TrainingData, TrainingPlan, folds, is_of, judged
 from gestured.lab.trajectory import trajectory_features
 from gestured.model.model import Model

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from gestured.lab.augment import symmetry_table, turned, varied
-from gestured.lab.dataset import WINDOW, Samples
 from gestured.lab.nets import CnnLstm, Lstm
 from gestured.lab.prefixes import askable, drawn, floors, shortened
 from gestured.lab.progress import progress
+from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES, NON_GESTURES, NONE

@@ -9,12 +9,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from gestured.lab.dataset import WINDOW, Samples, join
 from gestured.lab.early import Answers, Asked, at_release, calibrated, published, tap_threshold
 from gestured.lab.field import Contacts
 from gestured.lab.fit import FitConfig, logits, targets
 from gestured.lab.nets import Decision
 from gestured.lab.prefixes import prefixes
+from gestured.lab.samples import WINDOW, Samples, join
 from gestured.simulator import GESTURES, NONE
 
 Logits = Mapping[str, Tensor]  # (N, K) of each network

@@ -12,7 +12,6 @@ import torch
 from torch import Tensor, nn
 
 import gestured
-from gestured.lab.dataset import WINDOW
 from gestured.lab.decide import fit_decision, threshold
 from gestured.lab.evaluate import Evaluation, outcome
 from gestured.lab.export import Facts, export_net
@@ -20,6 +19,7 @@ from gestured.lab.field import table
 from gestured.lab.fit import logits, targets
 from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Decision, Judged, Opinion
+from gestured.lab.samples import WINDOW
 from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan, judged
 from gestured.model.file import inspect
 from gestured.model.model import Model

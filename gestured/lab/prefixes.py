@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from gestured.core.measures import ACTIVE
-from gestured.lab.dataset import WINDOW, Samples
+from gestured.lab.samples import WINDOW, Samples
 
 
 def askable(samples: Samples) -> NDArray[np.bool_]:

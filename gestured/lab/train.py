@@ -22,7 +22,7 @@ import gestured
 from gestured.core.features import feature_names
 from gestured.core.measures import MEASURES, measures
 from gestured.lab.adapt.material import own_recordings
-from gestured.lab.dataset import OTHER_TRIALS, TRIALS, WINDOW, Samples, join, recorded, simulated
+from gestured.lab.dataset import OTHER_TRIALS, TRIALS, recorded, simulated
 from gestured.lab.decide import fit_decision, threshold
 from gestured.lab.digest import code_digest
 from gestured.lab.export import Facts, export_forest, export_net, write_manifest
@@ -31,6 +31,7 @@ from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Judged, Opinion
 from gestured.lab.recordings.origin import origins
+from gestured.lab.samples import WINDOW, Samples, join
 from gestured.record.arrays import read
 from gestured.simulator import GESTURES, NONE, wide
 

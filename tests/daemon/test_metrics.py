@@ -239,7 +239,7 @@ def test_metadata_that_say_nothing_give_no_verdict(quantiles: dict[str, Any]) ->
 
 def test_what_is_measured_is_what_the_lab_measures_of_its_training_data() -> None:
     train = pytest.importorskip("gestured.lab.train", reason="needs the lab's packages")
-    from gestured.lab.dataset import WINDOW, Samples
+    from gestured.lab.samples import WINDOW, Samples
 
     rng = np.random.default_rng(3)
     segments = []

@@ -125,8 +125,9 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     for package in cli.LAB_PACKAGES:
         pytest.importorskip(package, reason="needs the extra [lab]")
     from gestured.lab import train
-    from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS, Samples, collect
+    from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
     from gestured.lab.fit import FitConfig
+    from gestured.lab.samples import Samples, collect
 
     spread = {"wide": range(80), "cohort": range(0, len(TRIALS), 9), "others": range(0, len(OTHER_TRIALS), 9)}
     made: dict[tuple[str, int], Samples] = {}

@@ -18,18 +18,15 @@ from gestured.lab.dataset import (
     OTHER_TRIALS,
     STREAMS,
     TRIALS,
-    WINDOW,
-    Samples,
     Truth,
-    collect,
     cuts,
     from_take,
-    join,
     matched,
     recorded,
     simulated,
     with_idle,
 )
+from gestured.lab.samples import WINDOW, Samples, collect, join
 from gestured.record.recordings import Recordings
 from gestured.simulator import (
     GESTURES,

@@ -14,7 +14,7 @@ pytest.importorskip("onnx", reason="needs the extra [lab]")
 from torch import nn
 
 from gestured.lab import fit, train
-from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS, Samples, collect
+from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
 from gestured.lab.fit import (
     CLASSES,
     REAL_KINDS,
@@ -30,6 +30,7 @@ from gestured.lab.fit import (
     targets,
 )
 from gestured.lab.progress import progress as shown
+from gestured.lab.samples import Samples, collect
 from gestured.simulator import GESTURES
 
 SMALL = FitConfig(epochs=3, batch=16, real_epochs=1, real_samples=32)

@@ -7,12 +7,12 @@ import pytest
 
 from gestured.core.errors import ModelError
 from gestured.core.prototypes import EXAMPLES, Prototype
-from gestured.lab.dataset import Sample, Samples, collect
 from gestured.lab.own import command
 from gestured.lab.own.learn import Seen, figures, learn, played_through
 from gestured.lab.own.play import PLAN, REPETITIONS, repeated
 from gestured.lab.own.signs import JUDGED, LEARNED, SIGNS, sign
 from gestured.lab.own.warping import distances, series
+from gestured.lab.samples import Sample, Samples, collect
 from gestured.model.model import Model
 from gestured.simulator import GESTURES, Participant, generator
 from tests.daemon import tiny_model

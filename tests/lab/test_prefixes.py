@@ -8,9 +8,10 @@ import pytest
 torch = pytest.importorskip("torch", reason="needs the extra [lab]")
 
 from gestured.core.frames import Segment
-from gestured.lab.dataset import STREAMS, WINDOW, Samples, collect, cuts, sample
+from gestured.lab.dataset import STREAMS, cuts
 from gestured.lab.early import at_release
 from gestured.lab.prefixes import askable, drawn, floors, prefixes, shortened
+from gestured.lab.samples import WINDOW, Samples, collect, sample
 from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
 
 

@@ -21,10 +21,10 @@ from gestured.lab.adapt.material import Groups, Own, held_out
 from gestured.lab.adapt.refitting import refitted
 from gestured.lab.adapt.takes import Simulated
 from gestured.lab.adapt.weights import Base
-from gestured.lab.dataset import Samples
 from gestured.lab.fit import FitConfig
 from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Decision, Judged
+from gestured.lab.samples import Samples
 from gestured.simulator import GESTURES
 
 WAYS = (0.25, 0.5, 0.75, 1.0)  # of the way from the old weights to the new ones

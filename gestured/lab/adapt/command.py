@@ -19,11 +19,11 @@ from gestured.lab.adapt.learning import Course
 from gestured.lab.adapt.material import Own, own_recordings
 from gestured.lab.adapt.takes import simulate
 from gestured.lab.adapt.weights import Base, base_of
-from gestured.lab.dataset import WINDOW, Samples
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
 from gestured.lab.own.command import PEOPLE, teach
 from gestured.lab.recordings.origin import KEY, origins
+from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.train import answer_figures, quantiles
 from gestured.model.shipped import shipped_name
 from gestured.record.files import PUBLIC, atomic_write

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.lab.adapt.learning import classes_of
-from gestured.lab.dataset import Samples
+from gestured.lab.samples import Samples
 from gestured.lab.study.bootstrap import interval
 from gestured.simulator import NONE
 

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from gestured.lab.augment import symmetry_table, turned, varied
-from gestured.lab.dataset import Samples, join
 from gestured.lab.fit import CLASSES, FitConfig, lengths_of, logits, padded, targets
 from gestured.lab.nets import Judged, Opinion
 from gestured.lab.prefixes import askable, drawn, floors, shortened
 from gestured.lab.progress import progress
+from gestured.lab.samples import Samples, join
 from gestured.simulator import GESTURES
 
 OTHER = len(CLASSES)  # a non-gesture of a kind that has no class

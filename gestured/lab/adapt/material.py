@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.errors import GesturedError, RecordingError
-from gestured.lab.dataset import Samples, collect, join, recorded
+from gestured.lab.dataset import recorded
 from gestured.lab.recordings.sources import UNNAMED
 from gestured.lab.recordings.store import touched
+from gestured.lab.samples import Samples, collect, join
 from gestured.record.arrays import read
 from gestured.record.check import SESSION
 from gestured.record.recordings import Recordings

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.lab.dataset import OTHER_TRIALS, Samples, join, simulated
+from gestured.lab.dataset import OTHER_TRIALS, simulated
+from gestured.lab.samples import Samples, join
 from gestured.simulator import NONE
 
 PEOPLE = 6  # of the nominal simulated set, whom no training has met

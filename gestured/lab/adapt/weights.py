@@ -18,10 +18,10 @@ from onnx import numpy_helper
 from torch import Tensor, nn
 
 from gestured.core.errors import ModelError
-from gestured.lab.dataset import WINDOW
 from gestured.lab.export import PARITY
 from gestured.lab.fit import CLASSES, build
 from gestured.lab.nets import Decision, Judged, Opinion
+from gestured.lab.samples import WINDOW
 from gestured.model.file import inspect, read_bytes
 from gestured.model.model import Model
 from gestured.model.opening import open_model

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from sklearn.linear_model import LogisticRegression
 
 from gestured.core.prototypes import EXAMPLES, Array, Prototype, Space
-from gestured.lab.dataset import Samples
 from gestured.lab.own.play import PLAN, REPETITIONS
 from gestured.lab.own.signs import SIGNS
+from gestured.lab.samples import Samples
 from gestured.model.model import Model
 
 ACCEPTED = (

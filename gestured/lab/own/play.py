@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gestured.lab.dataset import STREAMS, Sample, Samples, cuts, matched, simulated, truths
+from gestured.lab.dataset import STREAMS, cuts, matched, simulated, truths
 from gestured.lab.digest import code_digest
 from gestured.lab.own.signs import JUDGED, LEARNED, SIGNS, sign
+from gestured.lab.samples import Sample, Samples
 from gestured.simulator import (
     GESTURES,
     NON_GESTURES,

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from gestured.core.measures import ACTIVE
 from gestured.core.prototypes import EXAMPLES
-from gestured.lab.dataset import Samples
 from gestured.lab.own.learn import Seen
 from gestured.lab.own.play import REPETITIONS
+from gestured.lab.samples import Samples
 
 Array = NDArray[np.float64]
 FLOOR = 0.12  # of the peak: below it a taxel counts for nothing

@@ -12,7 +12,7 @@ import numpy as np
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
-from gestured.lab.dataset import WINDOW
+from gestured.lab.samples import WINDOW
 from gestured.lab.stability.made import IDLE_LEVEL, NOISE
 from gestured.lab.stability.path import Array
 from gestured.lab.stability.table import Table, Value

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.features import touch_pattern
-from gestured.lab.dataset import WINDOW
+from gestured.lab.samples import WINDOW
 from gestured.lab.stability.segments import segment_cases
 from gestured.lab.stability.table import Table, Value
 from gestured.lab.stability.ways import NET_CLASSES, WindowList, by_onnxruntime, by_reference, difference

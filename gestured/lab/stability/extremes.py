@@ -18,7 +18,7 @@ from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Recognizer
 from gestured.core.window import Window
-from gestured.lab.dataset import WINDOW
+from gestured.lab.samples import WINDOW
 from gestured.lab.stability.made import IDLE_LEVEL, NOISE, swipes
 from gestured.lab.stability.path import events, fault, labels
 from gestured.lab.stability.segments import broken_segments, segment_cases

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from gestured.lab.dataset import Samples, collect, cuts, sample
+from gestured.lab.dataset import cuts
 from gestured.lab.fit import NETS, FitConfig, logits, pretrain, targets
+from gestured.lab.samples import Samples, collect, sample
 from gestured.lab.stability.path import simulated_series
 from gestured.lab.stability.table import Table, Value
 from gestured.lab.stability.ways import ScoreTable

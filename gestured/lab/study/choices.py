@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gestured.lab.dataset import WINDOW, Samples
+from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.study.bootstrap import summary
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.cohort import Cohort

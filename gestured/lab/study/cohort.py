@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from gestured.core.frames import Segment
 from gestured.core.window import Window
-from gestured.lab.dataset import TRIALS, WINDOW, Samples, collect, cuts, matched, sample, truths
+from gestured.lab.dataset import TRIALS, cuts, matched, truths
 from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
+from gestured.lab.samples import WINDOW, Samples, collect, sample
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import Trial, cohort_take
 

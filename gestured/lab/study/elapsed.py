@@ -13,8 +13,8 @@ import torch
 from numpy.typing import NDArray
 
 from gestured.core.measures import ACTIVE
-from gestured.lab.dataset import WINDOW, Samples
 from gestured.lab.prefixes import floors
+from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.study.training import Indices, Net
 
 SHARES = (0.25, 0.5, 0.75, 1.0)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gestured.core.features import touch_pattern
-from gestured.lab.dataset import WINDOW, Samples
+from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.study.material import SHIFT, UNCHANGED, classes
 from gestured.lab.study.protocols import FOREIGN, REAL
 from gestured.lab.study.run_time import SHIPPED, told

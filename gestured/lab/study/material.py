@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.window import running_mean
-from gestured.lab.dataset import Samples, join
+from gestured.lab.samples import Samples, join
 from gestured.lab.study.shifting import THRESHOLD, copies
 from gestured.simulator import GESTURES
 

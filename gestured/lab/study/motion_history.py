@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.features import PRESSED
-from gestured.lab.dataset import WINDOW
+from gestured.lab.samples import WINDOW
 
 WHOLE = 0.0  # the decay takes as long as the gesture
 

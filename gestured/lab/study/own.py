@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from gestured.core.errors import GesturedError, RecordingError
-from gestured.lab.dataset import Samples, join, recorded
+from gestured.lab.dataset import recorded
 from gestured.lab.recordings.safe import read_what_is_good
+from gestured.lab.samples import Samples, join
 from gestured.record.arrays import read
 from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES, NONE

@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from gestured.core.frames import Segment
-from gestured.lab.dataset import WINDOW
 from gestured.lab.progress import progress
+from gestured.lab.samples import WINDOW
 from gestured.lab.study import onnx_form
 from gestured.lab.study.bootstrap import interval, summary
 from gestured.lab.study.cohort import Cohort

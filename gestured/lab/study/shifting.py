@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.lab.dataset import Samples
+from gestured.lab.samples import Samples
 
 THRESHOLD = 0.2  # of the gesture's peak
 EDGES = ("top", "bottom", "left", "right")

@@ -14,9 +14,10 @@ import torch
 import gestured
 from gestured.core.errors import GesturedError
 from gestured.lab.cli import REAL_FOLDER
-from gestured.lab.dataset import Samples, simulated
+from gestured.lab.dataset import simulated
 from gestured.lab.digest import file_digest
 from gestured.lab.made_of import made_of, renew
+from gestured.lab.samples import Samples
 from gestured.lab.study import cohort, elapsed, failures, own, signals, tables
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.choices import choices

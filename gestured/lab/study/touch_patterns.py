@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.features import PRESSED
-from gestured.lab.dataset import WINDOW
+from gestured.lab.samples import WINDOW
 
 
 def paper_features(window: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -13,9 +13,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from gestured.lab.dataset import Samples
 from gestured.lab.fit import padded
 from gestured.lab.nets import last_active
+from gestured.lab.samples import Samples
 
 BATCH_SEQUENCES = 64
 LONGEST = 80  # frames

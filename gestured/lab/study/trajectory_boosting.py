@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from gestured.lab.dataset import Samples
 from gestured.lab.fit import lengths_of, padded
+from gestured.lab.samples import Samples
 from gestured.lab.study.training import LONGEST
 from gestured.lab.trajectory import trajectory_features
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.features import touch_pattern
-from gestured.lab.dataset import WINDOW, Samples
+from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.study.motion_history import motion_history
 from gestured.lab.study.touch_patterns import paper_features
 from gestured.lab.study.training import Images, Windows

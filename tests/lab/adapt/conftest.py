@@ -11,9 +11,10 @@ import torch
 
 from gestured.lab.adapt.takes import Simulated
 from gestured.lab.adapt.weights import untrained
-from gestured.lab.dataset import WINDOW, Samples, collect, from_take
+from gestured.lab.dataset import from_take
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
+from gestured.lab.samples import WINDOW, Samples, collect
 from gestured.simulator import GESTURES, wide
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gestured.lab.dataset import Sample, Samples, collect
+from gestured.lab.samples import Sample, Samples, collect
 from gestured.lab.study.material import Data
 from gestured.simulator import GESTURES
 from tests.lab.made import gestures
