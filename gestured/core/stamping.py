@@ -23,21 +23,21 @@ class Stamper:
 
     `clock` "arrival": when they arrived. "sensor": by the increments of the time tags, as long as these go
     forward by at most `MAX_STEP_S`; else by the arrival. Frames of one call that have one time are spaced
-    backwards from it, by the counter or evenly, at the rate seen so far (`rate_hz` until it is known), and
+    backwards from it, by the counter or evenly, at the rate seen so far (`PERIOD_S` apart until it is known), and
     after the frame before. So read all waiting packets before you stamp: a stall then does no harm.
     """
 
-    MAX_STEP_S = 10.0
+    PERIOD_S = 1 / 15  # between frames at the nominal rate
+    MAX_STEP_S = 10.0  # between two time tags; a longer step is not believed
     AHEAD_S = 86_400.0  # a recording may be sent faster than it was felt, but a day ahead of its arrival is no time
     MIN_STEP_S = 1e-6  # where the clock did not move; a double still tells this after 30 years
-    REORDER = 16  # a frame that is so many back may have been overtaken ...
-    REORDER_S = 0.5  # ... but not after such a pause
-    STREAK = 3  # and so many in a row, in order, are a new start
+    REORDER = 16  # a frame whose counter is further back was not overtaken on its way: the sensor began anew
+    REORDER_S = 0.5  # the same after a longer pause
+    STREAK = 3  # the same for so many late frames in a row, in order
     LEAP = 10_000  # a counter that jumps further has lost nothing, it began anew: ten seconds at 1000 Hz
 
-    def __init__(self, clock: Literal["arrival", "sensor"] = "arrival", rate_hz: float = 15.0) -> None:
+    def __init__(self, clock: Literal["arrival", "sensor"] = "arrival") -> None:
         self._by_tag = clock == "sensor"
-        self._period = 1.0 / rate_hz
         self._intervals: deque[float] = deque(maxlen=15)
         self._last: float | None = None  # the last stamp
         self._arrived = 0.0  # and the arrival of its frame
@@ -126,4 +126,4 @@ class Stamper:
 
     def _typical(self) -> float:
         """Seconds between two frames: the median, since a late frame must not count."""
-        return sorted(self._intervals)[len(self._intervals) // 2] if self._intervals else self._period
+        return sorted(self._intervals)[len(self._intervals) // 2] if self._intervals else self.PERIOD_S

@@ -40,6 +40,7 @@ from gestured.simulator import (
 if TYPE_CHECKING:
     from gestured.record.recordings import Recordings
 
+IDLE = 20  # frames that are put on each side of a cut recording
 OVERLAP = 0.5  # of a performed gesture must lie in a segment for it to carry its label
 
 
@@ -133,12 +134,12 @@ def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) ->
     return samples
 
 
-def recorded(recordings: "Recordings", seed: int = 0) -> Samples:
+def recorded(recordings: "Recordings") -> Samples:
     """Cut gestures or whole sessions as samples; what the truth does not name is left out."""
-    return collect(s for i in range(len(recordings)) for s in _recorded(recordings, i, seed))
+    return collect(s for i in range(len(recordings)) for s in _recorded(recordings, i))
 
 
-def _recorded(recordings: "Recordings", i: int, seed: int) -> Iterator[Sample]:
+def _recorded(recordings: "Recordings", i: int) -> Iterator[Sample]:
     frames, times = recordings.frames_of(i), recordings.times_of(i)
     person = int(recordings.subjects[i])
     # Marks are frames, and a frame stands for the time around it: a tap of one frame has a duration, too.
@@ -157,7 +158,7 @@ def _recorded(recordings: "Recordings", i: int, seed: int) -> Iterator[Sample]:
                 yield from matched([segment], known)
         return
     first, last = int(_needed(recordings, "onsets")[i]), int(_needed(recordings, "releases")[i])
-    frames, times, lead = with_idle(frames, times, first, last, seed + i)
+    frames, times, lead = with_idle(frames, times, first, last, i)
     label, kind = str(recordings.labels[i]), str(_needed(recordings, "kinds")[i])
     onset, offset = times[first + lead] - half, times[last + lead] + half
     yield from matched(cuts(frames, times), [Truth(label, kind, person, onset, offset)])
@@ -171,9 +172,9 @@ def _needed(recordings: "Recordings", field: str) -> NDArray[Any]:
 
 
 def with_idle(
-    frames: NDArray[np.generic], times: NDArray[np.float64], first: int, last: int, seed: int, count: int = 20
+    frames: NDArray[np.generic], times: NDArray[np.float64], first: int, last: int, seed: int
 ) -> tuple[NDArray[np.generic], NDArray[np.float64], int]:
-    """Put `count` idle frames before and after a cut recording, drawn from its own quiet frames.
+    """Put `IDLE` idle frames before and after a cut recording, drawn from its own quiet frames.
 
     The front end needs a second to learn the idle sensor, and many recordings end where the next touch began.
     Returns frames, times, and how many were put before.
@@ -183,6 +184,6 @@ def with_idle(
         quiet = np.minimum(frames.min(axis=0), np.median(frames.min(axis=0))).astype(frames.dtype)[None]
     rng = np.random.default_rng([seed, 7])
     step = float(np.median(np.diff(times)))
-    around = quiet[rng.integers(0, len(quiet), 2 * count)]
-    before, after = times[0] - step * np.arange(count, 0, -1), times[-1] + step * np.arange(1, count + 1)
-    return np.concatenate([around[:count], frames, around[count:]]), np.concatenate([before, times, after]), count
+    around = quiet[rng.integers(0, len(quiet), 2 * IDLE)]
+    before, after = times[0] - step * np.arange(IDLE, 0, -1), times[-1] + step * np.arange(1, IDLE + 1)
+    return np.concatenate([around[:IDLE], frames, around[IDLE:]]), np.concatenate([before, times, after]), IDLE

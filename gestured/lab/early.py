@@ -56,8 +56,8 @@ class Asked:
         return np.searchsorted(STRETCHES, self.elapsed_s + 1e-9, side="right") - 1
 
 
-def chance_of(people: NDArray[np.int64], revoked: NDArray[np.bool_], share: float = CONFIRMED) -> float:
-    """How likely so few revoked events would be if less than `share` were confirmed: a binomial test over people.
+def chance_of(people: NDArray[np.int64], revoked: NDArray[np.bool_]) -> float:
+    """How likely so few revoked events would be if less than `CONFIRMED` were confirmed: a binomial test over people.
 
     A person counts once, with the share of that person's events that were revoked.
     """
@@ -65,7 +65,7 @@ def chance_of(people: NDArray[np.int64], revoked: NDArray[np.bool_], share: floa
     if not len(who):
         return 1.0
     each = np.bincount(who, revoked) / np.bincount(who)
-    return at_most(math.ceil(each.sum() - 1e-9), len(each), 1 - share)
+    return at_most(math.ceil(each.sum() - 1e-9), len(each), 1 - CONFIRMED)
 
 
 def at_most(most: int, of: int, chance: float) -> float:

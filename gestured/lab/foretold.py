@@ -103,9 +103,9 @@ def _joined(parts: Sequence[Logits]) -> Logits:
     return {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
 
 
-def as_in_sessions(samples: Samples, share: float = OTHERS, seed: int = 1) -> NDArray[np.int64]:
-    """Indices of all gestures, and of as many non-gestures as give that share of all, or all where there are fewer."""
+def as_in_sessions(samples: Samples) -> NDArray[np.int64]:
+    """Indices of all gestures, and of so many non-gestures that these are `OTHERS` of all, or of all that there are."""
     others = np.flatnonzero(samples.labels == NONE)
     gestures = np.flatnonzero(samples.labels != NONE)
-    count = round(len(gestures) * share / (1 - share))
-    return np.sort(np.concatenate([gestures, np.random.default_rng(seed).permutation(others)[:count]]))
+    count = round(len(gestures) * OTHERS / (1 - OTHERS))
+    return np.sort(np.concatenate([gestures, np.random.default_rng(1).permutation(others)[:count]]))

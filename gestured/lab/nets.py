@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from gestured.core.measures import ACTIVE
 
+HIDDEN = 160  # units of each hidden layer of the perceptron
 SCALE = 3.0  # windows are mostly zeros: without it the first layers hardly move
 
 
@@ -108,18 +109,18 @@ class Perceptron(nn.Module):
     mean: Tensor
     scale: Tensor
 
-    def __init__(self, inputs: int, classes: int, units: int = 160) -> None:
+    def __init__(self, inputs: int, classes: int) -> None:
         super().__init__()
         self.register_buffer("mean", torch.zeros(inputs))
         self.register_buffer("scale", torch.ones(inputs))
         self.layers = nn.Sequential(
-            nn.Linear(inputs, units),
+            nn.Linear(inputs, HIDDEN),
             nn.ReLU(),
             nn.Dropout(0.1),
-            nn.Linear(units, units),
+            nn.Linear(HIDDEN, HIDDEN),
             nn.ReLU(),
             nn.Dropout(0.1),
-            nn.Linear(units, classes),
+            nn.Linear(HIDDEN, classes),
         )
 
     def fit_scale(self, features: Tensor) -> None:
@@ -128,7 +129,7 @@ class Perceptron(nn.Module):
         self.scale.copy_(features.std(0).clamp(min=1e-3))
 
     def embed(self, features: Tensor) -> Tensor:
-        """(B, inputs) -> (B, units): the last hidden layer."""
+        """(B, inputs) -> (B, HIDDEN): the last hidden layer."""
         hidden: Tensor = self.layers[:-1](((features - self.mean) / self.scale).clamp(-6, 6))
         return hidden
 

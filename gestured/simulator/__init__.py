@@ -1,7 +1,7 @@
 """A simulator of people, fingers, a textile and its sensor, in plain numpy.
 
 What it is: human strokes in continuous time (`perform`), a soft matrix sensor that samples, blurs, leaks,
-lags and quantises them (`SimulatedSensor.record`), and seeded collections of both (`cohort`, `wide`, `session`).
+lags and quantises them (`SimulatedSensor.record`), and seeded collections of both (`cohort_take`, `wide`, `session`).
 What it is not: a finite-element model of a fabric, nor fitted to textile recordings (none were at hand). Its
 distributions are invented within plausible bounds; blob sizes, durations and speeds were compared with real
 fingers on a touchscreen only. A figure measured on it is a figure about it.
@@ -15,7 +15,6 @@ from gestured.simulator.cohort import (
     NONE,
     SEQUENCES,
     Trial,
-    cohort,
     cohort_plan,
     cohort_take,
     gesture_take,
@@ -41,7 +40,6 @@ __all__ = [
     "SimulatedSensor",
     "Take",
     "Trial",
-    "cohort",
     "cohort_plan",
     "cohort_take",
     "generator",

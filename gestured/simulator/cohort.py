@@ -20,6 +20,8 @@ GESTURES: tuple[str, ...] = tuple(TEN)
 SEQUENCES = ("tap_then_swipe", "tap_then_hold", "triple_tap")
 NON_GESTURES: tuple[str, ...] = tuple(kind for kind in OTHERS if kind not in SEQUENCES)
 NONE = "none"
+OTHERS_SHARE = 0.35  # of the wide stream that is none of the ten gestures
+LEAD_S, TAIL_S = 1.3, 0.8  # of an idle pad around a single performance, the first plus up to one frame
 FLICKS = 0.25  # share of the hardest takes in which strokes are hurried, down to two to four frames
 
 
@@ -70,14 +72,12 @@ def gesture_take(
     rng: np.random.Generator,
     speed: str = "normal",
     inclination: int = 1,
-    lead_s: float = 1.3,
-    tail_s: float = 0.8,
     hurry: float = 1.0,
 ) -> Take:
-    """One performance with an idle pad before (lead_s, plus up to one frame) and after it."""
+    """One performance with an idle pad before and after it."""
     performance = perform(kind, participant, rng, speed, inclination, sensor.extent, hurry)
-    start = lead_s + float(rng.random()) / sensor.rate_hz
-    return sensor.record([(start, performance)], start + performance.duration_s + tail_s, rng)
+    start = LEAD_S + float(rng.random()) / sensor.rate_hz
+    return sensor.record([(start, performance)], start + performance.duration_s + TAIL_S, rng)
 
 
 def session(
@@ -143,28 +143,16 @@ def cohort_take(trial: Trial, seed: int = 0) -> Take:
     return gesture_take(trial.gesture, person, sensor, rng, trial.speed, trial.inclination)
 
 
-def cohort(seed: int = 0, participants: int = 34) -> Iterator[Take]:
-    """All takes of the cohort in the plan's order."""
-    for trial in cohort_plan(participants):
-        yield cohort_take(trial, seed)
-
-
-def wide(
-    seed: int,
-    index: int,
-    non_gesture_share: float = 0.35,
-    hardness: float | None = None,
-    kinds: Sequence[str] | None = None,
-) -> Take:
+def wide(seed: int, index: int, hardness: float | None = None) -> Take:
     """The index-th take of an endless stream: a random participant on a random sensor.
 
-    `hardness` is drawn from 0..1 for each take unless it is given; `kinds` restricts what is performed.
+    `hardness` is drawn from 0..1 for each take unless it is given.
     """
     rng = generator(seed, 0x71DE, index)
     hard = float(rng.random()) if hardness is None else hardness
     person = Participant(int(rng.integers(1 << 40)) + 1_000_000)
     sensor = SimulatedSensor.wide(rng, hard)
-    pool = kinds if kinds is not None else NON_GESTURES if rng.random() < non_gesture_share else GESTURES
+    pool = NON_GESTURES if rng.random() < OTHERS_SHARE else GESTURES
     kind = pool[int(rng.integers(len(pool)))]
     speed = ("slow", "normal", "fast")[int(rng.integers(3))]
     hurry = float(rng.uniform(1.3, 2.5)) if rng.random() < FLICKS * hard else 1.0

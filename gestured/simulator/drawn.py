@@ -30,9 +30,7 @@ def _leg_s(occasion: Occasion, length: float) -> float:
     return float(np.clip(0.3 * (length / 40.0) ** 0.4 / occasion.rate * occasion.rng.lognormal(0.0, 0.15), 0.11, 0.9))
 
 
-def _legs(
-    occasion: Occasion, points: list[tuple[float, float]], overlap: float = 0.25, pause_s: float = 0.0
-) -> list[Press]:
+def _legs(occasion: Occasion, points: list[tuple[float, float]], overlap: float, pause_s: float = 0.0) -> list[Press]:
     """One finger through via points."""
     legs = [_leg_s(occasion, math.dist(a, b)) for a, b in zip(points[:-1], points[1:], strict=True)]
     t, x, y = polyline(points, legs, overlap, pause_s)

@@ -126,7 +126,7 @@ def submovements(
 
 
 def polyline(
-    points: Sequence[tuple[float, float]], leg_s: Sequence[float], overlap: float = 0.25, pause_s: float = 0.0
+    points: Sequence[tuple[float, float]], leg_s: Sequence[float], overlap: float, pause_s: float
 ) -> tuple[Array, Array, Array]:
     """t, x, y (n,) of a stroke through via points.
 

@@ -37,7 +37,7 @@ class Occasion:
         """Size of this movement, 0..1: habit and chance."""
         return float(np.clip(self.person.reach + self.rng.normal(0.0, 0.22), 0.0, 1.0))
 
-    def spot(self, half_width: float = 0.0, half_height: float = 0.0, beyond: float = 0.05) -> tuple[float, float]:
+    def spot(self, half_width: float, half_height: float, beyond: float = 0.05) -> tuple[float, float]:
         """Centre for something of that half size; in a share `beyond` of cases partly over the edge."""
         rng, (px, py), spread = self.rng, self.person.place, self.person.place_spread
         slack = 0.09 if rng.random() < beyond else -0.04
@@ -49,12 +49,12 @@ class Occasion:
             out.append(extent / 2 + float(np.clip(offset, -room, room)))
         return out[0], out[1]
 
-    def settle(self, x: Array, y: Array, beyond: float = 0.05) -> tuple[Array, Array]:
+    def settle(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Moves a path (n,) given anywhere to a place on the pad; one that is too large is shrunk to fit."""
         x, y = x - (x.min() + x.max()) / 2, y - (y.min() + y.max()) / 2
         hx, hy = max(float(x.max()), 0.1), max(float(y.max()), 0.1)
         scale = min(1.0, 0.47 * self.width / hx, 0.47 * self.height / hy)
-        cx, cy = self.spot(hx * scale, hy * scale, beyond)
+        cx, cy = self.spot(hx * scale, hy * scale)
         return x * scale + cx, y * scale + cy
 
     def finger(
@@ -109,13 +109,7 @@ class Occasion:
 
 
 def touch_down(
-    occasion: Occasion,
-    x: float,
-    y: float,
-    duration_s: float,
-    start: float = 0.0,
-    force: float = 1.0,
-    size: float = 1.0,
+    occasion: Occasion, x: float, y: float, duration_s: float, start: float = 0.0, force: float = 1.0
 ) -> Press:
     """A finger that stays where it lands for that long, rolling a little."""
     rng = occasion.rng
@@ -130,7 +124,6 @@ def touch_down(
         x + roll[:, 0],
         y + roll[:, 1],
         force=force,
-        size=size,
         start=start,
         fade_in_s=min(rng.uniform(0.015, 0.09), edge),
         fade_out_s=min(rng.uniform(0.02, 0.11), edge),
@@ -188,7 +181,7 @@ def swipe_length(occasion: Occasion, heading: float) -> float:
     return float(np.clip(length, max(12.0, 0.2 * across), min(150.0, 0.97 * across)))
 
 
-def fingers_on(occasion: Occasion, path: Stroke, count: int, heading: float, delay_s: float = 0.08) -> list[Press]:
+def fingers_on(occasion: Occasion, path: Stroke, count: int, heading: float) -> list[Press]:
     """Several fingers side by side on one stroke: uneven in force, size, length, landing and lifting."""
     rng = occasion.rng
     if count == 1:
@@ -201,7 +194,7 @@ def fingers_on(occasion: Occasion, path: Stroke, count: int, heading: float, del
     ys = [path.y * rng.uniform(0.9, 1.08) + o * math.sin(side) for o in offsets]
     all_x, all_y = occasion.settle(np.concatenate(xs), np.concatenate(ys))
     total = float(path.t[-1])
-    delay_s = min(delay_s, 0.25 * total)
+    delay_s = min(0.08, 0.25 * total)
     forces = rng.uniform(0.35, 1.0, count) if rng.random() < 0.3 else rng.uniform(0.7, 1.0, count)
     forces /= forces.max()
     contacts = []

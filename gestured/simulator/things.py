@@ -20,7 +20,6 @@ def blob(
     size: Pair,
     fades_s: Pair,
     *,
-    angle: float | None = None,
     start: float = 0.0,
     unrest: float = 0.08,
     flatness: float = 1.2,
@@ -33,7 +32,7 @@ def blob(
     level = np.clip(t / min(fades_s[0], 0.45 * total), 0.0, 1.0)
     level = level * np.clip((total - t) / min(fades_s[1], 0.45 * total), 0.0, 1.0)
     level = level * np.clip(1.0 + unrest * wander(t, rng, 0.3, 4.0), 0.0, 3.0)
-    turn = rng.uniform(0.0, math.pi) if angle is None else angle
+    turn = rng.uniform(0.0, math.pi)
     return Press(t + start, x * ones, y * ones, force * level, *size, turn, 0.1, flatness, False)
 
 

@@ -11,11 +11,12 @@ from gestured.lab.stability.ways import NET_CLASSES, WindowList, by_onnxruntime,
 from gestured.model.shipped import LADDER, shipped
 
 LONGEST = 80  # frames; float64, operator by operator, takes minutes for more, and no front end gives more at 15 Hz
+SHORT = 12  # frames
 
 
-def short_windows(quick: bool, longest: int = 12) -> WindowList:
-    """Those of all families that have at most so many frames."""
-    return [window for some in extreme_windows(quick).values() for window in some if len(window) <= longest]
+def short_windows(quick: bool) -> WindowList:
+    """Those of all families that have at most SHORT frames."""
+    return [window for some in extreme_windows(quick).values() for window in some if len(window) <= SHORT]
 
 
 def extreme_windows(quick: bool) -> dict[str, WindowList]:

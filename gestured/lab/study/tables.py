@@ -16,6 +16,7 @@ from gestured.lab.study.views import Values
 from gestured.simulator import GESTURES
 
 GIVEN, TUNED = "paper", "tuned"
+BINS = 10  # of confidence, equally wide
 ASKED = {"real": (REAL,), "foreign": (FOREIGN,)}  # protocols of data that are not split as the paper does
 
 
@@ -156,14 +157,14 @@ def elapsed_rows(found: Mapping[Cell, Result], points: Sequence[Mapping[str, flo
     ]
 
 
-def calibration(found: Mapping[Cell, Result], bins: int = 10) -> list[dict[str, Any]]:
+def calibration(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:
     """Confidence against truth, participants held out: expected calibration error (Naeini et al. 2015), equal bins."""
     out = []
     for cell, result in found.items():
         if (cell.settings, cell.augmentation, cell.protocol, cell.data) != (TUNED, SHIFT, PARTICIPANTS, "simulated"):
             continue
         sure, good = np.array(result["confidence"]), right(result)
-        at = np.minimum((sure * bins).astype(int), bins - 1)
+        at = np.minimum((sure * BINS).astype(int), BINS - 1)
         rows, error = [], 0.0
         for k in np.unique(at):
             here = at == k
