@@ -8,6 +8,7 @@ import queue
 
 import paho.mqtt.client as mqtt
 import zenoh
+from paho.mqtt.enums import CallbackAPIVersion
 
 from tests.bridge.test_zenoh import opened
 
@@ -25,7 +26,7 @@ def main() -> None:
         there = sample.kind == zenoh.SampleKind.PUT
         found.put(("zenoh", str(sample.key_expr), "online" if there else "offline"))
 
-    client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2, protocol=mqtt.MQTTv5)
+    client = mqtt.Client(CallbackAPIVersion.VERSION2, protocol=mqtt.MQTTv5)
     client.on_connect = lambda client, *_: client.subscribe("gestured/#", qos=1)
     client.on_subscribe = lambda *_: print("ready", flush=True)
     client.on_message = lambda _, __, message: found.put(("mqtt", message.topic, message.payload.decode()))
