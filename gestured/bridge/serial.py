@@ -16,7 +16,8 @@ from typing import Any
 
 from gestured.bridge.counts import Counts
 from gestured.bridge.options import BridgeError, add_destination, add_metrics, destination, need, on_stop
-from gestured.bridge.protocols import COUNTER, MOST_TAXELS, PROTOCOLS, Reading, looks_like
+from gestured.bridge.protocols import PROTOCOLS, looks_like
+from gestured.bridge.readings import COUNTER, MOST_TAXELS, Reading
 from gestured.client.grid import rows_by_columns
 from gestured.client.say import say
 from gestured.client.sensor import Form, sent_after_refusal

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-from gestured.bridge.protocols import PROTOCOLS, Protocol, looks_like
+from gestured.bridge.protocols import PROTOCOLS, looks_like
+from gestured.bridge.readings import Protocol
 
 ROWS, COLUMNS = 4, 5
 SIZE = ROWS * COLUMNS

@@ -1,0 +1,71 @@
+"""One frame that a serial sensor sent, and what every protocol does: bytes in, frames out."""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+MOST_TAXELS = 64 * 64  # of the largest grid
+LINE_BYTES = 32 * MOST_TAXELS  # of the longest packet or line; numbers in text have up to some 25 characters
+COUNTER = 0x7FFFFFFF  # a frame counter is an `i` of OSC
+FEWEST = 3  # frames of another protocol that are no accident
+
+
+class Reading(NamedTuple):
+    """One frame: (R, C) counts; the sensor's own counter and time (s since the epoch) where it has them."""
+
+    values: NDArray[np.generic]
+    counter: int | None = None
+    moment: float | None = None
+
+
+class Protocol(ABC):
+    """The bytes of one connection. `passed` counts those that belong to no frame."""
+
+    baud = 115_200
+    grid = (9, 9)  # rows and columns, unless told
+    fixed = False  # whether there are no others
+    request = b""  # what asks for the next frame; empty where the sensor speaks by itself
+
+    def __init__(self, rows: int, columns: int) -> None:
+        self.shape = (rows, columns)
+        self.taxels = rows * columns
+        self.passed = 0
+        self._buffer = bytearray()
+
+    @abstractmethod
+    def push(self, data: bytes) -> list[Reading]:
+        """The frames that are complete with these bytes, in order."""
+
+    def flush(self) -> list[Reading]:
+        """The frame that is complete where the line is quiet now."""
+        return []
+
+    @staticmethod
+    @abstractmethod
+    def fits(data: bytes) -> str | None:
+        """What these bytes look like, such as "csv with 81 numbers a line"; None where not like this protocol."""
+
+    def _pass(self, count: int) -> None:
+        """So many bytes at the front belong to no frame."""
+        self.passed += count
+        del self._buffer[:count]
+
+
+def reading_of(found: Sequence[object], shape: tuple[int, int], dtype: np.dtype[np.generic]) -> Reading | None:
+    """A frame of so many numbers, or one more in front that counts frames; None for any other number of them."""
+    extra = len(found) - shape[0] * shape[1]
+    if extra not in (0, 1):
+        return None
+    values = np.array(found[extra:], dtype=dtype.newbyteorder("=")).reshape(shape)
+    if not np.isfinite(values).all():
+        return None
+    if extra == 0:
+        return Reading(values)
+    first = found[0]
+    if not isinstance(first, int | float) or not math.isfinite(first) or first != int(first):
+        return None
+    return Reading(values, int(first) & COUNTER)

@@ -1,0 +1,97 @@
+"""OSC packets on a serial line, framed by SLIP (RFC 1055): any sensor's, and eTextile's matrix."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.bridge.readings import FEWEST, LINE_BYTES, Protocol, Reading, reading_of
+from gestured.core.errors import ProtocolError
+from gestured.core.osc import decode
+from gestured.core.osc_message import Message
+
+SLIP_END = b"\xc0"
+# Bytes a taxel -> what they are.
+BLOB_TYPES: dict[int, np.dtype[Any]] = {1: np.dtype("u1"), 2: np.dtype(">u2"), 4: np.dtype(">f4")}
+
+
+class OscSlip(Protocol):
+    """OSC packets between END bytes."""
+
+    def push(self, data: bytes) -> list[Reading]:
+        """A frame for each packet that holds one."""
+        found = []
+        for packet, raw in self._packets(data):
+            reading = self._frame(packet)
+            if reading is None:
+                self.passed += raw
+            else:
+                found.append(reading)
+        return found
+
+    def _packets(self, data: bytes) -> list[tuple[bytes, int]]:
+        """Each whole packet, and how many bytes it took."""
+        self._buffer += data
+        *whole, rest = bytes(self._buffer).split(SLIP_END)
+        self._buffer = bytearray(rest)
+        if len(rest) > LINE_BYTES:
+            self._pass(len(rest))
+        return [(slip_decoded(each), len(each)) for each in whole if each]
+
+    def _frame(self, packet: bytes) -> Reading | None:
+        for message in messages_of(packet):
+            reading = self._values(message)
+            if reading is not None:
+                return reading._replace(moment=message.timetag)
+        return None
+
+    def _values(self, message: Message) -> Reading | None:
+        *before, last = message.args or (None,)
+        if isinstance(last, bytes):
+            dtype = BLOB_TYPES.get(len(last) // self.taxels) if len(last) % self.taxels == 0 else None
+            values: NDArray[Any] | None = None if dtype is None else np.frombuffer(last, dtype)
+        elif isinstance(last, np.ndarray):
+            values = last
+        else:
+            return None
+        return None if values is None else reading_of([*before, *values.tolist()], self.shape, values.dtype)
+
+    @staticmethod
+    def fits(data: bytes) -> str | None:
+        """Several packets that are OSC."""
+        packets = [message for each in data.split(SLIP_END)[1:-1] for message in messages_of(slip_decoded(each))]
+        return f"osc-slip with messages to {packets[0].address}" if len(packets) >= FEWEST else None
+
+
+class E256(OscSlip):
+    """Answers to /r."""
+
+    baud = 230_400
+    grid = (16, 16)
+    fixed = True
+    request = b"\xc0/r\0\0,\0\0\0\xc0"
+    ANSWER = "/r"
+
+    def _values(self, message: Message) -> Reading | None:
+        blob = message.args[0] if len(message.args) == 1 else None
+        if message.address != self.ANSWER or not isinstance(blob, bytes) or len(blob) != self.taxels:
+            return None
+        return Reading(np.frombuffer(blob, np.uint8).reshape(self.shape))
+
+    @staticmethod
+    def fits(data: bytes) -> str | None:
+        """Several answers."""
+        return "e256" if len(E256(*E256.grid).push(data)) >= FEWEST else None
+
+
+def slip_decoded(packet: bytes) -> bytes:
+    """A packet without its escapes."""
+    return packet.replace(b"\xdb\xdc", b"\xc0").replace(b"\xdb\xdd", b"\xdb")
+
+
+def messages_of(packet: bytes) -> list[Message]:
+    """The OSC messages of a packet; none where it is no OSC."""
+    try:
+        return decode(packet)
+    except ProtocolError:
+        return []
