@@ -2,6 +2,7 @@
 
 import os
 import socket
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,7 @@ from gestured.daemon.sockets import (
     bind_udp,
     make_default_directory,
     name_of,
+    stamp_arrivals,
 )
 
 INTERNET = (socket.AF_INET, socket.AF_INET6)
@@ -32,6 +34,7 @@ class Bound:
     """They stay open until `close`."""
 
     udp: socket.socket
+    since: float  # s, monotonic: what waited in a socket that was passed counts as if it had come then
     events: Listener
     control: Listener
     http: socket.socket | None
@@ -61,6 +64,9 @@ def bind_all(settings: Settings, passed: Sequence[tuple[str, socket.socket]]) ->
     try:
         if (udp := given.get("osc")) is None:
             opened.append(udp := bind_udp(settings.listen))
+        else:
+            stamp_arrivals(udp)
+        since = time.monotonic()
         if (http := given.get("metrics")) is None and settings.metrics is not None:
             opened.append(http := bind_tcp(settings.metrics))
         path = settings.socket
@@ -85,7 +91,7 @@ def bind_all(settings: Settings, passed: Sequence[tuple[str, socket.socket]]) ->
         raise
     for name, sock in given.items():
         log.info("socket from systemd", name=name, address=_where(sock))
-    return Bound(udp, events, control, http)
+    return Bound(udp, since, events, control, http)
 
 
 def _where(sock: socket.socket) -> str:

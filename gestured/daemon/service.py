@@ -72,7 +72,7 @@ class Service:
         self._foresee()
         self._publisher = Publisher(self._metrics, self._sinks())
         self._desk = Desk(self._metrics, self._publisher, self._watch, self._own, self._views)
-        self._receiver = Receiver(bound.udp, self._hub, self._desk, self._taps)
+        self._receiver = Receiver(bound.udp, bound.since, self._hub, self._desk, self._taps)
         operations = Operations(
             self._hub, self._desk, self._publisher, self._watch, self._taps, self._own,
             self._views, self.snapshot, self._state, self._reload.run,

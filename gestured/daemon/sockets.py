@@ -15,7 +15,8 @@ from gestured.core.errors import GesturedError
 
 RECEIVE_BYTES = 4 << 20  # the default holds 166 frames of 9 x 9 floats, this 6,500
 BACKLOG = 1024  # a thousand clients may come back at once after a restart
-SO_RCVBUFFORCE = 33  # Linux; these two are not in Python's socket module
+SO_RCVBUFFORCE = 33  # Linux; these three are not in Python's socket module
+SO_TIMESTAMPNS = 35
 SO_MEMINFO = 55  # nine numbers, the last of which counts drops
 
 
@@ -52,7 +53,13 @@ def bind_udp(address: Address) -> socket.socket:
         sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES)  # beyond the limit, for CAP_NET_ADMIN
     except OSError:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
+    stamp_arrivals(sock)
     return sock
+
+
+def stamp_arrivals(sock: socket.socket) -> None:
+    """Have the kernel say of each datagram from now on when it came."""
+    sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
 
 
 def kernel_drops(sock: socket.socket) -> int:

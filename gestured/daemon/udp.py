@@ -32,7 +32,6 @@ FEW = 8  # packets found by a read, up to which it is followed by a pause
 FULL_S = 0.25  # for which a stall explains that the kernel drops packets; if it lasts longer, it is a flood
 STEP_S = 0.05  # by which the wall clock may move against ours; after a larger step the kernel's times say nothing
 
-SO_TIMESTAMPNS = 35  # Linux; not in Python's socket module
 TIMESTAMP = struct.Struct("@qq")  # s and ns since the epoch, by the wall clock
 ANCILLARY_BYTES = socket.CMSG_SPACE(TIMESTAMP.size)
 
@@ -41,15 +40,21 @@ class Receiver:
     """Reads a UDP socket until it is closed."""
 
     def __init__(
-        self, sock: socket.socket, hub: Hub, desk: Desk, taps: Taps, clock: Callable[[], float] = time.monotonic
+        self,
+        sock: socket.socket,
+        empty: float,
+        hub: Hub,
+        desk: Desk,
+        taps: Taps,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Gives `hub` what waits, and its facts to `desk`; `taps` are shown what is served."""
+        """Gives `hub` what came since the socket was `empty` (s), and its facts to `desk`; `taps` are shown it."""
         self._loop = asyncio.get_running_loop()
         self._sock, self._hub, self._desk, self._taps, self._clock = sock, hub, desk, taps, clock
         self._backlog = Backlog(lambda source: source in hub.owners)
         self._muted = Muted()
         _, self._wall = self._clocks()  # s, from the monotonic clock to the one that the kernel stamps with
-        self._empty = clock()  # s, when the socket was last seen empty
+        self._empty = empty  # s, when the socket was last seen empty
         self._drops = 0  # packets that the kernel had dropped then
         self._dropping = -FLOOD_S  # s, when it began to
         self._behind_s = 0.0  # for so long the oldest packet waits that was read and not yet served
@@ -57,7 +62,6 @@ class Receiver:
         self._found = 0  # packets, then
         self._pause: asyncio.TimerHandle | None = None
         self._again: asyncio.Handle | None = None
-        sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         self._loop.add_reader(sock, self._wake)
 
     def served(self, now: float) -> float:

@@ -144,7 +144,7 @@ def test_packets_that_come_thick_are_taken_together_and_no_others_wait(
             loop, "call_later", lambda _, listen: rests.append(listen) or asyncio.Handle(listen, (), loop)
         )
         with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
-            receiver = Receiver(sock, parts.hub, parts.desk, parts.taps, lambda: now)
+            receiver = Receiver(sock, now, parts.hub, parts.desk, parts.taps, lambda: now)
             sender.connect(sock.getsockname())
             for k in range(5):
                 now += apart
@@ -162,6 +162,32 @@ def test_packets_that_come_thick_are_taken_together_and_no_others_wait(
             await asyncio.sleep(0)
 
     asyncio.run(main())
+
+
+def test_what_waits_since_the_socket_was_bound_keeps_its_times(parts: Parts, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A start takes a while; a sensor is learned from the frames that came meanwhile, too."""
+    served: list[float] = []
+    receive = parts.hub.receive
+    monkeypatch.setattr(parts.hub, "receive", lambda packets, now: served.append(now) or receive(packets, now))
+
+    async def main() -> float:
+        with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
+            empty = time.monotonic()
+            sender.connect(sock.getsockname())
+            moments = []
+            for k in range(2):
+                time.sleep(0.1)  # the sensor's pace
+                moments.append(time.monotonic())
+                sender.send(harness.floats("/a/pressure", Hand().frame(), k))
+                moments.append(time.monotonic())
+            receiver = Receiver(sock, empty, parts.hub, parts.desk, parts.taps)
+            while parts.metrics.frames.values != {("a", "ok"): 2}:
+                receiver.read()
+            receiver.close()
+            return moments[2] - moments[1]
+
+    apart = asyncio.run(main())
+    assert len(served) == 2 and served[1] - served[0] >= apart - 1e-4  # s, by which the two clocks may drift
 
 
 @pytest.mark.parametrize("call", range(8))
@@ -187,7 +213,7 @@ def test_wherever_in_a_read_a_stall_begins_no_frame_moves(
                 calls += 1
                 return clock() + leap
 
-            receiver = Receiver(sock, parts.hub, parts.desk, parts.taps, lambda: look(time.monotonic))
+            receiver = Receiver(sock, time.monotonic(), parts.hub, parts.desk, parts.taps, lambda: look(time.monotonic))
             calls = 0
             clocks = {name: getattr(time, name) for name in ("monotonic", "thread_time")}
             monkeypatch.setattr(udp, "time", SimpleNamespace(**clocks, time=lambda: look(time.time)))
