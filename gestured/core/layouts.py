@@ -10,7 +10,7 @@ from gestured.core.osc_message import Argument, Message, timetag
 LAYOUTS_BYTES = 8 << 20  # for the layouts that are remembered: 8,000 sensors of 9 x 9 floats
 PLACE_BYTES = 600  # that Python takes for a place, its head, address, type tags and scalars not counted
 SCALAR_BYTES = 48  # that Python takes for a scalar in a place
-# The bytes of a packet by which its layout is found: those of its first address, in a bundle with the size before it.
+# The bytes of a packet in which its first head begins, or all of it is: in a bundle with the size before it.
 ALONE, BUNDLED = slice(32), slice(16, 48)
 
 # Where a packet of a known layout has one message: scalars, then a run or a blob; all may be missing.
@@ -42,7 +42,7 @@ class Layouts:
 
     def read(self, data: bytes, bundled: bool) -> list[Message] | None:
         """The messages of a packet, None where its layout is not known."""
-        layout = self._known.get(data[BUNDLED if bundled else ALONE])
+        layout = self._known.get(_key(data, bundled))
         if layout is None or layout[0] != len(data):
             return None
         time, bundle = (timetag(data, 8, len(data)), 0) if bundled else (None, -1)
@@ -70,4 +70,10 @@ class Layouts:
             self._known.clear()
             self._room = self._most_bytes
         self._room -= cost
-        self._known[data[BUNDLED if bundled else ALONE]] = (len(data), places)
+        self._known[_key(data, bundled)] = (len(data), places)
+
+
+def _key(data: bytes, bundled: bool) -> bytes:
+    """By what a layout is found: the first address and type tags. What follows them is different in each packet."""
+    begin = data[BUNDLED if bundled else ALONE]
+    return begin[: begin.find(b"\0", begin.find(b","))]

@@ -185,6 +185,20 @@ def test_known_layouts_do_not_mix_up_sensors_and_a_thousand_of_them_are_known() 
     assert len(osc._layouts) >= 1000
 
 
+@pytest.mark.parametrize("name", ["s", "a-sensor-whose-name-is-longer-than-that"])
+@pytest.mark.parametrize("types", ["b", "ib", "iiiii", "iff"])
+@pytest.mark.parametrize("bundled", [False, True])
+def test_a_sensor_has_one_layout_whatever_it_counts_and_feels(
+    name: str, types: str, bundled: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(osc, "_layouts", Layouts())
+    for n in range(300):
+        args = [bytes([n % 256] * 9) if tag == "b" else n for tag in types]
+        message = encoding.message(f"/{name}/pressure", types, args)
+        osc.decode(encoding.bundle([message], n) if bundled else message)
+    assert len(osc._layouts) == 1
+
+
 INVENTED = {  # packets that nobody has sent before
     "an address": lambda n: encoding.message(f"/{n}" + "x" * 240, "b", (b"x",)),
     "an array": lambda n: encoding.message(f"/{n}", "i" * 4000, (np.arange(4000),)),
