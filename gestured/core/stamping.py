@@ -55,7 +55,7 @@ class Stamper:
         `missed`: packets may have been lost on this machine just before. A counter tells how many were this
         sensor's; without one, what fits into the pause counts as lost.
         """
-        before, usual = self._last, self._typical()
+        before, usual = self._last, self._typical() if missed else math.nan
         stamps: list[Stamp] = []
         run: list[tuple[int, int]] = []  # frames with one time: index, periods since the frame before
         for i, arrival in enumerate(arrivals):
