@@ -11,16 +11,13 @@ from collections.abc import Callable, Sequence
 from datetime import date
 from pathlib import Path
 
-import numpy as np
-
 from gestured.client.picture import draw, trace
 from gestured.lab.recordings.live import LiveSensor
 from gestured.lab.recordings.protocol import INCLINATION_NAMES, Exercise, left
 from gestured.lab.recordings.quality import Captured, faults
-from gestured.lab.recordings.store import compact, join_recordings
+from gestured.lab.recordings.store import join_recordings, recording
 from gestured.lab.recordings.terminal import Ended, Terminal
 from gestured.record.arrays import write
-from gestured.record.check import FINGERS
 from gestured.record.recordings import Recordings
 
 GESTURE_TIMEOUT_S = 10.0  # for a gesture to begin, and for it to end
@@ -211,30 +208,3 @@ class Session:
             return self._until(None)
         except Paused:
             return "p"
-
-
-def recording(take: Captured, trial: Exercise, participant: str, consent: str) -> Recordings:
-    """A take in the contract's form, times counted from its first frame."""
-    times = take.times()
-    n = len(times)
-    touches = np.full((n, FINGERS, 2), np.nan, np.float32)
-    ids = np.full((n, FINGERS), -1, np.int32)
-    for i, frame in enumerate(take.frames):
-        for k, touch in enumerate(frame.touches[:FINGERS]):
-            if touch.id >= 0:
-                touches[i, k], ids[i, k] = (touch.x, touch.y), touch.id
-    return Recordings(
-        frames=compact(np.array([frame.values for frame in take.frames])),
-        times=times - times[0],
-        offsets=np.array([0, n], np.int64),
-        labels=np.array([trial.gesture]),
-        subjects=np.array([participant]),
-        speeds=np.array([trial.speed]),
-        inclinations=np.array([trial.inclination]),
-        kinds=np.array([trial.gesture]),
-        onsets=np.array([take.onset]),
-        releases=np.array([take.release]),
-        touches=touches,
-        touch_ids=ids,
-        consents=np.array([consent]),
-    )

@@ -1,4 +1,4 @@
-"""Sets of recordings put together, and what the front end marks in them."""
+"""Recordings in the contract's form: of one take, or sets put together; and what the front end marks in them."""
 
 from collections.abc import Sequence
 from dataclasses import fields
@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
 from gestured.lab.dataset import cuts, with_idle
+from gestured.lab.recordings.protocol import Exercise
+from gestured.lab.recordings.quality import Captured
 from gestured.record.check import EVENT_FIELDS, FINGERS
 from gestured.record.recordings import Recordings
 
@@ -92,3 +94,30 @@ def touched(frames: NDArray[Any], times: NDArray[np.float64]) -> tuple[int, int]
             if 0 <= first <= last < len(times):
                 return int(first), int(last)
     return None
+
+
+def recording(take: Captured, trial: Exercise, participant: str, consent: str) -> Recordings:
+    """A take in the contract's form, times counted from its first frame."""
+    times = take.times()
+    n = len(times)
+    touches = np.full((n, FINGERS, 2), np.nan, np.float32)
+    ids = np.full((n, FINGERS), -1, np.int32)
+    for i, frame in enumerate(take.frames):
+        for k, touch in enumerate(frame.touches[:FINGERS]):
+            if touch.id >= 0:
+                touches[i, k], ids[i, k] = (touch.x, touch.y), touch.id
+    return Recordings(
+        frames=compact(np.array([frame.values for frame in take.frames])),
+        times=times - times[0],
+        offsets=np.array([0, n], np.int64),
+        labels=np.array([trial.gesture]),
+        subjects=np.array([participant]),
+        speeds=np.array([trial.speed]),
+        inclinations=np.array([trial.inclination]),
+        kinds=np.array([trial.gesture]),
+        onsets=np.array([take.onset]),
+        releases=np.array([take.release]),
+        touches=touches,
+        touch_ids=ids,
+        consents=np.array([consent]),
+    )

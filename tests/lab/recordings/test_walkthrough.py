@@ -12,8 +12,7 @@ from gestured.core.frames import Frame
 from gestured.lab.cli import main, parser
 from gestured.lab.recordings.protocol import Exercise
 from gestured.lab.recordings.quality import Captured
-from gestured.lab.recordings.session import recording
-from gestured.lab.recordings.store import join_recordings, touched
+from gestured.lab.recordings.store import join_recordings, recording, touched
 from gestured.record.arrays import read, write
 from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
 from tests.lab.recordings.test_import import capfingerid_lines, csv_lines, take, written
