@@ -12,7 +12,7 @@ from gestured.core.errors import GesturedError
 from gestured.lab.cards import write_block, write_cards
 from gestured.lab.cli import REAL_FOLDER
 from gestured.lab.evaluate import Evaluation, held_out_kinds, print_curve, real_figures, simulated_figures
-from gestured.lab.export import write_manifest
+from gestured.lab.manifest import write_manifest
 from gestured.lab.networks import compare, compare_rules
 from gestured.lab.own import command as own
 from gestured.lab.own.command import open_file, teach

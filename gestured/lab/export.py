@@ -1,10 +1,9 @@
-"""Trained networks and forests -> .onnx files that say all about themselves; and the manifest over them.
+"""Trained networks and forests -> .onnx files that say all about themselves.
 
 Every file is verified before it is written: ONNX's checker, everything that the daemon checks, and outputs
 against the trained model's own within `PARITY`, for batches and windows of many lengths.
 """
 
-import hashlib
 import json
 import math
 import tempfile
@@ -25,7 +24,7 @@ from gestured.core.errors import ModelError
 from gestured.core.window import Window
 from gestured.lab.forest_graph import OPSET, Outputs, around_thresholds, forest_graph, forest_outputs
 from gestured.lab.recordings import origin
-from gestured.model.file import SelfTest, inspect
+from gestured.model.file import SelfTest
 from gestured.model.model import Model
 from gestured.record.files import PUBLIC, atomic_write
 
@@ -130,39 +129,6 @@ def export_forest(
     metadata = facts.metadata() | {"features": json.dumps(list(features))}
     inputs = [sample[start : start + size] for start, size in ((0, 1), (1, 2), (3, 5), (8, 500))]
     return _finish(forest_graph(forest, count, facts.calibration), Path(path), metadata, sample[:4], truth, inputs)
-
-
-def write_manifest(directory: str | Path, figures: Mapping[str, Any]) -> Path:
-    """Write `manifest.json` over the directory's .onnx files.
-
-    `figures` holds what was measured of each, by file name without suffix. Raises ModelError for a file that
-    has no metadata.
-    """
-    models = {}
-    for path in sorted(Path(directory).glob("*.onnx")):
-        data = path.read_bytes()
-        try:
-            said = inspect(data)
-            models[path.name] = {
-                "sha256": hashlib.sha256(data).hexdigest(),
-                "size": len(data),
-                "kind": said["kind"],
-                "version": said["version"],
-                "gestures": json.loads(said["gestures"]),
-                "figures": figures.get(path.stem, {}),
-            }
-        except (ValueError, KeyError) as error:
-            raise ModelError(f"{path}: {error}") from error
-    target = Path(directory) / "manifest.json"
-    _write(target, (json.dumps({"models": _plain(models)}, indent=2, allow_nan=False) + "\n").encode())
-    return target
-
-
-def _plain(value: Any) -> Any:
-    """The same with null for what is not a finite number: JSON has no NaN."""
-    if isinstance(value, Mapping):
-        return {key: _plain(of) for key, of in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _finish(

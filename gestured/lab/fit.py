@@ -6,7 +6,6 @@ the split (`augment`), and some of its windows are cut short (`prefixes`). Nothi
 networks are told how long each window is.
 """
 
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,12 +16,12 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from gestured.lab.augment import symmetry_table, turned, varied
+from gestured.lab.checkpoints import restore, store
 from gestured.lab.nets import CnnLstm, Lstm
 from gestured.lab.prefixes import askable, drawn, floors, shortened
 from gestured.lab.progress import progress
 from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features
-from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES, NON_GESTURES, NONE
 
 REAL_KINDS = {"tap_hold": "long_press", "drag_diagonal": "diagonal_swipe"}  # what real non-gestures are
@@ -154,12 +153,12 @@ def pretrain(samples: Samples, config: FitConfig, checkpoint: Path) -> nn.Module
         )
     steps = config.epochs * len(list(_plan(samples, labels, config, np.random.default_rng(0), chosen)))
     optimiser, schedule = _optimiser(nets, config, 1.0, steps)
-    done = _restore(checkpoint, nets, optimiser, schedule)
+    done = restore(checkpoint, nets, optimiser, schedule)
     for epoch in range(done, config.epochs):
         one_epoch(
             nets, optimiser, schedule, [(samples, labels, chosen)], config, epoch, f"epoch {epoch + 1}/{config.epochs}"
         )
-        _store(checkpoint, nets, optimiser, epoch + 1)
+        store(checkpoint, nets, optimiser, epoch + 1)
     return nets
 
 
@@ -220,51 +219,9 @@ def logits(nets: nn.ModuleDict, samples: Samples, config: FitConfig) -> dict[str
     return {name: torch.cat(parts)[back] for name, parts in found.items()}
 
 
-def save_nets(path: Path, nets: nn.ModuleDict) -> None:
-    """Weights as plain arrays, without pickles."""
-    _write(path, {name: value.numpy() for name, value in nets.state_dict().items()})
-
-
 def load_nets(path: Path) -> nn.ModuleDict:
     """What `save_nets` wrote."""
     nets = build()
     with np.load(path, allow_pickle=False) as stored:
         nets.load_state_dict({name: torch.from_numpy(stored[name]) for name in stored.files})
     return nets
-
-
-def _store(path: Path, nets: nn.ModuleDict, optimiser: torch.optim.Optimizer, epochs: int) -> None:
-    arrays = {f"net.{name}": value.numpy() for name, value in nets.state_dict().items()}
-    for i, state in optimiser.state_dict()["state"].items():
-        arrays |= {f"optimiser.{i}.{name}": value.numpy() for name, value in state.items()}
-    _write(path, arrays | {"epochs": np.array(epochs)})
-
-
-def _restore(
-    path: Path, nets: nn.ModuleDict, optimiser: torch.optim.Optimizer, schedule: torch.optim.lr_scheduler.LRScheduler
-) -> int:
-    """Epochs already done; 0 without a checkpoint."""
-    if not path.exists():
-        return 0
-    with np.load(path, allow_pickle=False) as stored:
-        nets.load_state_dict({n[4:]: torch.from_numpy(stored[n]) for n in stored.files if n.startswith("net.")})
-        state: dict[int, dict[str, Tensor]] = {}
-        for name in stored.files:
-            if name.startswith("optimiser."):
-                _, i, key = name.split(".")
-                state.setdefault(int(i), {})[key] = torch.from_numpy(stored[name])
-        epochs = int(stored["epochs"])
-    whole = optimiser.state_dict()
-    optimiser.load_state_dict({**whole, "state": state})
-    steps = int(next(iter(state.values()))["step"]) if state else 0
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of a step before the optimiser's
-        for _ in range(steps):
-            schedule.step()
-    return epochs
-
-
-def _write(path: Path, arrays: dict[str, NDArray[np.generic]]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path, PUBLIC, durable=False) as file:
-        np.savez(file, **arrays)  # type: ignore[arg-type]

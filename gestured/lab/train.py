@@ -22,13 +22,15 @@ import gestured
 from gestured.core.features import feature_names
 from gestured.core.measures import MEASURES, measures
 from gestured.lab.adapt.material import own_recordings
+from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import OTHER_TRIALS, TRIALS, recorded, simulated
 from gestured.lab.decide import fit_decision, threshold
 from gestured.lab.digest import code_digest
-from gestured.lab.export import Facts, export_forest, export_net, write_manifest
-from gestured.lab.fit import CLASSES, FitConfig, finetune, load_nets, logits, pretrain, save_nets, targets
+from gestured.lab.export import Facts, export_forest, export_net
+from gestured.lab.fit import CLASSES, FitConfig, finetune, load_nets, logits, pretrain, targets
 from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.foretold import Foretold
+from gestured.lab.manifest import write_manifest
 from gestured.lab.nets import Judged, Opinion
 from gestured.lab.recordings.origin import origins
 from gestured.lab.samples import WINDOW, Samples, join

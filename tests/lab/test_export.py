@@ -25,8 +25,9 @@ from gestured.core.errors import ModelError
 from gestured.core.features import feature_names
 from gestured.core.frames import Segment
 from gestured.core.window import Window
-from gestured.lab.export import Facts, export_forest, export_net, write_manifest
+from gestured.lab.export import Facts, export_forest, export_net
 from gestured.lab.forest_graph import forest_outputs
+from gestured.lab.manifest import write_manifest
 from gestured.lab.recordings.origin import Origin, said
 from gestured.model.file import inspect
 from gestured.model.opening import open_model

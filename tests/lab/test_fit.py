@@ -14,6 +14,7 @@ pytest.importorskip("onnx", reason="needs the extra [lab]")
 from torch import nn
 
 from gestured.lab import fit, train
+from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
 from gestured.lab.fit import (
     CLASSES,
@@ -26,7 +27,6 @@ from gestured.lab.fit import (
     logits,
     padded,
     pretrain,
-    save_nets,
     targets,
 )
 from gestured.lab.progress import progress as shown

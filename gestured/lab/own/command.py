@@ -10,7 +10,7 @@ import onnx
 
 from gestured.core.errors import ModelError
 from gestured.core.prototypes import Space
-from gestured.lab.export import write_manifest
+from gestured.lab.manifest import write_manifest
 from gestured.lab.own.learn import Figures, Seen, figures, learn, played_through
 from gestured.lab.own.play import played
 from gestured.lab.own.signs import JUDGED

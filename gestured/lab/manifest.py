@@ -1,0 +1,46 @@
+"""`manifest.json`: what each model file of a folder is, and what was measured of it."""
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gestured.core.errors import ModelError
+from gestured.model.file import inspect
+from gestured.record.files import PUBLIC, atomic_write
+
+
+def write_manifest(directory: str | Path, figures: Mapping[str, Any]) -> Path:
+    """Write `manifest.json` over the directory's .onnx files.
+
+    `figures` holds what was measured of each, by file name without suffix. Raises ModelError for a file that
+    has no metadata.
+    """
+    models = {}
+    for path in sorted(Path(directory).glob("*.onnx")):
+        data = path.read_bytes()
+        try:
+            said = inspect(data)
+            models[path.name] = {
+                "sha256": hashlib.sha256(data).hexdigest(),
+                "size": len(data),
+                "kind": said["kind"],
+                "version": said["version"],
+                "gestures": json.loads(said["gestures"]),
+                "figures": figures.get(path.stem, {}),
+            }
+        except (ValueError, KeyError) as error:
+            raise ModelError(f"{path}: {error}") from error
+    target = Path(directory) / "manifest.json"
+    with atomic_write(target, PUBLIC) as file:
+        file.write((json.dumps({"models": _plain(models)}, indent=2, allow_nan=False) + "\n").encode())
+    return target
+
+
+def _plain(value: Any) -> Any:
+    """The same with null for what is not a finite number: JSON has no NaN."""
+    if isinstance(value, Mapping):
+        return {key: _plain(of) for key, of in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
