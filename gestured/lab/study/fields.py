@@ -15,7 +15,8 @@ from gestured.core.features import touch_pattern
 from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.study.material import SHIFT, UNCHANGED, classes
 from gestured.lab.study.protocols import FOREIGN, REAL
-from gestured.lab.study.run_time import SHIPPED, told
+from gestured.lab.study.run_time import told
+from gestured.lab.study.runners import SHIPPED
 from gestured.lab.study.tables import TUNED, Cell
 from gestured.lab.train import REAL_SETS
 from gestured.model.opening import open_model

@@ -9,7 +9,7 @@ from jinja2 import Environment, PackageLoader, Undefined, select_autoescape
 
 from gestured.simulator import GESTURES
 
-from . import charts_course, charts_right, drawing, formats, reading, summary
+from . import charts_course, charts_right, charts_run_time, drawing, formats, reading, summary
 from .reading import Study
 
 NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # what no XML may hold
@@ -55,7 +55,7 @@ def _environment() -> Environment:
     env.filters.update({write.__name__: write for write in written})
     env.globals.update(
         course=charts_course, families=drawing.families, GESTURES=GESTURES, mark_of=drawing.mark_of, reading=reading,
-        right=charts_right, summary=summary,
+        right=charts_right, timed=charts_run_time, summary=summary,
     )  # fmt: skip
     return env
 

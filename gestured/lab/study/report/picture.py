@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from . import formats, reading
-from .charts_right import Name, place
+from .charts_run_time import Name, place
 from .drawing import INK, SOFT, Drawing, Mark, families, mark_of, styled
 from .reading import Row, Study
 

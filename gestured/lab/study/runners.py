@@ -1,0 +1,123 @@
+"""What is timed: every method, run as well as it can here, and the models that ship.
+
+Networks, forests and boosting run in onnxruntime (one thread), as in the daemon, the rest in scikit-learn. int8 is
+onnxruntime's dynamic quantisation of matrix products and LSTMs.
+"""
+
+import pickle
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from gestured.core.frames import Segment
+from gestured.lab.progress import progress
+from gestured.lab.samples import WINDOW
+from gestured.lab.study import onnx_form
+from gestured.lab.study.material import SHIFT, Data
+from gestured.lab.study.methods import METHODS, Estimator
+from gestured.lab.study.plan import Plan
+from gestured.lab.study.protocols import PARTICIPANTS, fitted, material
+from gestured.lab.study.tables import TUNED, task
+from gestured.lab.study.training import Net
+from gestured.lab.study.views import Values
+from gestured.model.model import Model
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
+from gestured.simulator import GESTURES
+
+SHIPPED = {"cnn_lstm": "cnn_lstm", "lstm": "lstm", "tp_rf": "touch_pattern_rf"}  # methods, and the models that ship
+
+
+class Runner(Protocol):
+    """One model, from a segment to its answer; sent to another process to be weighed."""
+
+    method: str
+    precision: str
+    settings: str
+
+    def answer(self, segment: Segment) -> tuple[int, bool]:
+        """The class that it holds for the best, and whether it says so or rejects."""
+        ...
+
+    def size(self) -> int:
+        """Bytes on disk."""
+        ...
+
+
+@dataclass
+class Learned:
+    """A method of the study, which rejects nothing."""
+
+    method: str
+    precision: str
+    values: Values
+    model: Estimator | onnx_form.Graph
+    from_frames: bool = False  # the graph takes the window itself
+    settings: str = TUNED
+
+    def answer(self, segment: Segment) -> tuple[int, bool]:
+        """As in `Runner`."""
+        window = WINDOW.apply(segment)
+        seen = window[None] if self.from_frames else METHODS[self.method].view.one(window, self.values)
+        if isinstance(self.model, Estimator):
+            return int(self.model.fitted.predict(seen)[0]), True
+        return int(self.model.run(seen).argmax()), True
+
+    def size(self) -> int:
+        """The graph, or scikit-learn's own form."""
+        return len(pickle.dumps(self.model.fitted)) if isinstance(self.model, Estimator) else len(self.model.data)
+
+
+@dataclass
+class Shipped:
+    """A model that ships, opened when it is first asked."""
+
+    method: str
+    path: Path
+    precision: str = "float32"
+    settings: str = "shipped"
+    _model: Model | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_model": None}
+
+    def answer(self, segment: Segment) -> tuple[int, bool]:
+        """As in `Runner`, by the model's own threshold."""
+        if self._model is None:
+            self._model = open_model(self.path)
+        found = self._model.classify(segment)
+        best = int(found.values.argmax())
+        name = self._model.gestures[best]
+        return GESTURES.index(name), found.confidence >= found.threshold
+
+    def size(self) -> int:
+        """The file."""
+        return self.path.stat().st_size
+
+
+def runners(plan: Plan, tuned: Mapping[str, Values], data: Data) -> list[Runner]:
+    """Every method, fitted to all gestures and their shifted copies, in each precision; then the shipped models."""
+    out: list[Runner] = []
+    for method in progress(METHODS.values(), len(METHODS), "models to be timed"):
+        of_task = task(method, tuned[method.id], SHIFT, PARTICIPANTS, "simulated", plan)
+        of, inputs = material(of_task, data)
+        model = fitted(of_task, inputs, np.arange(len(of.labels)), of.labels)
+        values = dict(of_task.values)
+        if isinstance(model, Net):
+            graph = onnx_form.of_net(model.module, images=not method.elapses)
+            out.append(Learned(method.id, "float32", values, graph))
+            smaller = onnx_form.quantised(graph)
+            if smaller is not None:
+                out.append(Learned(method.id, "int8", values, smaller))
+            continue
+        assert isinstance(model, Estimator)
+        if method.id.endswith("_rf"):
+            out.append(Learned(method.id, "float32", values, onnx_form.of_forest(model.fitted)))
+        elif method.id == "trajectory_gb":
+            out.append(Learned(method.id, "float32", values, onnx_form.of_boosting(model.fitted), from_frames=True))
+        else:
+            out.append(Learned(method.id, "float64", values, model))
+    return out + [Shipped(method, shipped()[name]) for method, name in SHIPPED.items() if shipped()[name].exists()]
