@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import OLD_S
 
-WAITING_EVENTS = 1000  # that are kept for the broker; more than a second of the busiest daemon
+WAITING_EVENTS = 1000  # events that are kept for the broker; more than a second of the busiest daemon
 IN_FLIGHT = 20  # events whose acknowledgement is awaited at a time; more would only wait in the broker
 
 

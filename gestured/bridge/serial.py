@@ -24,14 +24,14 @@ from gestured.client.sensor import Form, sent_after_refusal
 from gestured.core.frames import Frame
 from gestured.core.osc_address import is_sensor
 
-KEPT = 8  # frames that are sent where more have come at once
+KEPT = 8  # frames that are sent where more have come at once: the newest
 QUIET_S = 0.002  # a line that says nothing for so long has ended its frame; a byte takes 0.1 ms at 115,200 baud
-POLL_S = 0.25  # after which it is looked whether we are to end
-ANSWER_S = 0.25  # for a sensor's answer, then it is asked again
+POLL_S = 0.25  # the longest wait for the line before it is looked whether we are to end
+ANSWER_S = 0.25  # how long a sensor may take for its answer before it is asked again
 AGAIN_S = 0.5  # from one attempt to open the device to the next
-SILENT_S = 5.0  # after which an open line that says nothing is mentioned
-JUDGED_BYTES = 4096 + 4 * MOST_TAXELS  # without a frame, after which it is said what they look like; and for each
-JUDGED_TAXEL_BYTES = 64  # taxel of ours so many more: two of the longest lines of text
+SILENT_S = 5.0  # an open line that says nothing for so long is mentioned
+JUDGED_BYTES = 4096 + 4 * MOST_TAXELS  # bytes without a frame after which it is said what they look like
+JUDGED_TAXEL_BYTES = 64  # so many more of them for each taxel of ours: two of the longest lines of text
 
 
 def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

@@ -13,7 +13,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 HEADS = 1024  # heads of frames that are remembered: one or two a sensor
 ANEW_S = 2_085_978_496  # s since 1970, in 2036, when a time tag's 32 bits of seconds begin anew
-AGAIN_S = 2**32  # until they do so again
+AGAIN_S = 2**32  # from one such beginning to the next
 NOT_ZERO_S = 2.0**-32  # so little that it is lost in the time tag of 1970
 
 _size = Struct(">i").pack

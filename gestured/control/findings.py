@@ -11,7 +11,7 @@ from gestured.core.errors import ModelError
 from gestured.core.pace import outside as rate_is_outside
 from gestured.model.opening import check
 
-BUFFER_BYTES = 4 << 20  # what the daemon asks of the kernel
+BUFFER_BYTES = 4 << 20  # the receive buffer that the daemon asks of the kernel
 SLOW_S = 0.1
 RECENT_S = 60.0  # what has not happened for so long is over
 

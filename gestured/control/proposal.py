@@ -19,7 +19,7 @@ from gestured.core.scene import SIDE
 USUAL = "/{sensor}/pressure"
 LONGEST_ADDRESS = 255  # characters of an address that is proposed
 TRAJECTORY = "/trajectory"
-STEP_S = 1e-6  # from frame to frame at the least: some were read at one time
+STEP_S = 1e-6  # from frame to frame at the least, because some were read at one time
 
 Grid = tuple[int, int]
 

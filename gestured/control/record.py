@@ -20,7 +20,7 @@ from gestured.core.errors import GesturedError
 from gestured.record.tape import library
 from gestured.record.tape_writer import Writer
 
-FLUSH_S = 1.0  # what a crash or a power cut costs
+FLUSH_S = 1.0  # seconds of a recording that a crash or a power cut costs
 WAITING_LINES = 50_000  # lines; the daemon counts what finds no room
 
 

@@ -28,7 +28,7 @@ Times = NDArray[np.float64]
 
 BUNDLE = b"#bundle\0"
 STATUS_TIMEOUT_S = 10.0  # a daemon says something once a second
-BACKLOG_S = 0.5  # what a daemon needs for a receive buffer that is full
+BACKLOG_S = 0.5  # how long a daemon needs for a receive buffer that is full
 CONTACTS = 1000  # onsets of a sensor that are compared with as many others: 8 MB, and an hour of gestures
 TIMES = ("onset", "offset", "decided")
 

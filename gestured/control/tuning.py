@@ -11,8 +11,8 @@ from typing import Any
 from gestured.client.score import NONE, TOLERANCE_S, Performed
 
 THRESHOLDS = tuple(round(0.05 * k, 2) for k in range(1, 20))
-ENOUGH = 20  # performances of a gesture, before anything is proposed for it alone
-FALSE_AN_HOUR = 1.0  # at most, where recordings hold no gestures to lose
+ENOUGH = 20  # performances of a gesture before anything is proposed for it alone
+FALSE_AN_HOUR = 1.0  # false gestures that a proposal may cost at most, where recordings hold no gestures to lose
 
 
 @dataclass(frozen=True)

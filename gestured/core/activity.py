@@ -13,13 +13,13 @@ from gestured.core.quantiles import median
 
 Array = NDArray[np.float64]
 
-COMMON = 4.0  # noise units of what all taxels share that are taken off; a palm must not cancel itself
+COMMON = 4.0  # noise units: the most that is taken off for what all taxels share; a palm must not cancel itself
 BLOB = (0.5, 1.0, 0.5)  # a fingertip over three taxels, in rows and in columns
-BLOB_GAIN = sum(BLOB) ** 2 / sum(b * b for b in BLOB)  # by which a level that all taxels share grows in a spot
+BLOB_GAIN = sum(BLOB) ** 2 / sum(b * b for b in BLOB)  # factor by which a level that all taxels share grows in a spot
 PLACE_SHARE = 0.3  # of the highest taxel: what lies below it says nothing of where the finger is
-PLACE_NOISE = 3.5  # noise units, likewise
-TYPICAL = 0.88  # of sqrt(2 ln N): the median of an idle frame's activity, where noise is normal
-USUAL_AT_MOST = 5.0  # times that: a sensor more restless than this is touched, or out of order
+PLACE_NOISE = 3.5  # noise units above which a taxel says where the finger is
+TYPICAL = 0.88  # median activity of an idle frame, in units of sqrt(2 ln N), where noise is normal
+USUAL_AT_MOST = 5.0  # times the typical activity count as a sensor's own restlessness; more is a touch, or a fault
 SURPRISE = 2.0  # times the typical activity: a frame that is stronger counts as so strong, since one must not rule
 
 

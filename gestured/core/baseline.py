@@ -9,8 +9,8 @@ from gestured.core.settling import Learned, Settling
 
 Array = NDArray[np.float64]
 
-BASELINE_TAU_S = 2.0  # drift of hours and warmth of minutes are followed
-RECOVERY_TAU_S = 0.4  # just after a contact: textile comes back slowly, and what is left of it is no touch
+BASELINE_TAU_S = 2.0  # time constant of the idle sensor: drift of hours and warmth of minutes are followed
+RECOVERY_TAU_S = 0.4  # time constant just after a contact: textile comes back slowly, and that is no touch
 
 
 class Baseline:

@@ -7,9 +7,9 @@ from gestured.core.timing import Timing
 
 Place = tuple[float, float]  # (row, column) in taxel pitches
 
-ON_SHARE = 0.20  # of the last contact's peak: what a new contact must exceed while the textile recovers
-RECOVERY_S = 1.0  # the time constant of that, and how long what is left on the sensor counts as an after-effect
-AFTER_S = 8.0  # then nothing is left of a contact: a firm finger has faded below the noise
+ON_SHARE = 0.20  # of a contact's peak: what is strong in it, and what a new one must exceed while the textile recovers
+RECOVERY_S = 1.0  # the time constant with which the last peak's share fades; as long, a remainder is an after-effect
+AFTER_S = 8.0  # after so long nothing is left of a contact: a firm finger has faded below the noise
 SPIKE = 4.0  # times the next highest frame: a peak that one frame alone reached counts for so much at most
 FIRM = 8.0  # times the threshold of a contact: what the next highest frame is taken for at least, as a tap may be one
 

@@ -16,7 +16,7 @@ from gestured.core.taxels import Inspection
 
 LARGEST = float(np.finfo(np.float32).max)  # counts; also what a frame on the wire can hold
 LEAD_S = 0.15  # quiet frames kept before an onset: at 15 Hz two of them
-LEAD_FRAMES = 200  # the same at 1000 Hz, and some: a sensor's own clock may all but stand still
+LEAD_FRAMES = 200  # quiet frames kept at most: LEAD_S at 1000 Hz and more; a sensor's own clock may all but stand still
 
 
 class Kept(NamedTuple):

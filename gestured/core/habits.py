@@ -6,11 +6,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Counts = NDArray[np.generic]
 
-ENOUGH = 3  # contacts after which something is said
+ENOUGH = 3  # contacts that must have come before anything is said
 MOSTLY = 3  # times as many contacts that say so as say the contrary
-PAUSE_S = 0.3  # after which counts that lie below the baseline again are another contact
+PAUSE_S = 0.3  # counts that fall below the baseline again after so long belong to another contact
 ALIKE = 0.3  # correlation from which neighbours are alike: a fingertip covers more than one taxel
-CLEARLY = 0.1  # by which the correlation must be higher than with rows and columns as they are
+CLEARLY = 0.1  # how much higher the correlation must be with rows and columns exchanged than as they are
 
 
 class Habits:

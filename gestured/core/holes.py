@@ -15,8 +15,8 @@ HOLE_FRAMES = 2.5  # of the sensor's own intervals: a slow one may take so many,
 CLEAR_S = 0.45  # five frames lost in a row at 15 Hz; however clear the path, longer is too long
 SIDE = 3  # frames at most on each side of a hole from which its way is taken
 RESTS = 0.5  # taxel pitches: a shorter way has no direction, and a finger that goes no further rests
-STRAIGHT = math.radians(40.0)  # between the way across the hole and the way beside it: straight on
-BENT = math.radians(75.0)  # the same where both ways bend to the same side, as on a circle
+STRAIGHT = math.radians(40.0)  # angle up to which the way across the hole goes straight on from the way beside it
+BENT = math.radians(75.0)  # the same angle where both ways bend to the same side, as on a circle
 SLOWEST = 0.75  # times the speed beside the hole: who got less far has turned a corner, or stopped
 
 

@@ -10,16 +10,16 @@ from gestured.core.quantiles import median, quantile
 
 Array = NDArray[np.float64]
 
-NOISE_TAU_S = 30.0  # noise moves slowly
-REVIEW_S = 0.5  # so it is looked at twice a second, which costs less than at each frame
-UNSEEN_S = 4.0  # at most so much of what passed under a contact or in silence counts as seen in one look
+NOISE_TAU_S = 30.0  # the time constant with which noise is followed: it changes slowly
+REVIEW_S = 0.5  # the pause between two looks at the noise; they would cost too much at each frame
+UNSEEN_S = 4.0  # the most that one look counts of the time under a contact or in silence
 OUTLIER = 4.0  # times its noise: a taxel that is further off counts as this far, since one outlier must not rule
 JUMP_PER_SIGMA = 1.128  # of normal noise, the mean absolute difference of successive values: 2 / sqrt(pi)
-SIGMA_PER_DEVIATION = 1.2533  # of normal noise, by its mean absolute deviation: sqrt(pi / 2)
+SIGMA_PER_DEVIATION = 1.2533  # of normal noise, its sigma by its mean absolute deviation: sqrt(pi / 2)
 LIVELY_FRAMES = 10  # from so many one can tell that a sensor never sends the same frame twice in a row
 TREMBLE = 0.35  # of a step: with that much noise a finger's tremble shows in the last digit
-CLIPPED_SHARE = 0.25  # of the taxels lie at the lowest value in two frames or more: the sensor cuts off its noise
-CLIPPED_QUANTILE = 0.75  # then most taxels seem quieter than they are, and the upper quartile knows better
+CLIPPED_SHARE = 0.25  # of the taxels: where so many lie at the lowest value twice, the sensor cuts off its noise
+CLIPPED_QUANTILE = 0.75  # of the taxels' noise, where it is cut off: most taxels seem quieter than they are
 PRIOR_FRAMES = 16  # frames that the noise of all taxels weighs: a second of frames knows a taxel's own noise badly
 LEAST_STEP = 1e-35  # counts; its reciprocal must stay a number
 WHOLE = 2.0**52  # counts: from here on every float64 is a whole number, which says nothing

@@ -18,11 +18,11 @@ from gestured.core.layouts import Layouts, Place
 from gestured.core.osc_message import Argument, Message, timetag
 
 MAX_PACKET = 65_536  # bytes; no UDP datagram is longer
-MAX_ADDRESS = 255  # bytes
+MAX_ADDRESS = 255  # bytes of an address
 MAX_TAGS = 4_352  # type tags of one message; a 64 x 64 frame has 4,097
-MAX_MESSAGES = 2_048  # in one packet
+MAX_MESSAGES = 2_048  # messages of one packet
 MAX_DEPTH = 8  # bundles within bundles
-RUN = 4  # so many `i` or `f` in a row come as one array
+RUN = 4  # `i` or `f` in a row from which on they come as one array
 
 _BUNDLE = b"#bundle\0"
 _SCALARS = {"i": "i", "f": "f", "d": "d", "h": "q", "t": "Q"}

@@ -1,8 +1,8 @@
 """How fast the frames of one sensor come."""
 
-RANGE_HZ = (5.0, 1000.0)  # for which everything is made
-MARGIN = 1.1  # by which a rate may lie outside: clocks differ, and a rate is measured
-SHARE = 0.05  # of the difference to the last interval that is followed: one late frame says little
+RANGE_HZ = (5.0, 1000.0)  # rates that everything here is made for
+MARGIN = 1.1  # factor by which a rate may lie outside of RANGE_HZ: clocks differ, and a rate is measured
+SHARE = 0.05  # share of the difference to the last interval that is followed: one late frame says little
 
 
 class Pace:

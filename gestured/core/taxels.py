@@ -13,10 +13,10 @@ Mask = NDArray[np.bool_]
 
 NOISY = 8.0  # a taxel with more than this many times the sensor's noise is bad
 FROZEN_S = 0.4  # a pressed taxel that stays the same to the last digit for so long is no finger
-FROZEN_NOISE = 3.0  # of its noise units: above this a taxel that froze is pressed
-STRIKES = 2  # gestures in which a taxel stood still while its neighbours were pressed, and it is stuck
+FROZEN_NOISE = 3.0  # times a taxel's own noise: above this a taxel that froze is pressed
+STRIKES = 2  # gestures in which a taxel stood still while its neighbours were pressed, after which it is stuck
 STRUCK_SHARE = 0.4  # of the contact's peak that the neighbours of such a taxel have to reach
-STRUCK_NOISE = 8.0  # times the sensor's noise, likewise
+STRUCK_NOISE = 8.0  # times the sensor's noise that they have to reach as well
 
 
 class Inspection(NamedTuple):

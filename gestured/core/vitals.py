@@ -5,10 +5,10 @@ from numpy.typing import NDArray
 
 from gestured.core.front_end import FrontEnd
 
-SHORT_S = 5.0  # a stretch of frames between two silences that holds no more than some gestures
-STRETCHES = 3  # of them in a row: the sensor sends only while it is touched
-FAULTY = 0.25  # of the taxels bad: what is bridged between them is guesswork
-WEIGHT = 1 / 16  # of the newest interval in the jitter (RFC 3550, 6.4.1)
+SHORT_S = 5.0  # frames between two silences for no longer than this are no more than some gestures
+STRETCHES = 3  # short stretches in a row after which a sensor is said to send only while it is touched
+FAULTY = 0.25  # share of the taxels: where so many are bad, what is bridged between them is guesswork
+WEIGHT = 1 / 16  # weight of the newest interval in the jitter (RFC 3550, 6.4.1)
 
 
 class Vitals:

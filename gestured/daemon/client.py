@@ -17,7 +17,7 @@ from gestured.core.errors import ProtocolError
 from gestured.core.subscription import MAX_LINE, Subscription, parse_subscription
 from gestured.daemon.metrics import Metrics
 
-BACKLOG_BYTES = 256 << 10  # that wait for one client; it bounds the memory, and who is further behind wants the newest
+BACKLOG_BYTES = 256 << 10  # bytes that wait for one client at most; who is further behind wants the newest
 READ_BYTES = 1024  # small: a client that sends rubbish waits its turn
 TURNS = 20  # reads and lines of one client in a second; what is more waits
 RUBBISH = 100  # bad lines without a good one between them after which a client is cut off: some seconds of nothing else

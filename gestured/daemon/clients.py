@@ -19,12 +19,12 @@ from gestured.daemon.client import Client
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 
-CLIENTS = 1024  # at a time; each costs a descriptor, and at most BACKLOG_BYTES of memory
+CLIENTS = 1024  # connections at a time; each costs a descriptor, and at most BACKLOG_BYTES of memory
 STALLED_S = 30.0  # a client that takes nothing for this long is cut off
-LINES = 16  # of all clients that are answered before the loop looks after its frames again
-ACCEPTED = 64  # clients at most before the loop does so
-AGAIN_S = 1.0  # until the next one is accepted after there was no descriptor for one
-DRAINED_S = 0.01  # from one look at what still waits to the next, at the end
+LINES = 16  # lines of all clients that are answered before the loop looks after its frames again
+ACCEPTED = 64  # connections that are accepted before the loop looks after its frames again
+AGAIN_S = 1.0  # the pause before the next connection is accepted where there was no descriptor for one
+DRAINED_S = 0.01  # at the end, the pause between two looks at what still waits
 
 
 class EventServer:

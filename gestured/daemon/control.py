@@ -19,12 +19,12 @@ from gestured.daemon.caller import Connection, Peer, peer_of
 from gestured.daemon.log import Throttle
 from gestured.daemon.request import MAX_REQUEST_BYTES, Refusal, Reply, ReplyStream, Verb, parse_request
 
-OPERATORS = 16
-OPERATORS_KEPT = 4  # more connections for root and our own user: no member of the group can lock them out
-IDLE_S = 60.0  # who asks nothing for so long, and is no tap, gives its place to others
-UNREAD_S = 10.0  # the same for who does not read an answer
+OPERATORS = 16  # connections at a time
+OPERATORS_KEPT = 4  # connections beyond OPERATORS for root and our own user: no member of the group can lock them out
+IDLE_S = 60.0  # an operator who asks nothing for so long, and is sent no stream, gives his place to others
+UNREAD_S = 10.0  # an operator who does not read an answer for so long is cut off
 LOGGED = 8  # lines of one verb and user in a log.PERIOD_S; what is more is counted
-TURN_BYTES = 16 << 10  # of a stream that are made in one turn: less than a millisecond's work
+TURN_BYTES = 16 << 10  # bytes of a stream that are made in one turn: less than a millisecond's work
 TURN_PAUSE_S = 0.1  # the longest pause after a turn
 
 

@@ -19,7 +19,7 @@ import structlog
 LOG_LEVELS = {"debug": 10, "info": 20, "warning": 30, "error": 40}
 PERIOD_S = 10.0  # the time in which lines of one reason are bounded
 REASONS = 64  # more reasons than there are; a bound in case one slips in that a peer can choose
-WAITING_BYTES = 256 << 10  # of lines that nobody has read so far; what comes after them is thrown away, and counted
+WAITING_BYTES = 256 << 10  # bytes of lines that wait for a reader at most; later lines are thrown away, and counted
 LAST_S = 0.5  # how long the end waits for a reader to take the last lines
 STDOUT, STDERR = 1, 2
 

@@ -17,7 +17,7 @@ from gestured.core.errors import SettingsError
 from gestured.daemon.settings import FLAGS, AddressSettings, GestureSettings, Part, SensorSettings, Settings
 
 ENVIRONMENT = "GESTURED_"
-KEYS = (*FLAGS, "config")  # that a variable can set
+KEYS = (*FLAGS, "config")  # settings that a variable can set
 # Kubernetes and Docker tell every container of every service: GESTURED_SERVICE_HOST, GESTURED_PORT_9000_UDP_ADDR.
 SERVICE = re.compile(r"GESTURED_(\w+_)?(SERVICE_HOST|SERVICE_PORT(_\w+)?|PORT_\d+_(TCP|UDP|SCTP)(_(ADDR|PORT|PROTO))?)")
 PORT = re.compile(r"GESTURED_(\w+_)?PORT")  # its value is a URL, as tcp://10.96.0.17:9000

@@ -14,14 +14,14 @@ from typing import NamedTuple
 
 from gestured.core.owner import Source
 
-TOO_MANY = 100  # packets dropped within a second, for which their sender is muted
-FIRST_S = 1.0  # for which a sender is muted at first; each further time lasts twice as long as the one before
-LONGEST_S = 8.0  # for which a sender is muted at the most: whoever has mended his flood is heard soon
+TOO_MANY = 100  # packets dropped within a second after which their sender is muted
+FIRST_S = 1.0  # how long a sender is muted at first; each further time lasts twice as long as the one before
+LONGEST_S = 8.0  # how long a sender is muted at most: whoever has mended his flood is heard soon
 SO_ATTACH_FILTER, SO_DETACH_FILTER = 26, 27  # Linux; not in Python's socket module
 NETWORK = 0xFFF00000
 LOAD_WORD, LOAD_HALF, LOAD_BYTE, AND, JUMP_EQUAL, RETURN = 0x20, 0x28, 0x30, 0x54, 0x15, 0x06  # of absolute offsets
 LET_IN, THROW_AWAY = 0xFFFFFFFF, 0
-MOST_RULES = 256  # of at most 13 instructions each; the kernel takes 4096
+MOST_RULES = 256  # rules of one filter, at most 13 instructions each; the kernel takes 4096 instructions
 
 
 Sender = Source | str  # a host and port, or all of a host

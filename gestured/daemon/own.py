@@ -21,7 +21,7 @@ from gestured.model.ladder import Ladder
 from gestured.model.model import Model
 from gestured.model.own import Examiner, Own
 
-PATIENCE_S = 120.0  # without an attempt, after which an enrolment gives its place to others
+PATIENCE_S = 120.0  # an enrolment without an attempt for so long gives its place to others
 ANSWERED_TWICE = "refractory"  # such a contact was decided, too
 
 

@@ -15,7 +15,7 @@ from gestured.model.process import ModelProcess
 
 PAIRS = 10  # disagreements that a report names
 WAITING_SEGMENTS = 8  # segments; each may be some seconds of frames
-FINISH_S = 2.0  # for what a candidate was given before it was to end
+FINISH_S = 2.0  # how long a candidate may take for the segments that it has when it is ended
 UNKNOWN = "unknown"
 
 

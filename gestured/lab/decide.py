@@ -13,8 +13,8 @@ from torch import Tensor
 from gestured.lab.nets import Decision
 
 THRESHOLDS = tuple(round(0.05 + 0.01 * k, 2) for k in range(91))
-WRONG = 2.0  # a gesture that is taken for another one counts as much as so many lost ones
-ACCEPTED = 0.25  # and a point of non-gestures that are taken for one as much as so many points of lost gestures
+WRONG = 2.0  # points of lost gestures that a point of gestures taken for another one counts as much as
+ACCEPTED = 0.25  # points of lost gestures that a point of non-gestures taken for a gesture counts as much as
 
 
 def fit_decision(first: Tensor, second: Tensor, labels: NDArray[np.int64], gestures: int) -> Decision:

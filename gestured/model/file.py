@@ -26,10 +26,10 @@ from gestured.model.protobuf import BYTES, VARINT, Field, fields, varint
 MAX_MODEL_BYTES = 64 << 20  # far more than a net for a grid of taxels needs; a file is held in memory
 MAX_FIELDS = 500_000  # protobuf fields that are looked at; a shipped model has some thousands
 MAX_MESSAGE_DEPTH = 16  # messages inside messages
-MAX_PROPERTIES = 64  # metadata; a shipped model has a dozen
-MAX_TEXT = 2 << 20  # bytes of one of them; the largest is the self-test, some kilobytes
-MAX_METADATA = 4 << 20  # bytes of all of them
-MAX_SELF_TEST = 400_000  # values; more do not fit into MAX_TEXT
+MAX_PROPERTIES = 64  # entries of metadata; a shipped model has a dozen
+MAX_TEXT = 2 << 20  # bytes of one entry of metadata; the largest is the self-test, some kilobytes
+MAX_METADATA = 4 << 20  # bytes of all entries of metadata together
+MAX_SELF_TEST = 400_000  # numbers of a self-test's input; more do not fit into MAX_TEXT
 MOST_VALUES = 1 << 63  # values of a tensor, as far as they are counted: what claims more claims too much anyway
 
 # (message, field number) -> the message inside that is looked at; everything else is skipped. "property" stands for

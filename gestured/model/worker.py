@@ -7,9 +7,9 @@ import signal
 import sys
 from typing import Any
 
-BASE_BYTES = 192 << 20  # of memory for Python, numpy, onnxruntime (some 80 MiB) and a small model
-BYTES_PER_BYTE = 4  # more for each of the file's: as read, as parsed, and its weights as onnxruntime arranges them
-START_S = 8  # s until the model is here
+BASE_BYTES = 192 << 20  # memory for Python, numpy, onnxruntime (some 80 MiB) and a small model
+BYTES_PER_BYTE = 4  # memory for each byte of the file: as read, as parsed, and its weights as onnxruntime has them
+START_S = 8  # seconds that starting may take, until the model's bytes are here
 REQUEST_HEADER_BYTES = 9  # a length, and the seconds that the answer may take
 
 

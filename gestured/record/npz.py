@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from gestured.record.check import CHARACTERS, Wrong
 
-DIRECTORY_BYTES = 64 << 10  # of the list of members; a recording's has less than two thousand
-HEADER_BYTES = 16 << 10  # of an array's header; NumPy itself takes no more than 10,000
-ITEM_BYTES = 4 * CHARACTERS  # of one number or text
-UNPACK_BYTES = 1 << 20  # that are unpacked at once
+DIRECTORY_BYTES = 64 << 10  # bytes of the list of members; a recording's has less than two thousand
+HEADER_BYTES = 16 << 10  # bytes of an array's header; NumPy itself takes no more than 10,000
+ITEM_BYTES = 4 * CHARACTERS  # bytes of one number or text
+UNPACK_BYTES = 1 << 20  # bytes that are unpacked at once
 # The end of an archive's directory, and what stands before it where there is another, larger one.
 _END, _END_BYTES, _LOCATOR, _LOCATOR_BYTES = b"PK\x05\x06", 22, b"PK\x06\x07", 20
 

@@ -23,10 +23,10 @@ from gestured.core.timing import Timing
 from gestured.record.tape import Tape
 from gestured.record.tape_reader import read
 
-SENSORS = 4096  # that a daemon's settings allow, at most
-MAX_SENSORS = 64  # where a tape does not say
-TAP_GAP_S = Timing().tap_gap_s  # where a tape does not say
-STALE_S = 60  # that a daemon's settings allow, at most
+SENSORS = 4096  # the most that a daemon's settings allow
+MAX_SENSORS = 64  # a daemon's default, for a tape that does not say
+TAP_GAP_S = Timing().tap_gap_s  # a daemon's default, for a tape that does not say
+STALE_S = 60  # the longest that a daemon's settings allow
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from gestured.core.errors import RecordingError
 from gestured.record.files import create
 from gestured.record.tape import EVENT_SCHEMA, EVENTS, PACKETS, SCENE, library
 
-CHUNK_BYTES = 1 << 20  # that are written at a time, unless a flush comes before
+CHUNK_BYTES = 1 << 20  # bytes that are written at a time, unless a flush comes before
 MESSAGE_BYTES = 32  # of the file for a message, besides its content: its header, and its place in the index
-SENDER_CHANNELS = 256  # channels; whoever comes after that shares one
+SENDER_CHANNELS = 256  # senders that have a channel of their own; whoever comes after them shares one
 
 
 class Writer:

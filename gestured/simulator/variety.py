@@ -7,9 +7,9 @@ import numpy as np
 from gestured.simulator.sensor import SimulatedSensor
 
 # Shares of the hardest sensors.
-FAINT = 0.3  # touches of 8 to 25 times the noise
-LINE_BURSTS = 0.15  # interference that hits whole rows or columns for a frame
-LOSS_IN_STEP = 0.15  # frames that are lost at regular distances
+FAINT = 0.3  # share of the hardest sensors whose touches are faint: 8 to 25 times the noise
+LINE_BURSTS = 0.15  # share of the hardest sensors where interference hits whole rows or columns for a frame
+LOSS_IN_STEP = 0.15  # share of the hardest sensors that lose frames at regular distances
 
 
 def _log(rng: np.random.Generator, low: float, high: float) -> float:

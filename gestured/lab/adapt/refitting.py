@@ -11,7 +11,7 @@ from torch.nn import functional
 from gestured.lab.decide import minimise
 from gestured.lab.nets import Decision
 
-BELIEF = 100.0  # in the old decision: samples' worth of loss for a number of it that moves by one
+BELIEF = 100.0  # samples' worth of loss for each number of the old decision that moves by one
 
 
 def refitted(

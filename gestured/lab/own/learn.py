@@ -20,11 +20,11 @@ from gestured.model.model import Model
 ACCEPTED = (
     0.015  # of other non-gestures that a threshold lets through in simulation: less than the 0.02 that is promised
 )
-TAKEN = 0.003  # of the model's gestures that one gesture of the user's own may take from it in simulation
-DIRECTIONS = 64  # that are kept, at most
-TELLING = 0.05  # variance between gestures over that within one, below which a direction tells nothing
+TAKEN = 0.003  # share of the model's gestures that one gesture of the user's own may take from it in simulation
+DIRECTIONS = 64  # directions of the embedding that are kept at most
+TELLING = 0.05  # variance between gestures over that within one; a direction with less tells nothing
 DIAGONAL, EVEN = 0.1, 0.1  # shares of the diagonal and of a multiple of one in the pooled covariance: shrinkage
-FOLDS = 5  # of kinds
+FOLDS = 5  # groups of kinds, each held out in turn
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from gestured.simulator import GESTURES
 
 UNCHANGED, SHIFT, WIDE = "none", "shift", "wide"
 AUGMENTATIONS = (UNCHANGED, SHIFT, WIDE)
-STRANGER, JUDGE = -1, -2  # in the place of a gesture's index: other people, who teach alone or judge alone
+STRANGER, JUDGE = -1, -2  # stand for a gesture's index: of other people, who teach alone or judge alone
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ GROUPS = {
     "circles": ("circle_clockwise", "circle_counter_clockwise"),
     "two fingers": ("swipe_up_two_fingers", "swipe_down_two_fingers"),
 }
-SLACK_S = 0.3  # by which an onset may lie beside what was performed and still belong to it
-FIRST_PERSON = 940  # the sessions of `online` have others
+SLACK_S = 0.3  # how far an onset may lie beside what was performed and still belong to it
+FIRST_PERSON = 940  # participants from here on: the sessions of `online` have others
 
 
 def said(model: Model, minutes: float) -> list[dict[str, Any]]:

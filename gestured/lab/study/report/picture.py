@@ -16,7 +16,7 @@ from .reading import Row, Study
 
 FIELDS = {"simulated": "simulated people", "foreign": "another generator's people", "real": "real fingers"}
 LEAST = 0.001  # an error of 0 is drawn here: a logarithm cannot show it
-KINDS = {"provisional": 1, "final": 0}  # and the filling of their marks
+KINDS = {"provisional": 1, "final": 0}  # kinds of answer, and the filling of their marks
 GROUP_MARKS = {"taps": Mark(0, "f0"), "swipes": Mark(1, "f1"), "circles": Mark(2, "f2"), "two fingers": Mark(3, "f3")}
 WIDTH, HEIGHT = 1060, 860  # pixels
 
