@@ -36,9 +36,9 @@ Line = dict[str, Any]
 class Client:
     """A subscriber of the event socket."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, deadline_s: float = DEADLINE_S) -> None:
         self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self.sock.settimeout(DEADLINE_S)
+        self.sock.settimeout(deadline_s)
         self.sock.connect(str(path))
         self._file = self.sock.makefile("rb")
         self.hello = self.line()

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from tests.daemon.harness import Client, Sensor, counted
-from tests.systemd.container import Container
+from tests.systemd.container import DEADLINE_S, Container
 
 FRAMES = 800  # 8 s: longer than the reloads take
 RATE_HZ = 100.0
@@ -27,7 +27,7 @@ class Vehicle:
 
     def client(self) -> Client:
         """A new subscriber of gestures; it waits until the daemon answers."""
-        return Client(self.box.path(self.events))
+        return Client(self.box.path(self.events), DEADLINE_S)
 
     def instance(self) -> str:
         """Which start of the daemon answers."""
