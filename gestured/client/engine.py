@@ -70,11 +70,6 @@ class Engine:
         """Its process."""
         return self._process.pid
 
-    def resident(self) -> int:
-        """Bytes of memory that it holds now (Linux)."""
-        pages = Path(f"/proc/{self._process.pid}/statm").read_text().split()[1]
-        return int(pages) * os.sysconf("SC_PAGE_SIZE")
-
     def close(self) -> None:
         """End it as an operator would; again is nothing."""
         self._process.terminate()
