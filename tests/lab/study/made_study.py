@@ -42,6 +42,11 @@ GROUPS = {
     "place": [f"{part}: 0.123 to 2.34 taxels from the middle" for part in ("low", "middle", "high")],
     "signal to noise": ["low: 12 to 40.1", "middle: 40.1 to 80.2", "high: 80.2 to 161"],
 }
+# The sections of a study that are lists.
+LISTS = (
+    "cells", "copies", "tuning", "choices", "run_time", "elapsed", "learning", "calibration", "failures", "online",
+    "online_shipped",
+)  # fmt: skip
 
 
 def made_study(seed: int = 5) -> Study:
@@ -98,20 +103,8 @@ def small_study() -> Study:
 def empty_study() -> Study:
     """The same with nothing computed, as small as the schema allows."""
     study = made_study()
-    lists = (
-        "cells",
-        "copies",
-        "tuning",
-        "choices",
-        "run_time",
-        "elapsed",
-        "learning",
-        "calibration",
-        "failures",
-        "online",
-    )
     data = {"simulated": study["data"]["simulated"], "real": None, "own": [], "left_out": []}
-    nothing: Study = {name: [] for name in lists}
+    nothing: Study = {name: [] for name in LISTS}
     return {**study, **nothing, "methods": {}, "data": data, "signals": {}, "double_tap": None}
 
 

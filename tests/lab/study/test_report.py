@@ -14,23 +14,10 @@ pytest.importorskip("matplotlib", reason="needs the extra [lab]")
 pytest.importorskip("jinja2", reason="needs the extra [lab]")
 
 from gestured.lab.study.report.page import write_report
-from tests.lab.study.made_study import NAMES, empty_study, made_study, small_study
+from tests.lab.study.made_study import LISTS, NAMES, empty_study, made_study, small_study
 
 Study = dict[str, Any]
 HOSTILE = "</script></style><script>alert('\"x\"')</script>&\x00\ud800"
-LISTS = (
-    "cells",
-    "copies",
-    "tuning",
-    "choices",
-    "run_time",
-    "elapsed",
-    "learning",
-    "calibration",
-    "failures",
-    "online",
-    "online_shipped",
-)
 MAY_BE_NULL = [
     ("low", "high"),
     ("p95_us", "memory_bytes", "file_bytes", "latency_ms", "error"),
