@@ -32,7 +32,10 @@ def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: Tr
 
 
 def write_block(readme: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
-    """Renew the table of figures in a README; GesturedError where its marks are missing."""
+    """Renew the tables of figures in a README; GesturedError where their marks are missing.
+
+    The one of kinds that nobody taught stays where it was not measured.
+    """
     rows = [
         _row(f"`{name}.onnx`, {title}", values)
         for name, found in figures.items()
@@ -43,6 +46,9 @@ def write_block(readme: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
     ]
     origin = made_of("gestured-lab evaluate --readme README.md", models_and_manifest())
     renew(readme, "figures", [origin, "", *HEAD, *rows])
+    if "whole_left_out" in figures["cnn_lstm"]:
+        origin = made_of("gestured-lab evaluate --whole --readme README.md", models_and_manifest())
+        renew(readme, "unseen", [origin, "", *_unseen(figures["cnn_lstm"])])
 
 
 HEAD = (
@@ -57,13 +63,7 @@ def _card(path: Path, name: str, found: Mapping[str, Any], plan: TrainingPlan) -
     rows = [(f"simulated, {test} ", values) for test, values in found["simulated"].items()]
     rows += [(f"real, {k}", v) for k, v in found.get("real", {}).items() if k != "kinds"]
     table = "\n".join(_row(title.strip(), values) for title, values in rows)
-    held = found.get("held_out_kinds")
-    extra = (
-        f"\nNon-gestures of kinds that heads and calibration had not seen (three groups, {held['count']} simulated segments): "
-        f"{held['rejected']:.3f} rejected.\n"
-        if held
-        else ""
-    )
+    extra = "".join(f"\n{line}" for line in ["", *_unseen(found)]) if "held_out_kinds" in found else ""
     return f"""# {name}
 
 {WHAT[name]}
@@ -90,12 +90,12 @@ Printed by `gestured-lab evaluate`. *Simulated* is gestured's own simulator, whi
 learned from, too, with other seeds: *nominal* the cohort's participants 28 to 33 on the
 nominal 9 x 9 sensor, *wide* other people on randomised sensors of every quality, some of them hopeless. *Real* is CapFingerId,
 each subject judged by networks that have not seen them (three folds). Shares of the gestures that were performed; *right\\** is
-before rejection, *lost* is unknown or never cut out; *rejected* is of the non-gestures.
+before rejection, *lost* is unknown or never cut out; *rejected* is of the non-gestures. In brackets: 95 % intervals over people.
 
 {HEAD[0]}
 {HEAD[1]}
-{table}
-{extra}
+{table}{extra}
+
 ## Limits
 
 {LIMITS}
@@ -103,7 +103,43 @@ before rejection, *lost* is unknown or never cut out; *rejected* is of the non-g
 
 
 def _row(title: str, values: Mapping[str, Any]) -> str:
-    numbers = [values[n] for n in ("right_before", "right", "wrong", "lost")]
-    shares = " | ".join(f"{n:.3f}" for n in numbers)
-    rejected = f"{values['rejected']:.3f}" if values["others"] else "-"
-    return f"| {title} | {values['gestures']} | {shares} | {values['others']} | {rejected} |"
+    ends = values["intervals"]
+    shares = " | ".join(_with_interval(values[n], ends[n]) for n in ("right", "wrong", "lost"))
+    rejected = _with_interval(values["rejected"], ends["rejected"]) if values["others"] else "-"
+    before = f"{values['right_before']:.3f}"
+    return f"| {title} | {values['gestures']} | {before} | {shares} | {values['others']} | {rejected} |"
+
+
+def _with_interval(share: float, ends: Mapping[str, float]) -> str:
+    return f"{share:.3f} ({ends['low']:.3f}–{ends['high']:.3f})"
+
+
+TAUGHT = {
+    "known": "nobody: the model that ships has learned them",
+    "heads": "heads and calibration; the network below them has learned these kinds",
+    "whole": "the whole of it: network, second opinion, heads and calibration",
+}
+
+
+def _unseen(found: Mapping[str, Any]) -> list[str]:
+    """Lines about non-gestures of kinds that were not learned: by the heads, and by the whole network."""
+    heads, whole = found["held_out_kinds"], found.get("whole_left_out")
+    lines = [
+        "Non-gestures of kinds that heads and calibration had not seen, while the network below the heads had (three groups of",
+        f"kinds in turn, {heads['count']} simulated segments): {_with_interval(heads['rejected'], heads)} rejected.",
+    ]
+    if whole is None:
+        return lines
+    tests = list(whole["whole"]["simulated"])
+    lines += [
+        "", f"One group of kinds ({', '.join(whole['kinds'])}) was then left out of everything: networks were trained from "
+        "nothing without them, by the plan of those that ship, and calibrated without them. Rejected are "
+        f"{whole['whole']['count']} simulated segments of these kinds alone; right and wrong are of all gestures:", "",
+        f"| who has not seen these kinds | rejected | {' | '.join(f'{t}: right | wrong' for t in tests)} |",
+        f"|---|---|{'---|' * 2 * len(tests)}",
+    ]  # fmt: skip
+    for how, words in TAUGHT.items():
+        sets = [whole[how]["simulated"][test] for test in tests]
+        shares = " | ".join(_with_interval(one[n], one["intervals"][n]) for one in sets for n in ("right", "wrong"))
+        lines.append(f"| {words} | {_with_interval(whole[how]['rejected'], whole[how])} | {shares} |")
+    return lines

@@ -11,12 +11,13 @@ import torch
 from gestured.core.errors import GesturedError
 from gestured.lab.cards import write_block, write_cards
 from gestured.lab.cli import REAL_FOLDER
-from gestured.lab.evaluate import Evaluation, held_out_kinds, print_curve, real_figures, simulated_figures
+from gestured.lab.evaluate import Evaluation, print_curve, real_figures, simulated_figures
 from gestured.lab.manifest import write_manifest
 from gestured.lab.networks import compare, compare_rules
 from gestured.lab.own import command as own
 from gestured.lab.own.command import open_file, teach
 from gestured.lab.train import TrainingPlan, calibration_set, learn, load_data, train
+from gestured.lab.unseen import held_out_kinds, whole_left_out
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
 
@@ -45,6 +46,7 @@ def train_models(args: argparse.Namespace) -> int:
         if open_file(path).embeds:
             teach(path, args.cache, own.QUICK_PEOPLE if args.quick else own.PEOPLE, args.jobs)
     args.models, args.readme, args.curve, args.networks, args.field = args.out, None, False, False, False
+    args.whole = False
     return evaluate_models(args)
 
 
@@ -71,6 +73,8 @@ def evaluate_models(args: argparse.Namespace) -> int:
     for name, found in real_figures(trained, calibrated, data).items():
         figures[name]["real"] = found
     figures["cnn_lstm"]["held_out_kinds"] = held_out_kinds(trained, data, plan)
+    if args.whole:
+        figures["cnn_lstm"]["whole_left_out"] = whole_left_out(trained, data, plan, args.cache, paths["cnn_lstm"])
     write_manifest(args.models, figures)
     write_cards(args.models, figures, plan)
     if args.readme:

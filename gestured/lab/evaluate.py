@@ -1,31 +1,28 @@
 """The figures: what the exported files are worth on people they have never seen.
 
 Simulated figures are of the exported .onnx files themselves. Real figures are of networks that were trained without
-the subjects they are judged on (three folds); non-gestures held out are judged with heads refitted without them.
+the subjects they are judged on (three folds).
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
 
-from gestured.lab.augment import varied
-from gestured.lab.decide import THRESHOLDS, curve, fit_decision, threshold
-from gestured.lab.fit import CLASSES, lengths_of, padded, targets
-from gestured.lab.nets import Perceptron, Recurrent
+from gestured.lab.decide import THRESHOLDS, curve
+from gestured.lab.fit import padded, targets
 from gestured.lab.samples import Samples
-from gestured.lab.train import REAL_SETS, Calibrated, Trained, TrainingData, TrainingPlan, folds, is_of, judged
-from gestured.lab.trajectory import trajectory_features
+from gestured.lab.study.bootstrap import interval
+from gestured.lab.train import REAL_SETS, Calibrated, Trained, TrainingData, folds, is_of, judged
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.simulator import GESTURES, NONE
 
-GROUPS = 3  # of kinds of non-gestures held out
+SHARES = ("right", "wrong", "lost", "rejected")  # of an evaluation, those that have intervals
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +36,8 @@ class Evaluation:
     wrong: float
     lost: float  # to unknown, or never cut out
     rejected: float  # of the non-gestures
+    people: int = 0  # who performed; 0 where nobody said who
+    intervals: dict[str, dict[str, float]] = field(default_factory=dict)  # low and high, 95 % over people, by name
 
     HEAD = f"{'set':<40}{'gestures':>9}{'right*':>8}{'right':>8}{'wrong':>8}{'lost':>8}{'others':>8}{'rejected':>9}"
 
@@ -49,14 +48,29 @@ class Evaluation:
             f"{self.lost:>8.3f}{self.others:>8}{self.rejected:>9.3f}"
         )
 
+    def rows(self, title: str) -> str:
+        """The row, and below it where its intervals begin and end."""
+        lines = [self.row(title)]
+        for end, words in (("low", f"  95 % over {self.people} people, from"), ("high", "  to")):
+            right, wrong, lost, rejected = (self.intervals[name][end] for name in SHARES)
+            lines.append(f"{words:<57}{right:>8.3f}{wrong:>8.3f}{lost:>8.3f}{'':>8}{rejected:>9.3f}")
+        return "\n".join(lines)
+
 
 Answers = tuple[NDArray[np.float32], NDArray[np.float32]]  # scores (N, G), unknown (N,)
 
 
-def outcome(answers: Answers, labels: NDArray[np.int64], least: float, performed: int | None = None) -> Evaluation:
+def outcome(
+    answers: Answers,
+    labels: NDArray[np.int64],
+    least: float,
+    performed: int | None = None,
+    people: NDArray[np.int64] | None = None,
+) -> Evaluation:
     """Judge answers against classes (N,), published from a confidence of `least` on.
 
-    `performed`: how many gestures were performed, where some were never cut out.
+    `performed`: how many gestures were performed, where some were never cut out. With `people` (N,) there are
+    intervals; as nobody knows whose the gestures are that were never cut out, these are lost in all that is drawn.
     """
     scores, unknown = answers
     known = (labels >= 0) & (labels < scores.shape[1])
@@ -68,10 +82,33 @@ def outcome(answers: Answers, labels: NDArray[np.int64], least: float, performed
         return float(chosen.sum() / of) if of else float("nan")
 
     hits, misses = share(right & published & known, total), share(~right & published & known, total)
-    return Evaluation(
+    found = Evaluation(
         total, int((~known).sum()), share(right & known, total), hits, misses, 1 - hits - misses,
         share(~published & ~known, int((~known).sum())),
     )  # fmt: skip
+    if people is None:
+        return found
+    ends = _intervals(known, published, right, known.sum() / max(total, 1), people)
+    return replace(found, people=len(np.unique(people)), intervals=ends)
+
+
+def _intervals(
+    known: NDArray[np.bool_],
+    published: NDArray[np.bool_],
+    right: NDArray[np.bool_],
+    cut: float,
+    people: NDArray[np.int64],
+) -> dict[str, dict[str, float]]:
+    """Low and high of each of `SHARES`; `cut` is the share of the gestures that answers (N,) were given to at all."""
+
+    def ends(chosen: NDArray[np.bool_], of: NDArray[np.bool_]) -> NDArray[np.float64]:
+        return np.array(interval(chosen[of], people[of])[1:])
+
+    found = (
+        cut * ends(right & published, known), cut * ends(~right & published, known),
+        cut * ends(~published, known) + 1 - cut, ends(~published, ~known),
+    )  # fmt: skip
+    return {name: {"low": float(low), "high": float(high)} for name, (low, high) in zip(SHARES, found, strict=True)}
 
 
 def model_answers(model: Model, samples: Samples) -> Answers:
@@ -95,9 +132,9 @@ def simulated_figures(models: Mapping[str, Path], data: TrainingData) -> dict[st
         found[name] = {}
         for test, samples in data.tests.items():
             given = model_answers(model, samples)
-            result = outcome(given, targets(samples), model.threshold, data.performed[test])
+            result = outcome(given, targets(samples), model.threshold, data.performed[test], samples.people)
             found[name][test] = asdict(result) | {"kinds": by_kind(given, samples, model.threshold)}
-            print(result.row(f"{name}, simulated, {test}"), flush=True)
+            print(result.rows(f"{name}, simulated, {test}"), flush=True)
     return found
 
 
@@ -151,91 +188,9 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
         judged_once = np.arange(len(real)) < data.real_judged
         for title in REAL_SETS:
             chosen = is_of(real.labels, title) & judged_once
-            result = outcome((scores[chosen], unknown[chosen]), labels[chosen], least, data.performed.get(title))
+            answers = scores[chosen], unknown[chosen]
+            result = outcome(answers, labels[chosen], least, data.performed.get(title), real.people[chosen])
             found.setdefault(name, {})[title] = asdict(result)
-            print(result.row(f"{name}, real, {title}"), flush=True)
+            print(result.rows(f"{name}, real, {title}"), flush=True)
         found[name]["kinds"] = by_kind(both, real, least)
     return found
-
-
-def held_out_kinds(trained: Trained, data: TrainingData, plan: TrainingPlan, name: str = "cnn_lstm") -> dict[str, Any]:
-    """Non-gestures of kinds that the heads and the calibration have not seen: three groups of kinds, in turn."""
-    net = trained.nets[name]
-    assert isinstance(net, Recurrent)
-    teach, calibrate = _cues(net, data.teach, plan, vary=True), _cues(net, data.calibrate, plan)
-    tests = {test: _cues(net, samples, plan) for test, samples in data.tests.items()}
-    kinds: dict[str, float] = {}
-    rejected: list[float] = []
-    for group in range(GROUPS):
-        hidden = [CLASSES.index(kind) for kind in sorted(CLASSES[len(GESTURES) :])[group::GROUPS]]
-        first, second = (_refit(teach, which, hidden, plan) for which in (0, 1))
-        seen = ~np.isin(calibrate[2], hidden)
-        decision = fit_decision(
-            first(calibrate[0][seen]).detach(), second(calibrate[1][seen]).detach(), calibrate[2][seen], len(GESTURES)
-        )
-        with torch.no_grad():
-            scores, unknown = decision(first(calibrate[0][seen]), second(calibrate[1][seen]))
-            least = threshold(scores.numpy(), unknown.numpy(), calibrate[2][seen])
-            for embedded, features, labels in tests.values():
-                chosen = np.isin(labels, hidden)
-                scores, unknown = decision(first(embedded[chosen]), second(features[chosen]))
-                accepted = (scores.max(1).values * (1 - unknown) >= least).numpy()
-                rejected += (~accepted).tolist()
-                for k in hidden:
-                    of = labels[chosen] == k
-                    if of.any():
-                        kinds[CLASSES[k]] = round(float((~accepted[of]).mean()), 3)
-    share = float(np.mean(rejected))
-    print(f"{f'{name}, non-gestures of held-out kinds':<40}{len(rejected):>49}{share:>9.3f}", flush=True)
-    return {"rejected": share, "count": len(rejected), "kinds": kinds}
-
-
-Cues = tuple[Tensor, Tensor, NDArray[np.int64]]  # embedding (N, 32), trajectory features (N, F), class (N,)
-
-
-def _cues(net: Recurrent, samples: Samples, plan: TrainingPlan, *, vary: bool = False) -> Cues:
-    """What the heads see. With `vary` a random part of the samples, as they are and varied."""
-    labels = targets(samples)
-    index = np.flatnonzero(labels >= 0)
-    if vary:
-        index = np.random.default_rng(plan.fit.seed).permutation(index)[:24_000]
-    index = index[np.argsort(samples.lengths()[index], kind="stable")]
-    generator = torch.Generator().manual_seed(plan.fit.seed)
-    embedded, features, found = [], [], []
-    net.eval()
-    with torch.no_grad():
-        for start in range(0, len(index), 256):
-            chosen = index[start : start + 256]
-            x = padded(samples, chosen, plan.fit.longest)
-            lengths = lengths_of(samples, chosen, plan.fit.longest)
-            for y in (x, varied(x, generator)) if vary else (x,):
-                embedded.append(net.embed(y, lengths))
-                features.append(trajectory_features(y, lengths))
-                found.append(labels[chosen])
-    return torch.cat(embedded), torch.cat(features), np.concatenate(found)
-
-
-def _refit(cues: Cues, which: int, hidden: list[int], plan: TrainingPlan) -> nn.Module:
-    """A fresh head (0: on the embedding, linear; 1: on the trajectory features) that never saw the hidden kinds."""
-    torch.manual_seed(plan.fit.seed)
-    seen = torch.from_numpy(~np.isin(cues[2], hidden))
-    x, y = cues[which][seen], torch.from_numpy(cues[2])[seen]
-    head: nn.Module
-    if which == 0:
-        head = nn.Linear(x.shape[1], len(CLASSES))
-    else:
-        head = Perceptron(x.shape[1], len(CLASSES))
-        head.fit_scale(x)
-    epochs = 6
-    optimiser = torch.optim.AdamW(head.parameters(), lr=4e-3)
-    steps = epochs * (-(-len(x) // 256))
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 4e-3, total_steps=steps, pct_start=0.1)
-    criterion = nn.CrossEntropyLoss(label_smoothing=plan.fit.smoothing)
-    for _ in range(epochs):
-        for part in torch.split(torch.randperm(len(x)), 256):
-            loss = criterion(head(x[part]), y[part])
-            optimiser.zero_grad()
-            loss.backward()
-            optimiser.step()
-            schedule.step()
-    return head.eval()

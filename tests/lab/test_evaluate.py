@@ -55,3 +55,29 @@ def test_the_shares_of_the_gestures_add_up(least: float) -> None:
 def test_a_row_stands_under_its_heading() -> None:
     found = outcome(answer((0, 0.0), (1, 0.0)), np.array([0, 4]), 0.5)
     assert len(found.row("a set")) == len(Evaluation.HEAD)
+
+
+def test_people_are_what_is_drawn_for_an_interval() -> None:
+    """As many right answers, from people who are all alike, and from people of whom half cannot do it at all."""
+    people = np.repeat(np.arange(8), 10)
+    alike = np.where(np.arange(80) % 2, 0, 1)
+    apart = np.where(people % 2, 0, 1)
+    said = answer(*[(0, 0.0)] * 80)
+    one, other = (outcome(said, labels, 0.5, people=people) for labels in (alike, apart))
+    assert one.right == other.right == 0.5 and one.people == 8
+    assert one.intervals["right"] == {"low": 0.5, "high": 0.5}
+    assert other.intervals["right"]["low"] < 0.3 and other.intervals["right"]["high"] > 0.7
+
+
+@pytest.mark.parametrize("performed", [None, 170, 300])
+def test_intervals_hold_the_shares_that_they_are_of(performed: int | None) -> None:
+    rng = np.random.default_rng(4)
+    said = rng.dirichlet(np.ones(3), 200).astype(np.float32), rng.random(200).astype(np.float32)
+    labels, people = rng.integers(0, 4, 200), rng.integers(0, 12, 200)
+    found = outcome(said, labels, 0.3, performed, people)
+    for name, ends in found.intervals.items():
+        assert 0 <= ends["low"] < getattr(found, name) < ends["high"] <= 1
+    never = found.gestures - int((labels < 3).sum())
+    assert found.intervals["lost"]["low"] >= never / found.gestures  # what was never cut out is lost whoever is drawn
+    assert found.rows("a set").splitlines()[0] == found.row("a set")
+    assert {len(line) for line in found.rows("a set").splitlines()} == {len(Evaluation.HEAD)}

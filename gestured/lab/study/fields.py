@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from gestured.core.features import touch_pattern
+from gestured.lab.digest import file_digest
 from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.study.material import SHIFT, UNCHANGED, classes
 from gestured.lab.study.protocols import FOREIGN, REAL
@@ -70,10 +71,26 @@ def _published(name: str, judges: Samples, performed: int) -> dict[str, Any]:
 
 
 def _manifest(name: str) -> dict[str, Any] | None:
-    """The manifest's figures of real subjects; it has no intervals."""
+    """The manifest's figures of real subjects; one that was written by an older version has no intervals."""
     entry = json.loads((shipped()[name].parent / "manifest.json").read_text())["models"].get(f"{name}.onnx", {})
     row = entry.get("figures", {}).get("real", {}).get(REAL_SETS[0])
     if row is None:
         return None
-    error = row["wrong"] + row["lost"]
-    return {"wrong": round(row["wrong"], 4), "error": round(error, 4), "performed": row["gestures"]}
+    found = {"wrong": row["wrong"], "error": row["wrong"] + row["lost"]}
+    if ends := row.get("intervals"):
+        wrong, right = ends["wrong"], ends["right"]
+        found |= {"wrong_low": wrong["low"], "wrong_high": wrong["high"]}
+        found |= {"error_low": 1 - right["high"], "error_high": 1 - right["low"]}
+    return {name: round(share, 4) for name, share in found.items()} | {"performed": row["gestures"]}
+
+
+def renewed(study: Mapping[str, Any]) -> dict[str, Any]:
+    """The same study with the manifest's real figures of the shipped models, where it timed those that are here."""
+    here = {name: file_digest(path) for name, path in shipped().items() if path.exists()}
+    rows = []
+    for row in study["run_time"]:
+        name = SHIPPED.get(row["method"]) if row["settings"] == "shipped" else None
+        same = name in here and (study["about"].get("models") or {}).get(name) == here[name]
+        real = _manifest(name) if name and same else None
+        rows.append({**row, "fields": row["fields"] | {"real": real}} if real else row)
+    return {**study, "run_time": rows}

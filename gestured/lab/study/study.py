@@ -21,7 +21,7 @@ from gestured.lab.samples import Samples
 from gestured.lab.study import cohort, elapsed, failures, own, signals, tables
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.choices import choices
-from gestured.lab.study.fields import with_fields
+from gestured.lab.study.fields import renewed, with_fields
 from gestured.lab.study.learning import learning
 from gestured.lab.study.machine import machine
 from gestured.lab.study.material import SHIFT, Data
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     torch.set_num_threads(1)
     if args.draw:
         args.out.mkdir(parents=True, exist_ok=True)
-        kept = _kept(args.draw)
+        kept = renewed(_kept(args.draw))
         path = write_picture(kept, args.out)
         below = [made_of("gestured-lab study", [path, path.with_suffix(".json")]), "", *table(kept)]
         if args.readme:

@@ -1,0 +1,145 @@
+"""Non-gestures of kinds that nobody taught: how many are rejected where heads alone, or whole networks, lack them."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from gestured.lab.augment import symmetry_table
+from gestured.lab.evaluate import Answers, Evaluation, model_answers, outcome
+from gestured.lab.fit import CLASSES, logits, targets
+from gestured.lab.heads import Heads
+from gestured.lab.samples import Samples
+from gestured.lab.study.bootstrap import interval
+from gestured.lab.train import Trained, TrainingData, TrainingPlan, calibration_set, judged, learn
+from gestured.model.opening import open_model
+from gestured.simulator import GESTURES
+
+NAME = "cnn_lstm"  # the network that is judged
+GROUPS = 3  # of kinds of non-gestures that are held out in turn
+WHOLE = 0  # the group that whole networks are trained without: the first one, chosen before any figure was seen
+
+
+def group_of(number: int) -> list[int]:
+    """The classes of one of `GROUPS` groups: every third kind of non-gesture, by its name."""
+    return [CLASSES.index(kind) for kind in sorted(CLASSES[len(GESTURES) :])[number::GROUPS]]
+
+
+def untaught(classes: Sequence[int]) -> list[int]:
+    """Those of some classes that no other class is turned or mirrored into while networks learn.
+
+    A swipe of two fingers to the right is one upward turned: a network that learns the one has seen the other.
+    """
+    left = set(classes)
+    table = symmetry_table(CLASSES).numpy()
+    while taught := {int(k) for i in range(len(CLASSES)) if i not in left for k in table[:, i]} & left:
+        left -= taught
+    return sorted(left)
+
+
+def without_kinds(data: TrainingData, classes: Sequence[int]) -> TrainingData:
+    """The same data with no sample of these classes left in what teaches and calibrates; what judges keeps them."""
+
+    def kept(samples: Samples) -> NDArray[np.bool_]:
+        return ~np.isin(targets(samples), classes)
+
+    teach = kept(data.teach)
+    left = replace(
+        data,
+        teach=data.teach.take(teach),
+        nominal=int(teach[len(teach) - data.nominal :].sum()),
+        calibrate=data.calibrate.take(kept(data.calibrate)),
+    )
+    if data.real is None:
+        return left
+    real = kept(data.real)
+    return replace(left, real=data.real.take(real), real_judged=int(real[: data.real_judged].sum()))
+
+
+class Said(NamedTuple):
+    """What is answered on a test set, where some classes of non-gestures are asked after."""
+
+    test: str
+    answers: Answers
+    samples: Samples
+    least: float  # confidence from which answers are published
+    classes: Sequence[int]
+
+    def judged(self, performed: int) -> Evaluation:
+        """Of all gestures, and of these non-gestures alone."""
+        labels = targets(self.samples)
+        chosen = ((labels >= 0) & (labels < len(GESTURES))) | np.isin(labels, self.classes)
+        scores, unknown = self.answers
+        of = self.samples.people[chosen]
+        return outcome((scores[chosen], unknown[chosen]), labels[chosen], self.least, performed, of)
+
+
+def rejected(found: Sequence[Said]) -> dict[str, Any]:
+    """Which share of those non-gestures was rejected, with its 95 % interval over people, and of each kind."""
+    labels, people, hit = [], [], []
+    for said in found:
+        known = targets(said.samples)
+        chosen = np.isin(known, said.classes)
+        scores, unknown = said.answers
+        labels.append(known[chosen])
+        people.append(said.samples.people[chosen])
+        hit.append((scores.max(axis=1) * (1 - unknown) < said.least)[chosen])
+    classes, hits = np.concatenate(labels), np.concatenate(hit)
+    share, low, high = interval(hits, np.concatenate(people))
+    kinds = {CLASSES[k]: round(float(hits[classes == k].mean()), 3) for k in np.unique(classes)}
+    return {"rejected": share, "low": low, "high": high, "count": len(hits), "kinds": kinds}
+
+
+def held_out_kinds(trained: Trained, data: TrainingData, plan: TrainingPlan) -> dict[str, Any]:
+    """Non-gestures of kinds that the heads and the calibration have not seen: three groups of kinds, in turn."""
+    heads = Heads.of(trained, data, plan, NAME)
+    groups = [group_of(number) for number in range(GROUPS)]
+    found = rejected([Said(*given, classes) for classes in groups for given in heads.without(classes, plan)])
+    print(f"{f'{NAME}, non-gestures of held-out kinds':<40}{found['count']:>49}{found['rejected']:>9.3f}", flush=True)
+    return found
+
+
+HOW = {"known": "knows them", "heads": "heads without", "whole": "whole without"}
+
+
+def whole_left_out(trained: Trained, data: TrainingData, plan: TrainingPlan, cache: Path, path: Path) -> dict[str, Any]:
+    """Non-gestures of one group of kinds that a network, its second opinion and its calibration have not seen at all.
+
+    Beside it the same kinds where heads and calibration alone lack them, and the model in `path`, which knows them;
+    with what each makes of the gestures. The training is kept in `cache`, as every other.
+    """
+    classes = untaught(group_of(WHOLE))
+    print(f"{NAME} and {len(classes)} kinds of non-gestures: {', '.join(CLASSES[k] for k in classes)}", flush=True)
+    less = without_kinds(data, classes)
+    model = open_model(path)
+    answers = {
+        "known": [Said(test, model_answers(model, s), s, model.threshold, classes) for test, s in data.tests.items()],
+        "heads": [Said(*given, classes) for given in Heads.of(trained, data, plan, NAME).without(classes, plan)],
+        "whole": _answers(learn(plan, less, cache), less, plan, classes),
+    }
+    found: dict[str, Any] = {"kinds": [CLASSES[k] for k in classes]}
+    for how, said in answers.items():
+        found[how] = rejected(said)
+        results = {one.test: one.judged(data.performed[one.test]) for one in said}
+        found[how]["simulated"] = {test: asdict(result) for test, result in results.items()}
+        for test, result in results.items():
+            print(result.rows(f"{NAME}, {HOW[how]}, {test}"), flush=True)
+        both = " ".join(f"{found[how][value]:.3f}" for value in ("rejected", "low", "high"))
+        print(f"{NAME}, {HOW[how]}: of {found[how]['count']} of these kinds rejected, low, high: {both}", flush=True)
+    return found
+
+
+def _answers(trained: Trained, data: TrainingData, plan: TrainingPlan, classes: Sequence[int]) -> list[Said]:
+    """What a network that was trained and calibrated on these data answers on the test sets."""
+    module, calibration, _ = judged(trained, NAME, calibration_set(trained, data, plan))
+    found = []
+    for test, samples in data.tests.items():
+        of = logits(trained.nets, samples, plan.fit)
+        with torch.no_grad():
+            scores, unknown = module.decision(of[NAME], of["trajectory"])
+        found.append(Said(test, (scores.numpy(), unknown.numpy()), samples, calibration["threshold"], classes))
+    return found
