@@ -10,7 +10,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from benchmarks.timing import Row
-from gestured.lab.made_of import made_of, models_and_manifest
+from gestured.lab.made_of import made_of
+from gestured.model.shipped import shipped
 
 
 def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
@@ -60,7 +61,7 @@ def main() -> int:
     rows = []
     if not args.json:
         print(
-            f"{machine()}\n{made_of('make bench', models_and_manifest())}\n\n"
+            f"{machine()}\n{made_of('make bench', shipped().values())}\n\n"
             "| figure | gestured | against | ratio | to reach | |\n|---|---|---|---|---|---|",
             flush=True,
         )

@@ -32,7 +32,7 @@ def renew(document: Path, name: str, lines: Iterable[str]) -> None:
 
 
 def models_and_manifest() -> list[Path]:
-    """What most tables are made of: the shipped models and the figures beside them."""
+    """What tables of figures are made of: the shipped models and the figures beside them."""
     paths = list(shipped().values())
     return [*paths, paths[0].parent / "manifest.json"]
 

@@ -21,7 +21,7 @@ from gestured.simulator import GESTURES
 
 NAME = "cnn_lstm"  # the network that is judged
 GROUPS = 3  # of kinds of non-gestures that are held out in turn
-WHOLE = 0  # the group that whole networks are trained without: the first one, chosen before any figure was seen
+WHOLE = 0  # the group that whole networks are trained without: the first one, chosen before any was trained
 
 
 def group_of(number: int) -> list[int]:

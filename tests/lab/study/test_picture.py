@@ -12,8 +12,10 @@ pytest.importorskip("matplotlib", reason="needs the extra [lab]")
 
 from gestured.core.errors import GesturedError
 from gestured.lab import cli
+from gestured.lab.digest import file_digest
 from gestured.lab.made_of import renew, stale
 from gestured.lab.study.report.picture import FIELDS, write_picture
+from gestured.model.shipped import shipped
 from tests.lab.study.made_study import NAMES, made_study
 
 
@@ -43,6 +45,25 @@ def test_it_is_drawn_again_from_what_is_kept(tmp_path: Path, capsys: pytest.Capt
     assert not re.search(r"\b(nan|inf|None)\b", first.read_text())
 
 
+def test_real_figures_of_the_models_that_ship_are_the_manifests(tmp_path: Path) -> None:
+    """A study that timed a model of this checkout takes them from there, intervals too; else it keeps its own."""
+    study, kept = made_study(), tmp_path / "study.json"
+    study["about"]["models"] = {name: file_digest(path) for name, path in shipped().items()} | {"lstm": "0" * 64}
+    kept.write_text(json.dumps(study))
+    assert cli.main(["study", "--draw", str(kept), "--out", str(tmp_path)]) == 0
+    drawn = json.loads((tmp_path / "operating-points.json").read_text())["run_time"]
+    names = [(row["method"], row["settings"]) for row in study["run_time"]]
+    found = drawn.pop(k := names.index(("cnn_lstm", "shipped")))["fields"]["real"]
+    study["run_time"].pop(k)
+    assert drawn == study["run_time"]
+    figures = json.loads((shipped()["cnn_lstm"].parent / "manifest.json").read_text())["models"]["cnn_lstm.onnx"]
+    real = figures["figures"]["real"]["taps and swipes"]
+    assert found["performed"] == real["gestures"] and found["wrong"] == pytest.approx(real["wrong"], abs=1e-4)
+    assert found["error"] == pytest.approx(1 - real["right"], abs=1e-4)
+    assert found["wrong_low"] < found["wrong"] < found["wrong_high"]
+    assert found["error_low"] < found["error"] < found["error_high"]
+
+
 def test_the_table_below_it_is_put_into_a_readme_and_only_there(tmp_path: Path) -> None:
     study, kept, readme = made_study(), tmp_path / "study.json", tmp_path / "README.md"
     kept.write_text(json.dumps(study))
@@ -53,6 +74,9 @@ def test_the_table_below_it_is_put_into_a_readme_and_only_there(tmp_path: Path) 
     ships = next(line for line in block if line.startswith("| CNN-LSTM, ships |"))
     (row,) = [r for r in study["run_time"] if (r["method"], r["settings"]) == ("cnn_lstm", "shipped")]
     wrong = [f"{100 * row['fields'][field]['wrong']:.1f}" for field in FIELDS]
+    simulated = row["fields"]["simulated"]
+    error, low, high = (f"{100 * simulated[name]:.1f}" for name in ("error", "error_low", "error_high"))
+    assert ships.split(" | ")[3].startswith(f"{error} ({low}–{high}), ")
     assert ships.split(" | ")[2] == ", ".join(wrong) and ships.endswith("| 0.31 |")
     assert len({line.count("|") for line in block if line.startswith("|")}) == 1
 

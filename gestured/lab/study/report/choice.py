@@ -28,7 +28,7 @@ CHOICES = (
     Choice("cnn_gru", "tuned", "the same, and a decision must take a third of the time"),
 )
 HEAD = (
-    "| take | if | % wrong: simulated, another generator, real | % wrong or lost "
+    "| take | if | % wrong: simulated, another generator, real | % wrong or lost (95 % over people) "
     "| a decision, cold | memory | false events a minute |",
     "|---|---|---|---|---|---|---|",
 )
@@ -46,7 +46,8 @@ def _line(study: Study, one: Choice, row: Row) -> str:
     ships = one.settings == "shipped"
     played = {of["method"]: of for of in study.get("online_shipped" if ships else "online") or []}
     fields = [row["fields"].get(field, {}) for field in FIELDS]
-    wrong, error = (", ".join(formats.percent(of.get(name)) for of in fields) for name in ("wrong", "error"))
+    wrong = ", ".join(formats.percent(of.get("wrong")) for of in fields)
+    error = ", ".join(_with_interval(of) for of in fields)
     name = f"{reading.title(study, one.method)}{', ships' if ships else ''}"
     memory = row["memory_bytes"]
     cells = (
@@ -55,3 +56,9 @@ def _line(study: Study, one: Choice, row: Row) -> str:
         formats.number(played.get(one.method, {}).get("false_per_minute", formats.NONE)),
     )  # fmt: skip
     return f"| {' | '.join(cells)} |"
+
+
+def _with_interval(of: Row) -> str:
+    """A field's error, and its interval where it has one."""
+    ends = formats.interval({end: of.get(f"error_{end}") for end in ("low", "high")})
+    return formats.percent(of.get("error")) + (f" ({ends})" if ends else "")
