@@ -125,6 +125,7 @@ def kinds_of(arguments: Sequence[object]) -> list[str]:
     return [str(kind) for one in arguments if isinstance(one, Samples) for kind in one.kinds]
 
 
+@pytest.mark.timeout(600)
 def test_train_makes_three_models_and_evaluate_their_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
