@@ -51,17 +51,16 @@ def _thirds(values: NDArray[np.float64], unit: str) -> NDArray[np.str_]:
 
 
 def failures(method: str, result: Result, by: dict[str, NDArray[np.str_]]) -> Iterator[dict[str, Any]]:
-    """One entry of study.json for each way of looking."""
+    """One entry of study.json for each way of looking. Groups count each gesture once, however many seeds there are."""
     good, source, people = right(result), np.array(result["source"]), np.array(result["person"])
     for title, names in by.items():
         of = names[source]
         rows = []
-        for name in dict.fromkeys(
-            names[np.argsort(source, kind="stable")] if title == "gesture" else sorted(set(names))
-        ):
+        for name in dict.fromkeys(names if title == "gesture" else sorted(set(names))):
             here = of == name
             if here.any():
-                rows.append({"name": str(name), "n": int(here.sum()), **summary(good[here], people[here])})
+                count = int(here.sum()) // len(result["shares"])
+                rows.append({"name": str(name), "n": count, **summary(good[here], people[here])})
         if title in ("hand size", "pressure", "place", "signal to noise"):
             rows.sort(key=lambda row: PARTS.index(str(row["name"]).split(":")[0]))
         yield {"method": method, "by": title, "groups": rows}
