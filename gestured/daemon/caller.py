@@ -4,6 +4,7 @@ import asyncio
 import os
 import socket
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from gestured.client.peer import CREDENTIALS
@@ -19,6 +20,7 @@ class Connection:
         self._writer = writer
         self.lost = 0  # lines that found no room
         self.streams = False  # it is sent lines as they come, and need not ask for anything
+        self.flush: Callable[[], None] = lambda: None  # has what waits for this connection sent
         self._over = False
 
     def send(self, text: bytes, *, lines: int = 1) -> bool:
@@ -42,7 +44,8 @@ class Connection:
         return self._over or self._writer.is_closing()
 
     def end(self) -> None:
-        """Send nothing more; what is on its way still goes."""
+        """Send nothing more; what waits for it or is on its way still goes."""
+        self.flush()
         self._over = True
 
 

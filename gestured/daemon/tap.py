@@ -50,7 +50,7 @@ class Taps:
     def join(self, connection: Connection) -> None:
         """Stream to this connection from now on."""
         self.flush()
-        connection.streams = True
+        connection.streams, connection.flush = True, self.flush
         self._live.append(connection)
 
     def packets(self, waiting: Sequence[tuple[bytes, Source]], now: float) -> None:

@@ -245,6 +245,18 @@ def test_a_tap_is_sent_all_that_came_before_the_daemon_ended(start) -> None:
     assert "onset" in [line["type"] for line in lines]
 
 
+def test_who_ends_a_tap_is_sent_all_that_led_to_what_was_published(daemon: Daemon) -> None:
+    client = daemon.client()
+    with Control(Path(daemon.ready["control"])) as control:
+        control.ask("tap")
+        sensor = Sensor(daemon, "ended").begin().perform("left")
+        client.events("gesture", "ended")
+        control.finish()
+        lines = list(control.lines())
+    assert "gesture" in [line["type"] for line in lines if line.get("sensor") == "ended"]
+    assert 0 < sum(line["type"] == "packet" for line in lines) <= sensor.count
+
+
 def test_the_flight_recorder_gives_what_it_held(daemon: Daemon, start) -> None:
     client = daemon.client()
     Sensor(daemon, "flown").begin().perform("left")
