@@ -95,11 +95,18 @@ before rejection, *lost* is unknown or never cut out; *rejected* is of the non-g
 {HEAD[0]}
 {HEAD[1]}
 {table}{extra}
-
+{judged(path.with_suffix(".md"))}
 ## Limits
 
 {LIMITS}
 """
+
+
+def judged(card: Path) -> str:
+    """What the card says of another generator's people: another command prints it, so it is kept as it stands."""
+    text = card.read_text() if card.exists() else ""
+    begin, end = text.find("<!-- judged: begin -->"), text.find("<!-- judged: end -->")
+    return f"\n{text[begin:end]}<!-- judged: end -->\n" if 0 <= begin < end else ""
 
 
 def _row(title: str, values: Mapping[str, Any]) -> str:
