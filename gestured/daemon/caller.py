@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from gestured.client.peer import CREDENTIALS
 
-TAP_BACKLOG_BYTES = 8 << 20  # of a connection that packets are streamed to; what is above is lost, and counted
+BACKLOG_BYTES = 8 << 20  # bytes that wait for a connection with a stream at most; lines beyond are lost, and counted
 SO_PEERGROUPS = 59  # Linux 4.13; not in Python's socket module
 
 
@@ -27,7 +27,7 @@ class Connection:
         """Send a line, or several, or count them as lost where too much waits already; never blocks."""
         if self.closed:
             return False
-        if self.unread > TAP_BACKLOG_BYTES:
+        if self.unread > BACKLOG_BYTES:
             self.lost += lines
             return False
         self._writer.write(text)

@@ -20,8 +20,8 @@ from gestured.daemon.caller import Connection
 
 KEPT_S = 30.0  # of the flight recorder
 OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps
-SOON_S = 0.025  # after a packet: what came together with it is answered by then, also where many sensors are touched
-TURN_LINES = 32  # of a live tap that are made in one turn: less than a millisecond's work
+SOON_S = 0.025  # how long a packet's lines wait: what came together with it is answered first, from many sensors, too
+TURN_LINES = 32  # lines that are made and sent before the loop looks after its frames again
 Remembered = tuple[int, Source, bytes] | bytes  # a packet with its time in ns (monotonic), or an event's line
 
 

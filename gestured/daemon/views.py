@@ -22,7 +22,7 @@ from gestured.daemon.tap import SOON_S
 
 VIEW_S = 1 / 30  # between two views of one sensor: nobody sees more
 VIEWS = 16  # sensors whose last view is kept for who asks again
-UNREAD_BYTES = 32 << 10  # that a connection may still have to read: with more it misses views until it has read
+UNREAD_BYTES = 32 << 10  # bytes that may wait for a connection; where more do, it misses views until it has read them
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Views:
 
     def follow(self, connection: Connection, sensors: Collection[str], *, raw: bool) -> None:
         """Stream to a connection: the state and the views of sensors as they are now, and then what is new."""
-        connection.streams = True
+        connection.streams, connection.flush = True, self._tell_events
         self._looks[connection] = Look(frozenset(sensors), raw)
         self._forget_gone()
         self._changed()

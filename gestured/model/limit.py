@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-LOOK_S = 1.0  # from one look to the next: less than what a segment's run may take
-AWAKE_S = 60.0  # without any run, until it sleeps
-ASLEEP_S = 3600.0
+LOOK_S = 1.0  # the pause between two looks: shorter than a segment's run may take, so that no run wakes the thread
+AWAKE_S = 60.0  # how long after the last run the thread goes on looking
+ASLEEP_S = 3600.0  # the pause where nothing was run for AWAKE_S; the next run ends it
 
 _running: dict[int, tuple[float, Any]] = {}  # when its time is over (s, monotonic), and its options
 _changed = threading.Condition()

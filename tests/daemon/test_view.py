@@ -111,6 +111,18 @@ def test_who_follows_hears_the_state_and_every_event_once(shared: Daemon) -> Non
     assert all(event["test"] is True for event in told["made_up"])
 
 
+def test_who_ends_following_has_heard_all_that_was_published(shared: Daemon) -> None:
+    sensor = Sensor(shared, "followed_to_the_end").begin()
+    client = shared.client().subscribe("gesture", sensors=[sensor.name])
+    with Control(Path(shared.ready["control"])) as control:
+        control.ask("follow", sensors=[])
+        sensor.perform("left")
+        client.events("gesture", sensor.name)
+        control.finish()
+        heard = [line["type"] for line in control.lines() if line.get("sensor") == sensor.name]
+    assert heard[:2] == ["onset", "gesture"]
+
+
 class Follower:
     """A connection whose other end reads, or does not."""
 
