@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from gestured.lab.made_of import made_of, models_and_manifest, renew
+from gestured.lab.made_of import kept, made_of, models_and_manifest, renew
 from gestured.lab.recordings.origin import said
 from gestured.lab.train import TrainingPlan
 from gestured.model.opening import open_model
@@ -95,18 +95,13 @@ before rejection, *lost* is unknown or never cut out; *rejected* is of the non-g
 {HEAD[0]}
 {HEAD[1]}
 {table}{extra}
-{judged(path.with_suffix(".md"))}
+
+{kept(path.with_suffix(".md"), "judged")}
+
 ## Limits
 
 {LIMITS}
 """
-
-
-def judged(card: Path) -> str:
-    """What the card says of another generator's people: another command prints it, so it is kept as it stands."""
-    text = card.read_text() if card.exists() else ""
-    begin, end = text.find("<!-- judged: begin -->"), text.find("<!-- judged: end -->")
-    return f"\n{text[begin:end]}<!-- judged: end -->\n" if 0 <= begin < end else ""
 
 
 def _row(title: str, values: Mapping[str, Any]) -> str:

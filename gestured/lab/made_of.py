@@ -23,12 +23,23 @@ def made_of(command: str, files: Iterable[Path]) -> str:
 
 def renew(document: Path, name: str, lines: Iterable[str]) -> None:
     """Put these lines between the marks `name: begin` and `name: end` of a document. GesturedError without them."""
-    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    begin, end = _marks(name)
     text = document.read_text()
     if text.count(begin) != 1 or text.count(end) != 1:
         raise GesturedError(f"{document}: expected the marks {begin} and {end} once each")
     block = "\n".join([begin, *lines, end])
     document.write_text(text[: text.index(begin)] + block + text[text.index(end) + len(end) :])
+
+
+def kept(document: Path, name: str) -> str:
+    """What a document says between the marks `name: begin` and `name: end`, with them; empty where it has none."""
+    begin, end = _marks(name)
+    text = document.read_text() if document.exists() else ""
+    return text[text.index(begin) : text.index(end) + len(end)] if begin in text and end in text else ""
+
+
+def _marks(name: str) -> tuple[str, str]:
+    return f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
 
 
 def models_and_manifest() -> list[Path]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gestured.lab.made_of import LINE, OLDER, made_of, models_and_manifest, stale
+from gestured.lab.made_of import LINE, OLDER, kept, made_of, models_and_manifest, renew, stale
 from gestured.lab.recordings.origin import said
 from gestured.model.shipped import shipped
 from tests.documents.blocks import ROOT, documents
@@ -25,7 +25,10 @@ def files() -> list[Path]:
     return [*models_and_manifest(), *(ROOT / "docs").glob("*.json"), *(ROOT / "docs").glob("*.svg")]
 
 
-@pytest.mark.parametrize("path", documents(), ids=lambda path: path.name)
+CARDS = [path.with_suffix(".md") for path in shipped().values()]
+
+
+@pytest.mark.parametrize("path", [*documents(), *CARDS], ids=lambda path: path.name)
 def test_no_table_outlives_its_models(path: Path) -> None:
     assert stale(path.read_text(), files()) == []
 
@@ -44,6 +47,25 @@ def test_a_card_is_its_models(name: str) -> None:
     assert re.findall(r"SHA-256 \| `([0-9a-f]{12})", card) == [of.split()[-2]]
     learned = "real development recordings of CapFingerId" in card
     assert learned == any("capfingerid" in one.file for one in said(shipped()[name]) or [])
+
+
+def test_what_was_renewed_between_marks_is_kept(tmp_path: Path) -> None:
+    card = tmp_path / "lstm.md"
+    assert kept(card, "judged") == ""
+    card.write_text("# lstm\n<!-- judged: begin --><!-- judged: end -->\nbelow\n")
+    renew(card, "judged", ["| right | 0.990 |"])
+    assert kept(card, "judged") == "<!-- judged: begin -->\n| right | 0.990 |\n<!-- judged: end -->"
+    assert kept(card, "figures") == ""
+
+
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_a_card_has_the_figures_on_another_generators_people_that_the_readme_has(name: str) -> None:
+    row = f"| `{name}.onnx`, another generator"
+    card, readme = (
+        [line for line in path.read_text().splitlines() if line.startswith(row)]
+        for path in (shipped()[name].with_suffix(".md"), ROOT / "README.md")
+    )
+    assert card == readme and len(card) == 2
 
 
 def test_a_changed_file_is_told_unless_the_document_says_so(tmp_path: Path) -> None:

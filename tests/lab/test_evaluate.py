@@ -1,7 +1,5 @@
 """Figures are counted as a user would count them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ pytest.importorskip("torch", reason="needs the extra [lab]")
 pytest.importorskip("sklearn", reason="needs the extra [lab]")
 pytest.importorskip("onnx", reason="needs the extra [lab]")
 
-from gestured.lab.cards import judged
 from gestured.lab.evaluate import Evaluation, outcome
 
 THREE = np.eye(3, dtype=np.float32)
@@ -84,11 +81,3 @@ def test_intervals_hold_the_shares_that_they_are_of(performed: int | None) -> No
     assert found.intervals["lost"]["low"] >= never / found.gestures  # what was never cut out is lost whoever is drawn
     assert found.rows("a set").splitlines()[0] == found.row("a set")
     assert {len(line) for line in found.rows("a set").splitlines()} == {len(Evaluation.HEAD)}
-
-
-def test_a_card_keeps_what_another_command_printed(tmp_path: Path) -> None:
-    card = tmp_path / "lstm.md"
-    assert judged(card) == ""
-    block = "<!-- judged: begin -->\n| right | 0.990 |\n<!-- judged: end -->"
-    card.write_text(f"# lstm\n\n{block}\n\n## Limits\n")
-    assert judged(card) == f"\n{block}\n"
