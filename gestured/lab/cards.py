@@ -117,9 +117,9 @@ def _with_interval(share: float, ends: Mapping[str, float]) -> str:
 
 
 TAUGHT = {
-    "known": "nobody: the model that ships has learned them",
-    "heads": "heads and calibration; the network below them has learned these kinds",
-    "whole": "the whole of it: network, second opinion, heads and calibration",
+    "known": "nothing: the model that ships",
+    "heads": "heads and calibration; the network below the heads has learned them",
+    "whole": "everything: network, second opinion, heads and calibration",
 }
 
 
@@ -135,9 +135,9 @@ def _unseen(found: Mapping[str, Any]) -> list[str]:
     tests = list(whole["whole"]["simulated"])
     lines += [
         "", f"One group of kinds ({', '.join(whole['kinds'])}) was then left out of everything: networks were trained from "
-        "nothing without them, by the plan of those that ship, and calibrated without them. Rejected are "
-        f"{whole['whole']['count']} simulated segments of these kinds alone; right and wrong are of all gestures:", "",
-        f"| who has not seen these kinds | rejected | {' | '.join(f'{t}: right | wrong' for t in tests)} |",
+        "nothing without them, by the plan of those that ship, and calibrated without them. The share that is rejected is of "
+        f"{whole['whole']['count']} simulated segments of these kinds; right and wrong are of all gestures:", "",
+        f"| these kinds were left out of | rejected | {' | '.join(f'{t}: right | wrong' for t in tests)} |",
         f"|---|---|{'---|' * 2 * len(tests)}",
     ]  # fmt: skip
     for how, words in TAUGHT.items():
