@@ -70,7 +70,7 @@ def parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--networks", action="store_true", help="also compare each network alone and with a second")
     evaluate.add_argument("--field", action="store_true", help="also compare rules for deciding early")
     evaluate.add_argument("--whole", action="store_true", help="also train networks that lack a group of kinds of "
-                          "non-gestures (as long as training takes), and say how many of these they reject")  # fmt: skip
+                          "non-gestures (as long as training takes), and say how many they reject")  # fmt: skip
     evaluate.add_argument("--curve", action="store_true", help="also print right, wrong and accepted by threshold")
     evaluate.add_argument("--readme", type=Path, help="a README whose table of figures is renewed")
     evaluate.add_argument("--recordings", **mine, help="those that the models were trained with")
