@@ -12,7 +12,7 @@ from gestured.client.control import Control
 def add_sockets(parser: argparse.ArgumentParser) -> None:
     """Add `--control` and `--socket` to a subcommand: either is enough to find the daemon."""
     for flag, what in (("--control", "control"), ("--socket", "event")):
-        text = f"the daemon's {what} socket (default: the daemon's own default; the other one will do, too)"
+        text = f"the daemon's {what} socket; naming either socket is enough (default: where the daemon puts it)"
         parser.add_argument(flag, type=Path, metavar="PATH", help=text)
 
 
