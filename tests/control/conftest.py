@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,13 @@ HELLO = {
     "sensors": {"armrest": 3},
 }
 Start = Callable[..., "subprocess.Popen[bytes]"]
+
+
+@pytest.fixture
+def shallow() -> Iterator[Path]:
+    """A folder for temporary files that is not deep: the path of a socket has at most 107 bytes."""
+    with tempfile.TemporaryDirectory(prefix="gestured-", dir="/tmp") as name:
+        yield Path(name)
 
 
 @pytest.fixture

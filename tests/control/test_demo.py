@@ -39,9 +39,9 @@ def test_a_folder_of_the_same_name_is_not_taken_for_the_program(tmp_path, monkey
         assert engine.ready["type"] == "ready"
 
 
-def test_outcomes_add_up_to_the_summary(run, tmp_path):
+def test_outcomes_add_up_to_the_summary(run, shallow):
     kinds = ("--kinds", "swipe_left,one_tap", "--speed", "normal")
-    status, out, err = run("demo", "--seconds", 9, *kinds, "--json", env={"TMPDIR": str(tmp_path)})
+    status, out, err = run("demo", "--seconds", 9, *kinds, "--json", env={"TMPDIR": str(shallow)})
     assert (status, err) == (0, "")
     *outcomes, summary = map(json.loads, out.splitlines())
     assert summary.pop("type") == "summary"
@@ -54,7 +54,7 @@ def test_outcomes_add_up_to_the_summary(run, tmp_path):
             assert outcome["recognised"] == outcome["performed"]
             assert -100 < outcome["latency_ms"] < 5000
     assert summary["right"] >= 1
-    assert daemons(tmp_path) == [] and os.listdir(tmp_path) == []
+    assert daemons(shallow) == [] and os.listdir(shallow) == []
 
 
 def test_without_a_terminal_no_escape_codes_and_without_block_characters_words(run):
@@ -65,22 +65,22 @@ def test_without_a_terminal_no_escape_codes_and_without_block_characters_words(r
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_ended_early_it_still_sums_up_and_leaves_nothing_behind(start, tmp_path, how):
-    process = start("demo", "--seconds", 60, env={"TMPDIR": str(tmp_path)})
+def test_ended_early_it_still_sums_up_and_leaves_nothing_behind(start, shallow, how):
+    process = start("demo", "--seconds", 60, env={"TMPDIR": str(shallow)})
     assert b"listens on" in process.stdout.readline()
-    assert len(daemons(tmp_path)) == 2  # and the page
+    assert len(daemons(shallow)) == 2  # and the page
     process.send_signal(how)
     out, err = process.communicate(timeout=30)
     assert process.returncode == 0
     assert b"Summary" in out and err == b""
-    assert daemons(tmp_path) == [] and os.listdir(tmp_path) == []
+    assert daemons(shallow) == [] and os.listdir(shallow) == []
 
 
-def test_a_model_that_cannot_be_used_is_one_sentence(run, tmp_path):
-    status, out, err = run("demo", "--model", tmp_path / "none.onnx", env={"TMPDIR": str(tmp_path)})
+def test_a_model_that_cannot_be_used_is_one_sentence(run, shallow):
+    status, out, err = run("demo", "--model", shallow / "none.onnx", env={"TMPDIR": str(shallow)})
     assert (status, out, err.count("\n")) == (1, "", 1)
     assert "none.onnx" in err
-    assert os.listdir(tmp_path) == []
+    assert os.listdir(shallow) == []
 
 
 @pytest.mark.parametrize("seconds", ["0", "nan", "1e9"])

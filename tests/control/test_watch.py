@@ -111,8 +111,8 @@ def test_without_a_terminal_or_a_sensor_it_says_what_to_do(run, terminal, daemon
 
 
 @pytest.mark.e2e
-def test_the_demo_begins_with_a_circle_that_is_drawn_and_ends_with_what_comes_next(terminal, tmp_path) -> None:
-    demo = terminal("demo", "--seconds", 8, "--speed", "normal", TMPDIR=str(tmp_path))
+def test_the_demo_begins_with_a_circle_that_is_drawn_and_ends_with_what_comes_next(terminal, shallow) -> None:
+    demo = terminal("demo", "--seconds", 8, "--speed", "normal", TMPDIR=str(shallow))
     said = demo.until("performed   circle_clockwise")
     assert re.search(r"http://127\.0\.0\.1:\d+/\?token=", said)
     seen = {sign for sign in said if sign in ARROWS}
