@@ -20,13 +20,11 @@ from gestured.lab.samples import Samples
 
 CONFIRMED = 0.97  # share of the events that the answer must confirm, in every stretch
 DOUBT = 0.1  # probability that a threshold is let through although it does not
-IN_A_ROW = 2  # frames that must agree: one alone may be noise
+IN_A_ROW = 1  # frames that must be sure enough: a second one would cost 67 ms, and thresholds make up for it
 STRETCHES = (0.0, 0.233, 0.367, 0.5, 0.7, 1.0)  # their beginnings in s, half-way between frames at 15 Hz
 STARTS = (120, 240, 480)  # people with an event; 112 is the least that a third of the doubt can be tested with
-LADDER = (
-    0.999, 0.998, 0.997, 0.996, 0.995, 0.993, 0.99, 0.987, 0.983, 0.98, 0.975, 0.97, 0.96, 0.95, 0.94, 0.92, 0.9, 0.87,
-    0.84, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.5,
-)  # fmt: skip
+# From the safest on, each step with a sixth more doubt (1 - confidence) than the one before.
+LADDER = tuple(round(1 - float(doubt), 4) for doubt in np.geomspace(0.001, 0.5, 41))
 
 
 Questions = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_], NDArray[np.int64]]  # see `safe_from`
@@ -42,13 +40,6 @@ class Asked:
     confidence: NDArray[np.float64]  # (N,)
     answer: NDArray[np.int64]  # (G,) gesture that was published, or -1
     person: NDArray[np.int64]  # (G,)
-
-    @property
-    def again(self) -> NDArray[np.bool_]:
-        """(N,) whether the question before was about the same contact, with the same best gesture."""
-        same = np.zeros(len(self.best), bool)
-        same[1:] = (self.contact[1:] == self.contact[:-1]) & (self.best[1:] == self.best[:-1])
-        return same
 
     @property
     def stretch(self) -> NDArray[np.int64]:
@@ -116,22 +107,17 @@ def deceives(questions: Questions, level: float) -> bool:
 
 def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None) -> dict[str, Any]:
     """The metadata `provisional`: for each stretch, and for each gesture with enough data, the threshold."""
-    stretch, again, wrong = asked.stretch, asked.again, asked.answer[asked.contact] != asked.best
+    stretch, wrong = asked.stretch, asked.answer[asked.contact] != asked.best
     person = asked.person[asked.contact]
-    before = np.concatenate([[-1], stretch[:-1]])[: len(stretch)]
-    given, reached = np.zeros(len(asked.answer), bool), np.zeros(len(stretch), bool)
+    given = np.zeros(len(asked.answer), bool)
     general: list[float | None] = []
     rows: dict[str, list[float | None]] = {name: [] for name in gestures}
 
     for k in range(len(STRETCHES)):
-        # The question before counts by its confidence, or where it lies in another stretch by that one's threshold.
-        earlier = np.where(before[1:] == k, asked.confidence[:-1], reached[:-1])
-        earlier = np.concatenate([[0.0], earlier])[: len(stretch)]
-        sure = np.where(again, np.minimum(asked.confidence, earlier), 0.0)
         now = (stretch == k) & ~given[asked.contact]
 
-        def of(chosen: NDArray[np.bool_], sure: NDArray[np.float64] = sure) -> Questions:
-            return sure[chosen], asked.contact[chosen], wrong[chosen], person[chosen]
+        def of(chosen: NDArray[np.bool_]) -> Questions:
+            return asked.confidence[chosen], asked.contact[chosen], wrong[chosen], person[chosen]
 
         everybody = safe_from(*of(now))
         general.append(everybody)
@@ -143,8 +129,7 @@ def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None) -> dict
             else:
                 rows[name].append(min((t for t in (own, everybody) if t is not None), default=None))
         level = np.array([row[-1] if row[-1] is not None else np.inf for row in rows.values()])[asked.best]
-        reached |= (stretch == k) & (asked.confidence >= level)
-        given[asked.contact[now & (sure >= level)]] = True
+        given[asked.contact[now & (asked.confidence >= level)]] = True
     return {
         "in_a_row": IN_A_ROW,
         "elapsed_s": list(STRETCHES),
@@ -155,14 +140,13 @@ def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None) -> dict
 
 
 def events(asked: Asked, provisional: dict[str, Any], gestures: Sequence[str]) -> NDArray[np.int64]:
-    """(G,) the question at which each contact's provisional event is given, -1 for none."""
+    """(G,) the question at which each contact's provisional event is given, -1 for none; `provisional` is a rule."""
     rows = [provisional["gestures"].get(name, provisional["thresholds"]) for name in gestures]
     level = np.array([[np.inf if value is None else value for value in row] for row in rows])
-    reached = asked.confidence >= level[asked.best, asked.stretch]
-    fired = np.flatnonzero(reached & asked.again & np.concatenate([[False], reached[:-1]])[: len(reached)])
+    reached = np.flatnonzero(asked.confidence >= level[asked.best, asked.stretch])
     found = np.full(len(asked.answer), -1, np.int64)
-    who, first = np.unique(asked.contact[fired], return_index=True)
-    found[who] = fired[first]
+    who, first = np.unique(asked.contact[reached], return_index=True)
+    found[who] = reached[first]
     return found
 
 

@@ -1,8 +1,9 @@
 """The shipped models from nothing: simulate, learn, calibrate, export. Each step is kept, so a run can go on later.
 
 Who is who (participants never cross): the cohort's participants 0 to 23 teach, 24 to 27 calibrate, 28 to 33 test;
-the wide stream's seeds 1, 2 and 3 do the same, each with people of its own. Real subjects calibrate and test only
-networks that have not seen them: three folds, which share what was learned from simulation.
+the wide stream's seeds 1, 2 and 3 do the same, each with people of its own; from those of its seed 4 the thresholds
+of provisional events are learned. Real subjects calibrate and test only networks that have not seen them: three
+folds, which share what was learned from simulation.
 """
 
 import hashlib
@@ -49,8 +50,9 @@ class TrainingPlan:
     """How much is simulated; the numbers behind the shipped models are the defaults."""
 
     wide: int = 60_000
-    wide_calibrate: int = 12_000  # takes to calibrate: thresholds by gesture and time need many people
+    wide_calibrate: int = 12_000  # takes to calibrate
     wide_check: int = 4_000  # takes to test
+    wide_early: int = 60_000  # takes for provisional events: the fewer people, the safer a threshold has to be
     cohort: int = len(TRIALS)
     others: int = len(OTHER_TRIALS)
     forest: int = 20_000  # simulated samples for the forest
@@ -60,7 +62,7 @@ class TrainingPlan:
     def quick(cls) -> "TrainingPlan":
         """A run of some minutes, to try the pipeline; its models are worth nothing."""
         fit = FitConfig(epochs=3, real_epochs=1, real_samples=1_000)
-        return cls(wide=1_500, wide_calibrate=400, wide_check=400, forest=2_000, fit=fit)
+        return cls(wide=1_500, wide_calibrate=400, wide_check=400, wide_early=400, forest=2_000, fit=fit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,9 +205,10 @@ def calibration_set(trained: Trained, data: TrainingData, plan: TrainingPlan) ->
     return Calibrated({name: x[torch.from_numpy(usable)] for name, x in found.items()}, labels[usable], sets[usable])
 
 
-def foretold(trained: Trained, data: TrainingData, plan: TrainingPlan) -> Foretold:
-    """What networks that have not seen them say of the calibration people before their gestures are over."""
-    parts = [(trained.nets, data.calibrate)]
+def foretold(trained: Trained, data: TrainingData, plan: TrainingPlan, cache: Path, jobs: int) -> Foretold:
+    """What networks that have not seen them say of the calibration people, and of further ones, before the end."""
+    further = simulated(cache, "wide", 4, plan.wide_early, jobs)
+    parts = [(trained.nets, data.calibrate), (trained.nets, further)]
     if data.real is not None:
         parts += [(nets, data.real.take(held)) for nets, held in zip(trained.folds, folds(data.real), strict=True)]
     return Foretold.sessions(parts, plan.fit)
@@ -323,7 +326,7 @@ def train(
     }  # fmt: skip
     seen = quantiles(data.teach)
     out.mkdir(parents=True, exist_ok=True)
-    contacts = foretold(trained, data, plan)
+    contacts = foretold(trained, data, plan, cache, jobs)
     for name in ("cnn_lstm", "lstm"):
         module, calibration, answered = judged(trained, name, calibrated)
         common |= {"kind": name, "calibration": calibration, "quantiles": seen | answered}
