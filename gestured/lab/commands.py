@@ -67,7 +67,7 @@ def evaluate_models(args: argparse.Namespace) -> int:
     trained = learn(plan, data, args.cache)
     calibrated = calibration_set(trained, data, plan)
     if args.networks:
-        compare(trained, calibrated, data, plan)
+        compare(trained, data, plan, args.cache)
     if args.field:
         compare_rules(trained, calibrated, data, plan, paths["cnn_lstm"])
     for name, found in real_figures(trained, calibrated, data).items():

@@ -6,7 +6,7 @@ the split (`augment`), and some of its windows are cut short (`prefixes`). Nothi
 networks are told how long each window is.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from gestured.lab.augment import symmetry_table, turned, varied
 from gestured.lab.checkpoints import restore, store
-from gestured.lab.nets import CnnLstm, Lstm
+from gestured.lab.nets import CnnGru, CnnLstm, Lstm, Opinion
 from gestured.lab.prefixes import askable, drawn, floors, shortened
 from gestured.lab.progress import progress
 from gestured.lab.samples import WINDOW, Samples
@@ -34,7 +34,6 @@ class FitConfig:
 
     epochs: int = 20
     batch: int = 64  # half as many steps with 128 learned far less
-    rates: tuple[float, float, float] = (4e-3, 8e-3, 3e-3)  # of each of NETS; they fall to 0 with a cosine
     decay: float = 1e-2
     smoothing: float = 0.03  # of labels: keeps the scores calibrated
     clip: float = 1.0
@@ -47,13 +46,18 @@ class FitConfig:
     seed: int = 1
 
 
-NETS = ("cnn_lstm", "lstm", "trajectory")
+NETS = ("cnn_lstm", "lstm", "trajectory")  # those that the shipped models are made of
+KINDS: dict[str, tuple[type[Opinion], float]] = {  # each with its learning rate, which falls to 0 with a cosine
+    "cnn_lstm": (CnnLstm, 4e-3),
+    "lstm": (Lstm, 8e-3),
+    "trajectory": (TrajectoryNet, 3e-3),
+    "cnn_gru": (CnnGru, 4e-3),
+}
 
 
-def build() -> nn.ModuleDict:
-    """The three untrained networks."""
-    size = (WINDOW.rows, WINDOW.columns, len(CLASSES))
-    return nn.ModuleDict({"cnn_lstm": CnnLstm(*size), "lstm": Lstm(*size), "trajectory": TrajectoryNet(*size)})
+def build(names: Iterable[str] = NETS) -> nn.ModuleDict:
+    """Untrained networks of these `KINDS`."""
+    return nn.ModuleDict({name: KINDS[name][0](WINDOW.rows, WINDOW.columns, len(CLASSES)) for name in names})
 
 
 def targets(samples: Samples) -> NDArray[np.int64]:
@@ -130,27 +134,15 @@ def _plan(
             yield samples, labels, pool[i : i + config.batch]
 
 
-def pretrain(samples: Samples, config: FitConfig, checkpoint: Path) -> nn.ModuleDict:
+def pretrain(samples: Samples, config: FitConfig, checkpoint: Path, names: Sequence[str] = NETS) -> nn.ModuleDict:
     """Stage one, on simulated samples; goes on where an interrupted run stopped."""
     torch.manual_seed(config.seed)
-    nets = build()
+    nets = build(names)
     labels = targets(samples)
     chosen = np.flatnonzero(labels >= 0)
-    net = nets["trajectory"]
-    assert isinstance(net, TrajectoryNet)
-    with torch.no_grad():
-        some = np.random.default_rng(config.seed).choice(chosen, min(4000, len(chosen)), replace=False)
-        net.perceptron.fit_scale(
-            torch.cat(
-                [
-                    trajectory_features(
-                        padded(samples, some[i : i + 256], config.longest),
-                        lengths_of(samples, some[i : i + 256], config.longest),
-                    )
-                    for i in range(0, len(some), 256)
-                ]
-            )
-        )
+    for net in nets.values():
+        if isinstance(net, TrajectoryNet):
+            _fit_scale(net, samples, chosen, config)
     steps = config.epochs * len(list(_plan(samples, labels, config, np.random.default_rng(0), chosen)))
     optimiser, schedule = _optimiser(nets, config, 1.0, steps)
     done = restore(checkpoint, nets, optimiser, schedule)
@@ -162,10 +154,21 @@ def pretrain(samples: Samples, config: FitConfig, checkpoint: Path) -> nn.Module
     return nets
 
 
+def _fit_scale(net: TrajectoryNet, samples: Samples, chosen: NDArray[np.int64], config: FitConfig) -> None:
+    """Standardise its features by some of the chosen samples."""
+    some = np.random.default_rng(config.seed).choice(chosen, min(4000, len(chosen)), replace=False)
+    with torch.no_grad():
+        found = [
+            trajectory_features(padded(samples, part, config.longest), lengths_of(samples, part, config.longest))
+            for part in (some[i : i + 256] for i in range(0, len(some), 256))
+        ]
+        net.perceptron.fit_scale(torch.cat(found))
+
+
 def finetune(start: nn.ModuleDict, simulated: Samples, real: Samples, config: FitConfig, title: str) -> nn.ModuleDict:
     """Stage two: go on from `start` with real samples among the simulated ones."""
     torch.manual_seed(config.seed)
-    nets = build()
+    nets = build(start)
     nets.load_state_dict(start.state_dict())
     rng = np.random.default_rng([config.seed, 77])
     labels, real_labels = targets(simulated), targets(real)
@@ -196,8 +199,8 @@ def balanced(
 def _optimiser(
     nets: nn.ModuleDict, config: FitConfig, share: float, steps: int
 ) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler]:
-    rates = [share * rate for rate in config.rates]
-    groups = [{"params": list(nets[name].parameters()), "lr": rate} for name, rate in zip(NETS, rates, strict=True)]
+    rates = [share * KINDS[name][1] for name in nets]
+    groups = [{"params": list(net.parameters()), "lr": rate} for net, rate in zip(nets.values(), rates, strict=True)]
     optimiser = torch.optim.AdamW(groups, weight_decay=config.decay)
     return optimiser, torch.optim.lr_scheduler.OneCycleLR(
         optimiser, rates, total_steps=max(steps, 11), pct_start=0.1, div_factor=10, cycle_momentum=False
@@ -221,7 +224,7 @@ def logits(nets: nn.ModuleDict, samples: Samples, config: FitConfig) -> dict[str
 
 def load_nets(path: Path) -> nn.ModuleDict:
     """What `save_nets` wrote."""
-    nets = build()
     with np.load(path, allow_pickle=False) as stored:
+        nets = build(dict.fromkeys(name.split(".")[0] for name in stored.files))
         nets.load_state_dict({name: torch.from_numpy(stored[name]) for name in stored.files})
     return nets

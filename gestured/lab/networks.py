@@ -20,13 +20,14 @@ from gestured.lab.fit import logits, targets
 from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Decision, Judged, Opinion
 from gestured.lab.samples import WINDOW
-from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan, judged
+from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan, calibration_set, judged, learn
 from gestured.model.file import inspect
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.simulator import GESTURES
 
 SECOND = "trajectory"
+CANDIDATES = ("cnn_gru",)  # networks that are trained for this comparison alone
 PAUSE_S = 1 / 15  # between two runs: caches are cold, as in a daemon that waits for frames
 RUNS = 40
 FRAMES = 15  # of the window that is run
@@ -59,8 +60,13 @@ def cold_ms(model: Model) -> float:
     return 1e3 * median(took)
 
 
-def compare(trained: Trained, calibrated: Calibrated, data: TrainingData, plan: TrainingPlan) -> dict[str, Any]:
-    """Print a row for each network and test set, with wrong and lost together and the time of a cold run."""
+def compare(trained: Trained, data: TrainingData, plan: TrainingPlan, cache: Path) -> dict[str, Any]:
+    """Print a row for each network and test set, with wrong and lost together and the time of a cold run.
+
+    Candidates that no shipped model is made of are trained on the same data, in the same way.
+    """
+    trained = trained.beside(learn(plan, data, cache, CANDIDATES))
+    calibrated = calibration_set(trained, data, plan)
     tests = {test: (logits(trained.nets, samples, plan.fit), targets(samples)) for test, samples in data.tests.items()}
     figures: dict[str, Any] = {}
     print(f"{Evaluation.HEAD}{'error':>8}{'cold ms':>9}", flush=True)

@@ -28,7 +28,7 @@ from gestured.lab.dataset import OTHER_TRIALS, TRIALS, recorded, simulated
 from gestured.lab.decide import fit_decision, threshold
 from gestured.lab.digest import code_digest
 from gestured.lab.export import Facts, export_forest, export_net
-from gestured.lab.fit import CLASSES, FitConfig, finetune, load_nets, logits, pretrain, targets
+from gestured.lab.fit import CLASSES, NETS, FitConfig, finetune, load_nets, logits, pretrain, targets
 from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.foretold import Foretold
 from gestured.lab.manifest import write_manifest
@@ -154,14 +154,19 @@ class Trained:
     held_out: dict[str, Tensor] | None  # (G, K) logits of each net over the real samples, None without any
     folds: list[nn.ModuleDict] = field(default_factory=list)  # those that had not seen the subjects of `folds`
 
+    def beside(self, other: "Trained") -> "Trained":
+        """These networks and another's, which learned from the same data."""
+        held = {**self.held_out, **(other.held_out or {})} if self.held_out is not None else None
+        return Trained(nn.ModuleDict({**self.nets, **other.nets}), held)
 
-def learn(plan: TrainingPlan, data: TrainingData, cache: Path) -> Trained:
-    """Both stages and the folds; what is done already is read from the cache."""
-    told = json.dumps([code_digest("gestured.lab.fit"), asdict(plan.fit), data.teach.digest()])
+
+def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[str] = NETS) -> Trained:
+    """Both stages and the folds of these networks; what is done already is read from the cache."""
+    told = json.dumps([code_digest("gestured.lab.fit"), asdict(plan.fit), data.teach.digest(), names])
     key = hashlib.sha256(told.encode()).hexdigest()[:12]
     first = cache / f"simulated-{key}.npz"
     if not first.exists():
-        save_nets(first, pretrain(data.teach, plan.fit, cache / f"checkpoint-{key}.npz"))
+        save_nets(first, pretrain(data.teach, plan.fit, cache / f"checkpoint-{key}.npz", names))
     start = load_nets(first)
     if data.real is None:
         return Trained(start, None)
