@@ -21,6 +21,7 @@ from gestured.simulator.cohort import (
     perform,
     session,
     wide,
+    wide_plan,
 )
 from gestured.simulator.people import INCLINATIONS, SPEEDS, Artefact, Participant, Performance, Press, generator
 from gestured.simulator.sensor import Act, SimulatedSensor, Take
@@ -47,4 +48,5 @@ __all__ = [
     "perform",
     "session",
     "wide",
+    "wide_plan",
 ]

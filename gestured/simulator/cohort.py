@@ -143,11 +143,21 @@ def cohort_take(trial: Trial, seed: int = 0) -> Take:
     return gesture_take(trial.gesture, person, sensor, rng, trial.speed, trial.inclination)
 
 
-def wide(seed: int, index: int, hardness: float | None = None) -> Take:
-    """The index-th take of an endless stream: a random participant on a random sensor.
+@dataclass(frozen=True)
+class WideTake:
+    """What a take of the wide stream is of, before it is performed; `rng` goes on with the performance."""
 
-    `hardness` is drawn from 0..1 for each take unless it is given.
-    """
+    kind: str
+    participant: Participant
+    sensor: SimulatedSensor
+    speed: str
+    inclination: int
+    hurry: float
+    rng: np.random.Generator
+
+
+def wide_plan(seed: int, index: int, hardness: float | None = None) -> WideTake:
+    """What `wide` will perform; a thousandth of its work."""
     rng = generator(seed, 0x71DE, index)
     hard = float(rng.random()) if hardness is None else hardness
     person = Participant(int(rng.integers(1 << 40)) + 1_000_000)
@@ -156,7 +166,18 @@ def wide(seed: int, index: int, hardness: float | None = None) -> Take:
     kind = pool[int(rng.integers(len(pool)))]
     speed = ("slow", "normal", "fast")[int(rng.integers(3))]
     hurry = float(rng.uniform(1.3, 2.5)) if rng.random() < FLICKS * hard else 1.0
-    return gesture_take(kind, person, sensor, rng, speed, int(rng.integers(3)), hurry=hurry)
+    return WideTake(kind, person, sensor, speed, int(rng.integers(3)), hurry, rng)
+
+
+def wide(seed: int, index: int, hardness: float | None = None) -> Take:
+    """The index-th take of an endless stream: a random participant on a random sensor.
+
+    `hardness` is drawn from 0..1 for each take unless it is given.
+    """
+    plan = wide_plan(seed, index, hardness)
+    return gesture_take(
+        plan.kind, plan.participant, plan.sensor, plan.rng, plan.speed, plan.inclination, hurry=plan.hurry
+    )
 
 
 def _person(seed: int, number: int) -> int:

@@ -70,7 +70,7 @@ def together(parts: list[Answers]) -> Answers:
 
 
 def table(said: dict[str, Said]) -> str:
-    """A row for each model, in Markdown."""
+    """A row for each model, in Markdown; the first one is the base."""
     own = {name: one.shares() for name, one in said.items()}
     first = next(iter(own.values()))
     levels = (first.wrong[0], WRONG)
@@ -79,7 +79,7 @@ def table(said: dict[str, Said]) -> str:
     for name, shares in own.items():
         cells = [shares.right, shares.wrong, shares.accepted, *(said[name].right_at(level) for level in levels)]
         lines.append([name, *("{:.3f} ({:.3f} to {:.3f})".format(*cell) for cell in cells)])
-    people = len(np.unique(together(said[BASE].every).unit))
+    people = len(np.unique(together(next(iter(said.values())).every).unit))
     foot = f"{people} people with {first.gestures} gestures and {first.others} non-gestures; 95 % intervals over people"
     return "\n".join([*(f"| {' | '.join(line)} |" for line in lines), foot])
 
