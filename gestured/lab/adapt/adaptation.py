@@ -95,7 +95,9 @@ def adapt(base: Base, own: Own, takes: Simulated, course: Course) -> Adapted:
     new = settled(start, least, own, takes, course)
     return Adapted(
         new.judged, new.least,
-        _early([(new.judged, takes.check), *new.apart], new.judged.decision, new.least, course),
+        _early(
+            [(new.judged, takes.check), (new.judged, takes.early), *new.apart], new.judged.decision, new.least, course
+        ),
         Outcome(new.before, _nominal(start, least, takes, course)),
         Outcome(new.after, _nominal(new.judged, new.least, takes, course)),
         new.way, new.groups.unit, new.groups.count, new.answers,
@@ -190,7 +192,7 @@ def _early(
     """The rule for provisional events, from what networks say of samples that they have not learned from."""
     name = "net"
     asked = [(nn.ModuleDict({name: one.net, "trajectory": one.trajectory}), samples) for one, samples in parts]
-    return Foretold.of(asked, FitConfig(longest=course.longest)).rule(name, decision, least)
+    return Foretold.sessions(asked, FitConfig(longest=course.longest)).rule(name, decision, least)
 
 
 def _nominal(judged: Judged, least: float, takes: Simulated, course: Course) -> Shares:

@@ -20,6 +20,7 @@ class Simulated:
 
     teach: Samples
     check: Samples  # to fit the decision
+    early: Samples  # for the thresholds of provisional events, together with `check`
     nominal: Samples  # to judge
     missed: NDArray[np.int64]  # people of the nominal gestures that were never cut out
 
@@ -28,8 +29,9 @@ def simulate(cache: Path, jobs: int) -> Simulated:
     """A few thousand takes, from a seed; cut once, then from the cache."""
     teach = simulated(cache, "wide", SEED, 4_000, jobs)
     check = simulated(cache, "wide", SEED + 1, 1_500, jobs)
+    early = simulated(cache, "wide", SEED + 2, 12_000, jobs)
     performed = 90 * PEOPLE
     others = len(OTHER_TRIALS) // 34 * PEOPLE
     nominal = join([simulated(cache, "cohort", SEED, performed, jobs), simulated(cache, "others", SEED, others, jobs)])
     lost = max(performed - int((nominal.labels != NONE).sum()), 0)
-    return Simulated(teach, check, nominal, np.full(lost, nominal.people[0]))
+    return Simulated(teach, check, early, nominal, np.full(lost, nominal.people[0]))

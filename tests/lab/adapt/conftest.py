@@ -24,7 +24,7 @@ def some(seed: int, count: int) -> Samples:
 
 @pytest.fixture(scope="session")
 def small_world() -> Simulated:
-    return Simulated(some(31, 60), some(32, 60), some(33, 60), np.zeros(0, np.int64))
+    return Simulated(some(31, 60), some(32, 60), some(34, 60), some(33, 60), np.zeros(0, np.int64))
 
 
 @pytest.fixture(scope="session")
