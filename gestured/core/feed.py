@@ -62,7 +62,7 @@ class Feed:
         except Exception as error:
             self._recover(error, now, facts)
             return
-        self._vitals.arrived(now, len(arrivals), self._recognizer.front_end.rate_hz)
+        self._vitals.arrived(now, len(arrivals), self._recognizer.front_end.rate_hz, missed=missed)
         taken = lost = duplicates = late = implausible = 0
         for arrival, stamp in zip(arrivals, stamps, strict=True):
             if stamp.dropped:

@@ -26,8 +26,13 @@ class Vitals:
         """Whether the sensor falls silent again and again, after a few seconds each time."""
         return self._stretches >= STRETCHES and (self._last is None or self._last - self._began < SHORT_S)
 
-    def arrived(self, now: float, frames: int, rate_hz: float) -> None:
-        """`frames` came together at `now` s. Interarrival jitter as RTP has it."""
+    def arrived(self, now: float, frames: int, rate_hz: float, *, missed: bool = False) -> None:
+        """`frames` came together at `now` s. Interarrival jitter as RTP has it.
+
+        `missed`: this machine may have had no room for others before them, so that a silence need not be the sensor's.
+        """
+        if missed:
+            self._stretches = 0
         if self._last is not None and rate_hz > 0:
             self.jitter_s += (abs(now - self._last - frames / rate_hz) - self.jitter_s) * WEIGHT
         if self._last is None:

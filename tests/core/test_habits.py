@@ -64,20 +64,28 @@ def test_what_was_noticed_is_forgotten_when_the_sensor_is_learned_anew() -> None
     assert not falling.habits.inverted
 
 
+def stretch(vitals: Vitals, begin: float, seconds: float, *, missed: bool = False) -> float:
+    """Frames for some seconds, then silence; when the next stretch may begin."""
+    for n in range(round(seconds * RATE_HZ)):
+        vitals.arrived(begin + n / RATE_HZ, 1, RATE_HZ, missed=missed and n == 0)
+    vitals.silent()
+    return begin + seconds + 3.0
+
+
 def test_stretches_of_frames_with_silences_between_are_noticed() -> None:
-    vitals = Vitals()
-    now = 0.0
-
-    def stretch(seconds: float) -> None:
-        nonlocal now
-        for _ in range(round(seconds * RATE_HZ)):
-            now += 1 / RATE_HZ
-            vitals.arrived(now, 1, RATE_HZ)
-        vitals.silent()
-        now += 3.0
-
+    vitals, now = Vitals(), 0.0
     for n in range(4):
         assert vitals.intermittent == (n >= 3)
-        stretch(0.6)
-    stretch(10.0)
+        now = stretch(vitals, now, 0.6)
+    stretch(vitals, now, 10.0)
     assert not vitals.intermittent  # it has sent while nobody touched it
+
+
+def test_a_silence_in_which_this_machine_had_no_room_is_not_the_sensors() -> None:
+    vitals, now = Vitals(), 0.0
+    for _ in range(8):
+        now = stretch(vitals, now, 0.6, missed=True)
+        assert not vitals.intermittent
+    for _ in range(3):
+        now = stretch(vitals, now, 0.6)
+    assert vitals.intermittent
