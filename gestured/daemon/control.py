@@ -9,6 +9,7 @@ The event socket knows none of this: it stays read-only.
 import asyncio
 import json
 import socket
+import sys
 import time
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager
@@ -26,6 +27,8 @@ UNREAD_S = 10.0  # an operator who does not read an answer for so long is cut of
 LOGGED = 8  # lines of one verb and user in a log.PERIOD_S; what is more is counted
 TURN_BYTES = 16 << 10  # bytes of a stream that are made in one turn: less than a millisecond's work
 TURN_PAUSE_S = 0.1  # the longest pause after a turn
+# From Python 3.13 on a server that closes removes its socket's path. Whoever made it does that; systemd's is to stay.
+STAYS: dict[str, Any] = {"cleanup_socket": False} if sys.version_info >= (3, 13) else {}
 
 
 class ControlServer:
@@ -42,7 +45,7 @@ class ControlServer:
 
     async def start(self) -> None:
         """Take connections from now on."""
-        self._server = await asyncio.start_unix_server(self._serve, sock=self._sock, limit=MAX_REQUEST_BYTES)
+        self._server = await asyncio.start_unix_server(self._serve, sock=self._sock, limit=MAX_REQUEST_BYTES, **STAYS)
 
     def close(self) -> None:
         """Take no more, and hang up. Nothing is asked from now on: what a verb looks at may be closed."""
