@@ -371,7 +371,8 @@ def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     key = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")
     for name in ("ca", "other"):
-        openssl("req", "-x509", *key, "-keyout", f"{name}.key", "-out", f"{name}.pem", "-subj", f"/CN={name}")
+        use = ("-addext", "keyUsage=critical,keyCertSign,cRLSign")  # Python 3.13 and newer ask an authority for it
+        openssl("req", "-x509", *key, *use, "-keyout", f"{name}.key", "-out", f"{name}.pem", "-subj", f"/CN={name}")
     openssl("req", *key, "-keyout", "broker.key", "-out", "broker.csr", "-subj", "/CN=broker")
     (folder / "san").write_text("subjectAltName=IP:127.0.0.1\n")
     openssl(
