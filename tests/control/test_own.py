@@ -11,8 +11,6 @@ from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
 from tests.daemon.test_own import Performer, ask, ready
 
-pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
-
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:

@@ -24,7 +24,6 @@ LEAD_S = 1.6  # untouched; 24 frames
 @pytest.fixture
 def serve(tmp_path: Path):
     """Starts daemons of one's own; gives the flags with which replay finds them."""
-    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
     daemons = []
 
     def start(*flags: object, gestures: tuple[str, ...] = tiny_model.GESTURES) -> tuple[str, ...]:

@@ -17,7 +17,6 @@ def session(tmp_path: Path) -> dict[str, str]:
 
 
 def test_each_daemon_is_shown_and_one_that_hangs_or_is_gone_too(run, session, tmp_path: Path):
-    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
     model = tiny_model.make(tmp_path / "tiny.onnx")
     daemons = []
     try:

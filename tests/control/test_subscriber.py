@@ -245,7 +245,6 @@ def test_attempts_come_ever_more_rarely_but_within_bounds(tmp_path: Path, monkey
 
 @pytest.mark.e2e
 def test_a_real_daemon_that_is_started_again(tmp_path: Path):
-    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
     model = tiny_model.make(tmp_path / "tiny.onnx")
     instances = []
     with Subscriber(tmp_path / "events.sock", types=["gesture", "status"]) as subscriber:

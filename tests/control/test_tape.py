@@ -108,7 +108,6 @@ def test_whatever_is_cut_off_the_rest_is_read(recorded, daemon: Daemon, tmp_path
 @pytest.fixture
 def flooded(tmp_path: Path) -> Iterator[Daemon]:
     """A daemon of its own for a flood, which would fill the others' flight recorder and wait in their socket."""
-    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
     daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"))
     yield daemon
     assert daemon.stop() == 0, daemon.stderr()
@@ -129,7 +128,6 @@ def test_a_recording_ends_at_its_size_and_never_replaces_a_file(run, start, floo
 
 
 def test_a_recording_whose_daemon_goes_is_good_and_says_so(start, tmp_path: Path) -> None:
-    pytest.importorskip("onnx")
     daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"), "--clock", "sensor")
     path = tmp_path / "gone.mcap"
     recorder = start("record", path, "--control", daemon.ready["control"])

@@ -22,8 +22,6 @@ from tests.control.browser import PROGRAM, Browser
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Frame, Sensor
 
-pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
-
 
 class Page:
     """The viewer as an HTTP client sees it."""

@@ -13,7 +13,6 @@ from tests.daemon.harness import Daemon
 @pytest.fixture(scope="session")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A valid model file named tiny."""
-    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
     return tiny_model.make(tmp_path_factory.mktemp("model") / "tiny.onnx")
 
 

@@ -13,7 +13,6 @@ from gestured.client.lines import Refused
 from tests.daemon import tiny_model
 from tests.daemon.harness import Client, Daemon, Frame, Hand, Sensor, lines_of
 
-pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
 Point = tuple[float, float]
 Begin = Callable[..., Daemon]
 

@@ -21,7 +21,6 @@ ALL = (*TYPES, "provisional")
 @pytest.fixture(scope="module")
 def early(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The small model, with thresholds for contacts that are not over."""
-    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
     return tiny_model.make(tmp_path_factory.mktemp("early") / "early.onnx", provisional=tiny_model.PROVISIONAL)
 
 

@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 GESTURES = (
     "one_tap", "double_tap", "swipe_down", "swipe_up", "swipe_right", "swipe_left", "circle_clockwise",
@@ -43,8 +44,9 @@ def make(
 
     `metadata` are further ones: `quantiles`; `provisional`, how sure it must be of a contact that is not over;
     `own`, with which it has an embedding: movement across, movement down, spread in time.
+    The test is skipped where the onnx package is not installed.
     """
-    import onnx
+    onnx = pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
     from onnx import TensorProto, helper, numpy_helper
 
     from gestured.core.window import Window

@@ -116,7 +116,6 @@ def test_bash_completes_names_of_gestures_types_and_sensors(tmp_path: Path, monk
     assert complete("gesturectl", "listen", "--sensor", "") == set()
     assert complete("gesturectl", "emit", "circle_") == {"circle_clockwise", "circle_counter_clockwise"}
     assert complete("gestured", "--gestures", "one_tap,swipe_l") == {"one_tap,swipe_left"}
-    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
     daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"), "--clock", "sensor")
     try:
         monkeypatch.setenv("GESTURED_SOCKET", str(daemon.socket))
