@@ -1,5 +1,6 @@
 """Training goes on where it stopped, comes out the same, and tells people apart."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
 from gestured.lab.fit import (
     CLASSES,
+    NETS,
     REAL_KINDS,
     FitConfig,
     balanced,
@@ -44,8 +46,8 @@ def samples() -> Samples:
 def steady(patch: pytest.MonkeyPatch) -> None:
     """Nets without dropout, whose masks come from the process's own generator."""
 
-    def without() -> nn.ModuleDict:
-        nets = build()
+    def without(names: Iterable[str] = NETS) -> nn.ModuleDict:
+        nets = build(names)
         for module in nets.modules():
             if isinstance(module, nn.Dropout):
                 module.p = 0.0
@@ -255,6 +257,12 @@ def test_no_real_subject_is_judged_by_a_net_that_has_seen_it(
     monkeypatch.setattr(train, "pretrain", lambda *_: pytest.fail("what is done is not done again"))
     monkeypatch.setattr(train, "finetune", lambda *_: pytest.fail("what is done is not done again"))
     train.learn(train.TrainingPlan(), data, tmp_path)
+
+    # A candidate is another training: nothing of the shipped networks is taken for it, and both can be compared.
+    monkeypatch.setattr(train, "pretrain", lambda *given: build(given[-1]))
+    monkeypatch.setattr(train, "finetune", tune)
+    both = trained.beside(train.learn(train.TrainingPlan(), data, tmp_path, ["cnn_gru"]))
+    assert set(both.nets) == {"cnn_lstm", "lstm", "trajectory", "cnn_gru"} == set(both.held_out or ())
 
 
 def test_stage_two_starts_from_stage_one_and_leaves_it_alone(samples: Samples) -> None:
