@@ -32,7 +32,7 @@ from gestured.simulator import (
     gesture_take,
     wide_plan,
 )
-from tests.lab.ablation import KINDS, PLAN, TAKES, network
+from tests.lab.ablation import KINDS, network
 from tests.lab.adapt.curve import Said, of_people, table
 
 CHOSEN = ("sensors like touchscreens", "touches of at most 25 times the noise")  # the two that are most of the takes
@@ -82,9 +82,9 @@ def main() -> None:
     args = parser.parse_args()
     torch.set_num_threads(1)
     takes, course = simulate(args.cache, 2), Course()
-    every = network(args.cache, PLAN, None, TAKES)
+    every = network(args.cache, None)
     for kind in CHOSEN:
-        base, least = network(args.cache, PLAN, kind, TAKES)
+        base, least = network(args.cache, kind)
         said = {name: Said() for name in (BASE, *(f"{count} people" for count in PEOPLE), EVERY)}
         for nth, sensor in enumerate(sensors(kind)):
             own = evening(sensor, nth)
