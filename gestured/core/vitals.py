@@ -26,10 +26,11 @@ class Vitals:
         """Whether the sensor falls silent again and again, after a few seconds each time."""
         return self._stretches >= STRETCHES and (self._last is None or self._last - self._began < SHORT_S)
 
-    def arrived(self, now: float, frames: int, rate_hz: float, *, missed: bool = False) -> None:
+    def arrived(self, now: float, frames: int, rate_hz: float, *, missed: bool) -> None:
         """`frames` came together at `now` s. Interarrival jitter as RTP has it.
 
-        `missed`: this machine may have had no room for others before them, so that a silence need not be the sensor's.
+        `missed`: this machine may have had no room for frames before these. Then the silence before them need not be
+        the sensor's own, and short stretches are counted anew.
         """
         if missed:
             self._stretches = 0

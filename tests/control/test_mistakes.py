@@ -271,6 +271,4 @@ def test_why_an_answer_is_unknown_is_shown(start, own) -> None:
         packet = sensor.packet(frame)
         if n not in (2, 3, 4, 5):  # they are lost on the way
             sensor.sock.send(packet)
-    while b"unknown" not in (line := listener.stdout.readline()):
-        pass
-    assert b"unknown (hole)" in line
+    assert b"unknown (hole)" in next(line for line in listener.stdout if b"unknown" in line)

@@ -127,8 +127,8 @@ def test_several_sensors_together_are_as_their_worst() -> None:
 def test_jitter_is_none_for_an_even_stream_and_grows_with_an_uneven_one() -> None:
     even, uneven = Vitals(), Vitals()
     for n in range(200):
-        even.arrived(n / 15, 1, 15.0)
-        uneven.arrived(n / 15 + (0.02 if n % 2 else 0.0), 1, 15.0)
+        even.arrived(n / 15, 1, 15.0, missed=False)
+        uneven.arrived(n / 15 + (0.02 if n % 2 else 0.0), 1, 15.0, missed=False)
     assert even.jitter_s < 1e-9 and uneven.jitter_s == pytest.approx(0.02, rel=0.01)
 
 
