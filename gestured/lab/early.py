@@ -140,7 +140,10 @@ def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None) -> dict
 
 
 def events(asked: Asked, provisional: dict[str, Any], gestures: Sequence[str]) -> NDArray[np.int64]:
-    """(G,) the question at which each contact's provisional event is given, -1 for none; `provisional` is a rule."""
+    """(G,) the question at which each contact's provisional event is given, -1 for none.
+
+    `provisional` is a rule as `calibrated` gives it, for which one frame is enough.
+    """
     rows = [provisional["gestures"].get(name, provisional["thresholds"]) for name in gestures]
     level = np.array([[np.inf if value is None else value for value in row] for row in rows])
     reached = np.flatnonzero(asked.confidence >= level[asked.best, asked.stretch])
