@@ -42,7 +42,8 @@ class Layouts:
 
     def read(self, data: bytes, bundled: bool) -> list[Message] | None:
         """The messages of a packet, None where its layout is not known."""
-        layout = self._known.get(_key(data, bundled))
+        begin = data[BUNDLED if bundled else ALONE]
+        layout = self._known.get(begin) or self._known.get(_key(begin))
         if layout is None or layout[0] != len(data):
             return None
         time, bundle = (timetag(data, 8, len(data)), 0) if bundled else (None, -1)
@@ -70,10 +71,13 @@ class Layouts:
             self._known.clear()
             self._room = self._most_bytes
         self._room -= cost
-        self._known[_key(data, bundled)] = (len(data), places)
+        self._known[_key(data[BUNDLED if bundled else ALONE])] = (len(data), places)
 
 
-def _key(data: bytes, bundled: bool) -> bytes:
-    """By what a layout is found: the first address and type tags. What follows them is different in each packet."""
-    begin = data[BUNDLED if bundled else ALONE]
-    return begin[: begin.find(b"\0", begin.find(b","))]
+def _key(begin: bytes) -> bytes:
+    """By what a layout is found: the first address and type tags. What follows them is different in each packet.
+
+    It is all of `begin` where they do not end there, as those of a frame of floats: such a packet is found without this.
+    """
+    end = begin.find(b"\0", begin.find(b","))
+    return begin if end < 0 else begin[:end]
