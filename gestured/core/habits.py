@@ -26,10 +26,7 @@ class Habits:
         self.exchanges = self.fits = 0  # contacts that look like one finger with R and C exchanged, and as they are
         self._fell = -np.inf  # s, the last frame that lay below the baseline
         self._idle: Counts | None = None  # (R, C) the last frame without a contact
-        self._strongest: tuple[float, Counts | None] = (
-            0.0,
-            None,
-        )  # activity and (R, C) of the contact's strongest frame
+        self._strongest: tuple[float, Counts | None] = 0.0, None  # the contact's strongest frame: activity, and (R, C)
 
     @property
     def inverted(self) -> bool:

@@ -77,7 +77,7 @@ class Layouts:
 def _key(begin: bytes) -> bytes:
     """By what a layout is found: the first address and type tags. What follows them is different in each packet.
 
-    It is all of `begin` where they do not end there, as those of a frame of floats: such a packet is found without this.
+    It is all of `begin` where they do not end there, as those of a frame of floats, which is found without this.
     """
     end = begin.find(b"\0", begin.find(b","))
     return begin if end < 0 else begin[:end]

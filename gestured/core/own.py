@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gestured.core.frames import Segment
 from gestured.core.prototypes import EXAMPLES
-from gestured.core.window import Window
+from gestured.core.window import LEAST_PEAK, Window
 
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 LONGEST_NAME = 32  # characters
@@ -41,12 +41,11 @@ class Example:
         frames = window.apply(segment)
         if not (0 < len(frames) <= MOST_FRAMES and frames.size <= MOST_VALUES and np.isfinite(frames).all()):
             return None
-        touched = segment.times[segment.times >= segment.onset - window.lead_s - 0.25 / window.rate_hz]
-        start = float(touched[0])  # the window's first frame; of it, only where it lies in time is needed
+        start = float(segment.times[window.span(segment)[0]])  # s, the window's first frame
         first, last = (
             min(max(round((t - start) * window.rate_hz), 0), len(frames) - 1) for t in (segment.onset, segment.offset)
         )
-        peak = max(float(segment.frames.max()), window.floor * segment.noise, 1e-37)
+        peak = max(float(segment.frames.max()), window.floor * segment.noise, LEAST_PEAK)
         return cls(frames.astype(np.float16), window.rate_hz, first, last, min(segment.noise / peak, 1.0))
 
     def segment(self) -> Segment:

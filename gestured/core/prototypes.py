@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 EXAMPLES = 5  # of one gesture, at most
 NEAR = 0.5  # confidence from which a segment is a gesture of the user's own, where nothing else is set
 DIMENSIONS = 512  # of a space or an embedding, at most
+SUREST = 40.0  # log odds that a confidence tells: beyond them it is 0 or 1 in any case, and `exp` would overflow
 
 Array = NDArray[np.float64]
 
@@ -108,7 +109,7 @@ class Prototype:
     def confidence(self, place: Array) -> float:
         """0 to 1 of a place (K,); NEAR at the threshold."""
         ahead = self.space.slope * (self.nearness(place) - self.threshold)
-        return float(1.0 / (1.0 + np.exp(-np.clip(ahead, -40, 40))))
+        return float(1.0 / (1.0 + np.exp(-np.clip(ahead, -SUREST, SUREST))))
 
 
 @dataclass(frozen=True, slots=True)

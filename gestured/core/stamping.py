@@ -34,11 +34,12 @@ class Stamper:
     REORDER = 16  # a frame whose counter is further back was not overtaken on its way: the sensor began anew
     REORDER_S = 0.5  # the same after a longer pause
     STREAK = 3  # the same for so many late frames in a row, in order
+    RECENT = 15  # intervals of which the usual one is taken: a second of a sensor at 15 Hz
     LEAP = 10_000  # a counter that jumps further has lost nothing, it began anew: ten seconds at 1000 Hz
 
     def __init__(self, clock: Literal["arrival", "sensor"] = "arrival") -> None:
         self._by_tag = clock == "sensor"
-        self._intervals: deque[float] = deque(maxlen=15)
+        self._intervals: deque[float] = deque(maxlen=self.RECENT)
         self._last: float | None = None  # the last stamp
         self._arrived = 0.0  # and the arrival of its frame
         self._tag: float | None = None

@@ -11,6 +11,10 @@ from gestured.core.frames import Segment
 from gestured.core.quantiles import median
 
 SAME_RATE = 0.12  # a rate this near to the model's is taken as it is: interpolating jittered times blurs taps
+SLACK = 0.25  # of the model's interval, by which a window is longer: jitter must not decide whether a frame is in
+USED = 0.3  # of the highest: a row or a column of a long sensor that is pressed so much is part of the movement
+RIM = 2.0  # taxel pitches around the movement that are taken in with it, both sides together
+LEAST_PEAK = 1e-37  # counts; its reciprocal is still a number in float32
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +65,12 @@ class Window:
         if self.smooth_frames > 1:
             frames = running_mean(frames, self.smooth_frames)
         frames = np.maximum(frames, 0.0)
-        peak = max(float(frames.max()), self.floor * segment.noise, 1e-37)
+        peak = max(float(frames.max()), self.floor * segment.noise, LEAST_PEAK)
         return (frames / peak).astype(np.float32)
 
     def span(self, segment: Segment) -> tuple[int, int]:
         """Which frames are taken in: from `lead_s` before the first touched one to `tail_s` after the last."""
-        slack = 0.25 / self.rate_hz  # jitter must not decide whether a frame is in
+        slack = SLACK / self.rate_hz
         start = int(np.searchsorted(segment.times, segment.onset - self.lead_s - slack))
         return start, int(np.searchsorted(segment.times, segment.offset + self.tail_s + slack))
 
@@ -85,10 +89,10 @@ class Window:
             axis = 1 if rows > columns else 2  # the longer one
             touched = segment.frames[segment.first : segment.last + 1]
             profile = np.maximum(touched.max(axis=(0, 3 - axis)), 0.0)
-            used = np.flatnonzero(profile >= 0.3 * profile.max())
+            used = np.flatnonzero(profile >= USED * profile.max())
             length = frames.shape[axis]
             low, high = float(used[0]), float(used[-1] + 1)
-            side = min(max(side, high - low + 2), float(length))
+            side = min(max(side, high - low + RIM), float(length))
             start = min(max((low + high - side) / 2, 0.0), length - side)
             top, left = (start, (columns - side) / 2) if axis == 1 else ((rows - side) / 2, start)
         vertical = _resize(rows, top, side, self.rows)
