@@ -18,6 +18,7 @@ from gestured.core.events import Gesture
 from gestured.core.found import Cut
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
+from gestured.core.layouts import Layouts
 from gestured.core.osc_address import Addresses
 from gestured.core.recognizer import Recognizer
 from gestured.core.wire import Decoder
@@ -35,7 +36,7 @@ def decode() -> list[Row]:
     rng = np.random.default_rng(0)
     packet = Form("armrest", plain=True).packet(Frame(0.0, rng.uniform(0, 4000, (9, 9))), 0, 0.0)
     decoder = Decoder(Addresses(), lambda _: Grid(9, 9), keep_touches=False)
-    source = ("127.0.0.1", 40000)
+    layouts, source = Layouts(), ("127.0.0.1", 40000)
 
     def theirs() -> None:
         values = np.array(OscMessage(packet).params, np.float32).reshape(9, 9)
@@ -43,7 +44,9 @@ def decode() -> list[Row]:
 
     return [
         _decode(
-            "decode one frame of 81 floats: the OSC message", lambda: osc.decode(packet), lambda: OscMessage(packet)
+            "decode one frame of 81 floats: the OSC message",
+            lambda: osc.decode(packet, None, layouts),
+            lambda: OscMessage(packet),
         ),
         _decode("the same, to a checked 9 x 9 matrix", lambda: decoder.decode(packet, source), theirs),
     ]

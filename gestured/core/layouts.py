@@ -1,7 +1,7 @@
 """How packets were laid out that came before: one that is laid out the same is read without parsing it again."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,18 +13,21 @@ SCALAR_BYTES = 48  # that Python takes for a scalar in a place
 # The bytes of a packet in which its first head begins, or all of it is: in a bundle with the size before it.
 ALONE, BUNDLED = slice(32), slice(16, 48)
 
-# Where a packet of a known layout has one message: scalars, then a run or a blob; all may be missing.
-Place = tuple[
-    int,  # where it starts
-    bytes,  # its head there: address and type tags, padded; in a bundle the size before them
-    str,  # address
-    str,  # types
-    Callable[[bytes, int], tuple[Any, ...]] | None,  # unpacks the scalars
-    int,  # where the scalars are
-    Any,  # the run's dtype; None for a blob
-    int,  # its length (a blob's in bytes), 0 for none
-    int,  # where it is
-]
+
+class Place(NamedTuple):
+    """Where a packet of a known layout has one message: scalars, then a run or a blob; all may be missing."""
+
+    start: int  # byte
+    head: bytes  # what stands there: address and type tags, padded; in a bundle the size before them
+    address: str
+    types: str
+    unpack: Callable[[bytes, int], tuple[Any, ...]] | None  # reads the scalars
+    scalars: int  # byte, where they are
+    dtype: Any  # of the run; None for a blob
+    length: int  # values of the run, or bytes of the blob; 0 for none
+    run: int  # byte, where it is
+
+
 _new = tuple.__new__  # Message(...) takes twice the time
 _frombuffer = np.frombuffer
 
@@ -48,25 +51,25 @@ class Layouts:
             return None
         time, bundle = (timetag(data, 8, len(data)), 0) if bundled else (None, -1)
         messages: list[Message] = []
-        for start, head, address, types, unpack, scalars, dtype, count, run in layout[1]:
+        for start, head, address, types, unpack, scalars, dtype, length, run in layout[1]:
             if not data.startswith(head, start):
                 return None
             args: tuple[Argument, ...] = () if unpack is None else unpack(data, scalars)
             if dtype is not None:
-                args += (_frombuffer(data, dtype, count, run),)
-            elif count:
-                if int.from_bytes(data[run - 4 : run], "big") != count:
+                args += (_frombuffer(data, dtype, length, run),)
+            elif length:
+                if int.from_bytes(data[run - 4 : run], "big") != length:
                     return None
-                args += (data[run : run + count],)
+                args += (data[run : run + length],)
             messages.append(_new(Message, (address, types, args, time, bundle)))
         return messages
 
     def remember(self, data: bytes, places: list[Place], bundled: bool) -> None:
         """A packet has just these messages, in these places, and nothing else is in it."""
         cost = 0
-        for _, head, _, types, _, _, dtype, count, _ in places:
-            scalars = len(types) - (count if dtype is not None else count > 0)  # all but the run, or the blob
-            cost += PLACE_BYTES + 3 * len(head) + SCALAR_BYTES * scalars
+        for place in places:
+            rest = place.length if place.dtype is not None else place.length > 0  # type tags of the run, or the blob
+            cost += PLACE_BYTES + 3 * len(place.head) + SCALAR_BYTES * (len(place.types) - rest)
         if cost > self._room:
             self._known.clear()
             self._room = self._most_bytes

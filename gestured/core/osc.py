@@ -29,20 +29,18 @@ _SCALARS = {"i": "i", "f": "f", "d": "d", "h": "q", "t": "Q"}
 _ARRAYS = {"i": np.dtype(">i4"), "f": np.dtype(">f4")}
 _RUNS = tuple(tag * RUN for tag in _ARRAYS)
 _PLACED = ("", "s", "r", "sr", "b", "sb")  # what has a place in a layout: scalars, a run, a blob that is not empty
-_layouts = Layouts()
 
 
-def decode(data: bytes, errors: list[ProtocolError] | None = None) -> list[Message]:
+def decode(data: bytes, errors: list[ProtocolError] | None = None, layouts: Layouts | None = None) -> list[Message]:
     """All messages of a packet, bundles flattened, in order.
 
     Raises ProtocolError at the first fault; where `errors` is given, puts faults there instead and keeps
-    every message that is sound.
+    every message that is sound. `layouts` remembers how packets are laid out, so that the next ones cost less.
     """
     if type(data) is not bytes:
         data = bytes(data)  # arrays are views of it: it must not change under their reader
     bundled = data[:8] == _BUNDLE
-    known = _layouts.read(data, bundled)
-    if known is not None:
+    if layouts is not None and (known := layouts.read(data, bundled)) is not None:
         return known
     messages: list[Message] = []
     places: list[Place] = []
@@ -57,8 +55,8 @@ def decode(data: bytes, errors: list[ProtocolError] | None = None) -> list[Messa
         if errors is None:
             raise
         errors.append(error)
-    if 0 < len(places) == len(messages) and not errors:  # nothing else is in it: no string, no inner bundle
-        _layouts.remember(data, places, bundled)
+    if layouts is not None and 0 < len(places) == len(messages) and not errors:  # no string is in it, no inner bundle
+        layouts.remember(data, places, bundled)
     return messages
 
 
@@ -142,7 +140,7 @@ def _message(
         raise ProtocolError("trailing", f"{end - at} bytes more than the type tags say")
     if kinds in _PLACED:
         unpack = layout.unpack_from if "s" in kinds else None
-        places.append((begin, head, address, types, unpack, scalars, dtype, count, run))
+        places.append(Place(begin, head, address, types, unpack, scalars, dtype, count, run))
     return Message(address, types, args, time, bundle)
 
 

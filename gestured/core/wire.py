@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gestured.core import osc
 from gestured.core.errors import ProtocolError
 from gestured.core.frames import Touch
+from gestured.core.layouts import Layouts
 from gestured.core.osc_address import Addresses
 from gestured.core.osc_message import Argument, Message
 
@@ -55,6 +56,7 @@ class Decoder:
         self._addresses = addresses
         self._grids = grids
         self._keep_touches = keep_touches
+        self._layouts = Layouts()
         self._routes: dict[tuple[str, str], _Route | None] = {}  # a memo, bounded
         self._pending: dict[tuple[Hashable, str], tuple[Touch, ...]] = {}  # touches that wait for their frame
 
@@ -67,7 +69,7 @@ class Decoder:
         errors: list[ProtocolError] = []
         found: list[tuple[int, str, Arrival | tuple[Touch, ...]]] = []  # the bundle's number, the sensor
         touched = bool(self._pending)
-        for message in osc.decode(packet, errors):
+        for message in osc.decode(packet, errors, self._layouts):
             key = message.address, message.types
             try:
                 route = self._routes.get(key) or self._learn(*key)

@@ -17,6 +17,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 from gestured.core import osc
 from gestured.core.errors import ProtocolError
 from gestured.core.layouts import Layouts
+from gestured.core.osc_message import Message
 from tests import encoding
 
 REASONS = {"not_osc", "address", "types", "truncated", "trailing", "bundle", "oversized"}
@@ -44,6 +45,13 @@ def encoded(message: tuple[str, list[Any]]) -> bytes:
     return encoding.message(address, "".join(t for t, _ in pairs), [value for _, value in pairs])
 
 
+LAYOUTS = Layouts()  # as a daemon has them: of all packets that came before
+
+
+def decode(data: bytes, errors: list[ProtocolError] | None = None, layouts: Layouts = LAYOUTS) -> list[Message]:
+    return osc.decode(data, errors, layouts)
+
+
 def flat(args: tuple[Any, ...]) -> Iterator[Any]:
     for arg in args:
         yield from arg.tolist() if isinstance(arg, np.ndarray) else [arg]
@@ -57,12 +65,12 @@ def same(a: list[Any], b: list[Any]) -> bool:
 def decodes_or_refuses(data: bytes) -> None:
     first: list[Any] | str
     try:
-        first = [m.types for m in osc.decode(data)]
+        first = [m.types for m in decode(data)]
     except ProtocolError as error:
         assert error.reason in REASONS
         first = error.reason
     errors: list[ProtocolError] = []
-    kept = osc.decode(data, errors)  # never raises, and says the same
+    kept = decode(data, errors)  # never raises, and says the same
     assert first == (errors[0].reason if errors else [m.types for m in kept])
 
 
@@ -83,7 +91,7 @@ def test_damaged_packets_decode_or_raise_protocol_error(
 ) -> None:
     parts = [encoded(m) for m in several]
     packet = parts[0] if len(parts) == 1 else encoding.bundle([parts[0], encoding.bundle(parts[1:])], timetag)
-    osc.decode(packet)  # a layout that is known must not make the damaged one pass
+    decode(packet)  # a layout that is known must not make the damaged one pass
     at = data.draw(st.integers(0, len(packet) - 1))
     for damaged in (
         packet[:at],
@@ -102,7 +110,7 @@ def test_bundles_of_any_sizes_decode_or_raise_protocol_error(sizes: list[int], r
 @given(messages)
 def test_a_message_comes_back_as_it_was_sent(message: tuple[str, list[Any]]) -> None:
     for _ in range(2):  # the second time its layout is known
-        (got,) = osc.decode(encoded(message))
+        (got,) = decode(encoded(message))
         assert (got.address, got.types) == (message[0], "".join(t for t, _ in message[1]))
         assert same(list(flat(got.args)), [value for _, value in message[1]])
         assert got.timetag is None and got.bundle == -1
@@ -114,7 +122,7 @@ def test_bundles_are_flattened_in_order_with_their_own_time_tags(inner: list[Any
     nested = [encoding.bundle([encoded(m) for m in part], tags[i]) for i, part in enumerate(inner)]
     packet = encoding.bundle([*nested, encoded(tail)], tags[4])
     for _ in range(2):
-        got = osc.decode(packet)
+        got = decode(packet)
         sent = [(m[0], tags[i], i + 1) for i, part in enumerate(inner) for m in part] + [("/tail", tags[4], 0)]
         assert [m.address for m in got] == [address for address, _, _ in sent]
         assert [m.bundle for m in got] == [number for _, _, number in sent]
@@ -130,10 +138,10 @@ def test_we_read_what_python_osc_builds(several: list[Any], timetag: float) -> N
         for tag, value in pairs:
             builder.add_arg(value, tag)
         bundle.add_content(builder.build())
-        (alone,) = osc.decode(builder.build().dgram)
+        (alone,) = decode(builder.build().dgram)
         assert alone.address == address and same(list(flat(alone.args)), [value for _, value in pairs])
     built = bundle.build()
-    got = osc.decode(built.dgram)
+    got = decode(built.dgram)
     assert [m.address for m in got] == [m[0] for m in several]
     assert got[0].timetag == pytest.approx(timetag, abs=1e-6)
 
@@ -141,15 +149,15 @@ def test_we_read_what_python_osc_builds(several: list[Any], timetag: float) -> N
 def test_time_tags_agree_with_python_osc() -> None:
     packet = encoding.bundle([encoded(("/a", []))], 1_763_712_000.25)
     assert OscBundle(packet).timestamp == 1_763_712_000.25
-    assert osc.decode(packet)[0].timetag == 1_763_712_000.25
-    assert osc.decode(OscBundleBuilder(IMMEDIATELY).build().dgram) == []
-    (now,) = osc.decode(encoding.bundle([encoded(("/a", []))]))
+    assert decode(packet)[0].timetag == 1_763_712_000.25
+    assert decode(OscBundleBuilder(IMMEDIATELY).build().dgram) == []
+    (now,) = decode(encoding.bundle([encoded(("/a", []))]))
     assert now.timetag is None
 
 
 def test_a_long_run_is_a_view_and_not_eighty_one_floats() -> None:
     packet = encoding.message("/s/pressure", "i" + "f" * 81, (7, np.arange(81.0)))
-    (message,) = osc.decode(packet)
+    (message,) = decode(packet)
     counter, frame = message.args
     assert counter == 7
     assert isinstance(frame, np.ndarray) and frame.dtype == ">f4" and not frame.flags.owndata
@@ -158,45 +166,43 @@ def test_a_long_run_is_a_view_and_not_eighty_one_floats() -> None:
 
 def test_a_buffer_that_is_used_again_does_not_change_a_message() -> None:
     buffer = bytearray(encoding.message("/s/pressure", "ffff", (np.arange(4.0),)))
-    (message,) = osc.decode(memoryview(buffer))  # type: ignore[arg-type]
+    (message,) = decode(memoryview(buffer))  # type: ignore[arg-type]
     buffer[:] = bytes(len(buffer))
     assert list(flat(message.args)) == [0, 1, 2, 3]
 
 
 def test_the_same_head_with_other_sizes_is_read_anew() -> None:
     for size in (0, 3, 4, 8, 1):
-        (message,) = osc.decode(encoding.message("/s", "ib", (1, bytes(size))))
+        (message,) = decode(encoding.message("/s", "ib", (1, bytes(size))))
         assert message.args == (1, bytes(size))
     for size in (5, 8, 7, 5):  # packets of one length, and a head so long that it alone is looked up
-        (message,) = osc.decode(encoding.message("/a-sensor-with-a-long-name/pressure", "ib", (1, bytes(size))))
+        (message,) = decode(encoding.message("/a-sensor-with-a-long-name/pressure", "ib", (1, bytes(size))))
         assert message.args == (1, bytes(size))
     long = encoding.message("/s/pressure", "ffff", (np.arange(4.0),))
-    osc.decode(long)
+    decode(long)
     for packet, reason in ((long[:-4], "truncated"), (long + bytes(4), "trailing")):
         with pytest.raises(ProtocolError) as caught:
-            osc.decode(packet)
+            decode(packet)
         assert caught.value.reason == reason
 
 
 def test_known_layouts_do_not_mix_up_sensors_and_a_thousand_of_them_are_known() -> None:
     for n in range(3000):
-        (message,) = osc.decode(encoding.message(f"/s{n % 1000}/pressure", "ffff", (np.full(4, n),)))
+        (message,) = decode(encoding.message(f"/s{n % 1000}/pressure", "ffff", (np.full(4, n),)))
         assert message.address == f"/s{n % 1000}/pressure" and list(flat(message.args)) == [n] * 4
-    assert len(osc._layouts) >= 1000
+    assert len(LAYOUTS) >= 1000
 
 
 @pytest.mark.parametrize("name", ["s", "a-sensor-whose-name-is-longer-than-that"])
 @pytest.mark.parametrize("types", ["b", "ib", "iiiii", "iff"])
 @pytest.mark.parametrize("bundled", [False, True])
-def test_a_sensor_has_one_layout_whatever_it_counts_and_feels(
-    name: str, types: str, bundled: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(osc, "_layouts", Layouts())
+def test_a_sensor_has_one_layout_whatever_it_counts_and_feels(name: str, types: str, bundled: bool) -> None:
+    known = Layouts()
     for n in range(300):
         args = [bytes([n % 256] * 9) if tag == "b" else n for tag in types]
         message = encoding.message(f"/{name}/pressure", types, args)
-        osc.decode(encoding.bundle([message], n) if bundled else message)
-    assert len(osc._layouts) == 1
+        decode(encoding.bundle([message], n) if bundled else message, layouts=known)
+    assert len(known) == 1
 
 
 INVENTED = {  # packets that nobody has sent before
@@ -209,19 +215,17 @@ INVENTED = {  # packets that nobody has sent before
 
 
 @pytest.mark.parametrize("kind", INVENTED)
-def test_invented_layouts_take_no_more_memory_than_was_given_to_them(
-    kind: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_invented_layouts_take_no_more_memory_than_was_given_to_them(kind: str) -> None:
     given = 1 << 20
-    monkeypatch.setattr(osc, "_layouts", Layouts(given))
+    known = Layouts(given)
     held = 0
     tracemalloc.start()
     try:
         before = tracemalloc.get_traced_memory()[0]
         for n in range(1500):
-            osc.decode(INVENTED[kind](n))
+            decode(INVENTED[kind](n), layouts=known)
             held = max(held, tracemalloc.get_traced_memory()[0] - before)
-            if n and len(osc._layouts) == 1:  # they were forgotten
+            if n and len(known) == 1:  # they were forgotten
                 break
         else:
             pytest.fail("not enough of them")
@@ -233,7 +237,7 @@ def test_invented_layouts_take_no_more_memory_than_was_given_to_them(
 def test_a_bad_message_does_not_lose_its_siblings() -> None:
     good, bad = encoded(("/good", [("i", 1)])), b"/bad\0\0\0\0,Q\0\0"
     errors: list[ProtocolError] = []
-    got = osc.decode(encoding.bundle([good, bad, encoding.bundle([bad, good]), good]), errors)
+    got = decode(encoding.bundle([good, bad, encoding.bundle([bad, good]), good]), errors)
     assert [m.address for m in got] == ["/good"] * 3
     assert [e.reason for e in errors] == ["types", "types"]
 
@@ -261,7 +265,7 @@ def test_a_bad_message_does_not_lose_its_siblings() -> None:
 )
 def test_each_fault_has_its_reason(packet: bytes, reason: str) -> None:
     with pytest.raises(ProtocolError) as caught:
-        osc.decode(packet)
+        decode(packet)
     assert caught.value.reason == reason
 
 
@@ -270,18 +274,18 @@ def test_depth_and_number_are_bounded() -> None:
     for depth in range(1, 2000):
         nested = encoding.bundle([nested])
         if depth == osc.MAX_DEPTH:
-            assert len(osc.decode(nested)) == 1
+            assert len(decode(nested)) == 1
     with pytest.raises(ProtocolError, match="deeper"):
-        osc.decode(nested)
+        decode(nested)
     many = [encoded(("/a", []))] * (osc.MAX_MESSAGES + 1)
-    assert len(osc.decode(encoding.bundle(many[1:]))) == osc.MAX_MESSAGES
+    assert len(decode(encoding.bundle(many[1:]))) == osc.MAX_MESSAGES
     with pytest.raises(ProtocolError, match="more than"):
-        osc.decode(encoding.bundle(many))
+        decode(encoding.bundle(many))
     errors: list[ProtocolError] = []
-    osc.decode(encoding.bundle([b"/\0\0\0"] * 8000), errors)
+    decode(encoding.bundle([b"/\0\0\0"] * 8000), errors)
     assert len(errors) == osc.MAX_MESSAGES + 1
 
 
 def test_infinities_survive() -> None:
-    (message,) = osc.decode(encoding.message("/a", "fd", (math.inf, -math.inf)))
+    (message,) = decode(encoding.message("/a", "fd", (math.inf, -math.inf)))
     assert message.args == (math.inf, -math.inf)

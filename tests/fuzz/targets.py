@@ -12,10 +12,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from gestured.core import osc
 from gestured.core.errors import ModelError, ProtocolError
 from gestured.core.frames import Segment
-from gestured.core.layouts import Layouts
 from gestured.core.osc_address import Addresses
 from gestured.core.stamping import Stamper
 from gestured.core.subscription import parse_subscription
@@ -40,16 +38,12 @@ _now = 0.0
 def decoder(data: bytes) -> None:
     """A packet is frames and errors, the same whether or not its layout was seen before; frames get rising times."""
     global _now
-    # The cache as other packets left it, against an empty one, against one that knows this packet alone.
-    found = [_read(_one, data)]
-    osc._layouts, kept = Layouts(), osc._layouts
-    try:
-        found += [_read(_decoder(), data), _read(_decoder(), data)]
-    finally:
-        osc._layouts = kept
+    # One that has seen other packets, against one that has seen none, and the same once it knows this packet alone.
+    found, new = [], _decoder()
+    for one in (_one, new, new):
+        found.append(one.decode(data, "source"))
+        one._pending.clear()  # touches that wait for a frame: what comes next depends on them
     (arrivals, errors), *others = found
-    if _one._pending:  # touches that wait for a frame: what comes next depends on it
-        _one._pending.clear()
     assert all(_plain(*other) == _plain(arrivals, errors) for other in others), "depends on what came before"
     for arrival in arrivals:
         assert arrival.values.shape == ((9, 9) if arrival.sensor == BIG else (2, 2))
@@ -60,10 +54,6 @@ def decoder(data: bytes) -> None:
         times = [before] + [stamp.t for stamp in stamper.stamp(arrivals, _now) if not stamp.dropped]
         assert all(map(math.isfinite, times)), clock
         assert all(a <= b for a, b in zip(times[1:], times[2:], strict=False)), clock
-
-
-def _read(one: Decoder, data: bytes) -> tuple[list[Arrival], list[ProtocolError]]:
-    return one.decode(data, "source")
 
 
 def _plain(arrivals: list[Arrival], errors: list[ProtocolError]) -> object:
