@@ -8,6 +8,7 @@ A bug in the path of one sensor is a `Fault`: its contact is ended, and the othe
 a bug does not end the program: a daemon in a vehicle that dies of one sensor's odd frame helps nobody.
 """
 
+import math
 from collections.abc import Callable, Sequence
 
 from gestured.core.classifier import Classifier
@@ -152,6 +153,7 @@ class Hub:
         self._scene, self._classifier = scene, classifier
         self._decoder = Decoder(scene.addresses, scene.grid_of, keep_touches=scene.touches)
         self._allowed: dict[str, bool] = {}  # by host
+        self._full_until = -math.inf  # s; before that no stranger has been silent for long enough to lose its place
 
     def _decode(self, packet: bytes, source: Source, now: float, waiting: Waiting, facts: list[Fact]) -> None:
         if self._scene.allow and not self._may_send(source[0]):
@@ -192,18 +194,24 @@ class Hub:
         return feed
 
     def _full(self, name: str, now: float) -> bool:
-        """Whether there is no place for a new sensor; places for those of the scene are kept free."""
+        """Whether there is no place for a new sensor; places for those of the scene are kept free.
+
+        One packet can hold hundreds of names: where there is no place, they are not each held against all sensors.
+        """
         named = self._scene.sensors
         if name in named:
             return False
+        if now <= self._full_until:
+            return True
         strangers = [feed for feed in self._feeds.values() if feed.name not in named]
         if len(strangers) < self._scene.max_sensors - len(named):
             return False
-        for feed in strangers:
-            if now - feed.owner.heard > FORGET_S:
-                self._forget(feed)
-                return False
-        return True
+        longest = min(strangers, key=lambda feed: feed.owner.heard, default=None)
+        if longest is None or now - longest.owner.heard <= FORGET_S:
+            self._full_until = now if longest is None else longest.owner.heard + FORGET_S
+            return True
+        self._forget(longest)
+        return False
 
     def _forget(self, feed: Feed) -> None:
         """Take a sensor off the list; what it has numbered is numbered on should it return."""

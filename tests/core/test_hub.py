@@ -19,7 +19,8 @@ from gestured.core.scene import Scene, Setup
 from gestured.lab.recordings.live import LiveSensor
 from gestured.record import tape_reader, tape_writer
 from gestured.record.replay import Replay, maker
-from tests.daemon.harness import Frame, Hand, floats
+from tests import encoding
+from tests.daemon.harness import Frame, Hand, blob, floats
 
 FIRST, SECOND, STRANGER = ("10.0.0.1", 1), ("10.0.0.2", 1), ("192.0.2.1", 1)
 GESTURES = ("swipe", "double_tap")
@@ -68,6 +69,33 @@ def test_a_second_source_feeds_nothing(crossed: list[Arrived]) -> None:
     assert len(taken) == len(crossed) - 35 and max(float(frame.values.max()) for frame in taken) < 205
     alone = [fact for fact in play(SCENE, [one for one in crossed if one[2] == FIRST]) if isinstance(fact, Event)]
     assert [fact for fact in facts if isinstance(fact, Event)] == alone != []
+
+
+class Counting(dict[str, Setup]):
+    """Sensors of a scene; counts how often it is asked for one."""
+
+    asked = 0
+
+    def __contains__(self, name: object) -> bool:
+        self.asked += 1
+        return super().__contains__(name)
+
+
+def test_strangers_cost_the_same_however_many_sensors_there_are() -> None:
+    """One packet holds hundreds of names: were each held against all sensors, it would stop the daemon."""
+    named, strangers = Counting(), 300
+    hub = Hub(replace(SCENE, sensors=named, max_sensors=200, frames=False), Sure())
+    frame = Hand().frame()
+    for n in range(200):
+        hub.receive([(floats(f"/s{n}/pressure", frame, 0), FIRST)], 1.0)
+    flood = encoding.bundle([blob("u1")(f"/x{n}/pressure", frame, 0) for n in range(strangers)])
+    named.asked = 0
+    facts = hub.receive([(flood, STRANGER)], 2.0)
+    assert [fact.reason for fact in facts if isinstance(fact, Dropped)] == ["too_many_sensors"] * strangers
+    assert named.asked < 3 * strangers
+    # A place is free as soon as one of them has been silent for long enough.
+    (new,) = hub.receive([(floats("/x0/pressure", frame, 0), STRANGER)], 1.5 + FORGET_S)[:1]
+    assert isinstance(new, Changed) and new.what == "new"
 
 
 def write(path: Path, arrived: list[Arrived], **settings: object) -> Path:
