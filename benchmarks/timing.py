@@ -2,10 +2,11 @@
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,12 @@ def interleaved(a: Callable[[], float], b: Callable[[], float], repeats: int) ->
     """Measure a, b, a, b ...; the first pair warms up and is thrown away."""
     pairs = [(a(), b()) for _ in range(repeats + 1)][1:]
     return [x for x, _ in pairs], [y for _, y in pairs]
+
+
+def delay_ms(event: Mapping[str, Any], heard: float) -> float:
+    """Milliseconds from when an answer was decided, or a frame began a contact, to `heard`, in monotonic s."""
+    epoch = time.time() - time.monotonic()
+    return 1e3 * (heard - (float(event.get("decided", event["onset"])) - epoch))
 
 
 def cpu_s_of(pid: int) -> float:

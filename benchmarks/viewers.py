@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
 from benchmarks.process import Program
-from benchmarks.timing import Row, cpu_s_of, interleaved, percentile, ratio
+from benchmarks.timing import Row, cpu_s_of, delay_ms, interleaved, percentile, ratio
 from benchmarks.traffic import RATE_HZ, touched
 from gestured.client.engine import Engine
 from gestured.client.sensor import Form
@@ -21,7 +21,7 @@ SENSORS = 20  # all of them are touched: so many events that a 99th percentile s
 SECONDS = 12.0
 ROUNDS = 6
 WARM = 30  # frames
-TYPES = ["onset", "gesture", "unknown", "cancelled", "release"]
+TYPES = ["onset", "gesture", "unknown"]
 
 
 @contextmanager
@@ -41,7 +41,6 @@ def viewers(model: str) -> list[Row]:
     """Delays of all events, and processor time, in the same daemon: in turn with three viewers and with none."""
     forms = [Form(f"bench{n}") for n in range(SENSORS)]
     takes = [touched(40 + n, SECONDS).frames for n in range(SENSORS)]
-    sent = [0.0] * SENSORS  # monotonic s, the last frame of each
     count = 0
     daemon_ms: dict[int, list[float]] = {0: [], VIEWERS: []}  # of processor time in a second, by the number of viewers
     viewers_ms: list[float] = []  # the same of all viewers together
@@ -52,9 +51,7 @@ def viewers(model: str) -> list[Row]:
         for k in range(frames):
             time.sleep(max(begin + k / RATE_HZ - time.monotonic(), 0.0))
             for n, form in enumerate(forms):
-                packet = form.packet(Frame(0.0, takes[n][k]), count, time.time())
-                sent[n] = time.monotonic()  # before: an event may be heard before this thread goes on
-                sender.send(packet)
+                sender.send(form.packet(Frame(0.0, takes[n][k]), count, time.time()))
             count += 1
 
     with Engine(model, 9, 9) as engine, socket.socket(type=socket.SOCK_DGRAM) as sender:
@@ -71,7 +68,7 @@ def viewers(model: str) -> list[Row]:
 
                 def hear() -> None:
                     for event in stream:
-                        delays.append(1e3 * (time.monotonic() - sent[int(event["sensor"].removeprefix("bench"))]))
+                        delays.append(delay_ms(event, time.monotonic()))
 
                 listener = threading.Thread(target=hear, daemon=True)
                 listener.start()

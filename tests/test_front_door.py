@@ -102,6 +102,24 @@ def touched(recognizer: Any, **more: Any) -> list[Any]:
     return [event for n, frame in enumerate(frames) for event in recognizer.push(n / 15, frame, **more)]
 
 
+def test_an_answer_can_be_had_before_the_next_frame(recognizer: Any, shelf: Path):
+    hand = Hand()
+    frames = [*hand.idle(2.0), *hand.swipe("left"), *hand.idle(1.0)]
+    other = gestured.open("cnn_lstm", sensor="armrest", grid=(9, 9))
+    waited, pushed = [], []
+    for n, frame in enumerate(frames):
+        before = (n - 1) / 15
+        if (due := recognizer.due) is not None:
+            assert recognizer.wait(before) == []
+            waited += recognizer.wait(due + 1e-6)
+            assert before < due < n / 15 and recognizer.due is None
+        waited += recognizer.push(n / 15, frame)
+        pushed += other.push(n / 15, frame)
+    assert [type(event) for event in waited] == [Onset, gestured.Gesture, gestured.Release] and waited == pushed
+    with pytest.raises(ValueError, match="not before the last frame's"):
+        recognizer.wait(0.0)
+
+
 def test_a_frame_may_say_what_the_sensor_knows_of_it(recognizer: Any):
     (onset,) = touched(recognizer, touches=[Touch(1, 4.0, 4.0)], lost=1)
     assert (onset.sensor, onset.id) == ("armrest", 1) and isinstance(onset, Onset)

@@ -48,7 +48,7 @@ class AfterEffect:
         """There was no contact."""
         self.peak = 0.0  # noise units, the highest activity of the contact that goes on, or of the last one
         self._next = 0.0  # noise units, the next highest: of one frame more
-        self._over = -math.inf  # s, when that contact was over; infinite while it goes on
+        self._over = -math.inf  # s, the first frame after that contact; infinite before it
 
     def begin(self) -> None:
         """A contact has begun."""
@@ -60,9 +60,10 @@ class AfterEffect:
         self._next = max(self._next, min(self.peak, activity))
         self.peak = max(self.peak, activity)
 
-    def end(self, t: float) -> None:
-        """The contact is over at `t` s."""
-        self._over = t
+    def fade(self, t: float) -> None:
+        """A frame at `t` s belongs to no contact: from the first such one on, what the last one left behind fades."""
+        if self._over == math.inf:
+            self._over = t
 
     def recovering(self, t: float) -> bool:
         """Whether a contact has ended just before `t` s, so that what is left on the sensor is its after-effect."""

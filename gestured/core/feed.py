@@ -1,5 +1,6 @@
 """One sensor on its way through the hub: its frames are stamped and recognised, and a bug in it stays in it."""
 
+import math
 from collections.abc import Callable, Sequence
 
 from gestured.core.classifier import Classifier
@@ -91,6 +92,16 @@ class Feed:
         if lost:
             self._lost, self._lost_at = self._lost + lost, now
         facts.append(Arrived(self.name, taken, lost, duplicates, late, implausible))
+
+    @property
+    def due(self) -> float:
+        """When `wait` will find something unless a frame comes before; infinite where nothing waits."""
+        due = self._recognizer.due
+        return math.inf if due is None else self._stamper.when(due)
+
+    def wait(self, now: float, facts: list[Fact]) -> None:
+        """No frame has come until `now`: a contact may be over."""
+        self._run(self._recognizer.wait, now, facts)
 
     def flush(self, now: float, facts: list[Fact]) -> None:
         """The sensor has nothing more to say: what is open is answered or cancelled."""

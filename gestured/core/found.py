@@ -12,7 +12,7 @@ class Cut:
 
     id: int
     segment: Segment  # the same object as in the last draft, unless more has become known since
-    decided: float  # s, the frame that completed it
+    decided: float  # s, when it was complete
     hole_s: float = 0.0  # the longest time until then in which the finger may have done anything unseen
 
 

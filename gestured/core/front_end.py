@@ -125,7 +125,7 @@ class FrontEnd:
         cutter.keep(look, touches, frame.lost, place)
         deeds = segmenter.push(t, look.activity, place)
         if deeds:
-            found += self._done(deeds, t, t)
+            found += self._done(deeds, t)
         if segmenter.phase.pending and len(cutter) > self.timing.limit_frames:
             found += self.give_up(t)
         if segmenter.phase.pending:
@@ -141,9 +141,20 @@ class FrontEnd:
             conditioner.idle(look, recovering=segmenter.after.recovering(t))
         return found
 
+    @property
+    def due(self) -> float | None:
+        """When a contact is over unless a frame comes before, in s. None where there is none, or a frame is overdue."""
+        over = self._segmenter.over
+        return over if over is not None and over <= self._pace.sure else None
+
+    def wait(self, t: float) -> list[Contact]:
+        """No frame has come until `t` s: a contact may be over. A frame that comes later decides the same."""
+        due = self.due
+        return [] if due is None or t < due else self._done(self._segmenter.flush(t, self._pace.sure), t)
+
     def give_up(self, t: float) -> list[Contact]:
         """A contact that goes on has taken too long by another clock than its frames': it is cancelled as held."""
-        return self._done(self._segmenter.give_up(t), t, t)
+        return self._done(self._segmenter.give_up(t), t)
 
     def flush(self, t: float) -> list[Contact]:
         """The stream paused or ended at `t` s: close what is open."""
@@ -151,7 +162,7 @@ class FrontEnd:
         segmenter, last = self._segmenter, self._pace.last
         if segmenter.phase.touched and last is not None:
             t = min(t, last + self.timing.stale_s)  # it was over then, whenever one asks
-            found += self._done(segmenter.flush(t), t, last)
+            found += self._done(segmenter.flush(t, self._pace.sure), last)
             if segmenter.phase.let_go:
                 found += self._close(segmenter.onset, segmenter.last_touched, t, last)
             elif segmenter.phase.touched:
@@ -173,9 +184,11 @@ class FrontEnd:
             found += self.flush(t)
         else:
             if self._segmenter.phase.touched:
-                found += self._done(self._segmenter.flush(t), t, t)
+                found += self._done(self._segmenter.flush(t, self._pace.sure), t)
             self._pace.learn(step)
         self._pace.last = t
+        if not self._segmenter.phase.touched:
+            self._segmenter.after.fade(t)
         return found
 
     def _shift(self, look: Look) -> list[Contact]:
@@ -199,10 +212,10 @@ class FrontEnd:
             self.habits.clear()
         return found
 
-    def _done(self, deeds: list[Deed], t: float, seen: float) -> list[Contact]:
-        """What the segmenter decided at `t` s, the sensor having been seen until then."""
+    def _done(self, deeds: list[Deed], seen: float) -> list[Contact]:
+        """What the segmenter decided, the sensor having been seen until then (s)."""
         found: list[Contact] = []
-        for action, onset, offset in deeds:
+        for action, onset, offset, decided in deeds:
             if action is Action.OPEN:
                 found += self._open(onset)
             elif action is Action.HELD:
@@ -210,7 +223,7 @@ class FrontEnd:
             elif action is Action.LEFT:
                 found.append(Release(self.sensor, self.segments, offset))
             else:
-                found += self._close(onset, offset, t, seen)
+                found += self._close(onset, offset, decided, min(seen, decided))
                 if action is Action.SPLIT:
                     found += self._open(self._segmenter.onset)
         return found

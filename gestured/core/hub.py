@@ -38,12 +38,19 @@ class Hub:
         self._told: dict[str, int] = {}  # and how many of them a sensor knows of
         self._owners: frozenset[Source] = frozenset()
         self._asked: Callable[[str], bool] = lambda sensor: False
+        self._waits: dict[str, Feed] = {}  # those in which a contact may be over before the next frame
+        self._due = math.inf  # s, when the first of them may
         self._set(scene, classifier)
 
     @property
     def scene(self) -> Scene:
         """What decides."""
         return self._scene
+
+    @property
+    def due(self) -> float:
+        """When `wait` will probably find something unless packets come before; infinite where there is nothing."""
+        return self._due
 
     @property
     def owners(self) -> frozenset[Source]:
@@ -62,12 +69,28 @@ class Hub:
         for name, (feed, arrivals) in waiting.items():
             missed = self._told[name] != self._missed
             self._told[name] = self._missed
+            if name in self._waits:
+                feed.wait(now, facts)
             feed.take(arrivals, now, facts, missed=missed)
+            due = feed.due
+            if due < math.inf:
+                self._waits[name], self._due = feed, min(self._due, due)
+        return facts
+
+    def wait(self, now: float) -> list[Fact]:
+        """No packets have come until `now`: contacts may be over."""
+        facts: list[Fact] = []
+        if now >= self._due:
+            for feed in self._waits.values():
+                feed.wait(now, facts)
+            due = {name: feed.due for name, feed in self._waits.items()}
+            self._waits = {name: feed for name, feed in self._waits.items() if due[name] < math.inf}
+            self._due = min(due.values(), default=math.inf)
         return facts
 
     def tick(self, now: float) -> list[Fact]:
-        """What the time alone decides, once everything that arrived until `now` was received: who fell silent."""
-        facts: list[Fact] = []
+        """What the time alone decides, once everything that arrived until `now` was received: `wait`, and silences."""
+        facts = self.wait(now)
         feeds = self._feeds.values()
         self._owners = frozenset(feed.owner.source for feed in feeds if now - feed.owner.heard <= FORGET_S)
         for feed in feeds:
@@ -216,6 +239,7 @@ class Hub:
     def _forget(self, feed: Feed) -> None:
         """Take a sensor off the list; what it has numbered is numbered on should it return."""
         del self._feeds[feed.name], self._told[feed.name]
+        self._waits.pop(feed.name, None)
         if len(self._numbers) >= REMEMBERED:
             self._numbers.pop(next(iter(self._numbers)))
         self._numbers[feed.name] = feed.numbers

@@ -1,5 +1,7 @@
 """How fast the frames of one sensor come."""
 
+import math
+
 RANGE_HZ = (5.0, 1000.0)  # rates that everything here is made for
 MARGIN = 1.1  # factor by which a rate may lie outside of RANGE_HZ: clocks differ, and a rate is measured
 SHARE = 0.05  # share of the difference to the last interval that is followed: one late frame says little
@@ -11,6 +13,11 @@ class Pace:
     def __init__(self) -> None:
         self.last: float | None = None  # s, the last frame
         self.interval_s = 0.0  # from frame to frame as they come, 0 before it is known
+
+    @property
+    def sure(self) -> float:
+        """Until when no frame is overdue, in s: all that the sensor has sent for the time before is known."""
+        return -math.inf if self.last is None else self.last + self.interval_s
 
     def step(self, t: float) -> float:
         """Seconds from the last frame to one at `t` s, 0 before the first. Raises ValueError where time goes back."""

@@ -10,6 +10,7 @@ from enum import IntEnum, auto  # its hash is an integer's; Enum's is a function
 from typing import NamedTuple
 
 from gestured.core.contact import ON_SHARE, Memory, Place, Stretch
+from gestured.core.timing import Timing
 
 OFF_SHARE = 0.12  # of the contact's peak: below it the finger is off (textile recovers slowly)
 
@@ -56,27 +57,36 @@ def _given_up(memory: Memory, t: float) -> tuple[float, float]:
     return memory.off, memory.off
 
 
-# --- what a wait says, after so many seconds of quiet
+# --- how long a wait lasts, and what it says once it was quiet for so long
 
 
-def _no_wait(memory: Memory, quiet_s: float) -> Signal | None:
-    return None
+class Wait(NamedTuple):
+    """A wait for the finger to come back."""
+
+    lasts: Callable[[Timing], float]  # s of quiet
+    says: Callable[[Memory], Signal]
 
 
-def _released(memory: Memory, quiet_s: float) -> Signal | None:
+def _release_s(timing: Timing) -> float:
+    return timing.release_s
+
+
+def _tap_gap_s(timing: Timing) -> float:
+    return timing.tap_gap_s
+
+
+def _released(memory: Memory) -> Signal:
     """The finger is off. After a single tap a second one may come."""
-    if quiet_s < memory.timing.release_s:
-        return None
     waits = memory.wait_for_double_tap and memory.first is None and memory.tap_so_far()
     return Signal.TAPPED if waits else Signal.RELEASED
 
 
-def _gap_over(memory: Memory, quiet_s: float) -> Signal | None:
-    return Signal.GAP_OVER if quiet_s >= memory.timing.tap_gap_s else None
+def _gap_over(memory: Memory) -> Signal:
+    return Signal.GAP_OVER
 
 
-def _left(memory: Memory, quiet_s: float) -> Signal | None:
-    return Signal.RELEASED if quiet_s >= memory.timing.release_s else None
+def _left(memory: Memory) -> Signal:
+    return Signal.RELEASED
 
 
 # --- what is remembered; what that shows is a signal in turn
@@ -138,11 +148,6 @@ def _part(memory: Memory, t: float, activity: float, place: Place | None) -> Non
     memory.first = None
 
 
-def _end(memory: Memory, t: float, activity: float, place: Place | None) -> None:
-    """The contact is over; its after-effect begins to fade."""
-    memory.after.end(t)
-
-
 # --- the phases and the table
 
 
@@ -152,7 +157,7 @@ class Phase:
 
     name: str
     levels: Callable[[Memory, float], tuple[float, float]]  # s -> activity that is strong, and that is not quiet
-    waits: Callable[[Memory, float], Signal | None] = _no_wait  # s of quiet -> what they say, if anything
+    wait: Wait | None = None  # what time alone decides
     touched: bool = True  # a contact goes on, given up or not
     pending: bool = True  # it is not given up, and what becomes of it is open
     let_go: bool = False  # the finger is off: if the stream ends, what is open may be decided
@@ -165,9 +170,9 @@ class Phase:
 
 IDLE = Phase("IDLE", _untouched, touched=False, pending=False)
 CONTACT = Phase("CONTACT", _touched)
-RELEASING = Phase("RELEASING", _touched, _released, let_go=True)
-GAP = Phase("GAP", _touched, _gap_over, let_go=True)
-SPENT = Phase("SPENT", _given_up, _left, pending=False)
+RELEASING = Phase("RELEASING", _touched, Wait(_release_s, _released), let_go=True)
+GAP = Phase("GAP", _touched, Wait(_tap_gap_s, _gap_over), let_go=True)
+SPENT = Phase("SPENT", _given_up, Wait(_release_s, _left), pending=False)
 
 
 class Row(NamedTuple):
@@ -191,16 +196,16 @@ TRANSITIONS: dict[tuple[Phase, Signal], Row] = {
     (RELEASING, S.QUIET): Row(RELEASING),
     (RELEASING, S.WEAK): Row(RELEASING),
     (RELEASING, S.STRONG): Row(CONTACT, None, _press),
-    (RELEASING, S.RELEASED): Row(IDLE, A.CLOSE, _end),
+    (RELEASING, S.RELEASED): Row(IDLE, A.CLOSE),
     (RELEASING, S.TAPPED): Row(GAP),
     (RELEASING, S.LIMIT): Row(SPENT, A.HELD),
     (GAP, S.QUIET): Row(GAP),
     (GAP, S.WEAK): Row(GAP),
     (GAP, S.STRONG): Row(CONTACT, None, _again),
-    (GAP, S.GAP_OVER): Row(IDLE, A.CLOSE, _end),
+    (GAP, S.GAP_OVER): Row(IDLE, A.CLOSE),
     (GAP, S.LIMIT): Row(SPENT, A.HELD),
     (SPENT, S.QUIET): Row(SPENT, None, _quiet),
     (SPENT, S.WEAK): Row(SPENT, None, _lie),
     (SPENT, S.STRONG): Row(SPENT, None, _lie),
-    (SPENT, S.RELEASED): Row(IDLE, A.LEFT, _end),
+    (SPENT, S.RELEASED): Row(IDLE, A.LEFT),
 }

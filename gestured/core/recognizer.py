@@ -61,6 +61,15 @@ class Recognizer:
         found = self.front_end.push(frame)
         return self._name(found) if found else []
 
+    @property
+    def due(self) -> float | None:
+        """When `wait` will have an answer unless a frame comes before; see `FrontEnd.due`."""
+        return self.front_end.due
+
+    def wait(self, t: float) -> list[Event | Decided]:
+        """No frame has come until `t` s; see `FrontEnd.wait`."""
+        return self._name(self.front_end.wait(t))
+
     def give_up(self, t: float) -> list[Event | Decided]:
         """Cancel a contact that goes on; see `FrontEnd.give_up`."""
         return self._name(self.front_end.give_up(t))

@@ -29,6 +29,7 @@ class Deed(NamedTuple):
     action: Action
     onset: float  # s
     offset: float  # s, when it was last touched
+    decided: float  # s
 
 
 class Segmenter:
@@ -70,13 +71,25 @@ class Segmenter:
         """One frame at `t` s, after `flush(t)`; `place`: the centroid (row, column), if activity is at least `off`."""
         return self._step(self.phase.reads(self._memory, t, activity), t, activity, place)
 
-    def flush(self, t: float) -> list[Deed]:
-        """What the time alone decides until `t` s. Comes before `push`: a late frame cannot join what is over."""
+    @property
+    def over(self) -> float | None:
+        """When the wait that goes on is over unless the finger comes back, in s; None where none goes on."""
+        wait, since = self.phase.wait, self._memory.quiet_since
+        return None if wait is None or since is None else since + wait.lasts(self._memory.timing)
+
+    def flush(self, t: float, sure: float) -> list[Deed]:
+        """What the time alone decides until `t` s. Comes before `push`: a late frame cannot join what is over.
+
+        A wait that was over while everything was known, until `sure` (s), is decided at its end; another one at `t`.
+        """
         memory = self._memory
         deeds: list[Deed] = []
-        if memory.quiet_since is not None:
-            while (signal := self.phase.waits(memory, t - memory.quiet_since)) is not None:
-                deeds += self._step(signal, t)
+        while (wait := self.phase.wait) is not None and memory.quiet_since is not None:
+            lasts = wait.lasts(memory.timing)
+            if t - memory.quiet_since < lasts:
+                break
+            over = memory.quiet_since + lasts
+            deeds += self._step(wait.says(memory), over if over <= sure else t)
         if self.phase.pending and t - memory.onset >= memory.timing.limit_s:
             deeds += self.give_up(t)
         return deeds
@@ -99,7 +112,7 @@ class Segmenter:
         """The action, with the segment as it is before anything is remembered of it."""
         memory = self._memory
         if action is Action.OPEN:
-            return Deed(action, t, t)
+            return Deed(action, t, t, t)
         if action is Action.SPLIT and memory.first is not None:
-            return Deed(action, memory.first.began, memory.first.touched)
-        return Deed(action, memory.onset, memory.contact.touched)
+            return Deed(action, memory.first.began, memory.first.touched, t)
+        return Deed(action, memory.onset, memory.contact.touched, t)

@@ -50,6 +50,10 @@ class Stamper:
         """The stream's time at the arrival time `t` s, for `flush`: the last stamp plus what passed since."""
         return t if self._last is None else self._last + max(0.0, t - self._arrived)
 
+    def when(self, t: float) -> float:
+        """The arrival time at which the stream's time is `t` s: the other way round."""
+        return t if self._last is None else self._arrived + (t - self._last)
+
     def stamp(self, arrivals: Sequence[Arrival], t: float, *, missed: bool = False) -> list[Stamp]:
         """One stamp for each of this sensor's frames that were waiting at the arrival time `t` s.
 

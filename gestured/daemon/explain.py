@@ -1,6 +1,5 @@
 """`gestured --explain`: what a configuration loads, listens to, computes per frame, leaves out, and why."""
 
-import math
 import os
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -16,13 +15,10 @@ from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
 from gestured.model.ladder import Ladder, gestures_in_use
 
-JITTERED = 0.1  # of a frame: a wait this near to whole frames is one more or not, by how the frames fall
-
 
 def _felt(wait_s: float, rate_hz: float) -> str:
-    """Seconds from the last touched frame to the answer: the first quiet frame, and those that the wait takes then."""
-    ends = (1 + math.ceil(wait_s * rate_hz + slack) for slack in (-JITTERED, JITTERED))
-    return " to ".join(dict.fromkeys(f"{frames / rate_hz:.2g}" for frames in ends)) + " s"
+    """Seconds from the last touched frame to the answer: the wait begins with the first quiet frame."""
+    return f"{1 / rate_hz + wait_s:.2g} s"
 
 
 def explain(settings: Settings, sources: Mapping[str, str]) -> str:

@@ -8,6 +8,7 @@ Work is done in slices: between two of them the loop serves everybody else.
 """
 
 import asyncio
+import math
 import socket
 import struct
 import time
@@ -30,6 +31,7 @@ DRAIN_S = 0.25  # for serving what still waits when the daemon ends
 PAUSE_S = 0.001  # between reads of packets that come thick: to be woken for each is a large part of its price
 FEW = 8  # packets found by a read, up to which it is followed by a pause
 FULL_S = 0.25  # for which a stall explains that the kernel drops packets; if it lasts longer, it is a flood
+EARLY_S = 0.001  # by which we are woken before something is due: the loop's timers know milliseconds
 STEP_S = 0.05  # by which the wall clock may move against ours; after a larger step the kernel's times say nothing
 
 TIMESTAMP = struct.Struct("@qq")  # s and ns since the epoch, by the wall clock
@@ -62,6 +64,8 @@ class Receiver:
         self._found = 0  # packets, then
         self._pause: asyncio.TimerHandle | None = None
         self._again: asyncio.Handle | None = None
+        self._due = math.inf  # s, when time alone will decide something
+        self._alarm: asyncio.Handle | None = None
         self._loop.add_reader(sock, self._wake)
 
     def served(self, now: float) -> float:
@@ -71,7 +75,7 @@ class Receiver:
     def close(self) -> None:
         """Stop reading; the socket stays its owner's."""
         self._loop.remove_reader(self._sock)
-        for handle in (self._pause, self._again):
+        for handle in (self._pause, self._again, self._alarm):
             if handle is not None:
                 handle.cancel()
 
@@ -205,6 +209,27 @@ class Receiver:
         if self._taps.active:
             self._taps.packets(packets, now)
         self._desk.take(self._hub.receive(packets, now))
+        self._expect()
+
+    def _expect(self) -> None:
+        """Be woken when the time alone will decide something; what waits is served before."""
+        if self._hub.due != self._due and not self._backlog:
+            self._due = self._hub.due
+            if self._alarm is not None:
+                self._alarm.cancel()
+                self._alarm = None
+            if self._due < math.inf:
+                self._alarm = self._loop.call_later(max(self._due - EARLY_S - self._clock(), 0.0), self._wait)
+
+    def _wait(self) -> None:
+        """The last millisecond is waited for turn by turn; meanwhile the loop serves everybody else."""
+        if self._clock() < self._due:
+            self._alarm = self._loop.call_soon(self._wait)
+        else:
+            self.read()
+            self._desk.take(self._hub.wait(self.served(self._clock())))
+            self._due = math.inf
+            self._expect()
 
     def _count_drops(self, now: float) -> None:
         """Tell the hub where the kernel had no room for something."""

@@ -51,19 +51,35 @@ class Embedded:
         self._last = t
         return events_of(self._recognizer.push(Frame(t, frame, tuple(touches), lost)))
 
+    @property
+    def due(self) -> float | None:
+        """When `wait` will have an answer unless a frame comes before, in s; None where nothing waits."""
+        return self._recognizer.due
+
+    def wait(self, t: float) -> list[Event]:
+        """No frame has come until `t` s: answer a contact that is over.
+
+        Whoever does not call it gets the same answer with the next frame. Raises ValueError for a time before the
+        last frame's.
+        """
+        return events_of(self._recognizer.wait(self._now(t)))
+
     def flush(self, t: float) -> list[Event]:
         """The stream paused or ended at `t` s: decide what can be decided, cancel the rest.
 
         A pause of more than a second needs none: the next frame notices it. Raises ValueError for a time before the
         last frame's.
         """
-        if not self._last <= t < math.inf:
-            raise ValueError(f"t: expected a time not before the last frame's, {self._last} s, found {t}")
-        return events_of(self._recognizer.flush(t))
+        return events_of(self._recognizer.flush(self._now(t)))
 
     def reset(self) -> list[Event]:
         """The sensor restarted: cancel what is open, learn the idle sensor anew."""
         return events_of(self._recognizer.reset())
+
+    def _now(self, t: float) -> float:
+        if not self._last <= t < math.inf:
+            raise ValueError(f"t: expected a time not before the last frame's, {self._last} s, found {t}")
+        return t
 
 
 def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name

@@ -1,17 +1,19 @@
 """The one path: whoever goes through the hub uses the same frames and says the same."""
 
 import ipaddress
+import math
 import socket
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 
 from gestured.control.export import sessions_of
 from gestured.core.classifier import Scores
-from gestured.core.events import Cancelled, Event, Onset, Release
+from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.facts import Changed, Dropped, Taken
 from gestured.core.frames import Segment
 from gestured.core.hub import FORGET_S, Hub
@@ -96,6 +98,61 @@ def test_strangers_cost_the_same_however_many_sensors_there_are() -> None:
     # A place is free as soon as one of them has been silent for long enough.
     (new,) = hub.receive([(floats("/x0/pressure", frame, 0), STRANGER)], 1.5 + FORGET_S)[:1]
     assert isinstance(new, Changed) and new.what == "new"
+
+
+@pytest.mark.parametrize("rate_hz", [5.0, 12.0, 15.0, 45.0])
+def test_an_answer_comes_when_the_wait_is_over_and_waits_for_no_frame(rate_hz: float) -> None:
+    hand, hub = Hand(), Hub(SCENE, Sure())
+    assert hub.due == math.inf
+    idle = [hand.frame() for _ in range(round(2 * rate_hz))]
+    frames = idle + hand.swipe("left") + idle
+    t = 0.0
+    for frame in frames:
+        t += 1 / rate_hz
+        assert not [fact for fact in hub.receive([(floats("/arm/pressure", frame, 0), FIRST)], t) if is_answer(fact)]
+        if hub.due < t + 1 / rate_hz:
+            break
+    due = hub.due
+    assert t < due < t + 1 / rate_hz
+    assert not hub.tick(due - 0.001)
+    gesture, release = (fact for fact in hub.tick(due + 1e-6) if isinstance(fact, Event))
+    assert isinstance(gesture, Gesture) and isinstance(release, Release)
+    assert gesture.decided == pytest.approx(due) == pytest.approx(gesture.offset + 1 / rate_hz + 0.1)
+    assert hub.due == math.inf
+
+
+@pytest.mark.parametrize("clock", ["arrival", "sensor"])
+@pytest.mark.parametrize("seed", range(8))
+def test_when_time_is_looked_at_changes_no_event(seed: int, clock: Literal["arrival", "sensor"]) -> None:
+    """Jitter, losses, stalls of the way; a tick now and then, or none."""
+    rng, hand = np.random.default_rng(seed), Hand(seed)
+    frames = hand.idle(2.0)
+    for _ in range(6):
+        frames += hand.swipe("left") if rng.random() < 0.5 else hand.tap()
+        frames += hand.idle(float(rng.uniform(0.1, 1.0)))
+    waiting: list[tuple[bytes, tuple[str, int]]] = []
+    come: list[tuple[float, list[tuple[bytes, tuple[str, int]]]]] = []
+    for n, frame in enumerate(frames, 1):
+        if rng.random() < 0.95:
+            waiting.append((encoding.bundle([floats("/arm/pressure", frame, 0)], 1.7e9 + n / 15), FIRST))
+        if rng.random() < 0.85:
+            come.append((n / 15 + rng.uniform(0, 0.03), waiting))
+            waiting = []
+
+    def events(looks: int) -> list[Event]:
+        hub, found, before = Hub(replace(SCENE, clock=clock), Sure()), list[object](), 0.0
+        for t, packets in come:
+            for at in sorted(rng.uniform(before, t, looks)):
+                found += hub.tick(at)
+            found += hub.receive(packets, t)
+            before = t
+        return [fact for fact in found + [*hub.flush(before + 2.0)] if isinstance(fact, Event)]
+
+    assert events(0) == events(1) == events(5)
+
+
+def is_answer(fact: object) -> bool:
+    return isinstance(fact, Gesture | Unknown | Cancelled)
 
 
 def write(path: Path, arrived: list[Arrived], **settings: object) -> Path:

@@ -20,15 +20,20 @@ activities = st.sampled_from([0.0, 2.0, 5.0, 8.0, 50.0, 1000.0])
 places = st.sampled_from([(4.0, 4.0), (4.0, 4.5), (0.0, 8.0)])
 
 
-def play(stream: Stream, wait: bool = True) -> list[Action]:
-    """What a segmenter says of a stream, asked as the front end asks it."""
+def deeds(stream: Stream, wait: bool = True, sure_s: float = 0.0) -> list[Deed]:
+    """What a segmenter says of a stream, asked as the front end asks it; no frame is overdue for so many seconds."""
     segmenter = Segmenter(81, 0.15 * 9, wait_for_double_tap=wait)
     t, said = 0.0, list[Deed]()
     for pause, activity, place in stream:
-        t += pause
-        said += segmenter.flush(t)
+        sure, t = t + sure_s, t + pause
+        said += segmenter.flush(t, sure)
         said += segmenter.push(t, activity, place if activity >= segmenter.off else None)
-    return [deed.action for deed in said]
+    return said
+
+
+def play(stream: Stream, wait: bool = True) -> list[Action]:
+    """What it does."""
+    return [deed.action for deed in deeds(stream, wait)]
 
 
 def table() -> dict[tuple[Phase, Signal], tuple[Phase, Action | None]]:
@@ -61,6 +66,13 @@ def test_whatever_comes_has_its_row_and_each_onset_its_end(stream: Stream, wait:
     assert wait or Action.SPLIT not in said  # nothing waits for a second contact, so none is split off
 
 
+@given(st.lists(st.tuples(waits, activities, places), max_size=60), st.booleans(), st.sampled_from([0.07, 0.11, 1.0]))
+def test_when_something_is_decided_changes_nothing_that_is(stream: Stream, wait: bool, sure_s: float) -> None:
+    late, soon = deeds(stream, wait), deeds(stream, wait, sure_s)
+    assert [deed[:3] for deed in soon] == [deed[:3] for deed in late]
+    assert all(deed.offset <= one.decided <= deed.decided for one, deed in zip(soon, late, strict=True))
+
+
 def test_no_row_is_there_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = set()
 
@@ -87,7 +99,7 @@ def test_no_row_is_there_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         play(stream)
     waiting = Segmenter(81, 0.15 * 9)
     for n, activity in enumerate([50.0] * 3 + [0.0] * 3):
-        waiting.flush(n / 15)
+        waiting.flush(n / 15, 0.0)
         waiting.push(n / 15, activity, (4.0, 4.0))
     assert [deed.action for deed in waiting.give_up(0.4)] == [
         Action.HELD

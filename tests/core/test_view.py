@@ -25,7 +25,7 @@ def test_the_thresholds_that_are_shown_are_those_that_decide(phase, peak: float,
     memory = Memory(Timing(), 6.0, 4.0, 1.0, True)
     memory.after.begin()
     memory.after.touch(peak)
-    memory.after.end(10.0)
+    memory.after.fade(10.0)
     on, off = phase.levels(memory, 10.0 + past)
     said = phase.reads(memory, 10.0 + past, activity)
     assert said is (Signal.QUIET if activity < off else Signal.STRONG if activity >= on else Signal.WEAK)

@@ -256,7 +256,7 @@ def test_a_tap_waits_as_long_as_it_is_set(early: Path, tmp_path: Path) -> None:
         waited += [line["decided"] - line["offset"] for line in client.events("gesture", "arm")]
     finally:
         assert daemon.stop() == 0
-    assert waited == [pytest.approx(0.333, abs=0.01), pytest.approx(0.667, abs=0.01)]
+    assert waited == [pytest.approx(1 / 15 + 0.25, abs=0.01), pytest.approx(1 / 15 + 0.55, abs=0.01)]
 
 
 def test_in_a_process_of_ones_own(early: Path) -> None:
@@ -271,7 +271,7 @@ def test_in_a_process_of_ones_own(early: Path) -> None:
     answers = [[event for event in events if isinstance(event, gestured.Gesture)] for events in told]
     assert [[event.provisional for event in events] for events in answers] == [["confirmed"] * 2, [None] * 2]
     assert [replace(event, provisional=None) for event in answers[0]] == answers[1]
-    assert answers[0][1].decided - answers[0][1].offset == pytest.approx(0.467, abs=0.01)
+    assert answers[0][1].decided - answers[0][1].offset == pytest.approx(1 / 15 + 0.35, abs=0.01)
     for wrong in (0.1, 0.7, float("nan")):
         with pytest.raises(gestured.GesturedError, match="tap_gap_s: expected 0.2 to 0.6 s"):
             gestured.open(early, tap_gap_s=wrong)

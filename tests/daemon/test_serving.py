@@ -45,6 +45,14 @@ def test_a_swipe_is_one_gesture_with_all_fields(shared: Daemon) -> None:
     assert before + 1.5 < event["onset"] < time.time() + 10
 
 
+def test_an_answer_waits_for_no_frame(shared: Daemon) -> None:
+    client = shared.client()
+    sensor = Sensor(shared, "ends").begin()
+    sensor.send(sensor.hand.swipe("left"), sensor.hand.idle(2 / harness.RATE_HZ))  # and nothing more
+    (event,) = client.events("gesture", "ends")
+    assert event["decided"] - event["offset"] == pytest.approx(1 / harness.RATE_HZ + 0.1, abs=1e-3)
+
+
 def test_every_onset_has_one_answer_and_one_release(shared: Daemon) -> None:
     client = shared.client().subscribe("gesture", "unknown", "cancelled", "onset", "release", sensors=["grammar"])
     sensor = Sensor(shared, "grammar").begin().perform("tap", "up", "down")

@@ -307,5 +307,5 @@ def test_explain_says_what_is_loaded_and_what_is_left_out(model: Path) -> None:
     assert "osc://127.0.0.1:9:" in full and "no --publish" not in full
     assert "waiting for a second tap: double_tap is not in use" in full and "no --metrics" not in full
     assert "gestures: command line" in full
-    assert "at 15 Hz a contact is answered 0.2 s after its last touched frame, a tap 0.6 s after it" in minimal
-    assert "a contact is answered 0.2 s after its last touched frame\n" in full
+    assert "at 15 Hz a contact is answered 0.17 s after its last touched frame, a tap 0.57 s after it" in minimal
+    assert "a contact is answered 0.17 s after its last touched frame\n" in full

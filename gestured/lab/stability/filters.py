@@ -76,7 +76,7 @@ def _after_effect(times: Array, inputs: Array) -> Array:
     made.begin()
     made.touch(1.0)
     made.touch(1.0)
-    made.end(0.0)
+    made.fade(0.0)
     scale = made.level(0.0)
     return np.array([made.level(float(t)) / scale for t in times])
 
