@@ -28,9 +28,10 @@ class Preview:
     """A contact that is not over: what of it has come so far."""
 
     id: int
-    segment: Segment  # to the last touched frame; once the finger has left, the same object as in the draft
+    segment: Segment  # of what has come so far
     t: float  # s, now
     down: bool  # whether the finger is on the sensor; else it has left, perhaps for good
+    drafted: bool  # whether the segment is the one of the last draft
     second: bool  # whether the second contact of the segment has begun: the first was a tap
     hole_s: float  # the longest time from one frame to the next so far
 

@@ -143,22 +143,31 @@ class FrontEnd:
 
     @property
     def due(self) -> float | None:
-        """When a contact is over unless a frame comes before, in s. None where there is none, or a frame is overdue."""
-        over = self._segmenter.over
-        return over if over is not None and over <= self._pace.sure else None
+        """When `wait` will find something unless a frame comes before, in s. None where there is nothing to wait for.
 
-    def wait(self, t: float) -> list[Contact]:
-        """No frame has come until `t` s: a contact may be over. A frame that comes later decides the same."""
-        due = self.due
-        return [] if due is None or t < due else self._done(self._segmenter.flush(t, self._pace.sure), t)
+        Nothing is waited for beyond a frame that is overdue: it may tell otherwise.
+        """
+        off = self._unfinished.due if self.previews else None
+        due = self._segmenter.over if off is None else off  # that a finger is off shows before a contact is over
+        return due if due is not None and due <= self._pace.sure else None
+
+    def wait(self, t: float) -> list[Found]:
+        """No frame has come until `t` s: a finger may be off, a contact may be over. A later frame finds the same."""
+        found: list[Found] = []
+        if self.previews and (due := self.due) is not None and due == self._unfinished.due and due <= t:
+            found += self._unfinished.wait(self.segments, due)
+        if (due := self.due) is not None and due <= t:
+            sure = self._pace.sure
+            found += self._done(self._segmenter.flush(min(t, sure), sure), t)
+        return found
 
     def give_up(self, t: float) -> list[Contact]:
         """A contact that goes on has taken too long by another clock than its frames': it is cancelled as held."""
         return self._done(self._segmenter.give_up(t), t)
 
-    def flush(self, t: float) -> list[Contact]:
+    def flush(self, t: float) -> list[Found]:
         """The stream paused or ended at `t` s: close what is open."""
-        found: list[Contact] = []
+        found = self.wait(t)
         segmenter, last = self._segmenter, self._pace.last
         if segmenter.phase.touched and last is not None:
             t = min(t, last + self.timing.stale_s)  # it was over then, whenever one asks
@@ -178,11 +187,11 @@ class FrontEnd:
 
     def _pass(self, t: float) -> list[Found]:
         """Time passes until a frame at `t` s: what that alone decides. A frame cannot join what is over."""
-        found: list[Found] = []
         step = self._pace.step(t)
         if step > self.timing.stale_s:
-            found += self.flush(t)
+            found = self.flush(t)
         else:
+            found = self.wait(t)
             if self._segmenter.phase.touched:
                 found += self._done(self._segmenter.flush(t, self._pace.sure), t)
             self._pace.learn(step)

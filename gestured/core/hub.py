@@ -81,7 +81,7 @@ class Hub:
         """No packets have come until `now`: contacts may be over."""
         facts: list[Fact] = []
         if now >= self._due:
-            for feed in self._waits.values():
+            for feed in sorted(self._waits.values(), key=lambda feed: feed.due):
                 feed.wait(now, facts)
             due = {name: feed.due for name, feed in self._waits.items()}
             self._waits = {name: feed for name, feed in self._waits.items() if due[name] < math.inf}

@@ -104,7 +104,7 @@ class Recognizer:
         in_use = classifier.gestures if self._gestures is None else self._gestures
         if not self._whole(preview.hole_s) or not foresight.open(preview, certainty, in_use):
             return []
-        answer = classifier.preview(preview.segment) if preview.down else self._ask(preview.segment)
+        answer = self._ask(preview.segment) if preview.drafted else classifier.preview(preview.segment)
         if answer is None:
             return []
         _, best, confidence = self._best(answer)

@@ -84,11 +84,7 @@ class Segmenter:
         """
         memory = self._memory
         deeds: list[Deed] = []
-        while (wait := self.phase.wait) is not None and memory.quiet_since is not None:
-            lasts = wait.lasts(memory.timing)
-            if t - memory.quiet_since < lasts:
-                break
-            over = memory.quiet_since + lasts
+        while (wait := self.phase.wait) is not None and (over := self.over) is not None and t >= over:
             deeds += self._step(wait.says(memory), over if over <= sure else t)
         if self.phase.pending and t - memory.onset >= memory.timing.limit_s:
             deeds += self.give_up(t)

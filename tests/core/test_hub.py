@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from gestured.control.export import sessions_of
+from gestured.core.certainty import Certainty
 from gestured.core.classifier import Scores
-from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
+from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, Release, Unknown
 from gestured.core.facts import Changed, Dropped, Taken
 from gestured.core.frames import Segment
 from gestured.core.hub import FORGET_S, Hub
@@ -36,6 +37,20 @@ class Sure:
 
     def classify(self, segment: Segment) -> Scores:
         return Scores(np.array([1.0, 0.0], np.float32), 0.0, "sure")
+
+
+class Early(Sure):
+    """The same of a contact that is not over; what is short it calls a tap."""
+
+    gestures = ("swipe", "double_tap", "one_tap")
+    certainty = Certainty(1, (0.0,), (0.5,), tap=0.5)
+
+    def classify(self, segment: Segment) -> Scores:
+        tap = segment.offset - segment.onset < 0.2
+        return Scores(np.array([not tap, 0, tap], np.float32), 0.0, "early")
+
+    def preview(self, segment: Segment) -> Scores:
+        return self.classify(segment)
 
 
 SCENE = Scene(GESTURES, (9, 9), frames=True)
@@ -121,9 +136,10 @@ def test_an_answer_comes_when_the_wait_is_over_and_waits_for_no_frame(rate_hz: f
     assert hub.due == math.inf
 
 
+@pytest.mark.parametrize("asked", [False, True])
 @pytest.mark.parametrize("clock", ["arrival", "sensor"])
 @pytest.mark.parametrize("seed", range(8))
-def test_when_time_is_looked_at_changes_no_event(seed: int, clock: Literal["arrival", "sensor"]) -> None:
+def test_when_time_is_looked_at_changes_no_event(seed: int, clock: Literal["arrival", "sensor"], asked: bool) -> None:
     """Jitter, losses, stalls of the way; a tick now and then, or none."""
     rng, hand = np.random.default_rng(seed), Hand(seed)
     frames = hand.idle(2.0)
@@ -140,7 +156,8 @@ def test_when_time_is_looked_at_changes_no_event(seed: int, clock: Literal["arri
             waiting = []
 
     def events(looks: int) -> list[Event]:
-        hub, found, before = Hub(replace(SCENE, clock=clock), Sure()), list[object](), 0.0
+        hub, found, before = Hub(replace(SCENE, clock=clock, gestures=Early.gestures), Early()), list[object](), 0.0
+        hub.foresee(lambda sensor: asked)
         for t, packets in come:
             for at in sorted(rng.uniform(before, t, looks)):
                 found += hub.tick(at)
@@ -149,6 +166,7 @@ def test_when_time_is_looked_at_changes_no_event(seed: int, clock: Literal["arri
         return [fact for fact in found + [*hub.flush(before + 2.0)] if isinstance(fact, Event)]
 
     assert events(0) == events(1) == events(5)
+    assert any(isinstance(event, Provisional) and event.gesture == "one_tap" for event in events(0)) == asked
 
 
 def is_answer(fact: object) -> bool:
