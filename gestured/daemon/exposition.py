@@ -1,7 +1,6 @@
 """All numbers of the daemon in Prometheus's text format, made where /metrics is asked for and nowhere else."""
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from gestured import __version__
@@ -19,46 +18,13 @@ def exposition(metrics: Metrics, snapshot: Snapshot) -> bytes:
     return generate_latest(registry)
 
 
-@dataclass(frozen=True, slots=True)
-class Gauges:
-    """What the metrics show of one sensor, or of several together."""
-
-    state: str
-    rate_hz: float
-    jitter_s: float
-    bad_taxels: int
-    drift: float
-
-
-def by_label(readings: Mapping[str, Reading], label_of: Callable[[str], str]) -> dict[str, Gauges]:
-    """Readings by sensor -> by label. Where several sensors share one: the worst of each, and all bad taxels."""
-    found: dict[str, list[Reading]] = {}
-    for sensor, reading in readings.items():
-        found.setdefault(label_of(sensor), []).append(reading)
-    return {
-        label: Gauges(
-            max((r.state for r in each), key=STATES.index),
-            min(r.rate_hz for r in each),
-            max(r.jitter_s for r in each),
-            sum(r.bad_taxels for r in each),
-            max(r.drift for r in each),
-        )
-        for label, each in found.items()
-    }
-
-
-_OF_SENSORS: tuple[tuple[str, str, Callable[[Gauges], float]], ...] = (
-    ("gestured_sensor_rate_hertz", "Frames a second", lambda r: r.rate_hz),
-    ("gestured_sensor_jitter_seconds", "Interarrival jitter of packets", lambda r: r.jitter_s),
-    ("gestured_sensor_bad_taxels", "Taxels that are bridged from their neighbours", lambda r: r.bad_taxels),
-    (
-        "gestured_sensor_drift_ratio",
-        "How far the baseline has gone, in units of noise",
-        lambda r: r.drift,
-    ),
+# Of each sensor; of several that share a label: the worst of them, and all bad taxels.
+_OF_SENSORS: tuple[tuple[str, str, Callable[[Iterable[float]], float], Callable[[Reading], float]], ...] = (
+    ("gestured_sensor_rate_hertz", "Frames a second", min, lambda r: r.rate_hz),
+    ("gestured_sensor_jitter_seconds", "Interarrival jitter of packets", max, lambda r: r.jitter_s),
+    ("gestured_sensor_bad_taxels", "Taxels that are bridged from their neighbours", sum, lambda r: r.bad_taxels),
+    ("gestured_sensor_drift_ratio", "How far the baseline has gone, in units of noise", max, lambda r: r.drift),
 )
-
-
 _OF_THE_DAEMON: tuple[tuple[str, str, Callable[[Snapshot], float]], ...] = (
     ("gestured_sensors", "Sensors that were heard", lambda s: sum(r.source is not None for r in s.sensors.values())),
     ("gestured_clients", "Clients of the event socket", lambda s: s.clients),
@@ -106,15 +72,17 @@ class _Collector:
                 yield CounterMetricFamily(name.removesuffix("_total"), text, value=read(snapshot))
             else:
                 yield GaugeMetricFamily(name, text, value=read(snapshot))
-        readings = by_label(snapshot.sensors, self._metrics.sensor_label)
-        for name, text, value_of in _OF_SENSORS:
+        labelled: dict[str, list[Reading]] = {}
+        for sensor, reading in snapshot.sensors.items():
+            labelled.setdefault(self._metrics.sensor_label(sensor), []).append(reading)
+        for name, text, together, read_one in _OF_SENSORS:
             family = GaugeMetricFamily(name, text, labels=["sensor"])
-            for sensor, reading in readings.items():
-                family.add_metric([sensor], value_of(reading))
+            for label, readings in labelled.items():
+                family.add_metric([label], together(map(read_one, readings)))
             yield family
         state = GaugeMetricFamily("gestured_sensor_state", "1 for the state of a sensor", labels=["sensor", "state"])
-        for sensor, reading in readings.items():
-            state.add_metric([sensor, reading.state], 1)
+        for label, readings in labelled.items():
+            state.add_metric([label, max((r.state for r in readings), key=STATES.index)], 1)
         yield state
         text = "Share of the last gestures outside of what the model was trained on"
         shift = GaugeMetricFamily("gestured_shift_ratio", text, labels=["quantity"])

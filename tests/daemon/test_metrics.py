@@ -20,8 +20,8 @@ from gestured.core.measures import MEASURES
 from gestured.core.reading import STATES, Reading
 from gestured.core.vitals import Vitals, faulty
 from gestured.core.window import Window
-from gestured.daemon.exposition import Gauges, by_label, exposition
-from gestured.daemon.metrics import Metrics
+from gestured.daemon.exposition import exposition
+from gestured.daemon.metrics import NAMED_SENSORS, Metrics
 from gestured.daemon.shadow import Comparison, Shadow
 from gestured.daemon.shift import LAST, LEAST_GESTURES, Shift, measured
 from gestured.daemon.watch import Watch
@@ -117,11 +117,20 @@ def test_a_sensors_state_and_rate_are_read_from_outside(shared: Daemon) -> None:
 
 
 def test_several_sensors_together_are_as_their_worst() -> None:
+    pytest.importorskip("prometheus_client")
     still, gone = np.zeros(81), np.full(81, 3.0)
     one = Reading("ok", (9, 9), 1 / 15, 0.001, 1, 1.0, first=still, baseline=still)
     other = Reading("stale", (9, 9), 1 / 15, 0.1, 2, 1.0, first=still, baseline=gone)
-    assert by_label({"a": one, "b": other}, lambda name: "other") == {"other": Gauges("stale", 0.0, 0.1, 3, 3.0)}
-    assert by_label({"a": one}, str)["a"].rate_hz == pytest.approx(15.0)
+    named = [f"named{n}" for n in range(NAMED_SENSORS)]
+    sensors = dict.fromkeys(named, one) | {"a": one, "b": other}
+    text = exposition(Metrics(), replace(SNAPSHOT, sensors=sensors)).decode()
+    found = dict(re.findall(r'^gestured_sensor_(\w+\{sensor="(?:other|named0)".*\}) (\S+)$', text, re.MULTILINE))
+    alone = {"rate_hertz": "15.0", "jitter_seconds": "0.001", "bad_taxels": "1.0", "drift_ratio": "0.0"}
+    together = {"rate_hertz": "0.0", "jitter_seconds": "0.1", "bad_taxels": "3.0", "drift_ratio": "3.0"}
+    expected = {f'{name}{{sensor="named0"}}': value for name, value in alone.items()}
+    expected |= {f'{name}{{sensor="other"}}': value for name, value in together.items()}
+    states = {'state{sensor="named0",state="ok"}': "1.0", 'state{sensor="other",state="stale"}': "1.0"}
+    assert found == expected | states
 
 
 def test_jitter_is_none_for_an_even_stream_and_grows_with_an_uneven_one() -> None:
