@@ -7,7 +7,6 @@ The event socket knows none of this: it stays read-only.
 """
 
 import asyncio
-import json
 import socket
 import sys
 import time
@@ -18,7 +17,7 @@ from typing import Any
 from gestured.core.errors import GesturedError
 from gestured.daemon.caller import Connection, Peer, peer_of
 from gestured.daemon.log import Throttle
-from gestured.daemon.request import MAX_REQUEST_BYTES, Refusal, Reply, ReplyStream, Verb, parse_request
+from gestured.daemon.request import MAX_REQUEST_BYTES, Refusal, Reply, ReplyStream, Verb, json_line, parse_request
 
 OPERATORS = 16  # connections at a time
 OPERATORS_KEPT = 4  # connections beyond OPERATORS for root and our own user: no member of the group can lock them out
@@ -115,7 +114,7 @@ class ControlServer:
                 return
             found = await self._run(connection, verb, parameters)
             # On its way before what the verb streams after it.
-            writer.write(_line(found.answer if isinstance(found, ReplyStream) else found))
+            writer.write(json_line(found.answer if isinstance(found, ReplyStream) else found))
         if isinstance(found, ReplyStream):
             self._streaming = True
             try:
@@ -132,10 +131,10 @@ class ControlServer:
                 raise Refusal("it is being sent to somebody else; ask again when that is over")
             return ReplyStream({"ok": True, **found.answer}, found.lines)
         except GesturedError as error:
-            return {"ok": False, "reason": str(error)}
+            return _refused(str(error))
         except Exception:  # a bug in a verb is this answer's end, not the daemon's
             self._throttle.error("a bug in a verb", "control")
-            return {"ok": False, "reason": "a bug; the daemon's log has the traceback"}
+            return _refused("a bug; the daemon's log has the traceback")
 
     async def _stream(self, connection: Connection, writer: asyncio.StreamWriter, lines: Iterator[bytes]) -> None:
         while not connection.closed:
@@ -169,9 +168,9 @@ async def _drain(writer: asyncio.StreamWriter) -> None:
         raise
 
 
-def _line(answer: Mapping[str, Any]) -> bytes:
-    return json.dumps(answer, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+def _refused(reason: str) -> Reply:
+    return {"ok": False, "reason": reason}
 
 
 def _refusal(reason: str) -> bytes:
-    return _line({"ok": False, "reason": reason})
+    return json_line(_refused(reason))

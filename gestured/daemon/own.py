@@ -1,7 +1,6 @@
 """The user's own gestures in a running daemon: who enrols one now, what is known, and the file they are kept in."""
 
 import asyncio
-import json
 import time
 from collections.abc import Callable, Collection
 from pathlib import Path
@@ -16,7 +15,7 @@ from gestured.core.prototypes import EXAMPLES
 from gestured.daemon import own_file
 from gestured.daemon.caller import Connection
 from gestured.daemon.log import log
-from gestured.daemon.request import Refusal
+from gestured.daemon.request import Refusal, json_line
 from gestured.model.ladder import Ladder
 from gestured.model.model import Model
 from gestured.model.own import Examiner, Own
@@ -115,7 +114,7 @@ class OwnGestures:
         except GesturedError as error:  # the model failed
             self._give_up(str(error))
             return
-        connection.send(_line(told))
+        connection.send(json_line(told))
         if enrolment.complete:
             self._finishing = asyncio.get_running_loop().create_task(self._finish(enrolment, connection))
 
@@ -143,7 +142,7 @@ class OwnGestures:
             async with self._writing:
                 self._check(enrolment.name)  # the models may be others by now
                 await self._keep({**self.gestures, enrolment.name: tuple(enrolment.kept)})
-            connection.send(_line({"enrolled": enrolment.name, "examples": len(enrolment.kept)}))
+            connection.send(json_line({"enrolled": enrolment.name, "examples": len(enrolment.kept)}))
             log.info("enrolled", gesture=enrolment.name, examples=len(enrolment.kept))
             self._end()
         except GesturedError as error:
@@ -183,14 +182,10 @@ class OwnGestures:
         assert enrolment is not None
         log.info("enrolment given up", gesture=enrolment.name, reason=reason)
         if connection is not None:
-            connection.send(_line({"given_up": enrolment.name, "reason": reason}))
+            connection.send(json_line({"given_up": enrolment.name, "reason": reason}))
         self._end()
 
     def _end(self) -> None:
         if self._connection is not None:
             self._connection.streams = False
         self._enrolment = self._connection = None
-
-
-def _line(told: dict[str, Any]) -> bytes:
-    return json.dumps(told, separators=(",", ":")).encode() + b"\n"

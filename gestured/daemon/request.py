@@ -1,4 +1,4 @@
-"""A request to the control socket: one line of JSON, held against the table of verbs as a whole."""
+"""What is asked on the control socket, held against the table of verbs as a whole, and what is answered; JSON lines."""
 
 import json
 from collections.abc import Awaitable, Callable, Iterator, Mapping
@@ -10,6 +10,12 @@ from gestured.core.errors import GesturedError
 MAX_REQUEST_BYTES = 4096  # bytes of a request
 
 Reply = dict[str, Any]
+_ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
+
+
+def json_line(reply: Reply) -> bytes:
+    """A reply, or what is streamed after one, as a line of the control socket. Raises ValueError for NaN, infinity."""
+    return _ENCODER.encode(reply).encode() + b"\n"
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ taps and no flight recorder is set. A live tap is sent its lines soon after, so 
 
 import asyncio
 import base64
-import json
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -17,6 +16,7 @@ from gestured.core import messages
 from gestured.core.events import Event, Status
 from gestured.core.owner import Source
 from gestured.daemon.caller import Connection
+from gestured.daemon.request import json_line
 
 KEPT_S = 30.0  # of the flight recorder
 OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps
@@ -119,8 +119,7 @@ class Taps:
 
 def packet_line(t_ns: int, source: Source, packet: bytes) -> bytes:
     """A packet as a line of the control socket: its time in ns (monotonic), who sent it, its bytes as base64."""
-    line = {"type": "packet", "t_ns": t_ns, "source": source[:2], "data": base64.b64encode(packet).decode()}
-    return json.dumps(line, separators=(",", ":")).encode() + b"\n"
+    return json_line({"type": "packet", "t_ns": t_ns, "source": source[:2], "data": base64.b64encode(packet).decode()})
 
 
 def as_lines(remembered: deque[Remembered]) -> Iterator[bytes]:

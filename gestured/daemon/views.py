@@ -5,7 +5,6 @@ is sent in few writes: who acts on an event waits neither for a picture nor for 
 """
 
 import asyncio
-import json
 import math
 import time
 from collections.abc import Callable, Collection, Sequence
@@ -16,7 +15,7 @@ from gestured.core.facts import Arrived, Fact
 from gestured.core.hub import Hub
 from gestured.core.messages import to_json
 from gestured.daemon.caller import Connection
-from gestured.daemon.request import Reply
+from gestured.daemon.request import Reply, json_line
 from gestured.daemon.status import viewed
 from gestured.daemon.tap import SOON_S
 
@@ -107,7 +106,7 @@ class Views:
             self._show(sensors.pop())
         elif self._state_due:
             self._state_due = False
-            self._send(_line({"type": "state"} | self._state()), self._looks)
+            self._send(json_line({"type": "state"} | self._state()), self._looks)
         if sensors or self._state_due:
             self._timer = asyncio.get_running_loop().call_soon(self._go_on, sensors)
         else:
@@ -128,7 +127,7 @@ class Views:
             lookers = [one for one, look in self._looks.items() if sensor in look.sensors and look.raw is raw]
             view = self._make(sensor, raw) if lookers else None
             if view is not None:
-                self._send(_line({"type": "view"} | view), lookers)
+                self._send(json_line({"type": "view"} | view), lookers)
 
     def _send(self, line: bytes, connections: Collection[Connection]) -> None:
         """Send what is replaced by the next one: who has not read the last ones misses it."""
@@ -152,7 +151,3 @@ class Views:
         view = viewed(sensor, *found) | {"time": time.time()}
         self._made[sensor, raw] = now, view
         return view
-
-
-def _line(what: Reply) -> bytes:
-    return json.dumps(what, separators=(",", ":"), allow_nan=False).encode() + b"\n"
