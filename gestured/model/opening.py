@@ -9,12 +9,11 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from gestured.core.errors import ModelError
 from gestured.model.file import inspect
 from gestured.model.metadata import Metadata
 from gestured.model.model import Model
 from gestured.model.process import ModelProcess, try_out
-from gestured.model.shipped import read
+from gestured.model.shipped import naming, read
 
 
 def open_model(source: str | Path, tried: str | None = None) -> Model:
@@ -24,14 +23,12 @@ def open_model(source: str | Path, tried: str | None = None) -> Model:
     not where its sha256 is that of a file that was `tried` before.
     """
     path, name, data = read(source)
-    try:
+    with naming(path):
         if name is None and tried is None:
             try_out(data)
         elif name is None and hashlib.sha256(data).hexdigest() != tried:
             raise ValueError("is not the file that was tried any more; a reload takes the new one")
         return Model(data, path.stem)
-    except ValueError as error:
-        raise ModelError(f"{path}: {error}") from error
 
 
 def look_at(source: str | Path) -> tuple[tuple[str, ...], str]:
@@ -40,30 +37,24 @@ def look_at(source: str | Path) -> tuple[tuple[str, ...], str]:
     Raises ModelError.
     """
     path, name, data = read(source)
-    try:
+    with naming(path):
         if name is None:
             report = try_out(data)
             return tuple(report["gestures"]), report["sha256"]
         return Metadata.parse(inspect(data)).gestures, hashlib.sha256(data).hexdigest()
-    except ValueError as error:
-        raise ModelError(f"{path}: {error}") from error
 
 
 def open_apart(source: str | Path) -> ModelProcess:
     """Open and verify a model in a process of its own, and leave it there. Raises ModelError."""
     path, _, data = read(source)
-    try:
+    with naming(path):
         return ModelProcess(data, path.stem)
-    except ValueError as error:
-        raise ModelError(f"{path}: {error}") from error
 
 
 def check(source: str | Path) -> dict[str, Any]:
     """What `gesturectl check` reports of a good model, as JSON values; raises ModelError for any other."""
     path, name, data = read(source)
-    try:
+    with naming(path):
         report = try_out(data) if name is None else Model(data, path.stem).report()
-    except ValueError as error:
-        raise ModelError(f"{path}: {error}") from error
     first = {key: report[key] for key in ("kind", "version")}
     return {"file": str(path), "name": path.stem, **first, "shipped": name is not None} | report

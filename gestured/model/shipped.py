@@ -6,6 +6,8 @@ Whatever is wrong is one `ModelError`: the file, what is wrong, what was expecte
 import hashlib
 import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from gestured.core.errors import ModelError
@@ -59,15 +61,22 @@ def _locate(source: str | Path) -> tuple[Path, str | None]:
 def read(source: str | Path) -> tuple[Path, str | None, bytes]:
     """(path, the shipped model's name where it is one, its bytes). A shipped file is held against its manifest."""
     path, name = _locate(source)
-    try:
+    with naming(path):
         data = read_bytes(path)
         if name is not None:
             expected = _manifest_sha256(path)
             if hashlib.sha256(data).hexdigest() != expected:
                 raise ValueError(f"is not the shipped file: expected the sha256 {expected} of manifest.json")
+    return path, name, data
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Make a ModelError, which names the file, of a ValueError that says what is wrong with it."""
+    try:
+        yield
     except ValueError as error:
         raise ModelError(f"{path}: {error}") from error
-    return path, name, data
 
 
 def _manifest_sha256(path: Path) -> str:
