@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
-from gestured.model.ladder import Ladder, ladder_for
+from gestured.model.ladder import RETRY_S, SLOW_RUNS, SLOW_S, Ladder, ladder_for
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
 from tests.small_model import GESTURES, build, segment
@@ -79,11 +79,11 @@ def test_failing_rung_hands_the_same_segment_on(three: list[Fake], clock: Clock,
 
 
 def test_better_rung_is_tried_again_after_a_while(three: list[Fake], clock: Clock) -> None:
-    ladder = Ladder(three, clock=clock, retry_after=30.0)
+    ladder = Ladder(three, clock=clock)
     three[0].error = ModelError("broken")
     ladder.classify(segment())
     three[0].error = None
-    clock.now += 29.0
+    clock.now += RETRY_S - 1.0
     assert ladder.classify(segment()).model == "second"
     clock.now += 2.0
     scores = ladder.classify(segment())
@@ -92,27 +92,28 @@ def test_better_rung_is_tried_again_after_a_while(three: list[Fake], clock: Cloc
 
 
 def test_slow_rung_is_put_aside_after_several_slow_runs_and_comes_back(three: list[Fake], clock: Clock) -> None:
-    ladder = Ladder(three, clock=clock, slow_s=0.05, slow_runs=3, retry_after=30.0)
-    three[0].takes_s = 0.06
-    assert [ladder.classify(segment()).model for _ in range(4)] == ["best"] * 3 + ["second"]
+    ladder = Ladder(three, clock=clock)
+    three[0].takes_s = 1.2 * SLOW_S
+    assert [ladder.classify(segment()).model for _ in range(SLOW_RUNS + 1)] == ["best"] * SLOW_RUNS + ["second"]
     three[0].takes_s = 0.0
-    clock.now += 31.0
+    clock.now += RETRY_S + 1.0
     scores = ladder.classify(segment())
     assert scores.model == "best" and scores.took_s == 0.0
 
 
 def test_slow_runs_that_are_not_in_a_row_change_nothing(three: list[Fake], clock: Clock) -> None:
-    ladder = Ladder(three, clock=clock, slow_s=0.05, slow_runs=3)
-    for takes_s in (0.06, 0.06, 0.01) * 3:
+    ladder = Ladder(three, clock=clock)
+    for takes_s in (*[1.2 * SLOW_S] * (SLOW_RUNS - 1), 0.2 * SLOW_S) * 3:
         three[0].takes_s = takes_s
         scores = ladder.classify(segment())
         assert scores.model == "best" and scores.took_s == pytest.approx(takes_s)
 
 
 def test_slow_rung_answers_where_nothing_else_does(three: list[Fake], clock: Clock) -> None:
-    ladder = Ladder(three, clock=clock, slow_runs=1)
+    ladder = Ladder(three, clock=clock)
     three[0].takes_s = 1.0
-    ladder.classify(segment())
+    for _ in range(SLOW_RUNS):
+        ladder.classify(segment())
     three[1].error = three[2].error = ModelError("broken")
     assert ladder.classify(segment()).model == "best"
 

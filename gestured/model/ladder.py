@@ -17,23 +17,25 @@ from gestured.model.own import Own
 from gestured.model.rung import Rung
 from gestured.model.shipped import LADDER, shipped, shipped_name
 
+SLOW_S = 0.05  # that a run may take: it delays an answer, and usually takes some milliseconds
+SLOW_RUNS = 3  # in a row, after which a rung is put aside: a single one may be the fault of what else the machine does
+RETRY_S = 30.0  # for which a rung is put aside: to try it again may cost an answer as much time as it took before
+
 
 class Ladder:
     """Models, best first, as one `Classifier`: a rung that fails hands the same segment to the next.
 
-    A rung that cannot be opened, raises or gives scores that are not finite is put aside for `retry_after`
-    seconds of `clock`, as is one that took more than `slow_s` seconds `slow_runs` times in a row; then it is
-    tried again. Rungs that are aside still come last, before giving up. What another rung than the
-    first says is `degraded`. Gestures of the user's own are compared by the rung that answers.
+    A rung that cannot be opened, raises or gives scores that are not finite is put aside for RETRY_S of `clock`, as is
+    one that took more than `slow_s` seconds SLOW_RUNS times in a row; then it is tried again. Rungs that are aside
+    still come last, before giving up. What another rung than the first says is `degraded`. Gestures of the user's own
+    are compared by the rung that answers.
     """
 
     def __init__(
         self,
         rungs: Sequence[str | Path | Classifier],
         *,
-        slow_s: float = 0.05,
-        slow_runs: int = 3,
-        retry_after: float = 30.0,
+        slow_s: float = SLOW_S,
         clock: Callable[[], float] = time.perf_counter,
         report: Callable[[str], None] | None = None,
     ) -> None:
@@ -44,8 +46,7 @@ class Ladder:
         if not rungs:
             raise ModelError("a ladder needs at least one model")
         self.rungs = tuple(Rung(source) for source in rungs)
-        self.slow_s, self.slow_runs, self.retry_after = slow_s, slow_runs, retry_after
-        self._clock = clock
+        self._slow_s, self._clock = slow_s, clock
         self._report = report or (lambda sentence: None)
         self.failures = 0  # how often a rung was put aside
         self._faint = 0  # previews in a row that failed, or took too long
@@ -123,8 +124,8 @@ class Ladder:
     def preview(self, segment: Segment) -> Scores | None:
         """Scores of the beginning of a segment by the active rung, None where that fails.
 
-        No rung is put aside, tried again or reported for it. Where `slow_runs` previews in a row failed or were slow,
-        there are none for `retry_after` seconds.
+        No rung is put aside, tried again or reported for it. Where SLOW_RUNS previews in a row failed or were slow,
+        there are none for RETRY_S.
         """
         model, start = self._active.model, self._clock()
         if model is None or start < self._previews_from:
@@ -134,9 +135,9 @@ class Ladder:
         except Exception:  # whatever it dies of, it has nothing to say
             scores = None
         end = self._clock()
-        self._faint = self._faint + 1 if scores is None or end - start > self.slow_s else 0
-        if self._faint >= self.slow_runs:
-            self._faint, self._previews_from = 0, end + self.retry_after
+        self._faint = self._faint + 1 if scores is None or end - start > self._slow_s else 0
+        if self._faint >= SLOW_RUNS:
+            self._faint, self._previews_from = 0, end + RETRY_S
         return scores
 
     def _first_open(self) -> tuple[Rung, Classifier]:
@@ -168,15 +169,15 @@ class Ladder:
 
     def _put_aside(self, rung: Rung, reason: str) -> None:
         rung.slow = 0
-        rung.aside_until = math.inf if rung.gone else self._clock() + self.retry_after
+        rung.aside_until = math.inf if rung.gone else self._clock() + RETRY_S
         self.failures += 1
-        until = "until a reload" if rung.gone else f"for {self.retry_after:g} s"
+        until = "until a reload" if rung.gone else f"for {RETRY_S:g} s"
         self._report(f"{rung.name} is put aside {until}: {reason}")
 
     def _timed(self, rung: Rung, took: float) -> None:
-        rung.slow = rung.slow + 1 if took > self.slow_s else 0
-        if rung.slow >= self.slow_runs:
-            self._put_aside(rung, f"{self.slow_runs} runs in a row took more than {self.slow_s:g} s")
+        rung.slow = rung.slow + 1 if took > self._slow_s else 0
+        if rung.slow >= SLOW_RUNS:
+            self._put_aside(rung, f"{SLOW_RUNS} runs in a row took more than {self._slow_s:g} s")
 
 
 def ladder_for(source: str | Path, fallbacks: Sequence[str | Path] | None = None, **settings: Any) -> Ladder:

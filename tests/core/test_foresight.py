@@ -24,7 +24,7 @@ from gestured.core.hub import Hub
 from gestured.core.prototypes import Match
 from gestured.core.recognizer import Recognizer
 from gestured.core.scene import Scene
-from gestured.model.ladder import Ladder
+from gestured.model.ladder import RETRY_S, SLOW_RUNS, Ladder
 from tests.daemon.harness import Hand, floats
 from tests.hostile.grammar import violations
 from tests.scenario import Player, parse
@@ -361,7 +361,7 @@ def answers_of(make: Callable[[], tuple[Any, Clock]], stream: Sequence[Frame], *
     subject = recognizer(classifier, asked=asked, thresholds={"left": 0.5}, refractory={"one_tap": 2.0})
     events: list[Event] = []
     for frame in stream:
-        clock.now = frame.t
+        clock.now = 10 * frame.t  # so fast that rungs which were put aside come back within a stream
         events += events_of(subject.push(frame))
     return events + events_of(subject.flush(stream[-1].t + 0.2))
 
@@ -382,7 +382,7 @@ def an_oracle() -> tuple[Any, Clock]:
 def a_ladder() -> tuple[Any, Clock]:
     clock = Clock()
     rungs = [Rung("best", clock, EAGER), Rung("second", clock, None), Rung("third", clock, EAGER)]
-    return Ladder(rungs, clock=clock, slow_runs=2, retry_after=3.0), clock
+    return Ladder(rungs, clock=clock), clock
 
 
 @pytest.mark.parametrize("make", [an_oracle, a_ladder])
@@ -429,10 +429,11 @@ def test_a_ladder_that_is_slow_is_not_asked_early_for_a_while() -> None:
             clock.now += 0.2
             return says("left")
 
-    ladder = Ladder([Slow("slow", clock, CERTAINTY)], clock=clock, slow_s=0.05, slow_runs=3, retry_after=30.0)
+    ladder = Ladder([Slow("slow", clock, CERTAINTY)], clock=clock)
     one = Segment(np.zeros((2, 9, 9), np.float32), np.array([0.0, 0.1]), 0, 1, 1.0)
-    assert [ladder.preview(one) is None for _ in range(5)] == [False, False, False, True, True] and len(calls) == 3
-    clock.now += 31.0
+    said = [ladder.preview(one) is not None for _ in range(SLOW_RUNS + 2)]
+    assert said == [True] * SLOW_RUNS + [False] * 2 and len(calls) == SLOW_RUNS
+    clock.now += RETRY_S + 1.0
     assert ladder.preview(one) is not None
 
 
