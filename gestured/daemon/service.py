@@ -50,7 +50,7 @@ class Service:
         self._settings, self._ladder, self._bound = settings, ladder, bound
         self._instance, self._started, self._stopping = secrets.token_hex(8), time.time(), False
         self._begun = time.monotonic()
-        self._tasks: set[asyncio.Future[Any]] = set()  # a task that nobody holds may be collected
+        self._reloading: asyncio.Task[str | None] | None = None  # a task that nobody holds may be collected
         self._said = ""  # to systemd
         self._pulse, self._metrics = Pulse(), Metrics()
         self._reload = Reload(load, self._swap, self._metrics)
@@ -110,7 +110,7 @@ class Service:
             flight_limit_bytes=self._taps.ring_bytes,
             flight_held_bytes=self._taps.held_bytes,
             addresses=self._bound.addresses(),
-            settings=self._settings.model_dump(mode="json"),
+            settings=self._settings,
         )
 
     def _state(self) -> dict[str, Any]:
@@ -165,7 +165,7 @@ class Service:
                 notify("WATCHDOG=1")
             if reload.is_set() and not self._reload.running:
                 reload.clear()
-                self._spawn(self._reload.run())  # a task: frames and timers go on
+                self._reloading = asyncio.create_task(self._reload.run())  # frames and timers go on meanwhile
             wait = min(period, status_at - now)
             due = time.monotonic() + wait
             try:
@@ -173,14 +173,9 @@ class Service:
                     await stop.wait()
             except TimeoutError:
                 pass
-        for task in tuple(self._tasks):
-            task.cancel()
+        if self._reloading is not None:
+            self._reloading.cancel()
         await self._finish()
-
-    def _spawn(self, work: Any) -> None:
-        task = asyncio.ensure_future(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
 
     def _every_second(self, now: float) -> None:
         self._clients.tick()

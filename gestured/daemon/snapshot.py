@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gestured.core.reading import SILENT, Reading
+from gestured.daemon.settings import Settings
 from gestured.daemon.shift import Shift
 from gestured.model.ladder import Ladder
 
@@ -65,7 +66,7 @@ class Snapshot:
     flight_limit_bytes: int
     flight_held_bytes: int
     addresses: Mapping[str, str | None]  # where it can be reached
-    settings: Mapping[str, Any]
+    settings: Settings
 
     @property
     def every_gesture(self) -> tuple[str, ...]:

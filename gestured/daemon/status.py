@@ -96,7 +96,7 @@ def scene(snapshot: Snapshot, epoch_ns: int, own: Examples) -> dict[str, Any]:
         },
         "gestures": list(snapshot.gestures),
         "own": to_dict(own),
-        "settings": snapshot.settings,
+        "settings": snapshot.settings.model_dump(mode="json"),
     }
 
 

@@ -11,6 +11,7 @@ from gestured.daemon.metrics import Metrics
 from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.scene import scene_of
+from gestured.daemon.settings import Settings
 from gestured.daemon.snapshot import Models, Snapshot
 from gestured.daemon.tap import Taps
 from gestured.daemon.views import Views
@@ -23,7 +24,7 @@ SNAPSHOT = Snapshot(
     instance="i", time=1.7e9, now=10.0, started=1.7e9, uptime_s=10.0, stopping=False, loop_age_s=0.1, loop_lag_s=0.0,
     models=Models("m", "m", 0, False, 0, "m.onnx", "1", "", (9, 9), False, 0, {}, ()), gestures=("one_tap",),
     own={"gestures": {}}, sensors={"arm": Reading("ok", (9, 9))}, recent=(), shadow=None, clients=0, backlog_bytes=0,
-    kernel_drops=0, taps=0, flight_limit_bytes=0, flight_held_bytes=0, addresses={}, settings={},
+    kernel_drops=0, taps=0, flight_limit_bytes=0, flight_held_bytes=0, addresses={}, settings=Settings(),
 )  # fmt: skip
 
 
