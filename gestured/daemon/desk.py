@@ -1,6 +1,7 @@
 """What becomes of the hub's facts: events are published, the rest is counted, logged and compared."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from gestured.core.address import Address
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
@@ -38,10 +39,9 @@ class Desk:
                 self.bug("in the path of a sensor; its recognizer is reset", fact.error, sensor=fact.sensor)
             elif not isinstance(fact, Taken):
                 self._publisher.publish(fact)
-        for one in decided:
-            self._watch.see(one)
+        self._beside("in what looks on while models answer", self._watch.see, decided)
         if self._own.enrolling:
-            self._enrol(facts)
+            self._beside("in what judges an example", self._own.see, facts)
         self._views.see(facts)
 
     def drop(self, reason: str, count: int = 1, **fields: object) -> None:
@@ -59,13 +59,13 @@ class Desk:
         self._metrics.internal_errors.add()
         self._throttle.error("a bug, caught", what, exc_info=error or True, **fields)
 
-    def _enrol(self, facts: Sequence[Fact]) -> None:
-        """Have what was performed judged as an example; a bug there is not the others' business."""
-        try:
-            for fact in facts:
-                self._own.see(fact)
-        except Exception as error:
-            self.bug("in what judges an example", error)
+    def _beside(self, what: str, look: Callable[[Any], None], facts: Sequence[Fact]) -> None:
+        """Have facts looked at of which the events are out; a bug there is not the others' business."""
+        for fact in facts:
+            try:
+                look(fact)
+            except Exception as error:
+                self.bug(what, error)
 
     def _count(self, arrived: Arrived) -> None:
         frames, label = self._metrics.frames, self._metrics.sensor_label(arrived.sensor)

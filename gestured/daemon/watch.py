@@ -6,7 +6,6 @@ after the answer went out, and cannot change or prevent it.
 
 from gestured.core.errors import ModelError
 from gestured.core.facts import Decided
-from gestured.daemon.log import Throttle
 from gestured.daemon.shadow import Shadow
 from gestured.daemon.shift import Shift
 from gestured.model.ladder import Ladder
@@ -19,7 +18,6 @@ class Watch:
 
     def __init__(self, ladder: Ladder) -> None:
         self.shadow: Shadow | None = None
-        self._throttle = Throttle()
         self.follow(ladder)
 
     def follow(self, ladder: Ladder) -> None:
@@ -33,12 +31,9 @@ class Watch:
 
     def see(self, decided: Decided) -> None:
         """Look at a segment, once its event is out."""
-        try:
-            self.shift.see(decided.segment, decided.scores, decided.known)
-            if self.shadow is not None:
-                self.shadow.see(decided.segment, decided.scores)
-        except Exception:  # the answer is out already, and is not the worse for it
-            self._throttle.error("a bug, caught", "in what looks on while models answer")
+        self.shift.see(decided.segment, decided.scores, decided.known)
+        if self.shadow is not None:
+            self.shadow.see(decided.segment, decided.scores)
 
     def compare(self, candidate: ModelProcess) -> Shadow:
         """Run a candidate beside the ladder from now on. Raises ModelError for one that knows other gestures."""

@@ -13,7 +13,6 @@ import pytest
 
 from gestured.core.classifier import Scores
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
-from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.measures import MEASURES
@@ -304,16 +303,10 @@ def test_a_shadow_that_dies_says_so_and_drops_the_rest(model: Path) -> None:
 
 
 def test_what_looks_on_cannot_prevent_an_answer(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    frames = np.zeros((6, 9, 9), np.float32)
-    frames[1:5, 4, 4] = 50
-    segment = Segment(frames, np.arange(6) / 15, 1, 4, 1.0)
-    ladder = ladder_for(model)
-    watch = Watch(ladder)
-    expected = ladder.classify(segment)
-    shadow = watch.compare(open_apart(model))
+    parts, hand = Parts(model), Hand()
+    shadow = parts.watch.compare(open_apart(model))
     monkeypatch.setattr(Shadow, "see", lambda self, segment, scores: 1 / 0)
-    for _ in range(2):
-        answer = ladder.classify(segment)
-        assert np.array_equal(answer.values, expected.values) and answer.unknown == expected.unknown
-        watch.see(Decided("arm", segment, answer, True))
+    parts.feed("arm", hand.idle(2.0) + 2 * (hand.swipe("left") + hand.idle(1.0)), 0.0)
+    assert [event.gesture for event in parts.events if isinstance(event, Gesture)] == ["swipe_left"] * 2
+    assert parts.metrics.internal_errors.total() == 2
     shadow.close()
