@@ -7,9 +7,9 @@ from typing import Any
 from gestured import __version__
 from gestured.core.scene import DOUBLE_TAP
 from gestured.core.timing import Timing
+from gestured.daemon.asked import open_ladder
 from gestured.daemon.client import BACKLOG_BYTES
 from gestured.daemon.clients import CLIENTS
-from gestured.daemon.ladder import open_ladder
 from gestured.daemon.settings import TABLES, Settings, control_beside, default_socket
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S

@@ -15,6 +15,7 @@ from gestured.core.prototypes import EXAMPLES
 from gestured.daemon import own_file
 from gestured.daemon.caller import Connection
 from gestured.daemon.log import log
+from gestured.daemon.own_file import OwnFile
 from gestured.daemon.request import Refusal, json_line
 from gestured.model.ladder import Ladder
 from gestured.model.model import Model
@@ -39,11 +40,11 @@ class OwnGestures:
         self._finishing: asyncio.Task[None] | None = None
         self._writing = asyncio.Lock()
 
-    def follow(self, ladder: Ladder, path: Path | None, read: tuple[Examples, str | None]) -> None:
+    def follow(self, ladder: Ladder, read: OwnFile) -> None:
         """Use what was read of a file, with these models: at the start, and after a reload."""
         if self._enrolment is not None and self._finishing is None:
             self._give_up("the daemon was told to reload; enrol again")
-        self._ladder, self.path, (self.gestures, self.fault) = ladder, path, read
+        self._ladder, (self.path, self.gestures, self.fault) = ladder, read
         if self.fault is not None:
             log.error("own gestures", what=self.fault)
         self._use()

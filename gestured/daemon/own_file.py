@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from gestured.core.errors import GesturedError
 from gestured.core.own import Examples, from_dict, to_dict
@@ -18,6 +19,14 @@ class OwnFileError(GesturedError):
     """The file of own gestures cannot be read or written; the text names it."""
 
 
+class OwnFile(NamedTuple):
+    """A file, and what was found in it."""
+
+    path: Path | None
+    gestures: Examples
+    fault: str | None  # why it cannot be read: the model's gestures go on without it
+
+
 def where(chosen: Path | None, environ: Mapping[str, str]) -> Path | None:
     """The file that was set, else the one in systemd's state directory, else None."""
     if chosen is not None:
@@ -26,8 +35,15 @@ def where(chosen: Path | None, environ: Mapping[str, str]) -> Path | None:
     return Path(directory.split(":")[0]) / NAME if directory else None
 
 
-def read(path: Path | None) -> Examples:
-    """The gestures; none where there is no file. Raises OwnFileError for one that cannot be read."""
+def load(path: Path | None) -> OwnFile:
+    """Read the file; there are no gestures where there is none, or where it cannot be read."""
+    try:
+        return OwnFile(path, _read(path), None)
+    except OwnFileError as error:
+        return OwnFile(path, {}, str(error))
+
+
+def _read(path: Path | None) -> Examples:
     if path is None:
         return {}
     try:
@@ -46,14 +62,6 @@ def read(path: Path | None) -> Examples:
         return from_dict(told.get("gestures"))
     except (ValueError, RecursionError) as error:
         raise OwnFileError(f"{path}: is no file of own gestures: {error}") from error
-
-
-def load(path: Path | None) -> tuple[Examples, str | None]:
-    """The gestures, and why there are none where the file cannot be read: the model's gestures go on without it."""
-    try:
-        return read(path), None
-    except OwnFileError as error:
-        return {}, str(error)
 
 
 def write(path: Path, gestures: Examples, sha256: str) -> None:

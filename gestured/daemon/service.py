@@ -12,6 +12,7 @@ from gestured.core.events import Status
 from gestured.core.hub import Hub
 from gestured.daemon import log as logging
 from gestured.daemon import systemd
+from gestured.daemon.asked import Asked, scene_of
 from gestured.daemon.bound import Bound
 from gestured.daemon.canary import Canary
 from gestured.daemon.clients import EventServer
@@ -23,9 +24,7 @@ from gestured.daemon.metrics import Metrics
 from gestured.daemon.operations import Operations
 from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
-from gestured.daemon.reload import Fresh, Loader, Reload, destinations, own_file_of
-from gestured.daemon.scene import scene_of
-from gestured.daemon.settings import Settings
+from gestured.daemon.reload import Loader, Reload
 from gestured.daemon.sinks import Sink
 from gestured.daemon.snapshot import Models, Snapshot
 from gestured.daemon.sockets import kernel_drops
@@ -34,7 +33,6 @@ from gestured.daemon.tap import Taps
 from gestured.daemon.udp import Receiver
 from gestured.daemon.views import Views
 from gestured.daemon.watch import Watch
-from gestured.model.ladder import Ladder
 
 STATUS_S = 1.0  # from one status to the next
 DRAIN_S = 0.5  # for clients to read what waits for them, when the daemon ends
@@ -45,19 +43,20 @@ AT_A_RESTART = ("listen", "socket", "control", "metrics", "flight_recorder")  # 
 class Service:
     """Everything that lives while the daemon runs."""
 
-    def __init__(self, settings: Settings, ladder: Ladder, bound: Bound, load: Loader) -> None:
+    def __init__(self, asked: Asked, metrics: Metrics, bound: Bound, load: Loader) -> None:
         """Serves from now on. `load` reads the configuration again, for a reload."""
+        settings, ladder = asked.settings, asked.ladder
         self._settings, self._ladder, self._bound = settings, ladder, bound
         self._instance, self._started, self._stopping = secrets.token_hex(8), time.time(), False
         self._begun = time.monotonic()
         self._reloading: asyncio.Task[str | None] | None = None  # a task that nobody holds may be collected
         self._said = ""  # to systemd
-        self._pulse, self._metrics = Pulse(), Metrics()
+        self._pulse, self._metrics = Pulse(), metrics
         self._reload = Reload(load, self._swap, self._metrics)
         for name in settings.sensors:
             self._metrics.sensor_label(name)  # those in the file are named first
         self._own = OwnGestures(self._own_changed)
-        self._own.follow(ladder, *own_file_of(settings))
+        self._own.follow(ladder, asked.own)
         self._hub = Hub(scene_of(settings, ladder), ladder)
         self._watch, self._taps = Watch(ladder), Taps(settings.flight_recorder << 20)
         self._clients = EventServer(
@@ -67,7 +66,7 @@ class Service:
             gestures=self._gestures,
             changed=self._foresee,
         )
-        self._osc = destinations(settings, self._metrics)
+        self._osc = asked.osc
         self._views = Views(self._hub, self._state, self._foresee)
         self._foresee()
         self._publisher = Publisher(self._metrics, self._sinks())
@@ -207,9 +206,9 @@ class Service:
             self._http.close()
         log.info("ended")
 
-    def _swap(self, fresh: Fresh) -> None:
+    def _swap(self, asked: Asked) -> None:
         """Go on with what a reload has opened."""
-        settings, ladder = fresh.settings, fresh.ladder
+        settings, ladder = asked.settings, asked.ladder
         for key in AT_A_RESTART:
             if getattr(settings, key) != getattr(self._settings, key):
                 log.warning("this setting changes at a restart only", key=key)
@@ -217,13 +216,13 @@ class Service:
         self._settings, self._ladder = settings, ladder
         self._watch.follow(ladder)
         before = self._gestures()
-        self._own.follow(ladder, *fresh.own)
+        self._own.follow(ladder, asked.own)
         self._desk.take(self._hub.change(scene_of(settings, ladder), ladder, time.monotonic()))
         if self._gestures() != before:
             self._clients.tell(messages.gestures_json(self._gestures()))
         for sink in self._osc:
             sink.close()
-        self._osc = fresh.osc
+        self._osc = asked.osc
         self._publisher.sinks = self._sinks()
         self._foresee()
         log.info("reloaded", model=ladder.active)

@@ -19,9 +19,10 @@ from typing import Any
 from gestured.client.notify import notify
 from gestured.daemon import log as logging
 from gestured.daemon import systemd
+from gestured.daemon.asked import open_all
 from gestured.daemon.bound import Bound, bind_all
-from gestured.daemon.ladder import open_ladder
 from gestured.daemon.log import Throttle, log
+from gestured.daemon.metrics import Metrics
 from gestured.daemon.reload import Loader
 from gestured.daemon.service import Service
 from gestured.daemon.settings import Settings
@@ -61,7 +62,8 @@ async def _run(settings: Settings, load: Loader) -> None:
     for number in STOPS:
         _when(number, partial(_end_at_once, bound))
     try:
-        service = Service(settings, open_ladder(settings), bound, load)  # it alone holds them: a reload lets them go
+        metrics = Metrics()
+        service = Service(open_all(settings, metrics), metrics, bound, load)  # it alone holds models: reloads free them
         for number in STOPS:
             _when(number, partial(loop.call_soon_threadsafe, stop.set))
         gc.freeze()  # what the start has made stays: later collections need not walk through it

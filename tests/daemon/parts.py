@@ -5,12 +5,12 @@ from pathlib import Path
 from gestured.core.events import Event
 from gestured.core.hub import Hub
 from gestured.core.reading import Reading
+from gestured.daemon.asked import scene_of
 from gestured.daemon.desk import Desk
 from gestured.daemon.merge import load_settings
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
-from gestured.daemon.scene import scene_of
 from gestured.daemon.settings import Settings
 from gestured.daemon.snapshot import Models, Snapshot
 from gestured.daemon.tap import Taps

@@ -11,8 +11,8 @@ from gestured.core.events import Cancelled, Event, Gesture, Onset
 from gestured.core.facts import Dropped
 from gestured.core.feed import HELD_S
 from gestured.core.hub import FORGET_S, Hub
+from gestured.daemon.asked import scene_of
 from gestured.daemon.merge import load_settings
-from gestured.daemon.scene import scene_of
 from gestured.model.ladder import ladder_for
 from tests.daemon.harness import Daemon, Frame, Hand, Sensor, floats
 

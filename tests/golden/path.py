@@ -22,7 +22,7 @@ from gestured.core.hub import Hub
 from gestured.core.reading import Reading
 from gestured.core.stamping import Stamp, Stamper
 from gestured.core.wire import Decoder
-from gestured.daemon.scene import scene_of
+from gestured.daemon.asked import scene_of
 from gestured.daemon.settings import Settings
 from gestured.model.ladder import Ladder
 from gestured.record import tape as mcap

@@ -28,10 +28,10 @@ from gestured.core.events import Event
 from gestured.core.frames import Frame
 from gestured.core.hub import Hub
 from gestured.daemon import log
+from gestured.daemon.asked import scene_of
 from gestured.daemon.backlog import Backlog, Datagram
 from gestured.daemon.health import TICK_S
 from gestured.daemon.merge import load_settings
-from gestured.daemon.scene import scene_of
 from gestured.lab.made_of import made_of
 from gestured.model.ladder import ladder_for
 from gestured.model.shipped import shipped

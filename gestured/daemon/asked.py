@@ -1,0 +1,91 @@
+"""What a configuration asks for: its models and the file of own gestures, opened; its destinations; its scene."""
+
+import os
+from dataclasses import dataclass
+
+from gestured.core.errors import ModelError
+from gestured.core.mounting import Mounting
+from gestured.core.osc_address import Addresses
+from gestured.core.own import is_name
+from gestured.core.scene import Scene, Setup
+from gestured.daemon import own_file
+from gestured.daemon.log import log
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.own_file import OwnFile
+from gestured.daemon.settings import Settings
+from gestured.daemon.sinks import OscSink
+from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, require_gestures
+
+SLIP = 0.8  # of difflib's ratio: a name so near to one of the model's gestures was meant to be that
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a configuration asks for, opened and not yet used."""
+
+    settings: Settings
+    ladder: Ladder
+    osc: list[OscSink]
+    own: OwnFile
+
+
+def open_all(settings: Settings, metrics: Metrics, *, insist: bool = False) -> Asked:
+    """Open what may take long: models, names of hosts, and the file of own gestures. Raises as `open_ladder`."""
+    ladder = open_ladder(settings, insist=insist)
+    osc = [OscSink(address, metrics, provisional=settings.publish_provisional) for address in settings.publish]
+    return Asked(settings, ladder, osc, own_file.load(own_file.where(settings.own_gestures, os.environ)))
+
+
+def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
+    """Open and test the models. Raises ModelError, or SettingsError for gestures that they do not know.
+
+    With `insist` a fallback is not good enough: what runs already is better than that.
+    """
+    early: list[str] = []
+    opened = False  # until then a failure may end the start, and the error says it all
+
+    def report(sentence: str) -> None:
+        if opened:
+            log.warning("model", what=sentence)
+        else:
+            early.append(sentence)
+
+    ladder = ladder_for(settings.model, settings.fallback or None, report=report)
+    if insist and ladder.degraded:
+        raise ModelError("; ".join(early))
+    opened = True
+    for sentence in early:
+        report(sentence)
+    gestures_in_use(ladder, settings.gestures)
+    require_gestures(ladder, (name for name in settings.per_gesture if not _may_be_own(name, settings, ladder)))
+    return ladder
+
+
+def _may_be_own(name: str, settings: Settings, ladder: Ladder) -> bool:
+    """Whether a table may be for a gesture of the user's own, enrolled or not: it may come, and go, at any time."""
+    from difflib import get_close_matches
+
+    possible = name not in ladder.gestures and own_file.where(settings.own_gestures, os.environ) is not None
+    return possible and is_name(name) and not get_close_matches(name, ladder.gestures, 1, SLIP)
+
+
+def scene_of(settings: Settings, ladder: Ladder) -> Scene:
+    """What decides, with the models of `ladder`, which knows all gestures that the settings name."""
+    parts = settings.per_gesture
+    return Scene(
+        gestures=gestures_in_use(ladder, settings.gestures),
+        grid=settings.grid or (ladder.rows, ladder.columns),
+        sensors={
+            name: Setup(own.grid, Mounting(own.rotate, own.mirror, own.invert), own.clock)
+            for name, own in settings.sensors.items()
+        },
+        addresses=Addresses(settings.addresses.pressure, settings.addresses.trajectory),
+        clock=settings.clock,
+        stale_s=settings.stale_s,
+        tap_gap_s=settings.tap_gap_s,
+        provisional_taps=settings.provisional_taps,
+        max_sensors=settings.max_sensors,
+        allow=settings.allow,
+        thresholds={name: part.threshold for name, part in parts.items() if part.threshold is not None},
+        refractory={name: part.refractory_s for name, part in parts.items()},
+    )
