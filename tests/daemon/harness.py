@@ -9,7 +9,6 @@ import re
 import select
 import signal
 import socket
-import struct
 import subprocess
 import sys
 import time
@@ -297,12 +296,3 @@ def counted_blob(address: str, frame: Frame, count: int) -> bytes:
 def lines_of(text: str) -> Iterator[Line]:
     """The JSON lines of a log."""
     return (json.loads(line) for line in text.splitlines() if line.startswith("{"))
-
-
-def raw_message(address: bytes, types: bytes, *floats: float) -> bytes:
-    """A message put together by hand, right or wrong."""
-
-    def pad(text: bytes) -> bytes:
-        return text + bytes(4 - len(text) % 4)
-
-    return pad(address) + pad(types) + b"".join(struct.pack(">f", value) for value in floats)

@@ -152,7 +152,7 @@ def test_a_test_event_is_marked_on_every_output_and_keeps_the_numbers(start) -> 
     assert daemon.client().hello["sensors"] == {"arm": 1}
     Sensor(daemon, "arm").begin().perform("left")  # the sensor comes: its gestures are numbered on, unmarked
     (event,) = client.events("gesture", "arm")
-    assert (event["gesture"], event["sequence"]) == ("swipe_left", 2) and "test" not in event
+    assert (event["gesture"], event["id"], event["sequence"]) == ("swipe_left", 2, 2) and "test" not in event
     with Control(Path(daemon.ready["control"])) as control:
         assert control.ask("emit", gesture="one_tap", sensor="arm")["sequence"] == 3
 

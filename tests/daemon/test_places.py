@@ -1,41 +1,32 @@
 """Whose a name is, for how long, and how its events are numbered when others come and go."""
 
 import tracemalloc
-from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from gestured.client.control import Control
-from gestured.core.events import Cancelled, Event, Gesture, Onset
-from gestured.core.facts import Dropped
+from gestured.core.events import Cancelled, Gesture, Onset
 from gestured.core.feed import HELD_S
-from gestured.core.hub import FORGET_S, Hub
-from gestured.daemon.asked import scene_of
-from gestured.daemon.merge import load_settings
-from gestured.model.ladder import ladder_for
-from tests.daemon.harness import Daemon, Frame, Hand, Sensor, floats
-
-RATE_HZ = 15.0
-SOURCE = ("10.0.0.1", 1)
+from gestured.core.hub import FORGET_S
+from tests.daemon.harness import RATE_HZ, Frame, Hand, Sensor, floats
+from tests.daemon.parts import SOURCE, Parts
 
 
-class Room:
-    """A hub with its events and what it dropped, at times that are written down."""
+class Room(Parts):
+    """A daemon's parts at a time that goes on."""
 
     def __init__(self, model: Path, **given: str) -> None:
-        self.events: list[Event] = []
-        self.dropped: Counter[str] = Counter()
-        ladder = ladder_for(model)
-        self.hub = Hub(scene_of(load_settings({"model": str(model), **given}, {})[0], ladder), ladder)
+        super().__init__(model, **given)
         self.now = 0.0
         self._hand = Hand()
 
+    def dropped(self, reason: str) -> int:
+        """Packets that were not used for this reason."""
+        return self.metrics.dropped.values.get((reason,), 0)
+
     def take(self, packet: bytes, source: tuple[str, int] = SOURCE, later: float = 0.0) -> None:
         """One packet, and what comes of it."""
-        facts = self.hub.receive([(packet, source)], self.now + later)
-        self.dropped.update(fact.reason for fact in facts if isinstance(fact, Dropped))
-        self.events += [fact for fact in facts if isinstance(fact, Event)]
+        self.desk.take(self.hub.receive([(packet, source)], self.now + later))
 
     def send(self, name: str, frames: list[Frame], source: tuple[str, int] = SOURCE) -> None:
         """Frames of a sensor at its pace."""
@@ -64,7 +55,7 @@ def test_who_is_silent_for_long_loses_the_place_and_goes_on_counting_on_return(r
         room.swipe(f"squatter{n}")
     room.wait(FORGET_S / 2)
     room.swipe("late")
-    assert "late" not in room.hub.states(room.now) and room.dropped["too_many_sensors"] > 0
+    assert "late" not in room.hub.states(room.now) and room.dropped("too_many_sensors") > 0
     room.wait(FORGET_S)
     for n in range(4):
         room.swipe(f"new{n}")
@@ -91,9 +82,9 @@ def test_a_name_whose_sender_goes_on_is_not_given_to_another_port(room: Room) ->
     room.send("arm", idle[:1])
     for _ in range(2):
         room.take(floats("/arm/pressure", idle[0], 0), ("10.0.0.1", 2), later=0.01)
-    before = room.dropped["second_source"]
+    before = room.dropped("second_source")
     room.swipe("arm")
-    assert room.dropped["second_source"] == before == 1
+    assert room.dropped("second_source") == before == 1
     assert [e.gesture for e in room.events if isinstance(e, Gesture)] == ["swipe_left"]
 
 
@@ -141,16 +132,3 @@ def test_an_idle_sensor_whose_clock_stands_still_does_not_grow(model: Path) -> N
     finally:
         tracemalloc.stop()
     assert held < len(frames) * frame.nbytes / 2  # not even half of the frames
-
-
-def test_a_test_event_leaves_its_numbers_to_the_sensor_that_comes(start) -> None:
-    daemon: Daemon = start("--clock", "sensor")
-    client = daemon.client().subscribe("onset", "gesture", "release", sensors=["arm"])
-    with Control(Path(daemon.ready["control"])) as control:
-        control.ask("emit", gesture="one_tap", sensor="arm")
-    Sensor(daemon, "arm").begin().perform("left")
-    lines = client.until(lambda line: line["type"] == "release" and not line.get("test"))
-    assert [(line["type"], line["id"]) for line in lines] == [
-        (kind, number) for number in (1, 2) for kind in ("onset", "gesture", "release")
-    ]
-    assert [line["sequence"] for line in lines if line["type"] == "gesture"] == [1, 2]
