@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.events import Cancelled, Onset, Release
-from gestured.core.found import Contact, Cut, Draft, Found
+from gestured.core.found import Contact, Cut, Draft, Preview
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 
@@ -268,10 +268,9 @@ class Player:
                 assert self._holds(word, step), self._says(step, f"{word!r} is not so")
         else:
             for frame in self.frames(step):
-                self._note(front_end.push(frame))
+                self._note(contacts(front_end, frame))
 
-    def _note(self, found: Sequence[Found]) -> None:
-        events = [event for event in found if not isinstance(event, Draft)]
+    def _note(self, events: Sequence[Contact]) -> None:
         self.events += events
         for event in events:
             if isinstance(event, Cut):
@@ -320,3 +319,14 @@ def name(event: Contact) -> str:
     if isinstance(event, Cancelled):
         return f"cancelled {event.reason}"
     return {Onset: "onset", Cut: "cut", Release: "release"}[type(event)]
+
+
+def frames(*lines: str, seed: int = 0) -> list[Frame]:
+    """What a sensor sends while the lines of a scenario last."""
+    player = Player(parse("stream", "\n".join(lines)), seed)
+    return [frame for step in player.scenario.steps for frame in player.frames(step)]
+
+
+def contacts(front_end: FrontEnd, frame: Frame) -> list[Contact]:
+    """What a frame says of contacts: all that a front end finds in it, but for those that are not over."""
+    return [found for found in front_end.push(frame) if not isinstance(found, Draft | Preview)]

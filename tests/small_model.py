@@ -1,6 +1,7 @@
-"""A small real model file of two gestures, and what can be wrong with one."""
+"""A small real model file of two gestures, and what can be wrong with one; and a clock for a ladder of models."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,16 @@ from gestured.model.file import SelfTest
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=0.1, tail_s=0.1, floor=4.0)
 GESTURES = ("one_tap", "swipe_up")
+
+
+@dataclass
+class Clock:
+    """Time that tests set, and that runs of models take."""
+
+    now: float = 0.0  # s
+
+    def __call__(self) -> float:
+        return self.now
 
 
 def segment(frames: int = 6, level: float = 100.0) -> Segment:

@@ -14,15 +14,7 @@ from gestured.core.frames import Segment
 from gestured.model.ladder import RETRY_S, SLOW_RUNS, SLOW_S, Ladder, ladder_for
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
-from tests.small_model import GESTURES, build, segment
-
-
-@dataclass
-class Clock:
-    now: float = 0.0
-
-    def __call__(self) -> float:
-        return self.now
+from tests.small_model import GESTURES, Clock, build, segment
 
 
 @dataclass

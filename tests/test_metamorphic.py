@@ -3,7 +3,6 @@
 The changes and the streams are those of `gestured-lab stability`, which prints the figures; simulated gestures.
 """
 
-import struct
 from functools import cache
 
 import numpy as np
@@ -12,8 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gestured.core.mounting import Mounting
-from gestured.core.osc_address import Addresses
-from gestured.core.wire import Decoder
 from gestured.lab.dataset import cuts
 from gestured.lab.stability.metamorphic import (
     Property,
@@ -99,50 +96,3 @@ def test_the_nets_say_the_same_or_what_it_became(name: str, change: Property) ->
         for stream, before in zip(streams(), said(name), strict=True)
     ]
     assert sum(right) >= LEAST * len(right)
-
-
-# --- on the wire
-
-grids = st.tuples(st.integers(2, 9), st.integers(2, 9))
-
-
-def message(types: str, body: bytes) -> bytes:
-    def text(word: str) -> bytes:
-        return word.encode() + b"\0" * (4 - len(word) % 4)
-
-    return text("/armrest/pressure") + text("," + types) + body
-
-
-def bundle(*messages: bytes) -> bytes:
-    return b"#bundle\0" + struct.pack(">Q", 1) + b"".join(struct.pack(">i", len(m)) + m for m in messages)
-
-
-def blob(data: bytes) -> bytes:
-    return message("b", struct.pack(">i", len(data)) + data + b"\0" * (-len(data) % 4))
-
-
-def decoded(grid: tuple[int, int], *packets: bytes) -> list[np.ndarray]:
-    decoder = Decoder(Addresses(), lambda sensor: grid)
-    found = []
-    for packet in packets:
-        arrivals, errors = decoder.decode(packet)
-        assert errors == []
-        found += [arrival.values for arrival in arrivals]
-    return found
-
-
-@given(grids, st.integers(1, 4), st.integers(0, 2**32 - 1))
-def test_the_form_of_a_frame_on_the_wire_changes_nothing(grid: tuple[int, int], count: int, seed: int) -> None:
-    """Floats, integers, float and integer blobs, in packets of their own or all in one bundle."""
-    counts = np.random.default_rng(seed).integers(0, 65536, (count, *grid))
-    size = grid[0] * grid[1]
-    forms = [
-        [message("f" * size, frame.astype(">f4").tobytes()) for frame in counts],
-        [message("i" * size, frame.astype(">i4").tobytes()) for frame in counts],
-        [blob(frame.astype(">f4").tobytes()) for frame in counts],
-        [blob(frame.astype(">u2").tobytes()) for frame in counts],
-    ]
-    for packets in (*forms, *([bundle(*form)] for form in forms)):
-        found = decoded(grid, *packets)
-        assert len(found) == count
-        assert all(np.array_equal(one, two) for one, two in zip(found, counts, strict=True))

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from gestured.core.activity import BLOB, BLOB_GAIN, COMMON, Activity
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.features import touch_pattern
-from gestured.core.found import Contact, Cut, Draft, Preview
+from gestured.core.found import Contact, Cut
 from gestured.core.frames import Frame, Segment, Touch
 from gestured.core.front_end import FrontEnd
 from gestured.core.mounting import Mounting
 from gestured.core.window import Window
+from tests.scenario import contacts
 
 Array = NDArray[np.float64]
 Shape = tuple[int, int]
@@ -73,10 +74,6 @@ def stream(
             begin = ends[np.searchsorted(ends, t, side="right")] - seconds
             frame += pressed((t - begin) / seconds)
     return times, frames
-
-
-def contacts(front_end: FrontEnd, frame: Frame) -> list[Contact]:
-    return [found for found in front_end.push(frame) if not isinstance(found, Draft | Preview)]
 
 
 def play(front_end: FrontEnd, times: Array, frames: NDArray[np.generic]) -> list[Contact]:

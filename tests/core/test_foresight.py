@@ -27,19 +27,14 @@ from gestured.core.scene import Scene
 from gestured.model.ladder import RETRY_S, SLOW_RUNS, Ladder
 from tests.daemon.harness import Hand, floats
 from tests.hostile.grammar import violations
-from tests.scenario import Player, parse
+from tests.scenario import frames
+from tests.small_model import Clock
 
 GESTURES = ("one_tap", "double_tap", "left", "right")
 CERTAINTY = Certainty(2, (0.0, 0.2), (0.9, 0.8), tap=0.7)
 TAP = "press 4,4 0.8 for 130ms"
 SWIPE = "move 4,1 to 4,7 0.8 in 600ms"
 IDLE, PAUSE, SHORT = "quiet for 1500ms", "quiet for 900ms", "quiet for 150ms"
-
-
-def frames(*lines: str) -> list[Frame]:
-    """What a sensor sends while the lines of a scenario last."""
-    player = Player(parse("stream", "\n".join(lines)), 0)
-    return [frame for step in player.scenario.steps for frame in player.frames(step)]
 
 
 def says(gesture: str, confidence: float = 0.95) -> Scores:
@@ -317,16 +312,6 @@ def oracle(segment: Segment, salt: bytes = b"") -> Scores:
     ).digest()  # fmt: skip
     values = np.frombuffer(digest[:4], np.uint8).astype(np.float32) ** 4 + 1
     return Scores((values / values.sum()).astype(np.float32), digest[4] / 1024, "oracle", threshold=0.4)
-
-
-@dataclass
-class Clock:
-    """Frames set it; a run of a rung takes its time."""
-
-    now: float = 0.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 @dataclass

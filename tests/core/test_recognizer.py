@@ -24,17 +24,11 @@ from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Recognizer
 from gestured.core.timing import Timing
 from gestured.core.window import Window
-from tests.scenario import Player, parse
+from tests.scenario import contacts, frames
 
 GESTURES = ("tap", "left", "right")
 TAP = "press 4,4 0.8 for 130ms"
 SWIPE = "move 4,1 to 4,7 0.8 in 400ms"
-
-
-def frames(*lines: str, seed: int = 0) -> list[Frame]:
-    """What a sensor sends while the lines of a scenario last."""
-    player = Player(parse("stream", "\n".join(lines)), seed)
-    return [frame for step in player.scenario.steps for frame in player.frames(step)]
 
 
 def says(*values: float, unknown: float = 0.0, threshold: float = 0.5) -> Scores:
@@ -198,10 +192,6 @@ def touched(stream: Sequence[Frame]) -> tuple[int, int]:
 def cut_out(stream: Sequence[Frame]) -> list[Contact]:
     front_end = FrontEnd("armrest", 9, 9)
     return [x for frame in stream for x in contacts(front_end, frame)]
-
-
-def contacts(front_end: FrontEnd, frame: Frame) -> list[Contact]:
-    return [found for found in front_end.push(frame) if not isinstance(found, Draft | Preview)]
 
 
 @pytest.mark.parametrize("where", [-4, 0, 1, 9, 11])  # frames from the onset; the last touched one is the eleventh

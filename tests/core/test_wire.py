@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from gestured.core import wire
@@ -153,14 +153,21 @@ def test_a_blob_is_told_apart_by_its_length(dtype: str, counter: int | None) -> 
     assert arrival.counter == counter
 
 
-@pytest.mark.parametrize("grid", [(2, 2), (2, 3), (27, 15), (64, 64)])
-def test_every_grid_takes_every_form(grid: tuple[int, int]) -> None:
-    sent = (np.arange(grid[0] * grid[1]) % 251).reshape(grid)
-    packets = [pressure(sent.ravel(), n, tag=tag) for n in (None, 9) for tag in "if"]
-    packets += [blob(sent.astype(dtype).tobytes(), n) for n in (None, 9) for dtype in (">f4", ">u2", ">u1")]
-    for packet in packets:
-        (arrival,), errors = Decoder(Addresses(), lambda sensor: grid).decode(packet)
-        assert not errors and np.array_equal(arrival.values, sent)
+@example((64, 64), 1, 8, 0)
+@given(
+    st.tuples(st.integers(2, 27), st.integers(2, 27)), st.integers(1, 4), st.sampled_from([8, 16]), st.integers(0, 999)
+)
+def test_the_form_of_frames_changes_nothing(grid: tuple[int, int], count: int, bits: int, seed: int) -> None:
+    """Floats, integers and blobs, with a counter and without, in packets of their own or all in one bundle."""
+    sent = np.random.default_rng(seed).integers(0, 1 << bits, (count, *grid))
+    blobs = (">f4", ">u2", ">u1") if bits == 8 else (">f4", ">u2")
+    forms = [[pressure(frame.ravel(), n, tag=tag) for frame in sent] for n in (None, 9) for tag in "if"]
+    forms += [[blob(frame.astype(dtype).tobytes(), n) for frame in sent] for n in (None, 9) for dtype in blobs]
+    for packets in (*forms, *([encoding.bundle(form)] for form in forms)):
+        decode = Decoder(Addresses(), lambda sensor: grid)
+        found = [decode.decode(packet) for packet in packets]
+        assert not any(errors for _, errors in found)
+        assert np.array_equal([arrival.values for arrivals, _ in found for arrival in arrivals], sent)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
