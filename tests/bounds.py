@@ -1,4 +1,4 @@
-"""A bound on memory for what opens any bytes as a model in this process, as `model_worker` has one in its own."""
+"""A bound on memory for what opens any bytes as a model in this process, as `model.worker` has one in its own."""
 
 import re
 import resource

@@ -18,7 +18,6 @@ from tests.scenario import Player, Scenario, ScenarioError, load, parse
 SCENARIOS = sorted((Path(__file__).parent / "scenarios").glob("*.txt"))
 
 
-# Faults of the front end that are known; a mended one makes its test fail until its line is taken out.
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
 def test_scenario(path: Path) -> None:
     scenario = load(path)

@@ -524,14 +524,8 @@ def kinds(events: Sequence[Contact]) -> list[str]:
     return [event.reason if isinstance(event, Cancelled) else type(event).__name__ for event in events]
 
 
-@pytest.mark.parametrize(
-    ("what", "answer", "silence"),
-    [
-        *((what, "Cut", silence) for what in ("lifted", "tapped") for silence in (1.5, 3.0, 5.5, 60.0)),
-        *(("finger", "silence", silence) for silence in (1.5, 3.0)),
-        *(("finger", "silence", silence) for silence in (5.5, 60.0)),
-    ],
-)
+@pytest.mark.parametrize("silence", [1.5, 3.0, 5.5, 60.0])
+@pytest.mark.parametrize(("what", "answer"), [("lifted", "Cut"), ("tapped", "Cut"), ("finger", "silence")])
 def test_a_silence_means_the_same_however_long_it_was(what: str, answer: str, silence: float) -> None:
     """A daemon asks after `stale_s`, replay when the next frame comes: both hear the same."""
     stream = frames(*OPEN[what])

@@ -250,15 +250,12 @@ def test_flags_nobody_knows_and_help() -> None:
     assert run("--version")[1].startswith("gestured ")
 
 
-@pytest.mark.parametrize("broken", ["missing", "empty", "truncated", "self_test", "text"])
+@pytest.mark.parametrize("broken", ["missing", "truncated"])
 def test_a_model_that_cannot_be_used(model: Path, tmp_path: Path, broken: str) -> None:
+    """In a real process; what else may be wrong with one, tests/test_models.py says."""
     path = tmp_path / "bad.onnx"
-    data = model.read_bytes()
-    if broken == "self_test":
-        tiny_model.make(path, broken="self_test")
-    elif broken != "missing":
-        text = {"empty": b"", "truncated": data[: len(data) // 2], "text": b"hello " * 100}
-        path.write_bytes(text[broken])
+    if broken == "truncated":
+        path.write_bytes(model.read_bytes()[:2000])
     flags = ("--listen", "127.0.0.1:0", "--socket", tmp_path / "s")
     assert str(path) in refused(3, "--model", path, *flags)
     assert not (tmp_path / "s").exists()

@@ -16,8 +16,6 @@ GESTURES = (
     "circle_counter_clockwise", "swipe_up_two_fingers", "swipe_down_two_fingers",
 )  # fmt: skip
 ROWS = COLUMNS = 9
-
-
 PROVISIONAL = '{"in_a_row": 1, "elapsed_s": [0.0, 0.1], "thresholds": [null, 0.9], "tap": 0.8}'
 
 
@@ -37,10 +35,8 @@ def own() -> str:
     return Space(np.array([0.0, 0.0, 4.0]), directions, between, built_in, (0.0,) * 5, 1.0, 5.0).to_json()
 
 
-def make(
-    path: Path, *, gestures: tuple[str, ...] = GESTURES, version: str = "1", broken: str = "", **metadata: str
-) -> Path:
-    """Write the model to `path`; `broken` = "self_test" stores other outputs than it gives.
+def make(path: Path, *, gestures: tuple[str, ...] = GESTURES, version: str = "1", **metadata: str) -> Path:
+    """Write the model to `path`.
 
     `metadata` are further ones: `quantiles`; `provisional`, how sure it must be of a contact that is not over;
     `own`, with which it has an embedding: movement across, movement down, spread in time.
@@ -128,8 +124,6 @@ def make(
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
     frames = np.random.default_rng(1).random((2, 7, ROWS, COLUMNS), np.float32)
     scores, unknown = _run(model.SerializeToString(), frames)
-    if broken == "self_test":
-        scores = scores[:, ::-1]
     window = Window(ROWS, COLUMNS, 15.0, 1, 0.0, 0.0, 5.0)
     helper.set_model_props(
         model,

@@ -13,9 +13,8 @@ from tests.hostile.grammar import violations
 pytestmark = pytest.mark.skipif(not shipped()["cnn_lstm"].exists(), reason="models/cnn_lstm.onnx is not here")
 SECONDS = 40.0
 HEALED_S = 16.0  # the fault ends
-AGAIN_S = (
-    26.0  # from here on everything is as if it had never been: what is held for 5 s is given up, 1 s more is learned
-)
+# From here on everything is as if it had never been: what is held for 5 s is given up, 1 s more is learned.
+AGAIN_S = 26.0
 
 
 @pytest.fixture(scope="module")
