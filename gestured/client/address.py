@@ -2,7 +2,6 @@
 
 import argparse
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -31,6 +30,20 @@ def bind_address(text: str) -> Address:
         raise argparse.ArgumentTypeError(f"{text!r}: expected {error}") from None
 
 
+def default_socket(environ: Mapping[str, str]) -> Path:
+    """The event socket of a daemon that is told none: where systemd or the session keeps such things."""
+    if directory := environ.get("RUNTIME_DIRECTORY"):
+        return Path(directory.split(":")[0]) / "events.sock"
+    if directory := environ.get("XDG_RUNTIME_DIR"):
+        return Path(directory) / "gestured" / "events.sock"
+    return SHARED / f"gestured-{os.getuid()}" / "events.sock"
+
+
+def control_beside(socket: Path) -> Path:
+    """The control socket of a daemon that is told none: beside its event socket."""
+    return socket.with_suffix(".ctl")
+
+
 def find_socket(environ: Mapping[str, str]) -> Path:
     """The event socket that is meant where none is named, the first of these.
 
@@ -39,20 +52,18 @@ def find_socket(environ: Mapping[str, str]) -> Path:
     """
     if path := setting(environ, "socket"):
         return Path(path)
-    if directory := environ.get("RUNTIME_DIRECTORY"):
-        return Path(directory.split(":")[0]) / "events.sock"
-    session = environ.get("XDG_RUNTIME_DIR")
-    own = (Path(session, "gestured") if session else SHARED / f"gestured-{os.getuid()}") / "events.sock"
-    if session and os.path.exists(own):  # unlike Path.exists, no error where we may not look
+    own = default_socket(environ)
+    # Unlike Path.exists, os.path.exists raises no error where we may not look.
+    if environ.get("RUNTIME_DIRECTORY") or (environ.get("XDG_RUNTIME_DIR") and os.path.exists(own)):
         return own
     return SYSTEM if SYSTEM.parent.is_dir() else own
 
 
 def find_control(environ: Mapping[str, str]) -> Path:
-    """Where it keeps its control socket: beside the other."""
+    """Where it keeps its control socket."""
     if path := setting(environ, "control"):
         return Path(path)
-    return find_socket(environ).with_suffix(".ctl")
+    return control_beside(find_socket(environ))
 
 
 def find_all_controls(environ: Mapping[str, str]) -> list[Path]:
@@ -67,8 +78,12 @@ def setting(environ: Mapping[str, str], key: str) -> str | None:
     """A setting of the daemon's that a variable, or the file that a variable names, has; None where neither does."""
     if value := environ.get(f"GESTURED_{key.upper()}"):
         return value
+    if not (path := environ.get("GESTURED_CONFIG")):
+        return None
+    import tomllib  # it takes longer to import than all the rest
+
     try:
-        with open(environ.get("GESTURED_CONFIG") or os.devnull, "rb") as file:
+        with open(path, "rb") as file:
             value = tomllib.load(file).get(key)
     except (OSError, ValueError):  # what is wrong with the file, the daemon says
         return None

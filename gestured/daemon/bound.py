@@ -6,8 +6,9 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from gestured.client.address import control_beside, default_socket
 from gestured.daemon.log import log
-from gestured.daemon.settings import Settings, control_beside, default_socket
+from gestured.daemon.settings import Settings
 from gestured.daemon.sockets import (
     AddressError,
     Listener,

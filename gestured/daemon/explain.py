@@ -5,12 +5,13 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from gestured import __version__
+from gestured.client.address import control_beside, default_socket
 from gestured.core.scene import DOUBLE_TAP
 from gestured.core.timing import Timing
 from gestured.daemon.asked import open_ladder
 from gestured.daemon.client import BACKLOG_BYTES
 from gestured.daemon.clients import CLIENTS
-from gestured.daemon.settings import TABLES, Settings, control_beside, default_socket
+from gestured.daemon.settings import TABLES, Settings
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
 from gestured.model.ladder import Ladder, gestures_in_use

@@ -1,7 +1,5 @@
 """What can be set. Every key is described here, and nowhere else: help and documents are made from this."""
 
-import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -146,17 +144,3 @@ class Settings(Part):
 TABLES = ("sensors", "per_gesture", "addresses")  # in the file only
 FLAGS = tuple(name for name in Settings.model_fields if name not in TABLES)
 REPEATED = ("fallback", "publish", "allow")
-
-
-def default_socket(environ: Mapping[str, str]) -> Path:
-    """Where the event socket stands when nobody says so: where systemd or the session keeps such things."""
-    if directory := environ.get("RUNTIME_DIRECTORY"):
-        return Path(directory.split(":")[0]) / "events.sock"
-    if directory := environ.get("XDG_RUNTIME_DIR"):
-        return Path(directory) / "gestured" / "events.sock"
-    return Path(f"/tmp/gestured-{os.getuid()}") / "events.sock"
-
-
-def control_beside(socket: Path) -> Path:
-    """Where the control socket stands when nobody says so: beside the event socket."""
-    return socket.with_suffix(".ctl")

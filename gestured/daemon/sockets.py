@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from gestured.client.address import SHARED
 from gestured.client.holder import bind_failure
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
@@ -172,7 +173,7 @@ class UnixListener(Listener):
 
 def make_default_directory(directory: Path) -> None:
     """Make the folder of the default socket, for its owner alone. Raises AddressError."""
-    shared = directory.parent == Path("/tmp")  # where anybody could have made it, or a link, before us
+    shared = directory.parent == SHARED  # anybody could have made it, or a link, before us
     try:
         directory.mkdir(0o700, parents=True, exist_ok=True)
         found = directory.lstat() if shared else directory.stat()

@@ -214,19 +214,6 @@ def test_wrong_usage(run, wrong, tmp_path: Path):
     assert wrong[0] in err
 
 
-def test_the_default_socket_is_where_the_daemon_keeps_it(monkeypatch, tmp_path):
-    from gestured.client import address
-    from gestured.daemon.settings import default_socket as daemons
-
-    monkeypatch.setattr(address, "SYSTEM", tmp_path / "none" / "events.sock")  # no daemon is installed
-    for given in (
-        {},
-        {"XDG_RUNTIME_DIR": "/run/user/1"},
-        {"RUNTIME_DIRECTORY": "/run/a:/run/b", "XDG_RUNTIME_DIR": "/c"},
-    ):
-        assert address.find_socket(given) == daemons(given)
-
-
 def test_a_gesture_that_the_daemon_does_not_know_is_said(start, fake):
     process = start("listen", "--socket", fake.path, "--gesture", "swipeleft", "--count", 1)
     fake.accept()
