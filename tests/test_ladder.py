@@ -12,14 +12,15 @@ from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
 from gestured.model.ladder import RETRY_S, SLOW_RUNS, SLOW_S, Ladder, ladder_for
+from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
 from tests.small_model import GESTURES, Clock, build, segment
 
 
 @dataclass
-class Fake:
-    """A rung that does what its test says, and remembers what it was given."""
+class Fake(Model):
+    """A model that does what its test says, and remembers what it was given."""
 
     name: str
     clock: Clock
@@ -27,10 +28,12 @@ class Fake:
     takes_s: float = 0.0
     error: Exception | None = None
     gestures: tuple[str, ...] = GESTURES
+    rows: int = 9
+    columns: int = 9
     seen: list[Segment] = field(default_factory=list)
 
-    def classify(self, one: Segment) -> Scores:
-        self.seen.append(one)
+    def classify(self, segment: Segment) -> Scores:
+        self.seen.append(segment)
         self.clock.now += self.takes_s
         if self.error is not None:
             raise self.error

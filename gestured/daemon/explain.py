@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from gestured import __version__
 from gestured.client.address import control_beside, default_socket
@@ -25,7 +24,7 @@ def _felt(wait_s: float, rate_hz: float) -> str:
 def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     """The text; opens the models to do so, binds nothing. Raises ModelError or SettingsError."""
     ladder = open_ladder(settings)
-    model: Any = ladder.model
+    model = ladder.model
     window = model.metadata.window
     used = gestures_in_use(ladder, settings.gestures)
     path = settings.socket or default_socket(os.environ)

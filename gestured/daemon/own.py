@@ -18,7 +18,6 @@ from gestured.daemon.log import log
 from gestured.daemon.own_file import OwnFile
 from gestured.daemon.request import Refusal, json_line
 from gestured.model.ladder import Ladder
-from gestured.model.model import Model
 from gestured.model.own import Examiner, Own
 
 PATIENCE_S = 120.0  # an enrolment without an attempt for so long gives its place to others
@@ -59,9 +58,7 @@ class OwnGestures:
     @property
     def off(self) -> str | None:
         """Why the model that answers knows none of them, or None."""
-        model = self._ladder.model
-        embeds = isinstance(model, Model) and model.space is not None
-        return None if embeds else f"{self._ladder.active} has no embedding"
+        return f"{self._ladder.active} has no embedding" if self._ladder.model.space is None else None
 
     def report(self) -> dict[str, Any]:
         """For the status."""
@@ -93,7 +90,7 @@ class OwnGestures:
         if not 1 <= examples <= EXAMPLES:
             raise Refusal(f"expected 1 to {EXAMPLES} examples, found {examples}")
         model = self._ladder.model
-        if not isinstance(model, Model) or model.space is None:
+        if model.space is None:
             raise Refusal(f"{self.off}: own gestures are off while it answers")
         judge = Examiner(model, model.space, self._ladder.own, in_use)
         self._enrolment, self._connection = Enrolment(name, sensor, examples, judge), connection
@@ -153,9 +150,7 @@ class OwnGestures:
 
     async def _keep(self, gestures: Examples) -> None:
         """Write them, and use them."""
-        path, model = self._file(), self._ladder.model
-        sha256 = model.sha256 if isinstance(model, Model) else ""
-        await asyncio.to_thread(own_file.write, path, gestures, sha256)
+        await asyncio.to_thread(own_file.write, self._file(), gestures, self._ladder.model.sha256)
         self.gestures = gestures
         self._use()
         self._changed()

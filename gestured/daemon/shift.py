@@ -32,7 +32,7 @@ QUANTITIES = ("strength", *MEASURES, "confidence")
 class Shift:
     """What came, held against a model's `quantiles` (metadata); knows nothing where they say nothing."""
 
-    def __init__(self, quantiles: Mapping[str, Any], window: Window | None = None) -> None:
+    def __init__(self, quantiles: Mapping[str, Any], window: Window) -> None:
         self._window = window
         self.ranges = {name: found for name in QUANTITIES if (found := _range(quantiles, name)) is not None}
         names = [*self.ranges, *([UNKNOWN] if _mostly_known(quantiles) else [])]
@@ -40,7 +40,7 @@ class Shift:
 
     def see(self, segment: Segment, scores: Scores, known: bool) -> None:
         """A segment was decided, as a gesture or as unknown. The quantiles say nothing of a fallback's answers."""
-        if self._window is None or not self._outside or scores.degraded:
+        if not self._outside or scores.degraded:
             return
         if UNKNOWN in self._outside:
             self._outside[UNKNOWN].append(not known)

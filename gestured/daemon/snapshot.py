@@ -33,7 +33,7 @@ class Models:
     @classmethod
     def of(cls, ladder: Ladder, shift: Shift, failed: bool) -> "Models":
         """As they are now."""
-        model: Any = ladder.model
+        model = ladder.model
         return cls(
             ladder.active, ladder.name, ladder.rung, ladder.degraded, ladder.failures, ladder.source,
             model.metadata.version, model.sha256, (model.rows, model.columns), failed,

@@ -9,7 +9,6 @@ from gestured.core.facts import Decided
 from gestured.daemon.shadow import Shadow
 from gestured.daemon.shift import Shift
 from gestured.model.ladder import Ladder
-from gestured.model.model import Model
 from gestured.model.process import ModelProcess
 
 
@@ -23,8 +22,7 @@ class Watch:
     def follow(self, ladder: Ladder) -> None:
         """Look at other models from now on; a shadow that does not know their gestures ends."""
         self._ladder = ladder
-        model = ladder.model
-        self.shift = Shift(model.metadata.quantiles, model.metadata.window) if isinstance(model, Model) else Shift({})
+        self.shift = Shift(ladder.model.metadata.quantiles, ladder.model.metadata.window)
         if self.shadow is not None and self.shadow.candidate.gestures != ladder.gestures:
             self.shadow.close()
             self.shadow = None

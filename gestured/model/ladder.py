@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from gestured.core.certainty import Certainty
-from gestured.core.classifier import Classifier, Scores
+from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError, SettingsError
 from gestured.core.frames import Segment
+from gestured.model.model import Model
 from gestured.model.own import Own
 from gestured.model.rung import Rung
 from gestured.model.shipped import LADDER, shipped, shipped_name
@@ -33,7 +34,7 @@ class Ladder:
 
     def __init__(
         self,
-        rungs: Sequence[str | Path | Classifier],
+        rungs: Sequence[str | Path | Model],
         *,
         slow_s: float = SLOW_S,
         clock: Callable[[], float] = time.perf_counter,
@@ -53,9 +54,8 @@ class Ladder:
         self._previews_from = -math.inf  # s of `clock`
         self.own = Own({})  # gestures of the user's own; may be replaced between two segments
         self._active, opened = self._first_open()
-        self.gestures: tuple[str, ...] = tuple(opened.gestures)
-        self.rows = int(getattr(opened, "rows", 0))
-        self.columns = int(getattr(opened, "columns", 0))
+        self.gestures = opened.gestures
+        self.rows, self.columns = opened.rows, opened.columns
         for rung in self.rungs:
             self._check_gestures(rung)
 
@@ -85,7 +85,7 @@ class Ladder:
         return self._active is not self.rungs[0]
 
     @property
-    def model(self) -> Classifier:
+    def model(self) -> Model:
         """The active rung's model."""
         return self._active.open()
 
@@ -97,7 +97,7 @@ class Ladder:
         for rung in ready + aside:
             try:
                 model = rung.open()
-                if tuple(model.gestures) != self.gestures:
+                if model.gestures != self.gestures:
                     raise ModelError(f"{rung.name}: knows other gestures than {self.name}")
                 start = self._clock()
                 scores = model.classify(segment)
@@ -118,8 +118,7 @@ class Ladder:
     @property
     def certainty(self) -> Certainty | None:
         """How sure the active rung must be of a contact that is not over; None where it was not made for that."""
-        found = getattr(self._active.model, "certainty", None)
-        return found if isinstance(found, Certainty) else None
+        return None if self._active.model is None else self._active.model.certainty
 
     def preview(self, segment: Segment) -> Scores | None:
         """Scores of the beginning of a segment by the active rung, None where that fails.
@@ -140,7 +139,7 @@ class Ladder:
             self._faint, self._previews_from = 0, end + RETRY_S
         return scores
 
-    def _first_open(self) -> tuple[Rung, Classifier]:
+    def _first_open(self) -> tuple[Rung, Model]:
         reasons = []
         for rung in self.rungs:
             try:

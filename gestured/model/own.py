@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.classifier import Classifier
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
 from gestured.core.own import Example, Examples
@@ -30,7 +29,7 @@ class Own:
         self.gestures = dict(gestures)
         self._banks: dict[str, Bank | None] = {}  # by the model's sha256
 
-    def match(self, model: Classifier, segment: Segment) -> Match | None:
+    def match(self, model: Model, segment: Segment) -> Match | None:
         """The nearest of them; None where the model has no embedding, or fails: its own answer is none the worse."""
         bank = self.bank(model)
         if bank is None:
@@ -40,9 +39,9 @@ class Own:
         except ModelError:
             return None
 
-    def bank(self, model: Classifier) -> Bank | None:
+    def bank(self, model: Model) -> Bank | None:
         """The prototypes of a model, made when it is first asked; None for one that has no embedding."""
-        if not isinstance(model, Model) or model.space is None:
+        if model.space is None:
             return None
         if model.sha256 not in self._banks:
             try:
@@ -51,9 +50,9 @@ class Own:
                 self._banks[model.sha256] = None
         return self._banks[model.sha256]
 
-    def made(self, model: Classifier) -> Bank | None:
+    def made(self, model: Model) -> Bank | None:
         """The prototypes of a model that was asked already; any thread may look."""
-        return self._banks.get(model.sha256) if isinstance(model, Model) else None
+        return self._banks.get(model.sha256)
 
     def _made(self, model: Model, space: Space) -> Bank:
         places = {name: places_of(model, space, examples) for name, examples in self.gestures.items()}
@@ -70,9 +69,8 @@ def places_of(model: Model, space: Space, examples: Sequence[Example]) -> Array:
     return np.stack([place(model, space, one.segment()) for one in examples])
 
 
-def place(model: Classifier, space: Space, segment: Segment) -> Array:
+def place(model: Model, space: Space, segment: Segment) -> Array:
     """(K,) place of a segment. Raises ModelError where the model fails, or the segment is not finite."""
-    assert isinstance(model, Model)
     with np.errstate(all="ignore"):  # counts near the limits of float32 overflow; checked below
         window: NDArray[np.float32] = model.metadata.window.apply(segment)
         if not (len(window) and np.isfinite(segment.frames).all() and np.isfinite(window).all()):

@@ -3,8 +3,8 @@
 import math
 from pathlib import Path
 
-from gestured.core.classifier import Classifier
 from gestured.core.errors import ModelError
+from gestured.model.model import Model
 from gestured.model.opening import look_at, open_model
 from gestured.model.shipped import shipped_name
 
@@ -12,17 +12,17 @@ from gestured.model.shipped import shipped_name
 class Rung:
     """What is known of a model before it is opened, and whether it can be used now."""
 
-    def __init__(self, source: str | Path | Classifier) -> None:
+    def __init__(self, source: str | Path | Model) -> None:
         self.source = source  # a file, a shipped model's name, or a model that is open already
-        self.model: Classifier | None = None if isinstance(source, str | Path) else source
-        self.name = str(getattr(source, "name", None) or Path(str(source)).stem)
+        self.model = None if isinstance(source, str | Path) else source
+        self.name = Path(source).stem if isinstance(source, str | Path) else source.name
         self.slow = 0  # runs in a row that took too long
         self.aside_until = -math.inf  # s, on the clock of whoever puts it aside
         self._ships = isinstance(source, str | Path) and shipped_name(source) is not None
         self._tried = ""  # sha256 of the file that was tried and found good
         self._refused: ModelError | None = None  # why the file that was tried is no model
 
-    def open(self) -> Classifier:
+    def open(self) -> Model:
         """Its model. Not to be waited for: a file that does not ship is opened only after `gestures` has tried it."""
         if self._refused is not None:
             raise self._refused
@@ -31,7 +31,7 @@ class Rung:
             self.model = open_model(self.source, self._tried)
         return self.model
 
-    def open_first(self) -> Classifier:
+    def open_first(self) -> Model:
         """Its model, however long it takes to try it."""
         if self.model is None and not self._ships:
             self.gestures()
@@ -40,7 +40,7 @@ class Rung:
     def gestures(self) -> tuple[str, ...]:
         """What it knows. A file that ships is not opened for it; any other is tried, now and not again."""
         if self.model is not None:
-            return tuple(self.model.gestures)
+            return self.model.gestures
         assert isinstance(self.source, str | Path)
         if self._refused is not None:
             raise self._refused

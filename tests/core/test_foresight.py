@@ -25,6 +25,7 @@ from gestured.core.prototypes import Match
 from gestured.core.recognizer import Recognizer
 from gestured.core.scene import Scene
 from gestured.model.ladder import RETRY_S, SLOW_RUNS, Ladder
+from gestured.model.model import Model
 from tests.daemon.harness import Hand, floats
 from tests.hostile.grammar import violations
 from tests.scenario import frames
@@ -315,13 +316,15 @@ def oracle(segment: Segment, salt: bytes = b"") -> Scores:
 
 
 @dataclass
-class Rung:
+class Rung(Model):
     """Fails or dawdles with some segments, by what they hold."""
 
     name: str
     clock: Clock
     certainty: Certainty | None
     gestures: tuple[str, ...] = GESTURES
+    rows: int = 9
+    columns: int = 9
 
     def classify(self, segment: Segment) -> Scores:
         scores = oracle(segment, self.name.encode())

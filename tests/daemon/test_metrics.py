@@ -194,7 +194,7 @@ QUANTILES = {
 
 
 def test_gestures_as_in_training_are_no_shift_and_others_are() -> None:
-    shift = Shift(QUANTILES)
+    shift = Shift(QUANTILES, WINDOW)
     usual = {"strength": 40.0, "duration_s": 0.4, "area": 0.1, "confidence": 1.0}  # surer than ever is no fault
     for _ in range(LEAST_GESTURES - 1):
         shift.add(usual)
@@ -239,7 +239,7 @@ def test_more_unknown_than_known_is_a_shift_and_a_fallback_says_nothing() -> Non
     [{}, {"at": []}, {"at": [0.01, 0.99], "strength": "x"}, {"at": 3}, {"at": [0.01, 0.99], "strength": [2, 1]}],
 )
 def test_metadata_that_say_nothing_give_no_verdict(quantiles: dict[str, Any]) -> None:
-    shift = Shift(quantiles)
+    shift = Shift(quantiles, WINDOW)
     for _ in range(LAST):
         shift.add({"strength": 1.0, "duration_s": 1.0, "area": 1.0})
     assert shift.shares() == {} and shift.count == 0

@@ -144,5 +144,4 @@ def front_ends(tape: Tape) -> Iterator[tuple[FrontEnd, Stamp, list[Contact]]]:
 
 def window(segment: Segment, model: Ladder) -> Any:
     """A segment as the model takes it."""
-    metadata: Any = model.model
-    return metadata.metadata.window.apply(segment)
+    return model.model.metadata.window.apply(segment)
