@@ -33,15 +33,14 @@ class OwnGestures:
         self.gestures: Examples = {}
         self.path: Path | None = None
         self.fault: str | None = None  # why nothing can be enrolled
-        self._enrolment: Enrolment | None = None
-        self._connection: Connection | None = None
+        self._open: tuple[Enrolment, Connection] | None = None  # what is being learned, and who waits for it
         self._heard = 0.0  # monotonic s, the last attempt
         self._finishing: asyncio.Task[None] | None = None
         self._writing = asyncio.Lock()
 
     def follow(self, ladder: Ladder, read: OwnFile) -> None:
         """Use what was read of a file, with these models: at the start, and after a reload."""
-        if self._enrolment is not None and self._finishing is None:
+        if self._finishing is None:
             self._give_up("the daemon was told to reload; enrol again")
         self._ladder, (self.path, self.gestures, self.fault) = ladder, read
         if self.fault is not None:
@@ -61,31 +60,28 @@ class OwnGestures:
         return f"{self._ladder.active} has no embedding" if self._ladder.model.space is None else None
 
     def report(self) -> dict[str, Any]:
-        """For the status."""
+        """For the status; any thread may ask."""
+        held = self._open
         return {
             "file": None if self.path is None else str(self.path),
             "fault": self.fault,
             "gestures": {name: len(examples) for name, examples in self.gestures.items()},
             "off": self.off,
             "doubtful": list(bank.doubtful) if (bank := self._ladder.own.made(self._ladder.model)) else [],
-            "enrolling": self._enrolment.name if self._enrolment is not None and self._waited_for else None,
+            "enrolling": None if held is None or held[1].closed else held[0].name,
         }
 
     @property
     def enrolling(self) -> bool:
         """Whether somebody performs examples now."""
-        return self._enrolment is not None
-
-    @property
-    def _waited_for(self) -> bool:
-        """Whether the client that enrols is still there."""
-        return self._connection is not None and not self._connection.closed
+        return self._open is not None
 
     def begin(self, connection: Connection, name: str, sensor: str, examples: int, in_use: Collection[str]) -> None:
         """Take what is performed on a sensor as examples, and tell the connection of each. Raises Refusal."""
         self.tick()
-        if self._enrolment is not None:
-            raise Refusal(f"{self._enrolment.name!r} is being enrolled on {self._enrolment.sensor}; one at a time")
+        if self._open is not None:
+            before, _ = self._open
+            raise Refusal(f"{before.name!r} is being enrolled on {before.sensor}; one at a time")
         self._check(name)
         if not 1 <= examples <= EXAMPLES:
             raise Refusal(f"expected 1 to {EXAMPLES} examples, found {examples}")
@@ -93,16 +89,16 @@ class OwnGestures:
         if model.space is None:
             raise Refusal(f"{self.off}: own gestures are off while it answers")
         judge = Examiner(model, model.space, self._ladder.own, in_use)
-        self._enrolment, self._connection = Enrolment(name, sensor, examples, judge), connection
+        self._open = Enrolment(name, sensor, examples, judge), connection
         self._heard = time.monotonic()
         connection.streams = True  # it need not ask for anything meanwhile
 
     def see(self, fact: Fact) -> None:
         """Look at what the hub found: an answer on the sensor is an attempt."""
-        enrolment, connection = self._enrolment, self._connection
-        if enrolment is None or connection is None or enrolment.complete:
+        if self._open is None or not isinstance(fact, Decided | Cancelled):
             return
-        if not isinstance(fact, Decided | Cancelled) or fact.sensor != enrolment.sensor:
+        enrolment, connection = self._open
+        if enrolment.complete or fact.sensor != enrolment.sensor:
             return
         if isinstance(fact, Cancelled) and fact.reason == ANSWERED_TWICE:
             return
@@ -118,9 +114,9 @@ class OwnGestures:
 
     def tick(self) -> None:
         """Give up what nobody waits for any more; call it once a second."""
-        if self._enrolment is None or self._finishing is not None:
+        if self._open is None or self._finishing is not None:
             return
-        if not self._waited_for:
+        if self._open[1].closed:
             self._give_up("its client has gone")
         elif time.monotonic() - self._heard > PATIENCE_S:
             self._give_up(f"nothing was performed for {PATIENCE_S:g} s")
@@ -142,7 +138,7 @@ class OwnGestures:
                 await self._keep({**self.gestures, enrolment.name: tuple(enrolment.kept)})
             connection.send(json_line({"enrolled": enrolment.name, "examples": len(enrolment.kept)}))
             log.info("enrolled", gesture=enrolment.name, examples=len(enrolment.kept))
-            self._end()
+            self._end(connection)
         except GesturedError as error:
             self._give_up(str(error))
         finally:
@@ -174,14 +170,13 @@ class OwnGestures:
             raise Refusal(f"{MOST} gestures are enrolled already, which is the most there can be; forget one first")
 
     def _give_up(self, reason: str) -> None:
-        connection, enrolment = self._connection, self._enrolment
-        assert enrolment is not None
-        log.info("enrolment given up", gesture=enrolment.name, reason=reason)
-        if connection is not None:
+        """End the enrolment, if there is one, without keeping its examples."""
+        if self._open is not None:
+            enrolment, connection = self._open
+            log.info("enrolment given up", gesture=enrolment.name, reason=reason)
             connection.send(json_line({"given_up": enrolment.name, "reason": reason}))
-        self._end()
+            self._end(connection)
 
-    def _end(self) -> None:
-        if self._connection is not None:
-            self._connection.streams = False
-        self._enrolment = self._connection = None
+    def _end(self, connection: Connection) -> None:
+        connection.streams = False
+        self._open = None
