@@ -39,7 +39,8 @@ class Desk:
                 self.bug("in the path of a sensor; its recognizer is reset", fact.error, sensor=fact.sensor)
             elif not isinstance(fact, Taken):
                 self._publisher.publish(fact)
-        self._beside("in what looks on while models answer", self._watch.see, decided)
+        if decided:
+            self._beside("in what looks on while models answer", self._watch.see, decided)
         if self._own.enrolling:
             self._beside("in what judges an example", self._own.see, facts)
         self._views.see(facts)
