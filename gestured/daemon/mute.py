@@ -23,7 +23,6 @@ LOAD_WORD, LOAD_HALF, LOAD_BYTE, AND, JUMP_EQUAL, RETURN = 0x20, 0x28, 0x30, 0x5
 LET_IN, THROW_AWAY = 0xFFFFFFFF, 0
 MOST_RULES = 256  # rules of one filter, at most 13 instructions each; the kernel takes 4096 instructions
 
-
 Sender = Source | str  # a host and port, or all of a host
 
 

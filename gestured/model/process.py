@@ -82,7 +82,13 @@ class ModelProcess:
     def close(self) -> None:
         """End it, and let go of everything; for the thread that asks it."""
         self.kill()
-        _collect(self._child)
+        self._child.wait()
+        for pipe in (self._child.stdin, self._child.stdout):
+            if pipe is not None:
+                try:
+                    pipe.close()
+                except OSError:
+                    pass  # what was to be flushed has nobody to read it
 
     def _ask(self, content: bytes, seconds: int) -> dict[str, Any]:
         pipes = self._child
@@ -159,13 +165,3 @@ def _bear() -> "subprocess.Popen[bytes]":
         if _ending:
             child.kill()
         return child
-
-
-def _collect(child: "subprocess.Popen[bytes]") -> None:
-    child.wait()
-    for pipe in (child.stdin, child.stdout):
-        if pipe is not None:
-            try:
-                pipe.close()
-            except OSError:
-                pass  # what was to be flushed has nobody to read it
