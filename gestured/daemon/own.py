@@ -145,11 +145,13 @@ class OwnGestures:
             self._finishing = None
 
     async def _keep(self, gestures: Examples) -> None:
-        """Write them, and use them."""
-        await asyncio.to_thread(own_file.write, self._file(), gestures, self._ladder.model.sha256)
-        self.gestures = gestures
-        self._use()
-        self._changed()
+        """Write them, and use them, unless a reload has named another file meanwhile."""
+        path = self._file()
+        await asyncio.to_thread(own_file.write, path, gestures, self._ladder.model.sha256)
+        if path == self.path:
+            self.gestures = gestures
+            self._use()
+            self._changed()
 
     def _file(self) -> Path:
         """The file that examples are written to. Raises Refusal where there is none, or it could not be read."""

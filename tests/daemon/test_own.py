@@ -1,5 +1,6 @@
 """Gestures of the user's own: enrolled, recognised, forgotten, by a real daemon that a simulated hand plays to."""
 
+import asyncio
 import json
 import socket
 from collections.abc import Callable, Iterator
@@ -10,8 +11,13 @@ import pytest
 
 from gestured.client.control import Control
 from gestured.client.lines import Refused
+from gestured.core.own import Example
+from gestured.daemon import own_file
+from gestured.daemon.own import OwnGestures
+from gestured.model.ladder import ladder_for
 from tests.daemon import tiny_model
 from tests.daemon.harness import Client, Daemon, Frame, Hand, Sensor, lines_of
+from tests.small_model import WINDOW, segment
 
 Point = tuple[float, float]
 Begin = Callable[..., Daemon]
@@ -319,3 +325,25 @@ def test_a_client_that_enrols_without_end_leaves_room_for_others(begin: Begin) -
         enrolment.control.ask("enrol", name="cut", sensor="armrest")
     sensor.slash()
     assert enrolment.line()["kept"] is True
+
+
+def test_what_is_written_while_a_reload_names_another_file_leaves_that_file_alone(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    example = Example.of(segment(), WINDOW)
+    assert example is not None
+    one, other = tmp_path / "one.json", tmp_path / "other.json"
+    own_file.write(one, {"slash": (example,), "cut": (example,)}, "")
+    own_file.write(other, {"wave": (example,)}, "")
+    ladder, own = ladder_for(model), OwnGestures(lambda: None)
+    own.follow(ladder, own_file.load(one))
+    write = own_file.write
+
+    def reload_meanwhile(path: Path, *what: Any) -> None:
+        write(path, *what)
+        own.follow(ladder, own_file.load(other))
+
+    monkeypatch.setattr(own_file, "write", reload_meanwhile)
+    asyncio.run(own.forget("slash"))
+    assert own_file.load(one).gestures.keys() == {"cut"}
+    assert own.gestures.keys() == {"wave"} == own_file.load(other).gestures.keys()
