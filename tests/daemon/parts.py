@@ -1,11 +1,13 @@
 """A hub with the daemon's desk behind it, at times that are written down, for tests of parts."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from gestured.core.events import Event
 from gestured.core.hub import Hub
 from gestured.core.reading import Reading
 from gestured.daemon.asked import scene_of
+from gestured.daemon.cli import parser
 from gestured.daemon.desk import Desk
 from gestured.daemon.merge import load_settings
 from gestured.daemon.metrics import Metrics
@@ -26,6 +28,13 @@ SNAPSHOT = Snapshot(
     own={"gestures": {}}, sensors={"arm": Reading("ok", (9, 9))}, recent=(), shadow=None, clients=0, backlog_bytes=0,
     kernel_drops=0, taps=0, flight_limit_bytes=0, flight_held_bytes=0, addresses={}, settings=Settings(),
 )  # fmt: skip
+
+
+def settings_of(*flags: object, env: Mapping[str, str] = {}) -> tuple[Settings, dict[str, str]]:
+    """The settings that a command line and variables make, and where each comes from."""
+    given = vars(parser().parse_args(list(map(str, flags))))
+    given.pop("explain")
+    return load_settings(given, env)
 
 
 class Kept:

@@ -77,6 +77,11 @@ def connect(listener: socket.socket) -> socket.socket:
     return client
 
 
+def serve(listener: socket.socket, metrics: Metrics | None = None, hello: bytes = b"") -> EventServer:
+    """The event stream of a daemon without gestures."""
+    return EventServer(listener, lambda: hello, metrics or Metrics(), gestures=tuple, changed=lambda: None)
+
+
 async def turn() -> None:
     """Let the loop look at its sockets."""
     for _ in range(5):
@@ -86,7 +91,7 @@ async def turn() -> None:
 def test_a_client_that_reads_nothing_for_long_is_cut_off(listener, monkeypatch) -> None:
     async def main() -> None:
         metrics = Metrics()
-        server = EventServer(listener, lambda: b"hello\n", metrics, gestures=tuple, changed=lambda: None)
+        server = serve(listener, metrics, hello=b"hello\n")
         with connect(listener), connect(listener) as idle:
             await turn()
             stalled = min(server._clients, key=lambda client: client.sock.fileno())  # who came first
@@ -107,7 +112,7 @@ def test_a_client_that_reads_nothing_for_long_is_cut_off(listener, monkeypatch) 
 def test_the_backlog_is_bounded_and_drops_the_oldest(listener) -> None:
     async def main() -> None:
         metrics = Metrics()
-        server = EventServer(listener, lambda: b"", metrics, gestures=tuple, changed=lambda: None)
+        server = serve(listener, metrics)
         with connect(listener) as sock:
             await turn()
             (client,) = server._clients
@@ -136,7 +141,7 @@ def test_more_clients_than_there_is_room_for_are_told_so(listener, monkeypatch) 
 
     async def main() -> None:
         metrics = Metrics()
-        server = EventServer(listener, lambda: b"hello\n", metrics, gestures=tuple, changed=lambda: None)
+        server = serve(listener, metrics, hello=b"hello\n")
         with connect(listener) as a, connect(listener) as b, connect(listener) as c:
             await turn()
             assert (a.recv(99), b.recv(99)) == (b"hello\n", b"hello\n")
@@ -155,7 +160,7 @@ def test_an_event_is_encoded_once_for_all(listener, monkeypatch) -> None:
     )
 
     async def main() -> None:
-        server = EventServer(listener, lambda: b"", Metrics(), gestures=tuple, changed=lambda: None)
+        server = serve(listener)
         socks = [connect(listener) for _ in range(10)]
         await turn()
         server.publish(Onset("arm", 1, 2.0), 0.0)
@@ -188,7 +193,7 @@ def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> None:
 
     async def main() -> None:
         nonlocal now
-        server = EventServer(listener, lambda: b"", Metrics(), gestures=tuple, changed=lambda: None)
+        server = serve(listener)
         socks = [connect(listener) for _ in range(40)]
         for sock in socks:
             sock.send(b"x\n" * 500)
@@ -215,7 +220,7 @@ def test_who_sends_nothing_but_rubbish_for_long_is_cut_off(listener, monkeypatch
 
     async def main() -> None:
         metrics = Metrics()
-        server = EventServer(listener, lambda: b"", metrics, gestures=tuple, changed=lambda: None)
+        server = serve(listener, metrics)
         with connect(listener) as rude, connect(listener) as clumsy:
             while server.count < 2:
                 await asyncio.sleep(0)

@@ -9,10 +9,9 @@ from gestured.core.found import Cut
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.timing import Timing
-from gestured.daemon.cli import parser
 from gestured.daemon.explain import explain
-from gestured.daemon.merge import load_settings
 from gestured.model.shipped import shipped
+from tests.daemon.parts import settings_of
 
 RATE_HZ = 15.0
 JITTER_S = 0.003
@@ -38,7 +37,6 @@ def waited(tap_gap_s: float, seed: int) -> float:
 def test_a_tap_is_answered_when_explain_says(tap_gap_s: float) -> None:
     if not shipped()["cnn_lstm"].exists():
         pytest.skip("the shipped models are not there")
-    given = vars(parser().parse_args(["--tap-gap-s", str(tap_gap_s)]))
-    given.pop("explain")
-    (said,) = re.findall(r"at 15 Hz .* a tap ([0-9.]+) s after it", explain(*load_settings(given, {})))
+    text = explain(*settings_of("--tap-gap-s", tap_gap_s))
+    (said,) = re.findall(r"at 15 Hz .* a tap ([0-9.]+) s after it", text)
     assert [waited(tap_gap_s, seed) for seed in range(12)] == [pytest.approx(float(said), abs=3 * JITTER_S)] * 12

@@ -8,7 +8,8 @@ import pytest
 from gestured.core.events import Cancelled, Gesture, Onset
 from gestured.core.feed import HELD_S
 from gestured.core.hub import FORGET_S
-from tests.daemon.harness import RATE_HZ, Frame, Hand, Sensor, floats
+from tests import encoding
+from tests.daemon.harness import RATE_HZ, Frame, Hand, floats
 from tests.daemon.parts import SOURCE, Parts
 
 
@@ -89,19 +90,22 @@ def test_a_name_whose_sender_goes_on_is_not_given_to_another_port(room: Room) ->
 
 
 class Slow(Room):
-    """A sensor with a clock of its own, which all but stands still."""
+    """A sensor with a clock of its own, which all but stands still once it is learned."""
+
+    clock = 1.7e9  # s
+
+    def feel(self, frame: Frame, pace_s: float, step_s: float) -> None:
+        """One frame, so much later, and so much later by the sensor's clock."""
+        self.now += pace_s
+        self.clock += step_s
+        self.take(encoding.bundle([floats("/arm/pressure", frame, 0)], self.clock))
 
     def touch(self, frames: int, pace_s: float) -> None:
-        sensor = Sensor.__new__(Sensor)
-        sensor.name, sensor.count, sensor.t, sensor._encode = "arm", 0, 1.7e9, floats
-        hand = Hand()
-        for frame in hand.idle(2.0):
-            self.now += pace_s
-            self.take(sensor.packet(frame))
+        """Two quiet seconds, and then a touch."""
+        for frame in self._hand.idle(2.0):
+            self.feel(frame, pace_s, 1 / RATE_HZ)
         for n in range(frames):
-            self.now += pace_s
-            sensor.t += 2e-6 - 1 / RATE_HZ
-            self.take(sensor.packet(hand.frame(4.0, 4.0 + n % 2)))
+            self.feel(self._hand.frame(4.0, 4.0 + n % 2), pace_s, 2e-6)
 
 
 def test_a_contact_is_bounded_in_frames_whatever_the_sensors_clock_says(model: Path) -> None:
@@ -120,14 +124,11 @@ def test_a_contact_is_bounded_in_the_time_of_arrival(model: Path) -> None:
 def test_an_idle_sensor_whose_clock_stands_still_does_not_grow(model: Path) -> None:
     room = Slow(model, clock="sensor")
     room.touch(0, 0.067)
-    sensor = Sensor.__new__(Sensor)
-    sensor.name, sensor.count, sensor.t, sensor._encode = "arm", 0, 1.7e9 + 2.0, floats
     frames = Hand().idle(100.0)
     tracemalloc.start()
     try:
         for frame in frames:
-            sensor.t += 2e-6 - 1 / RATE_HZ
-            room.take(sensor.packet(frame))
+            room.feel(frame, 0.0, 2e-6)
         held = tracemalloc.get_traced_memory()[0]
     finally:
         tracemalloc.stop()

@@ -1,7 +1,7 @@
 """Provisional events of a real daemon: who is told what, before the answer and with it."""
 
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from pythonosc.osc_message import OscMessage
 import gestured
 from gestured.client.control import Control
 from tests.daemon import tiny_model
-from tests.daemon.harness import Client, Daemon, Hand, Sensor
+from tests.daemon.harness import DEADLINE_S, Client, Daemon, Hand, Sensor
 from tests.hostile.grammar import TYPES, violations
 
 ALL = (*TYPES, "provisional")
@@ -116,34 +116,22 @@ def test_nobody_asks_and_nothing_is_said(daemon: Daemon) -> None:
     other.close()
 
 
-def test_answers_are_the_same_whether_or_not_anybody_asks(early: Path, tmp_path: Path) -> None:
-    told = []
+def test_answers_are_the_same_whether_or_not_anybody_asks(
+    start: Callable[..., Daemon], early: Path, tmp_path: Path
+) -> None:
+    told, times = [], []
     for types in (TYPES, ALL):
-        folder = tmp_path / str(len(types))
-        folder.mkdir()
-        daemon = Daemon.start(folder, early, "--clock", "sensor")
+        daemon = start("--clock", "sensor", "--socket", tmp_path / f"{len(types)}.sock", model=early)
         client = daemon.client().subscribe(*types)
         sensor = Sensor(daemon, "arm").begin().perform("left", "tap", "up")
         two_taps(sensor)
         sensor.send([sensor.hand.frame(4.0) for _ in range(30)], sensor.hand.idle(1.0)).perform("down")
         lines = client.until(lambda line: line["type"] == "release" and line["id"] == 6)
-        assert daemon.stop() == 0
         assert violations(lines) == [] and (words(lines, "arm").count("one_tap?") == 2) == (types == ALL)
-        zero = lines[0]["onset"]
-        told.append(
-            [
-                {
-                    k: v - zero if k in ("onset", "offset", "decided") else v
-                    for k, v in line.items()
-                    if k != "provisional"
-                }
-                for line in lines
-                if line["type"] != "provisional"
-            ]
-        )
-    times = [
-        [line.pop(key) for line in lines for key in ("onset", "offset", "decided") if key in line] for lines in told
-    ]
+        answers = [line for line in lines if line["type"] != "provisional"]
+        felt = [line.pop(key) for line in answers for key in ("onset", "offset", "decided") if key in line]
+        times.append([t - felt[0] for t in felt])
+        told.append([{key: value for key, value in line.items() if key != "provisional"} for line in answers])
     assert told[0] == told[1] and times[0] == pytest.approx(times[1], abs=1e-5)
 
 
@@ -194,26 +182,29 @@ def test_a_made_up_gesture_is_said_before_too(daemon: Daemon) -> None:
         assert plain.line()["provisional"] is None
 
 
-@pytest.mark.parametrize("taps", ["true", "false"])
-def test_over_osc(early: Path, tmp_path: Path, taps: str) -> None:
+@pytest.fixture
+def osc() -> Iterator[socket.socket]:
+    """Where a daemon publishes."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
         out.bind(("127.0.0.1", 0))
-        out.settimeout(30)
-        daemon = Daemon.start(
-            tmp_path, early, "--clock", "sensor", "--publish", f"osc://127.0.0.1:{out.getsockname()[1]}",
-            "--publish-provisional", "true", "--provisional-taps", taps,
-        )  # fmt: skip
-        try:
-            sensor = Sensor(daemon, "arm").begin().perform("left")
-            two_taps(sensor)
-            found: list[tuple[str, str, list[Any]]] = []
-            while len([one for one in found if one[0].endswith("gesture")]) < 2:
-                message = OscMessage(out.recv(9999))
-                if message.address != "/gestured/status":
-                    types = message.dgram[message.dgram.index(b",") :].split(b"\0")[0].decode()
-                    found.append((message.address.removeprefix("/gestured/arm/"), types, message.params))
-        finally:
-            assert daemon.stop() == 0
+        out.settimeout(DEADLINE_S)
+        yield out
+
+
+def published_to(out: socket.socket) -> tuple[str, ...]:
+    return "--clock", "sensor", "--publish", f"osc://127.0.0.1:{out.getsockname()[1]}"
+
+
+@pytest.mark.parametrize("taps", ["true", "false"])
+def test_over_osc(start: Callable[..., Daemon], early: Path, osc: socket.socket, taps: str) -> None:
+    daemon = start(*published_to(osc), "--publish-provisional", "true", "--provisional-taps", taps, model=early)
+    two_taps(Sensor(daemon, "arm").begin().perform("left"))
+    found: list[tuple[str, str, list[Any]]] = []
+    while len([one for one in found if one[0].endswith("gesture")]) < 2:
+        message = OscMessage(osc.recv(9999))
+        if message.address != "/gestured/status":
+            types = message.dgram[message.dgram.index(b",") :].split(b"\0")[0].decode()
+            found.append((message.address.removeprefix("/gestured/arm/"), types, message.params))
     before = [("provisional", "one_tap"), ("revoked", "one_tap")] if taps == "true" else [("provisional", "double_tap")]
     assert [(what, params[0]) for what, _, params in found] == [
         ("provisional", "swipe_left"), ("gesture", "swipe_left"), *before, ("gesture", "double_tap"),
@@ -224,38 +215,31 @@ def test_over_osc(early: Path, tmp_path: Path, taps: str) -> None:
         assert found[3][1:] == (",si", ["one_tap", 2]) and found[2][2][2] == 2
 
 
-def test_without_the_setting_osc_says_only_what_it_said_before(early: Path, tmp_path: Path) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-        out.bind(("127.0.0.1", 0))
-        out.settimeout(30)
-        daemon = Daemon.start(
-            tmp_path, early, "--clock", "sensor", "--publish", f"osc://127.0.0.1:{out.getsockname()[1]}"
-        )
-        client = daemon.client().subscribe(*ALL)
-        two_taps(Sensor(daemon, "arm").begin())
-        assert "one_tap?" in said(client, "arm")
-        addresses = set()
-        while "/gestured/arm/gesture" not in addresses:
-            addresses.add(OscMessage(out.recv(9999)).address)
-        assert daemon.stop() == 0
-        assert addresses <= {"/gestured/arm/gesture", "/gestured/status"}
+def test_without_the_setting_osc_says_only_what_it_said_before(
+    start: Callable[..., Daemon], early: Path, osc: socket.socket
+) -> None:
+    daemon = start(*published_to(osc), model=early)
+    client = daemon.client().subscribe(*ALL)
+    two_taps(Sensor(daemon, "arm").begin())
+    assert "one_tap?" in said(client, "arm")
+    addresses = set()
+    while "/gestured/arm/gesture" not in addresses:
+        addresses.add(OscMessage(osc.recv(9999)).address)
+    assert addresses <= {"/gestured/arm/gesture", "/gestured/status"}
 
 
-def test_a_tap_waits_as_long_as_it_is_set(early: Path, tmp_path: Path) -> None:
+def test_a_tap_waits_as_long_as_it_is_set(start: Callable[..., Daemon], early: Path, tmp_path: Path) -> None:
     config = tmp_path / "gestured.toml"
     config.write_text("tap_gap_s = 0.25\n")
-    daemon = Daemon.start(tmp_path, early, "--clock", "sensor", "--config", config)
-    try:
-        client = daemon.client().subscribe("gesture")
-        sensor = Sensor(daemon, "arm").begin().perform("tap")
-        waited = [line["decided"] - line["offset"] for line in client.events("gesture", "arm")]
-        config.write_text("tap_gap_s = 0.55\n")
-        with Control(daemon.socket.with_suffix(".ctl")) as control:
-            control.ask("reload")
-        sensor.begin().perform("tap")
-        waited += [line["decided"] - line["offset"] for line in client.events("gesture", "arm")]
-    finally:
-        assert daemon.stop() == 0
+    daemon = start("--clock", "sensor", "--config", config, model=early)
+    client = daemon.client().subscribe("gesture")
+    sensor = Sensor(daemon, "arm").begin().perform("tap")
+    waited = [line["decided"] - line["offset"] for line in client.events("gesture", "arm")]
+    config.write_text("tap_gap_s = 0.55\n")
+    with Control(daemon.socket.with_suffix(".ctl")) as control:
+        control.ask("reload")
+    sensor.begin().perform("tap")
+    waited += [line["decided"] - line["offset"] for line in client.events("gesture", "arm")]
     assert waited == [pytest.approx(1 / 15 + 0.25, abs=0.01), pytest.approx(1 / 15 + 0.55, abs=0.01)]
 
 

@@ -11,11 +11,10 @@ from pathlib import Path
 import pytest
 
 from gestured.core.errors import SettingsError
-from gestured.daemon.cli import parser
 from gestured.daemon.explain import explain
-from gestured.daemon.merge import load_settings
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor, lines_of
+from tests.daemon.parts import settings_of
 
 
 def run(*flags: object, env: dict[str, str] | None = None) -> tuple[int, str, str]:
@@ -113,10 +112,8 @@ def test_the_default_socket_is_the_sessions(model: Path, tmp_path: Path) -> None
 
 def unread(*flags: object, env: dict[str, str] | None = None) -> str:
     """What is said of flags, variables and a file that are no settings, before anything is started."""
-    given = vars(parser().parse_args(list(map(str, flags))))
-    given.pop("explain")
     with pytest.raises(SettingsError) as found:
-        load_settings(given, env or {})
+        settings_of(*flags, env=env or {})
     return str(found.value)
 
 
@@ -283,9 +280,7 @@ def test_a_fallback_must_know_the_same_gestures(model: Path, tmp_path: Path) -> 
 
 def test_explain_says_what_is_loaded_and_what_is_left_out(model: Path) -> None:
     def explained(*flags: str) -> str:
-        given = vars(parser().parse_args(["--model", str(model), *flags]))
-        given.pop("explain")
-        return explain(*load_settings(given, {}))
+        return explain(*settings_of("--model", model, *flags))
 
     def words(text: str) -> list[str]:
         """Without what the one process alone has: its session's sockets."""

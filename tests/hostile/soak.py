@@ -25,12 +25,12 @@ from gestured.client.sensor import Form
 from gestured.core.frames import Frame
 from tests.daemon.harness import Daemon, Sensor
 from tests.hostile.damage import FIRST, take
+from tests.hostile.fleet import cpu_s
 from tests.hostile.grammar import TYPES, violations
 
 TAKE_S = 600.0
 CHUNK = 2000  # frames on their way at once: fewer than the socket's buffer holds
 READINGS = 30
-CLOCK_HZ = 100  # of the CPU time in /proc
 
 
 @dataclass
@@ -73,7 +73,6 @@ class Watch:
         frames = self.daemon.frames()
         visitor.close()
         status = dict(line.split(":", 1) for line in (proc / "status").read_text().splitlines())
-        ticks = (proc / "stat").read_text().rsplit(")", 1)[1].split()
         waited = int((proc / "schedstat").read_text().split()[1]) / 1e9
         latencies, self._latencies = self._latencies, []
         self.readings.append(
@@ -82,7 +81,7 @@ class Watch:
                 int(status["VmRSS"].split()[0]) / 1024,
                 len(list((proc / "fd").iterdir())),
                 int(status["Threads"]),
-                (int(ticks[11]) + int(ticks[12])) / CLOCK_HZ,
+                cpu_s(self.daemon.process.pid),
                 waited,
                 frames,
                 latencies,
