@@ -103,18 +103,6 @@ def test_prometheus_itself_finds_nothing_to_say(shared: Daemon) -> None:
     assert (done.returncode, done.stdout + done.stderr) == (0, "")
 
 
-def test_a_sensors_state_and_rate_are_read_from_outside(shared: Daemon) -> None:
-    pytest.importorskip("prometheus_client")
-    client = shared.client()
-    Sensor(shared, "counting").begin().perform("left")  # the same name as elsewhere: only the first eight have one
-    client.events("gesture", "counting")
-    text = shared.get("/metrics")[1]
-    label = "counting" if 'sensor="counting"' in text else "other"
-    assert f'gestured_sensor_rate_hertz{{sensor="{label}"}}' in text
-    assert shared.metric("gestured_confidence_count") >= 1
-    assert shared.metric("gestured_model_rung") == 0
-
-
 def test_several_sensors_together_are_as_their_worst() -> None:
     pytest.importorskip("prometheus_client")
     still, gone = np.zeros(81), np.full(81, 3.0)

@@ -1,7 +1,6 @@
 """Frames in, events out: what a client of a healthy daemon sees."""
 
 import json
-import re
 import select
 import socket
 import time
@@ -225,9 +224,12 @@ def test_metrics_count_what_happened(shared: Daemon) -> None:
     assert shared.metric("gestured_inference_seconds_count", model="tiny") >= 1
     assert shared.metric("gestured_latency_seconds_count") >= 1
     assert shared.metric("gestured_active_model_info", model="tiny", version=client.hello["version"]) == 1
-    assert shared.metric("gestured_sensors") >= 1
+    assert shared.metric("gestured_confidence_count") >= 1
+    assert shared.metric("gestured_sensors") >= 1 and shared.metric("gestured_model_rung") == 0
     text = shared.get("/metrics")[1]
-    assert re.search(r'gestured_frames_total\{result="ok",sensor="[^"]+"\}', text)
+    label = "counting" if 'sensor="counting"' in text else "other"  # only the first few have a name
+    assert f'gestured_frames_total{{result="ok",sensor="{label}"}}' in text
+    assert f'gestured_sensor_rate_hertz{{sensor="{label}"}}' in text
     assert text.count("\n") - text.count("\n#") < 200
 
 

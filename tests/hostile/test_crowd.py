@@ -123,12 +123,8 @@ def test_clients_that_send_rubbish_without_end_hold_nobody_up(start) -> None:
     sensor = Sensor(daemon, "arm").begin()
     for n in range(1, 11):
         for sock in rude:  # it does not read the answers either
-            try:
+            with suppress(OSError):  # the daemon has read as much as is its turn, or has had enough of this one
                 sock.send(b'{"subscribe":7}\n' * 1000 if n % 2 else b"[" * 16_000)
-            except BlockingIOError:
-                pass  # the daemon has read as much as is its turn
-            except OSError:
-                pass  # it has had enough of this one
         sensor.perform("left")
         assert client.line()["sequence"] == n
     for sock in rude:
