@@ -13,12 +13,12 @@ class Audience:
         self._owed: dict[tuple[str, int], set[Client]] = {}  # who was sent a provisional event, until its answer
 
     def join(self, client: Client, subscription: Subscription) -> None:
-        """A client that is in no class wants this."""
+        """Put a client, which is in no class, with those that ask for the same."""
         client.subscription = subscription
         self._classes.setdefault(subscription, set()).add(client)
 
     def leave(self, client: Client) -> bool:
-        """A client wants nothing any more; whether there is nobody left who asked for the same."""
+        """Take a client out of its class. Returns whether it was the last one in it."""
         members = self._classes.get(client.subscription, set())
         members.discard(client)
         if members:

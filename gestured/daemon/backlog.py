@@ -41,12 +41,13 @@ class Backlog:
         self._owns = owns
         self._waiting: deque[Datagram] = deque()
         self._bytes = 0
-        self._work = 0.0  # s that groups were served since
-        self._oldest = 0.0  # s, when what waited longest then had arrived
+        # Whether work catches up is measured from time to time: how much was done since, and how far that has led.
+        self._work = 0.0  # s that groups were served since the last measurement
+        self._oldest = 0.0  # s, the arrival of what waited longest at that time
         self._until = 0.0  # s, when the flood is over unless something is dropped before
         self._cost: dict[Sender, float] = {}  # s of work a byte
         self._credit: dict[Sender, tuple[float, float]] = {}  # s of work, and `_equal` then
-        self._equal = 0.0  # s of work that each owner could have had in all turns, were they shared out equally
+        self._equal = 0.0  # s of work that each owner could have had so far, all turns together
 
     def __bool__(self) -> bool:
         return bool(self._waiting)
@@ -75,7 +76,7 @@ class Backlog:
         self._until = max(self._until, until)
 
     def worked(self, seconds: float, now: float) -> None:
-        """So much work was done, in s: after a stall that catches up with what arrived, in a flood it does not."""
+        """Note that groups were served for so long (s): where that does not catch up with what comes, it is a flood."""
         self._work += seconds
         if self._waiting and self._work >= FLOOD_S:
             oldest = self._waiting[0].arrival
