@@ -27,7 +27,7 @@ from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Recognizer
 from gestured.model.opening import open_model
-from gestured.simulator import Participant, SimulatedSensor, generator, session
+from gestured.simulator import Participant, SimulatedSensor, any_sensor, generator, session
 from tests import foreign
 
 SESSION_S = 20.0
@@ -62,7 +62,7 @@ def ours(level: str, seed: int) -> Recording:
     sensor = SimulatedSensor.nominal(day=seed)
     if level != "nominal":
         while True:
-            sensor = SimulatedSensor.wide(rng, float(rng.uniform(*HARDNESS)))
+            sensor = any_sensor(rng, float(rng.uniform(*HARDNESS)))
             if (sensor.rows, sensor.columns) == (9, 9) and 12 < sensor.rate_hz < 18:
                 break
     if level == "faint":

@@ -79,18 +79,15 @@ def test_imports_go_downwards_only(path: Path) -> None:
 
 
 def known() -> dict[str, set[str]]:
-    """Module -> the modules of the package that it imports at its top, those for a type checker alone included."""
+    """Module -> the modules of the package that it names: in an import, wherever it stands, or in a text."""
     names = {path: ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in FILES}
-    modules = set(names.values())
-    return {
-        name: {
-            module
-            for found, inside in imports(path)
-            for module in (found, found.rpartition(".")[0])
-            if not inside and module in modules and module != name and "." in module
-        }
-        for path, name in names.items()
-    }
+    modules = {name for name in names.values() if "." in name}
+    found = {}
+    for path, name in names.items():
+        imported = {module for one, _ in imports(path) for module in (one, one.rpartition(".")[0])}
+        texts = {node.value for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Constant)}
+        found[name] = {module for module in modules - {name} if module in imported or module in texts}
+    return found
 
 
 def test_no_two_modules_know_each_other() -> None:

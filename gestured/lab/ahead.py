@@ -22,7 +22,7 @@ from gestured.lab.dataset import Truth, truths
 from gestured.lab.online import NON_GESTURE_SHARE, SESSION_S
 from gestured.lab.progress import progress
 from gestured.model.opening import open_model
-from gestured.simulator import NONE, Participant, SimulatedSensor, Take, generator, session
+from gestured.simulator import NONE, Participant, SimulatedSensor, Take, any_sensor, generator, session
 
 TAPS = ("one_tap", "double_tap")
 SLACK_S = 0.2  # an onset may be found so far from the true one
@@ -136,7 +136,7 @@ def takes(which: str, count: int, seed: int) -> Iterator[Take]:
     for n in range(count):
         person = seed + n
         rng = generator(person, 0xEA)
-        sensor = SimulatedSensor.wide(rng, HARD) if which == "hard" else SimulatedSensor.nominal(day=person)
+        sensor = any_sensor(rng, HARD) if which == "hard" else SimulatedSensor.nominal(day=person)
         share = 1.0 if which == "non-gestures" else NON_GESTURE_SHARE
         yield session(Participant(person), sensor, rng, SESSION_S, share)
 

@@ -3,18 +3,36 @@
 import argparse
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from gestured import __version__
 from gestured.client.say import say
 from gestured.core.errors import GesturedError
-from gestured.lab.recordings import commands as recordings
+from gestured.lab.recordings.flags import add_recordings
 
 CACHE = Path(".cache/lab")
 MODELS = Path("models")
 REAL_FOLDER = Path("../shared/data")
 LAB_PACKAGES = ("torch", "sklearn", "onnx", "mpmath", "pywt", "jinja2", "matplotlib")
+# The module whose `run` each command is, imported when it is asked for: some need seconds, or what others do not.
+PROGRAMS = {
+    "train": "gestured.lab.commands",
+    "evaluate": "gestured.lab.commands",
+    "adapt": "gestured.lab.adapt.command",
+    "early": "gestured.lab.ahead",
+    "online": "gestured.lab.online",
+    "taps": "gestured.lab.taps",
+    "own": "gestured.lab.own.command",
+    "stability": "gestured.lab.stability.command",
+    "study": "gestured.lab.study.study",
+    "collect": "gestured.lab.recordings.collect",
+    "import": "gestured.lab.recordings.importing",
+    "inspect": "gestured.lab.recordings.looking",
+    "forget": "gestured.lab.recordings.forget",
+}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -116,49 +134,44 @@ def parser() -> argparse.ArgumentParser:
     own.add_argument("models", type=Path, nargs="+", metavar="MODEL", help="an .onnx file that has an embedding")
     own.add_argument("--compare", action="store_true", help="also judge dynamic time warping")
     add_work(own)
-    recordings.add(add)
+    add_recordings(add)
     return top
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = parser().parse_args(arguments)
+    args.words = " ".join(["gestured-lab", *(sys.argv[1:] if arguments is None else arguments)])
     try:
-        if args.command in ("early", "online", "taps"):
-            from gestured.lab import ahead, online, taps
-
-            programs = {"early": ahead.run, "online": online.run, "taps": taps.run}
-            return programs[args.command](args)
-        if args.command in recordings.COMMANDS:
-            return recordings.run(args)
-        try:
-            from gestured.lab import commands
-            from gestured.lab.adapt import command as adapt
-            from gestured.lab.own import command as own
-            from gestured.lab.stability import command as stability
-            from gestured.lab.study import study
-        except ModuleNotFoundError as error:
-            package = (error.name or "").split(".")[0]
-            if package not in LAB_PACKAGES:
-                raise
-            raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from error
-        whole = {"adapt": adapt.run, "own": own.run, "stability": stability.run}
-        if args.command in whole:
-            return whole[args.command](args)
-        if args.command == "study":
-            args.words = " ".join(["gestured-lab", *(sys.argv[1:] if arguments is None else arguments)])
-            return study.run(args)
-        args.cache.mkdir(parents=True, exist_ok=True)
-        if args.command == "evaluate":
-            return commands.evaluate_models(args)
-        args.out.mkdir(parents=True, exist_ok=True)  # now, and not after half an hour
-        return commands.train_models(args)
+        program = _program(args.command)
+        _check(args)
+        status: int = program.run(args)
+        return status
     except (GesturedError, OSError) as error:
         say(f"gestured-lab: {error}", to=sys.stderr)
         return 1
     except KeyboardInterrupt:
         say("", "gestured-lab: interrupted; what is finished is kept", to=sys.stderr)
         return 130
+
+
+def _program(command: str) -> ModuleType:
+    """The module that runs a command; GesturedError where a package of the extra [lab] is missing."""
+    try:
+        return import_module(PROGRAMS[command])
+    except ModuleNotFoundError as error:
+        package = (error.name or "").split(".")[0]
+        if package not in LAB_PACKAGES:
+            raise
+        raise GesturedError(f"{package} is missing: pip install 'gestured[lab]', or make lab") from error
+
+
+def _check(args: argparse.Namespace) -> None:
+    """GesturedError for what no command can work with."""
+    if "jobs" in args and args.jobs < 1:
+        raise GesturedError(f"--jobs: expected 1 or more, found {args.jobs}")
+    if "real" in args and args.real != REAL_FOLDER and not args.real.is_dir():
+        raise GesturedError(f"--real: {args.real} is no folder")
 
 
 if __name__ == "__main__":

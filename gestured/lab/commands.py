@@ -8,9 +8,7 @@ from typing import Any
 
 import torch
 
-from gestured.core.errors import GesturedError
 from gestured.lab.cards import write_block, write_cards
-from gestured.lab.cli import REAL_FOLDER
 from gestured.lab.evaluate import Evaluation, print_curve, real_figures, simulated_figures
 from gestured.lab.manifest import write_manifest
 from gestured.lab.networks import compare, compare_rules
@@ -22,14 +20,18 @@ from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
 
 
+def run(args: argparse.Namespace) -> int:
+    """Either of the two; a folder that cannot be made is told of now, and not after half an hour."""
+    args.cache.mkdir(parents=True, exist_ok=True)
+    if args.command == "evaluate":
+        return evaluate_models(args)
+    args.out.mkdir(parents=True, exist_ok=True)
+    return train_models(args)
+
+
 def _plan(args: argparse.Namespace) -> tuple[TrainingPlan, Path | None]:
-    if args.jobs < 1:
-        raise GesturedError(f"--jobs: expected 1 or more, found {args.jobs}")
     torch.set_num_threads(args.jobs)
-    real = args.real if args.real.is_dir() else None
-    if real is None and args.real != REAL_FOLDER:
-        raise GesturedError(f"--real: {args.real} is no folder")
-    return (TrainingPlan.quick() if args.quick else TrainingPlan()), real
+    return (TrainingPlan.quick() if args.quick else TrainingPlan()), args.real if args.real.is_dir() else None
 
 
 def train_models(args: argparse.Namespace) -> int:

@@ -25,6 +25,7 @@ from gestured.simulator.cohort import (
 )
 from gestured.simulator.people import INCLINATIONS, SPEEDS, Artefact, Participant, Performance, Press, generator
 from gestured.simulator.sensor import Act, SimulatedSensor, Take
+from gestured.simulator.variety import any_sensor
 
 __all__ = [
     "GESTURES",
@@ -41,6 +42,7 @@ __all__ = [
     "SimulatedSensor",
     "Take",
     "Trial",
+    "any_sensor",
     "cohort_plan",
     "cohort_take",
     "generator",

@@ -14,6 +14,7 @@ from gestured.simulator.others import OTHERS
 from gestured.simulator.people import INCLINATIONS, SPEEDS, Artefact, Participant, Performance, Press, generator
 from gestured.simulator.sensor import SimulatedSensor, Take
 from gestured.simulator.strokes import Occasion
+from gestured.simulator.variety import any_sensor
 
 GESTURES: tuple[str, ...] = tuple(TEN)
 # Gestures one right after the other: read as such, not as none.
@@ -161,7 +162,7 @@ def wide_plan(seed: int, index: int, hardness: float | None = None) -> WideTake:
     rng = generator(seed, 0x71DE, index)
     hard = float(rng.random()) if hardness is None else hardness
     person = Participant(int(rng.integers(1 << 40)) + 1_000_000)
-    sensor = SimulatedSensor.wide(rng, hard)
+    sensor = any_sensor(rng, hard)
     pool = NON_GESTURES if rng.random() < OTHERS_SHARE else GESTURES
     kind = pool[int(rng.integers(len(pool)))]
     speed = ("slow", "normal", "fast")[int(rng.integers(3))]

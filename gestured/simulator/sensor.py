@@ -82,13 +82,6 @@ class SimulatedSensor(Nature):
             loss=float(rng.choice([0.0, 0.005])),
         )
 
-    @staticmethod
-    def wide(rng: np.random.Generator, hardness: float = 0.6) -> "SimulatedSensor":
-        """Any sensor at all; `hardness` 0 (clean) .. 1 (as bad as it may get) scales all that disturbs."""
-        from gestured.simulator.variety import any_sensor  # which builds Sensors itself
-
-        return any_sensor(rng, hardness)
-
     def record(
         self, performances: Sequence[tuple[float, Performance]], duration_s: float, rng: np.random.Generator
     ) -> Take:

@@ -48,7 +48,10 @@ def _lags(rng: np.random.Generator, hard: float) -> tuple[tuple[float, ...], tup
 
 
 def any_sensor(rng: np.random.Generator, hardness: float) -> SimulatedSensor:
-    """A random sensor: a fifth like touchscreens (sharp blobs, no offset, 8 bits), the rest textiles."""
+    """A random sensor: a fifth like touchscreens (sharp blobs, no offset, 8 bits), the rest textiles.
+
+    `hardness` 0 (clean) .. 1 (as bad as it may get) scales all that disturbs.
+    """
     hard = min(max(hardness, 0.0), 1.0)
     screen = rng.random() < 0.22
     rows, columns = _grid(rng, screen)

@@ -4,7 +4,7 @@ import itertools
 from dataclasses import replace
 
 from gestured.client.sensor import Form
-from gestured.simulator import GESTURES, NON_GESTURES, SEQUENCES, SimulatedSensor, Take, generator
+from gestured.simulator import GESTURES, NON_GESTURES, SEQUENCES, SimulatedSensor, Take, any_sensor, generator
 from tests.golden.making import LEG, QUIET, UINT16, hands, held, jammed, sent, struck, tape
 from tests.golden.tape import Tape
 
@@ -54,7 +54,7 @@ def _wide(number: int) -> Tape:
     """Four sensors as strange as the simulator knows them."""
     rng, found = generator(number, 0x31DE), list[tuple[int, SimulatedSensor]]()
     for seed in itertools.count(100 * number):
-        sensor = SimulatedSensor.wide(rng, 0.8)
+        sensor = any_sensor(rng, 0.8)
         if sensor.rows * sensor.columns <= 120 and sensor.gain < 400 and sensor.rate_hz < 40:
             found.append((seed, sensor))
         if len(found) == 4:

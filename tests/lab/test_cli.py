@@ -68,11 +68,23 @@ def test_arguments_that_mean_nothing_are_usage_errors(line: str, capsys: pytest.
     assert "usage: gestured-lab" in capsys.readouterr().err
 
 
-def test_no_jobs_is_a_mistake_that_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        *((f"{command} --jobs 0", "--jobs: expected 1 or more, found 0")
+          for command in ("train", "evaluate", "study", "own my.onnx")),
+        *((f"{command} --real nowhere", "--real: nowhere is no folder") for command in ("train", "evaluate", "study")),
+    ],
+)  # fmt: skip
+def test_what_no_command_can_work_with_is_named(
+    line: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     for package in cli.LAB_PACKAGES:
         pytest.importorskip(package, reason="needs the extra [lab]")
-    assert main(["train", "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"), "--jobs", "0"]) == 1
-    assert capsys.readouterr().err == "gestured-lab: --jobs: expected 1 or more, found 0\n"
+    monkeypatch.chdir(tmp_path)
+    assert main(line.split()) == 1
+    assert capsys.readouterr().err == f"gestured-lab: {reason}\n"
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("flag", ["--out", "--cache"])
@@ -117,7 +129,6 @@ def test_progress_passes_everything_on_and_ends_with_all_of_it(capsys: pytest.Ca
     assert "3/3" in err
 
 
-@pytest.mark.slow
 def kinds_of(arguments: Sequence[object]) -> list[str]:
     """The kinds in all samples among a function's arguments."""
     from gestured.lab.samples import Samples
@@ -125,6 +136,7 @@ def kinds_of(arguments: Sequence[object]) -> list[str]:
     return [str(kind) for one in arguments if isinstance(one, Samples) for kind in one.kinds]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_train_makes_three_models_and_evaluate_their_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

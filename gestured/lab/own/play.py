@@ -22,6 +22,7 @@ from gestured.simulator import (
     Participant,
     Performance,
     SimulatedSensor,
+    any_sensor,
     generator,
     perform,
 )  # fmt: skip
@@ -67,7 +68,7 @@ def _part(seed: int, index: int, plans: tuple[str, ...]) -> Iterator[Sample]:
     nth, part = divmod(index, len(kinds))
     kind, number = kinds[part], FIRST_PERSON + 10_000 * seed + nth
     person, rng = Participant(number), generator(number, 0x5E)
-    sensor = SimulatedSensor.wide(rng, 0.5) if nth % HARD == 0 else SimulatedSensor.nominal(day=number)
+    sensor = any_sensor(rng, 0.5) if nth % HARD == 0 else SimulatedSensor.nominal(day=number)
     if part < len(plans):
         rng = generator(number, part)
         plan = (sign if kind in SIGNS else perform)(kind, person, rng, _speed(rng), 1, sensor.extent)

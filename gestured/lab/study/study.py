@@ -13,7 +13,6 @@ import torch
 
 import gestured
 from gestured.core.errors import GesturedError
-from gestured.lab.cli import REAL_FOLDER
 from gestured.lab.dataset import simulated
 from gestured.lab.digest import file_digest
 from gestured.lab.made_of import made_of, renew
@@ -50,10 +49,6 @@ WIDE_SEED = 1  # of the stream that the shipped models learn from as well
 
 def run(args: argparse.Namespace) -> int:
     """`gestured-lab study`."""
-    if args.jobs < 1:
-        raise GesturedError(f"--jobs: expected 1 or more, found {args.jobs}")
-    if args.real != REAL_FOLDER and not args.real.is_dir():
-        raise GesturedError(f"--real: {args.real} is no folder")
     torch.set_num_threads(1)
     if args.draw:
         args.out.mkdir(parents=True, exist_ok=True)

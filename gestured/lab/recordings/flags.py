@@ -1,4 +1,4 @@
-"""`gestured-lab collect`, `import`, `inspect` and `forget`: their flags, and who runs them."""
+"""The flags of `gestured-lab collect`, `import`, `inspect` and `forget`."""
 
 import argparse
 import difflib
@@ -16,7 +16,6 @@ from gestured.lab.recordings.sources import UNNAMED
 from gestured.record.check import SESSION
 from gestured.simulator import GESTURES, NONE
 
-COMMANDS = ("collect", "import", "inspect", "forget")
 FOLDER = Path("recordings")
 NO_NAMES = (SESSION, UNNAMED)  # labels of recordings that are no gesture's, besides those that no gesture may have
 IMPORT = """\
@@ -35,7 +34,7 @@ capfingerid  The text files of github.com/interactionlab/CapFingerId, a line for
 Add = Callable[[str, str, str], argparse.ArgumentParser]
 
 
-def add(command: Add) -> None:
+def add_recordings(command: Add) -> None:
     """Add the four subcommands; `command` takes a name, what it does and an example."""
     collect = command("collect", "lead a participant through the protocol, and record the sensor that sends over OSC",
                       "gestured-lab collect --participant 07 --listen 0.0.0.0:9000")  # fmt: skip
@@ -81,15 +80,6 @@ def add(command: Add) -> None:
     forget.add_argument("--models", type=Path, default=Path("models"), help="folder of the models to ask (models)")
     forget.add_argument("--yes", action="store_true", help="do not ask")
     forget.add_argument("--dry-run", action="store_true", help="say what would be removed, and remove nothing")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run one of the four."""
-    from gestured.lab.recordings import collect, forget, importing, looking
-
-    modules = {"collect": collect, "import": importing, "inspect": looking, "forget": forget}
-    status: int = modules[args.command].run(args)
-    return status
 
 
 def _sensor(text: str) -> str:
