@@ -3,28 +3,27 @@
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-
-import numpy as np
+from itertools import chain, cycle
 
 from gestured.client.grid import rows_by_columns
-from gestured.core.frames import Frame, Touch
+from gestured.core.frames import Frame
+from gestured.record.recordings import touches_of
 from gestured.simulator import (
     GESTURES,
     NON_GESTURES,
     SEQUENCES,
     SPEEDS,
     Participant,
-    Performance,
     SimulatedSensor,
     Take,
+    at_random,
     generator,
-    perform,
+    session,
 )
 
 PART_S = 600.0  # what is simulated at a time; between two parts the sensor is off
 OFF_S = 3.0
 UNTOUCHED_S = 2.0  # untouched at first: the daemon learns the baseline
-LAST_PAUSE_S = 1.0
 BETWEEN_S = (1.0, 2.0)  # between performances
 
 
@@ -55,37 +54,19 @@ class Play:
         nominal = SimulatedSensor.nominal(day=self.participant)
         pitch = min(nominal.extent) / min(self.rows, self.columns)
         sensor = replace(nominal, rows=self.rows, columns=self.columns, pitch_mm=pitch, rate_hz=self.rate_hz)
+        first = [self.first] if self.first else []
+        kinds = cycle(self.kinds) if self.kinds else chain(first, at_random(rng, self.non_gestures))
         person = Participant(self.participant)
-        inclination = int(rng.integers(3))
-        performances: list[tuple[float, Performance]] = []
-        now = UNTOUCHED_S
-        while True:
-            kind = self._kind(len(performances), rng)
-            speed = self.speed or tuple(SPEEDS)[int(rng.integers(len(SPEEDS)))]
-            performance = perform(kind, person, rng, speed, inclination, sensor.extent)
-            if now + performance.duration_s + LAST_PAUSE_S > seconds:
-                return sensor.record(performances, seconds, rng)
-            performances.append((now, performance))
-            now += performance.duration_s + float(rng.uniform(*BETWEEN_S))
-
-    def _kind(self, number: int, rng: np.random.Generator) -> str:
-        if self.kinds:
-            return self.kinds[number % len(self.kinds)]
-        if number == 0 and self.first is not None:
-            return self.first
-        pool = NON_GESTURES if rng.random() < self.non_gestures else GESTURES
-        return pool[int(rng.integers(len(pool)))]
+        return session(
+            person, sensor, rng, seconds, idle_s=BETWEEN_S, kinds=kinds, lead_s=UNTOUCHED_S, speed=self.speed
+        )
 
 
 def frames(start: float, take: Take) -> Iterator[tuple[int, Frame]]:
     """(the sensor's counter, frame) of a take that begins at `start` seconds."""
-    for n in range(len(take.frames)):
-        touches = tuple(
-            Touch(int(id_), float(x), float(y))
-            for id_, (x, y) in zip(take.touch_ids[n], take.touches[n], strict=True)
-            if id_ >= 0
-        )
-        yield int(take.counter[n]), Frame(start + float(take.times[n]), take.frames[n], touches)
+    for n, values in enumerate(take.frames):
+        touches = touches_of(take.touch_ids[n], take.touches[n])
+        yield int(take.counter[n]), Frame(start + float(take.times[n]), values, touches)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -52,11 +52,7 @@ class Recordings:
         for n in range(span.start, span.stop):
             touches: tuple[Touch, ...] = ()
             if self.touches is not None and self.touch_ids is not None:
-                touches = tuple(
-                    Touch(int(k), float(x), float(y))
-                    for k, (x, y) in zip(self.touch_ids[n], self.touches[n], strict=True)
-                    if k >= 0
-                )
+                touches = touches_of(self.touch_ids[n], self.touches[n])
             yield Frame(float(self.times[n]), self.frames[n], touches)
 
     def take(self, chosen: Sequence[int] | NDArray[np.integer[Any]]) -> "Recordings":
@@ -86,3 +82,8 @@ class Recordings:
         if not -len(self) <= i < len(self):
             raise IndexError(f"recording {i} of {len(self)}")
         return slice(int(self.offsets[i % len(self)]), int(self.offsets[i % len(self) + 1]))
+
+
+def touches_of(ids: NDArray[np.int32], places: NDArray[np.float32]) -> tuple[Touch, ...]:
+    """The fingers of one frame: ids (3,), -1 for none, and their places (3, 2)."""
+    return tuple(Touch(int(k), float(x), float(y)) for k, (x, y) in zip(ids, places, strict=True) if k >= 0)

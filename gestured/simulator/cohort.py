@@ -4,16 +4,25 @@ Every take draws from a stream of its own (PCG64 on a SeedSequence of its coordi
 made alone and in parallel.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from gestured.simulator.gestures import TEN
-from gestured.simulator.others import OTHERS
-from gestured.simulator.people import INCLINATIONS, SPEEDS, Artefact, Participant, Performance, Press, generator
+from gestured.simulator.occasion import Occasion
+from gestured.simulator.others import OTHERS, Made
+from gestured.simulator.people import (
+    INCLINATIONS,
+    SPEEDS,
+    Artefact,
+    Participant,
+    Performance,
+    Press,
+    any_speed,
+    generator,
+)
 from gestured.simulator.sensor import SimulatedSensor, Take
-from gestured.simulator.strokes import Occasion
 from gestured.simulator.variety import any_sensor
 
 GESTURES: tuple[str, ...] = tuple(TEN)
@@ -23,6 +32,7 @@ NON_GESTURES: tuple[str, ...] = tuple(kind for kind in OTHERS if kind not in SEQ
 NONE = "none"
 OTHERS_SHARE = 0.35  # of the wide stream that is none of the ten gestures
 LEAD_S, TAIL_S = 1.3, 0.8  # of an idle pad around a single performance, the first plus up to one frame
+LAST_PAUSE_S = 1.0  # of an idle pad at least at the end of a session
 FLICKS = 0.25  # share of the hardest takes in which strokes are hurried, down to two to four frames
 
 
@@ -46,19 +56,24 @@ def perform(
         raise ValueError(f"speed: {speed!r} is none of {', '.join(SPEEDS)}")
     if inclination not in INCLINATIONS:
         raise ValueError(f"inclination: {inclination!r} is none of 0, 1, 2")
+    make = TEN[kind] if kind in TEN else OTHERS[kind]
+    return performed(kind, make, participant, rng, speed, inclination, extent, hurry)
+
+
+def performed(
+    kind: str,
+    make: Callable[[Occasion], Made],
+    participant: Participant,
+    rng: np.random.Generator,
+    speed: str,
+    inclination: int,
+    extent: tuple[float, float],
+    hurry: float = 1.0,
+) -> Performance:
+    """What one person makes once, by a function such as TEN and OTHERS hold; a gesture where `kind` is in TEN."""
     turn, grow, press = participant.pose(inclination)
-    occasion = Occasion(
-        rng,
-        participant,
-        extent[0],
-        extent[1],
-        speed,
-        participant.rate(rng, speed) * hurry,
-        turn + participant.bias,
-        grow,
-        press,
-    )
-    made = TEN[kind](occasion) if kind in TEN else OTHERS[kind](occasion)
+    rate = participant.rate(rng, speed) * hurry
+    made = make(Occasion(rng, participant, *extent, speed, rate, turn + participant.bias, grow, press))
     contacts = tuple(m for m in made if isinstance(m, Press))
     artefacts = tuple(m for m in made if isinstance(m, Artefact))
     stops = [float(c.t[-1]) for c in contacts] + [a.stop for a in artefacts]
@@ -76,9 +91,20 @@ def gesture_take(
     hurry: float = 1.0,
 ) -> Take:
     """One performance with an idle pad before and after it."""
-    performance = perform(kind, participant, rng, speed, inclination, sensor.extent, hurry)
+    return recorded(perform(kind, participant, rng, speed, inclination, sensor.extent, hurry), sensor, rng)
+
+
+def recorded(performance: Performance, sensor: SimulatedSensor, rng: np.random.Generator) -> Take:
+    """What a sensor sends of one performance, with an idle pad before and after it."""
     start = LEAD_S + float(rng.random()) / sensor.rate_hz
     return sensor.record([(start, performance)], start + performance.duration_s + TAIL_S, rng)
+
+
+def at_random(rng: np.random.Generator, non_gesture_share: float) -> Iterator[str]:
+    """Kinds without end: gestures, and in that share of cases non-gestures."""
+    while True:
+        pool = NON_GESTURES if rng.random() < non_gesture_share else GESTURES
+        yield pool[int(rng.integers(len(pool)))]
 
 
 def session(
@@ -88,26 +114,20 @@ def session(
     seconds: float = 60.0,
     non_gesture_share: float = 0.25,
     idle_s: tuple[float, float] = (0.9, 3.0),
-    kinds: Sequence[str] | None = None,
+    kinds: Iterable[str] | None = None,
     lead_s: float = 2.0,
+    speed: str | None = None,
 ) -> Take:
     """A continuous recording of that many seconds: performances in random order with idle gaps between them.
 
-    With `kinds` exactly those are performed, in that order, as far as the time reaches.
+    With `kinds` exactly those are performed, in that order, as far as the time reaches; with `speed` all at that one.
     """
-    todo = list(kinds) if kinds is not None else None
     performances: list[tuple[float, Performance]] = []
     inclination = int(rng.integers(3))
     now = lead_s
-    while todo is None or len(performances) < len(todo):
-        if todo is not None:
-            kind = todo[len(performances)]
-        else:
-            pool = NON_GESTURES if rng.random() < non_gesture_share else GESTURES
-            kind = pool[int(rng.integers(len(pool)))]
-        speed = ("slow", "normal", "fast")[int(rng.integers(3))]
-        performance = perform(kind, participant, rng, speed, inclination, sensor.extent)
-        if now + performance.duration_s + 1.0 > seconds:
+    for kind in at_random(rng, non_gesture_share) if kinds is None else kinds:
+        performance = perform(kind, participant, rng, speed or any_speed(rng), inclination, sensor.extent)
+        if now + performance.duration_s + LAST_PAUSE_S > seconds:
             break
         performances.append((now, performance))
         now += performance.duration_s + float(rng.uniform(*idle_s))
@@ -163,9 +183,8 @@ def wide_plan(seed: int, index: int, hardness: float | None = None) -> WideTake:
     hard = float(rng.random()) if hardness is None else hardness
     person = Participant(int(rng.integers(1 << 40)) + 1_000_000)
     sensor = any_sensor(rng, hard)
-    pool = NON_GESTURES if rng.random() < OTHERS_SHARE else GESTURES
-    kind = pool[int(rng.integers(len(pool)))]
-    speed = ("slow", "normal", "fast")[int(rng.integers(3))]
+    kind = next(at_random(rng, OTHERS_SHARE))
+    speed = any_speed(rng)
     hurry = float(rng.uniform(1.3, 2.5)) if rng.random() < FLICKS * hard else 1.0
     return WideTake(kind, person, sensor, speed, int(rng.integers(3)), hurry, rng)
 

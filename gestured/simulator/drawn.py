@@ -6,8 +6,8 @@ import numpy as np
 
 from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP
 from gestured.simulator.kinematics import Array, arc, ellipse, grid, polyline, stroke_progress, turning, wander
+from gestured.simulator.occasion import Occasion
 from gestured.simulator.people import Press
-from gestured.simulator.strokes import Occasion
 
 
 def drawn(occasion: Occasion, t: Array, x: Array, y: Array) -> list[Press]:

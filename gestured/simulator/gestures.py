@@ -6,8 +6,9 @@ from collections.abc import Callable
 import numpy as np
 
 from gestured.simulator.kinematics import ellipse, grid, turning, wander
+from gestured.simulator.occasion import Occasion
 from gestured.simulator.people import Press
-from gestured.simulator.strokes import Occasion, fingers_on, stroke, swipe_length, touch_down
+from gestured.simulator.strokes import fingers_on, stroke, swipe_length, touch_down
 from gestured.simulator.things import resting_hand
 
 RIGHT, UP, LEFT, DOWN = 0.0, math.pi / 2, math.pi, -math.pi / 2

@@ -19,9 +19,10 @@ from gestured.simulator.drawn import (
 )
 from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP, swipe
 from gestured.simulator.kinematics import arc, grid, stroke_progress
+from gestured.simulator.occasion import Occasion
 from gestured.simulator.people import Artefact, Press
 from gestured.simulator.several import drumming, knuckles, pinch, rotation, spread, three_finger_swipe, two_finger_tap
-from gestured.simulator.strokes import Occasion, fingers_on, stroke, swipe_length, touch_down
+from gestured.simulator.strokes import fingers_on, stroke, swipe_length, touch_down
 from gestured.simulator.things import (
     electrical_burst,
     forearm,

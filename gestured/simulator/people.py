@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gestured.simulator.kinematics import Array, wander
+from gestured.simulator.kinematics import Array
 
 SPEEDS = {"slow": 0.55, "normal": 1.0, "fast": 1.8}
 INCLINATIONS = (0, 1, 2)
@@ -20,6 +20,11 @@ INCLINATIONS = (0, 1, 2)
 def generator(*key: int) -> np.random.Generator:
     """A random stream of its own for an integer key: the same on every run and machine."""
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([int(k) & 0xFFFFFFFFFFFFFFFF for k in key])))
+
+
+def any_speed(rng: np.random.Generator) -> str:
+    """One of SPEEDS, each as likely."""
+    return tuple(SPEEDS)[int(rng.integers(len(SPEEDS)))]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,64 +151,3 @@ class Participant:
     def rate(self, rng: np.random.Generator, speed: str) -> float:
         """Factor on this movement's speed: habit, today's intention, chance."""
         return SPEEDS[speed] * self.pace * float(np.clip(rng.lognormal(0.0, self.pace_spread), 0.5, 2.0))
-
-
-def press(
-    rng: np.random.Generator, person: Participant, t: Array, level: float, fade_in_s: float, fade_out_s: float
-) -> Array:
-    """Force over a contact (n,): rise, a plateau that is never even, fall. Zero at both ends.
-
-    Forms: an overshoot at landing and lighter sliding after it, a slow rise or fall, a dome, a dip.
-    """
-    total = float(t[-1])
-    up = min(fade_in_s, 0.45 * total)
-    down = min(fade_out_s, 0.5 * total)
-    rise = 0.5 - 0.5 * np.cos(math.pi * np.clip(t / up, 0.0, 1.0))
-    fall = 0.5 - 0.5 * np.cos(math.pi * np.clip((total - t) / down, 0.0, 1.0))
-    u = t / total
-    form = rng.random()
-    if form < 0.3:
-        shape = 1.0 + rng.uniform(0.1, 0.9) * np.exp(-t / rng.uniform(0.04, 0.2))
-    elif form < 0.5:
-        shape = 1.0 + rng.uniform(-0.45, 0.7) * (u - 0.5)
-    elif form < 0.65:
-        shape = 1.0 + rng.uniform(-0.4, 0.5) * np.sin(math.pi * u)
-    else:
-        shape = np.ones_like(t)
-    uneven = rng.uniform(0.0, 0.16) * wander(t, rng, 0.3, 4.0) + 0.015 * wander(t, rng, 7.0, 12.0, 2)
-    return level * np.maximum(rise * fall * shape * np.clip(1.0 + uneven, 0.3, 2.0), 0.0)
-
-
-def fingertip(
-    rng: np.random.Generator,
-    person: Participant,
-    t: Array,
-    x: Array,
-    y: Array,
-    *,
-    force: float = 1.0,
-    fade_in_s: float | None = None,
-    fade_out_s: float | None = None,
-    size: float = 1.0,
-    start: float = 0.0,
-) -> Press:
-    """A finger of this person on the path x, y (n,) at times t (n,) from 0, with a hand's unsteadiness."""
-    level = force * person.force * float(np.clip(rng.lognormal(0.0, person.force_spread), 0.35, 2.5))
-    fade_in = rng.uniform(0.02, 0.08) if fade_in_s is None else fade_in_s
-    fade_out = rng.uniform(0.02, 0.09) if fade_out_s is None else fade_out_s
-    shake = person.tremor_mm * float(rng.uniform(0.5, 1.5))
-    # Once in a while it is the thumb or the finger's side.
-    broad = float(rng.uniform(1.2, 1.6)) if rng.random() < 0.08 else 1.0
-    width = min(person.finger_mm * size * broad * float(rng.uniform(0.88, 1.14)), 8.0)
-    oblong = float(np.clip(person.oblong * rng.uniform(0.85, 1.2), 1.0, 2.2))
-    return Press(
-        t=t + start,
-        x=x + shake * wander(t, rng, 8.0, 12.0, 3),
-        y=y + shake * wander(t, rng, 8.0, 12.0, 3),
-        force=press(rng, person, t, level, fade_in, fade_out),
-        length=width * math.sqrt(oblong),
-        width=width / math.sqrt(oblong),
-        angle=person.finger_angle + float(rng.normal(0.0, 0.25)),
-        growth=person.growth,
-        flatness=float(rng.uniform(0.85, 1.9)),
-    )

@@ -6,8 +6,9 @@ import numpy as np
 
 from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP, swipe
 from gestured.simulator.kinematics import grid, stroke_progress
+from gestured.simulator.occasion import Occasion
 from gestured.simulator.people import Press
-from gestured.simulator.strokes import Occasion, touch_down
+from gestured.simulator.strokes import touch_down
 
 
 def knuckles(occasion: Occasion) -> list[Press]:

@@ -1,4 +1,4 @@
-"""Building blocks of performances: where on the pad, which stroke, how many fingers."""
+"""Building blocks of performances: a finger that stays, a stroke, and several fingers on one."""
 
 import math
 from dataclasses import dataclass
@@ -6,106 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gestured.simulator.kinematics import Array, arc, grid, stroke_progress, wander
-from gestured.simulator.people import SPEEDS, Participant, Press, fingertip
-
-
-@dataclass(frozen=True, slots=True)
-class Occasion:
-    """One person about to do one thing on a pad of `width` x `height` millimetres."""
-
-    rng: np.random.Generator
-    person: Participant
-    width: float
-    height: float
-    speed: str
-    rate: float  # factor on speeds, of this movement
-    turn: float  # radians: pose and habit
-    grow: float  # factor on lengths from the pose
-    press: float  # factor on forces from the pose
-
-    @property
-    def small(self) -> float:
-        """The pad's shorter edge in millimetres."""
-        return min(self.width, self.height)
-
-    @property
-    def tempo(self) -> float:
-        """Factor on taps' speed: people hurry less in tapping than in moving."""
-        return math.sqrt(SPEEDS[self.speed])
-
-    def reach(self) -> float:
-        """Size of this movement, 0..1: habit and chance."""
-        return float(np.clip(self.person.reach + self.rng.normal(0.0, 0.22), 0.0, 1.0))
-
-    def spot(self, half_width: float, half_height: float, beyond: float = 0.05) -> tuple[float, float]:
-        """Centre for something of that half size; in a share `beyond` of cases partly over the edge."""
-        rng, (px, py), spread = self.rng, self.person.place, self.person.place_spread
-        slack = 0.09 if rng.random() < beyond else -0.04
-        out = []
-        for extent, half, habit in ((self.width, half_width, px), (self.height, half_height, py)):
-            room = max(extent * (0.5 + slack) - half, 0.0)
-            # A third of the places are anywhere; the rest cluster where this person likes to be.
-            offset = rng.uniform(-room, room) if rng.random() < 0.35 else (habit + rng.normal(0.0, spread)) * extent / 2
-            out.append(extent / 2 + float(np.clip(offset, -room, room)))
-        return out[0], out[1]
-
-    def settle(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Moves a path (n,) given anywhere to a place on the pad; one that is too large is shrunk to fit."""
-        x, y = x - (x.min() + x.max()) / 2, y - (y.min() + y.max()) / 2
-        hx, hy = max(float(x.max()), 0.1), max(float(y.max()), 0.1)
-        scale = min(1.0, 0.47 * self.width / hx, 0.47 * self.height / hy)
-        cx, cy = self.spot(hx * scale, hy * scale)
-        return x * scale + cx, y * scale + cy
-
-    def finger(
-        self,
-        t: Array,
-        x: Array,
-        y: Array,
-        *,
-        force: float = 1.0,
-        size: float = 1.0,
-        start: float = 0.0,
-        fade_in_s: float | None = None,
-        fade_out_s: float | None = None,
-    ) -> Press:
-        """This person's finger on a path, pressed as the pose has it."""
-        return fingertip(
-            self.rng,
-            self.person,
-            t,
-            x,
-            y,
-            force=force * self.press,
-            fade_in_s=fade_in_s,
-            fade_out_s=fade_out_s,
-            size=size,
-            start=start,
-        )
-
-    def tap_s(self) -> float:
-        """Duration of one tap in seconds, 0.04 to 0.45 (real ones on a touchscreen: median 0.2)."""
-        return float(np.clip(self.person.tap_s * self.rng.lognormal(0.0, 0.22) / self.tempo, 0.04, 0.45))
-
-    def gap_s(self) -> float:
-        """Pause between two taps in seconds, 0.08 to 0.42."""
-        return float(np.clip(self.person.gap_s * self.rng.lognormal(0.0, 0.2) / self.tempo, 0.08, 0.42))
-
-    def spacing(self) -> float:
-        """Distance of two fingertips: 0.16 to 0.55 of the pad's shorter edge (1.5 to 5 taxels of nine)."""
-        free = self.rng.uniform(0.16, 0.55) * self.small
-        own = self.person.spacing_mm * float(self.rng.lognormal(0.0, 0.15))
-        mix = own if self.rng.random() < 0.7 else free
-        return float(np.clip(mix, max(0.16 * self.small, 9.0), max(0.55 * self.small, 12.0)))
-
-    def rests(self) -> tuple[float, float]:
-        """Seconds at rest before and after a stroke: none, or up to 0.3 and 0.6, in a few cases 1.1."""
-        rng, person, hurry = self.rng, self.person, math.sqrt(self.rate)
-        before = rng.uniform(0.02, 0.3) * person.rest_start if rng.random() < 0.15 + 0.6 * person.rest_start else 0.0
-        after = 0.6 * rng.beta(1.5, 1.8) if rng.random() < 0.1 + 0.8 * person.rest_end else 0.0
-        if rng.random() < 0.15 * person.rest_end:
-            after += rng.uniform(0.0, 0.5)
-        return before / max(hurry, 0.7), min(after / max(hurry, 0.7), 1.1)
+from gestured.simulator.occasion import Occasion
+from gestured.simulator.people import Press
 
 
 def touch_down(

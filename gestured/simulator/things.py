@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from gestured.simulator.kinematics import Array, grid, stroke_progress, wander
+from gestured.simulator.occasion import Occasion
 from gestured.simulator.people import Artefact, Press
-from gestured.simulator.strokes import Occasion
 
 Pair = tuple[float, float]
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from gestured.client.sensor import Form
-from gestured.core.frames import Frame, Touch
+from gestured.core.frames import Frame
+from gestured.record.recordings import touches_of
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 from tests.golden.tape import Packet, Source, Tape, ticks
 from tests.hostile.faults import Fault
@@ -38,8 +39,7 @@ def frames_of(take: Take) -> list[Frame]:
     found = []
     for t, values, places, ids in zip(take.sensor_times, take.frames, take.touches, take.touch_ids, strict=True):
         places = np.round(16 * places) / 16  # what has few digits compresses well
-        touches = tuple(Touch(int(k), float(x), float(y)) for k, (x, y) in zip(ids, places, strict=True) if k >= 0)
-        found.append(Frame(float(t), values, touches))
+        found.append(Frame(float(t), values, touches_of(ids, places)))
     return found
 
 

@@ -18,7 +18,6 @@ from gestured.lab.samples import Sample, Samples
 from gestured.simulator import (
     GESTURES,
     NON_GESTURES,
-    SPEEDS,
     Participant,
     Performance,
     SimulatedSensor,
@@ -26,7 +25,9 @@ from gestured.simulator import (
     generator,
     perform,
 )  # fmt: skip
+from gestured.simulator.cohort import recorded
 from gestured.simulator.kinematics import wander
+from gestured.simulator.people import any_speed
 
 PLAN = "plan"  # label of a repetition; anything else that is done is labelled as everywhere
 REPETITIONS = 9  # of a plan: five examples, and four to try them on
@@ -71,27 +72,22 @@ def _part(seed: int, index: int, plans: tuple[str, ...]) -> Iterator[Sample]:
     sensor = any_sensor(rng, 0.5) if nth % HARD == 0 else SimulatedSensor.nominal(day=number)
     if part < len(plans):
         rng = generator(number, part)
-        plan = (sign if kind in SIGNS else perform)(kind, person, rng, _speed(rng), 1, sensor.extent)
+        plan = (sign if kind in SIGNS else perform)(kind, person, rng, any_speed(rng), 1, sensor.extent)
         for trial in range(REPETITIONS):
             rng = generator(number, part, trial)
             yield from _recorded(repeated(plan, rng, sensor.extent), sensor, rng, PLAN)
         return
     for trial in range(GESTURE_TRIALS if kind in GESTURES else OTHER_TRIALS):
         rng = generator(number, part, trial)
-        done = perform(kind, person, rng, _speed(rng), int(rng.integers(3)), sensor.extent)
+        done = perform(kind, person, rng, any_speed(rng), int(rng.integers(3)), sensor.extent)
         yield from _recorded(done, sensor, rng, done.label)
-
-
-def _speed(rng: np.random.Generator) -> str:
-    return tuple(SPEEDS)[int(rng.integers(len(SPEEDS)))]
 
 
 def _recorded(
     performance: Performance, sensor: SimulatedSensor, rng: np.random.Generator, label: str
 ) -> Iterator[Sample]:
     """The one segment that is cut out of it; nothing where it falls into several, or is missed."""
-    start = 1.3 + float(rng.random()) / sensor.rate_hz
-    take = sensor.record([(start, performance)], start + performance.duration_s + 0.8, rng)
+    take = recorded(performance, sensor, rng)
     found = list(matched(cuts(take.frames, take.times), truths(take)))
     if len(found) == 1:
         yield found[0]._replace(label=label)

@@ -4,16 +4,19 @@ They are drawn with one finger, by the simulator's hands.
 """
 
 import math
+from functools import partial
 
 import numpy as np
 
 from gestured.simulator import Participant, Performance
+from gestured.simulator.cohort import performed
 from gestured.simulator.drawn import drawn
 from gestured.simulator.kinematics import polyline
-from gestured.simulator.strokes import Occasion
+from gestured.simulator.occasion import Occasion
+from gestured.simulator.people import Press
 
-# Corners of each sign in a square of side 1, x to the right, y upward, in the order in which they are drawn.
-SIGNS: dict[str, tuple[tuple[float, float], ...]] = {
+Corners = tuple[tuple[float, float], ...]  # in a square of side 1, x to the right, y upward, in the order of drawing
+SIGNS: dict[str, Corners] = {
     "letter_m": ((0.0, 0.0), (0.1, 1.0), (0.5, 0.3), (0.9, 1.0), (1.0, 0.0)),
     "letter_n": ((0.0, 0.0), (0.0, 1.0), (0.8, 0.0), (0.8, 1.0)),
     "letter_s": ((0.9, 0.9), (0.4, 1.0), (0.1, 0.75), (0.5, 0.5), (0.9, 0.25), (0.6, 0.0), (0.1, 0.1)),
@@ -50,17 +53,16 @@ def sign(
     extent: tuple[float, float] = (72.0, 72.0),
 ) -> Performance:
     """One sign as one person draws it, in the manner of `simulator.perform`."""
-    turn, grow, press = participant.pose(inclination)
-    rate = participant.rate(rng, speed)
-    occasion = Occasion(rng, participant, *extent, speed, rate, turn + participant.bias, grow, press)
+    return performed(kind, partial(_made, SIGNS[kind]), participant, rng, speed, inclination, extent)
+
+
+def _made(corners: Corners, occasion: Occasion) -> list[Press]:
+    rng, far = occasion.rng, 0.5 * occasion.small
     size = occasion.small * (0.45 + 0.4 * occasion.reach())
-    points = [(size * (x + rng.normal(0.0, 0.04)), size * (y + rng.normal(0.0, 0.04))) for x, y in SIGNS[kind]]
-    far = 0.5 * occasion.small
+    points = [(size * (x + rng.normal(0.0, 0.04)), size * (y + rng.normal(0.0, 0.04))) for x, y in corners]
     legs = [
-        float(np.clip(LEG_S * (math.dist(a, b) / far) ** 0.4 / rate, 0.1, 0.9))
+        float(np.clip(LEG_S * (math.dist(a, b) / far) ** 0.4 / occasion.rate, 0.1, 0.9))
         for a, b in zip(points[:-1], points[1:], strict=True)
     ]
     t, x, y = polyline(points, legs, float(rng.uniform(0.1, 0.35)), 0.0)
-    contacts = tuple(drawn(occasion, t, x, y))
-    ends = max(float(contact.t[-1]) for contact in contacts)
-    return Performance(kind, "none", contacts, ends, speed, inclination, participant.seed)
+    return drawn(occasion, t, x, y)
