@@ -23,17 +23,17 @@ from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import NOTICE_S, follow
 from gestured.bridge.mqtt_session import Mqtt
 from gestured.bridge.options import add_filters, add_metrics, need, subscriber
+from gestured.client.program import Commands
 from gestured.core.errors import GesturedError
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the bridge to the command line."""
     parser = commands.add_parser(
         "mqtt",
         help="events to an MQTT broker",
         description="Publish events under gestured/HOST/SENSOR/TYPE, with Home Assistant discovery.\n"
         "User and password are the variables MQTT_USER and MQTT_PASSWORD, or a file that holds USER:PASSWORD.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gestured-bridge mqtt --broker 192.168.7.2\n"
         "  gestured-bridge mqtt --broker broker.example --tls --credentials /etc/gestured/mqtt-user",
     )

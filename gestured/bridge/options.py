@@ -10,8 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gestured.client.address import bind_address, find_socket, host_port
+from gestured.client.address import find_socket
 from gestured.client.subscriber import Subscriber
+from gestured.client.values import bind_address, host_port, some_of
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.messages import EVENT_TYPES
@@ -36,7 +37,7 @@ def add_filters(parser: argparse.ArgumentParser) -> None:
     text = "the daemon's event socket (default: the daemon's own default)"
     parser.add_argument("--socket", type=Path, metavar="PATH", help=text)
     text = f"which events, with commas, of {', '.join(EVENT_TYPES)} (default: gesture)"
-    parser.add_argument("--types", type=event_types, default=["gesture"], metavar="A,B", help=text)
+    parser.add_argument("--types", type=some_of(EVENT_TYPES), default=["gesture"], metavar="A,B", help=text)
     parser.add_argument("--sensors", type=names, metavar="A,B", help="only these sensors (default: all)")
     parser.add_argument("--gestures", type=names, metavar="A,B", help="only these gestures (default: all)")
 
@@ -81,14 +82,6 @@ def names(text: str) -> list[str]:
     found = [word.strip() for word in text.split(",") if word.strip()]
     if not found:
         raise argparse.ArgumentTypeError(f"{text!r}: expected names with commas between them")
-    return found
-
-
-def event_types(text: str) -> list[str]:
-    """Types of events between commas; for argparse."""
-    found = names(text)
-    if unknown := [name for name in found if name not in EVENT_TYPES]:
-        raise argparse.ArgumentTypeError(f"{', '.join(unknown)}: expected some of {', '.join(EVENT_TYPES)}")
     return found
 
 

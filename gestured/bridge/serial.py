@@ -18,9 +18,10 @@ from gestured.bridge.counts import Counts
 from gestured.bridge.options import BridgeError, add_destination, add_metrics, destination, need, on_stop
 from gestured.bridge.protocols import PROTOCOLS, looks_like
 from gestured.bridge.readings import COUNTER, MOST_TAXELS, Reading
-from gestured.client.grid import rows_by_columns
+from gestured.client.program import Commands
 from gestured.client.say import say
 from gestured.client.sensor import Form, sent_after_refusal
+from gestured.client.values import rows_by_columns
 from gestured.core.frames import Frame
 from gestured.core.osc_address import is_sensor
 
@@ -34,13 +35,12 @@ JUDGED_BYTES = 4096 + 4 * MOST_TAXELS  # bytes without a frame after which it is
 JUDGED_TAXEL_BYTES = 64  # so many more of them for each taxel of ours: two of the longest lines of text
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the bridge to the command line."""
     parser = commands.add_parser(
         "serial",
         help="a serial sensor's frames to the daemon",
         description="Read a sensor on a serial line and send its frames to the daemon as OSC.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gestured-bridge serial /dev/ttyUSB0 --protocol flexitac --sensor glove --grid 16x32\n"
         "  gestured-bridge serial /dev/ttyACM0 --protocol csv --sensor armrest --grid 9x9 --baud 115200",
     )

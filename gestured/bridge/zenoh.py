@@ -14,15 +14,15 @@ from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import NOTICE_S, follow
 from gestured.bridge.options import add_destination, add_filters, add_metrics, need, on_stop, subscriber
 from gestured.bridge.zenoh_session import ROUTER, Zenoh
+from gestured.client.program import Commands
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the bridge to the command line."""
     parser = commands.add_parser(
         "zenoh",
         help="events to Zenoh, and frames from there",
         description="Publish events under gestured/SITE/SENSOR/TYPE, with liveliness tokens for daemon and sensors.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gestured-bridge zenoh --connect tcp/192.168.7.2:7447 --site car7\n"
         "  gestured-bridge zenoh --frames --to 127.0.0.1:9000",
     )

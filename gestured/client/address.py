@@ -1,33 +1,11 @@
-"""Where a daemon is: HOST:PORT on the command line, and the rules for its sockets."""
+"""Where a daemon has its sockets, unless somebody says it."""
 
-import argparse
 import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from gestured.core.address import Address
-
 SYSTEM = Path("/run/gestured/events.sock")  # of the installed service
 SHARED = Path("/tmp")  # where a daemon without a session keeps its folder; anybody can make it first
-
-
-def host_port(text: str) -> Address:
-    """The address of a peer, whose port is known; for argparse."""
-    try:
-        address = Address.parse(text)
-        if address.port:
-            return address
-    except ValueError:
-        pass  # said below, with an example
-    raise argparse.ArgumentTypeError(f"{text!r}: expected HOST:PORT, such as 127.0.0.1:9000")
-
-
-def bind_address(text: str) -> Address:
-    """An address of our own, where port 0 means any free one; for argparse."""
-    try:
-        return Address.parse(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected {error}") from None
 
 
 def default_socket(environ: Mapping[str, str]) -> Path:

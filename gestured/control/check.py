@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+from gestured.client.program import Commands
 from gestured.client.say import say, say_json
 from gestured.core.errors import ModelError
 from gestured.model.opening import check
@@ -10,14 +11,13 @@ from gestured.model.opening import check
 UNUSABLE = 3
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "check",
         help="verify a model file",
         description="Open a model as the daemon would: its metadata, shapes and self-test.\n"
         "Exit status 3 if it cannot be used.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl check cnn_lstm\n  gesturectl check --json my_model.onnx",
     )
     parser.add_argument("model", metavar="MODEL", help="a path, or the name of a shipped model")

@@ -1,29 +1,22 @@
-"""The command line of gesturectl: one file per subcommand."""
+"""The command line of gesturectl."""
 
-import argparse
 import io
 import os
 import sys
 from collections.abc import Sequence
 
-import gestured
-from gestured.client.lines import JOIN, Forbidden
-from gestured.client.say import say
+from gestured.client import program
 from gestured.control import (
     check,
     demo,
     doctor,
-    emit,
-    enrol,
     export,
     flag,
-    forget,
-    gestures,
     listen,
     names,
-    recalibrate,
+    operate,
+    own,
     record,
-    reload,
     replay,
     shadow,
     simulate,
@@ -33,46 +26,37 @@ from gestured.control import (
     view,
     watch,
 )
-from gestured.core.errors import GesturedError
 
 SUBCOMMANDS = (
-    *(status, listen, view, watch, doctor, sniff),
-    *(reload, recalibrate, shadow, emit),
-    *(enrol, gestures, forget),
-    *(record, flag, replay, export, tune),
-    *(simulate, check, names, demo),
+    *(status.add, listen.add, view.add, watch.add, doctor.add, sniff.add),
+    *(operate.add_reload, operate.add_recalibrate, shadow.add, operate.add_emit),
+    own.add,
+    *(record.add, flag.add, replay.add, export.add, tune.add),
+    *(simulate.add, check.add, names.add, demo.add),
 )
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> program.Parser:
     """The whole command line; each subcommand adds itself and sets `run`."""
-    top = argparse.ArgumentParser(
-        prog="gesturectl",
+    top, commands = program.program(
+        "gesturectl",
+        "COMMAND",
         description="The operator's client of gestured.",
         epilog="example: gesturectl listen --socket /run/gestured/events.sock",
     )
-    top.add_argument("--version", action="version", version=f"gesturectl {gestured.__version__}")
-    commands = top.add_subparsers(metavar="COMMAND", required=True)
-    for module in SUBCOMMANDS:
-        module.add(commands)
+    for add in SUBCOMMANDS:
+        add(commands)
     return top
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one subcommand; returns the exit status (0 as asked, 1 failed, 2 usage, 3 unusable model)."""
-    args = parser().parse_args(argv)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without block characters shows question marks
     try:
-        status: int = args.run(args)
+        status = program.run(parser(), argv)
         sys.stdout.flush()
         return status
-    except GesturedError as error:
-        remedy = f" ({JOIN})" if isinstance(error, Forbidden) else ""
-        say(f"gesturectl: {error}{remedy}", to=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 0
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0

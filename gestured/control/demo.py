@@ -17,6 +17,7 @@ from gestured.client.control import Control
 from gestured.client.engine import Engine
 from gestured.client.lines import Refused
 from gestured.client.picture import trace
+from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json
 from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form, Sensor
@@ -35,7 +36,7 @@ POLL_S = 0.05
 HEARD = ("gesture", "unknown", "provisional")  # events that the daemon is asked for
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
 
     parser = commands.add_parser(
@@ -43,7 +44,6 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         help="see it recognise simulated gestures",
         description="Start a daemon with a shipped model and a simulated sensor that sends to it\n"
         "over UDP, and show what was performed beside what was recognised.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl demo --seconds 20 --speed fast\n  gesturectl demo --json --kinds double_tap",
     )
     parser.add_argument("--model", default="cnn_lstm", help="a path, or a shipped one's name (default: cnn_lstm)")

@@ -4,6 +4,7 @@ import argparse
 import platform
 import socket
 import stat
+import subprocess
 import time
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -14,24 +15,25 @@ from gestured.client.control import Control
 from gestured.client.holder import bind_failure
 from gestured.client.lines import JOIN, Forbidden, Refused, Unreachable
 from gestured.client.peer import Stranger
+from gestured.client.program import Commands
 from gestured.client.say import say, say_json
 from gestured.control.address import add_sockets, control_path
-from gestured.control.bridges import bridge_findings
 from gestured.control.findings import BUFFER_BYTES, Finding, examine_status, model_finding
 from gestured.core.address import Address
 
 YEAR_S = 365 * 86_400
 RELEASED = 1_750_000_000  # s since the epoch; a clock before that is wrong
+BRIDGES = ("gestured-bridge@*", "gestured-serial@*")  # units of systemd
+SYSTEMD_S = 5.0  # for its answer, which takes milliseconds
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "doctor",
         help="what is wrong, and what to do about it",
         description="Look at versions, clock, kernel buffer, sockets and permissions, and at the daemon, its model\n"
         "and its sensors. Each finding comes with its remedy. Exit status 1 where something is bad.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="example:\n  gesturectl doctor",
     )
     add_sockets(parser)
@@ -57,7 +59,7 @@ def examine(path: Path) -> Iterator[Finding]:
     yield _versions()
     yield _clock(time.time())
     yield _buffer(Path("/proc/sys/net/core/rmem_max"))
-    yield from bridge_findings()
+    yield from _bridges()
     try:
         with Control(path) as control:
             status = control.ask("status")
@@ -106,6 +108,27 @@ def _buffer(path: Path) -> Finding:
             f"sysctl -w net.core.rmem_max={BUFFER_BYTES}",
         )
     return Finding("ok", f"the kernel grants receive buffers of {most >> 10} KiB")
+
+
+def _bridges() -> Iterator[Finding]:
+    """The bridges that systemd runs, by what they last said of themselves."""
+    command = ["systemctl", "show", "--property=Id,ActiveState,StatusText", *BRIDGES]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=SYSTEMD_S)
+    except (OSError, subprocess.TimeoutExpired):
+        return  # no systemd here
+    for block in done.stdout.split("\n\n"):
+        unit = dict(line.partition("=")[::2] for line in block.splitlines())
+        if not unit.get("Id"):
+            continue
+        said = unit.get("StatusText") or unit.get("ActiveState", "")
+        remedy = f"journalctl --unit {unit['Id']} --lines 20 says why; docs/connect.md what it needs"
+        if unit.get("ActiveState") != "active":
+            yield Finding("bad", f"{unit['Id']} is {unit.get('ActiveState')}", remedy)
+        elif said.startswith("connected"):
+            yield Finding("ok", f"{unit['Id']} is {said}")
+        else:
+            yield Finding("warn", f"{unit['Id']} is {said}", remedy)
 
 
 def _port(address: Address) -> Finding:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gestured.client.program import Commands
 from gestured.client.say import tell
 from gestured.core.errors import RecordingError
 from gestured.core.facts import Taken
@@ -21,7 +22,7 @@ from gestured.record.tape import Tape
 FINGERS = 3
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "export",
@@ -29,7 +30,6 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         description="Write the frames of a recording as .npz, one session a sensor, with the gestures that the\n"
         "daemon recognised as its events. Sensors of one file have one grid. With --ros2 as MCAP instead,\n"
         "which rosbag2 plays and viewers of ROS 2 draw: sensor_msgs/Image and std_msgs/String.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl export drive.mcap drive.npz --sensor armrest\n"
         "  gesturectl export drive.mcap for-ros.mcap --ros2",
     )

@@ -8,6 +8,7 @@ from typing import Any
 
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable
+from gestured.client.program import Commands
 from gestured.client.say import tell
 from gestured.control.address import add_sockets, connect
 from gestured.control.record import Keeper
@@ -17,14 +18,13 @@ from gestured.record.tape_writer import Writer
 LIMIT_BYTES = 2 << 30  # more than the ring may hold
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "flag",
         help="keep the last 30 seconds: that was wrong",
         description="Keep what the daemon's flight recorder holds, the packets of the last 30 seconds with the\n"
         "events and the model's sha256, as a recording. The daemon must run with --flight-recorder.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog='examples:\n  gesturectl flag\n  gesturectl flag wrong.mcap --note "a tap, taken for a swipe"',
     )
     parser.add_argument("file", type=Path, nargs="?", metavar="FILE", help="default: flag-DATE-TIME.mcap")

@@ -7,26 +7,28 @@ from datetime import datetime
 from typing import Any
 
 from gestured.client.lines import Unsubscribed
+from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json
 from gestured.client.subscriber import Subscriber
+from gestured.client.values import some_of
 from gestured.control.address import add_sockets, event_path
 from gestured.control.show import said_when
 from gestured.core.messages import EVENT_TYPES
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "listen",
         help="print events as they come",
         description="Connect to the daemon's event socket and print events as they come.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl listen --types gesture,unknown\n"
         "  gesturectl listen --types gesture,provisional\n"
         "  gesturectl listen --json --gesture swipe_left --count 1",
     )
     add_sockets(parser)
-    parser.add_argument("--types", type=_types, help=f"comma-separated, of {', '.join(EVENT_TYPES)} (default: gesture)")
+    text = f"comma-separated, of {', '.join(EVENT_TYPES)} (default: gesture)"
+    parser.add_argument("--types", type=some_of(EVENT_TYPES), help=text)
     parser.add_argument("--sensor", action="append", metavar="NAME", help="only this sensor; may be repeated")
     parser.add_argument("--gesture", action="append", metavar="NAME", help="only this gesture; may be repeated")
     parser.add_argument("--count", type=int, metavar="N", help="end after N events")
@@ -114,11 +116,3 @@ def _repeat(line: str, event: dict[str, Any]) -> None:
         say_drawn(line)
     else:
         say_json(event)
-
-
-def _types(text: str) -> list[str]:
-    types = [word.strip() for word in text.split(",") if word.strip()]
-    unknown = [word for word in types if word not in EVENT_TYPES]
-    if unknown or not types:
-        raise argparse.ArgumentTypeError(f"{', '.join(unknown) or text!r}: expected some of {', '.join(EVENT_TYPES)}")
-    return types

@@ -4,6 +4,7 @@ import argparse
 from contextlib import suppress
 from typing import Any
 
+from gestured.client.program import Commands
 from gestured.client.say import say
 from gestured.control.address import add_sockets, connect
 from gestured.core.errors import GesturedError
@@ -11,13 +12,12 @@ from gestured.core.messages import EVENT_TYPES
 from gestured.simulator import GESTURES
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "names",
         help="names of gestures, types of events, or sensors, one a line",
         description="Print names, one a line, for completions and scripts: the running daemon's, where there is one.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="example:\n  gesturectl names sensors",
     )
     parser.add_argument("what", choices=("gestures", "types", "sensors"), help="of what")

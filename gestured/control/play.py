@@ -1,11 +1,11 @@
 """What the simulated sensor plays: a person who performs gesture after gesture, and the frames of it."""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, cycle
 
-from gestured.client.grid import rows_by_columns
+from gestured.client.values import number, rows_by_columns, some_of
 from gestured.core.frames import Frame
 from gestured.record.recordings import touches_of
 from gestured.simulator import (
@@ -31,14 +31,14 @@ BETWEEN_S = (1.0, 2.0)  # between performances
 class Play:
     """Who performs what, on which sensor. The same play gives the same frames."""
 
-    seed: int = 0
-    participant: int = 900  # nobody whom the shipped models know
-    rate_hz: float = 15.0
-    rows: int = 9
-    columns: int = 9
-    kinds: tuple[str, ...] = ()  # in this order, again and again; none: at random
-    non_gestures: float = 0.2  # share of what is performed at random
-    speed: str | None = None  # None: mixed
+    seed: int
+    participant: int
+    rate_hz: float
+    rows: int
+    columns: int
+    kinds: Sequence[str]  # in this order, again and again; none: at random
+    non_gestures: float  # share of what is performed at random
+    speed: str | None  # None: mixed
     first: str | None = None  # what is performed before all else, where `kinds` does not say
 
     def takes(self, seconds: float | None) -> Iterator[tuple[float, Take]]:
@@ -80,17 +80,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="another order of things (default: 0)")
     parser.add_argument(
-        "--kinds", type=_kinds, default=(), metavar="A,B", help="perform these in turn (default: at random)"
+        "--kinds",
+        type=some_of(GESTURES + NON_GESTURES + SEQUENCES),
+        default=(),
+        metavar="A,B",
+        help="perform these in turn (default: at random)",
     )
     parser.add_argument(
         "--non-gestures",
-        type=_share,
+        type=number(0.0, 1.0),
         default=0.2,
         metavar="SHARE",
         help="share of what is no gesture (default: 0.2)",
     )
     parser.add_argument("--speed", choices=tuple(SPEEDS), help="how fast the person moves (default: mixed)")
-    parser.add_argument("--rate", type=_rate, default=15.0, metavar="HZ", help="frames a second (default: 15)")
+    parser.add_argument(
+        "--rate", type=number(5.0, 1000.0), default=15.0, metavar="HZ", help="frames a second (default: 15)"
+    )
     parser.add_argument(
         "--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="rows and columns (default: 9x9)"
     )
@@ -100,31 +106,3 @@ def play_from(args: argparse.Namespace) -> Play:
     """The play that the flags ask for."""
     rows, columns = args.grid
     return Play(args.seed, args.participant, args.rate, rows, columns, args.kinds, args.non_gestures, args.speed)
-
-
-def _kinds(text: str) -> tuple[str, ...]:
-    kinds = tuple(word.strip() for word in text.split(",") if word.strip())
-    unknown = [kind for kind in kinds if kind not in GESTURES + NON_GESTURES + SEQUENCES]
-    if unknown or not kinds:
-        raise argparse.ArgumentTypeError(
-            f"{', '.join(unknown) or repr(text)}: expected some of {', '.join(GESTURES + NON_GESTURES + SEQUENCES)}"
-        )
-    return kinds
-
-
-def _share(text: str) -> float:
-    return _between(text, 0.0, 1.0)
-
-
-def _rate(text: str) -> float:
-    return _between(text, 5.0, 1000.0)
-
-
-def _between(text: str, low: float, high: float) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not low <= value <= high:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a number from {low:g} to {high:g}")
-    return value

@@ -13,6 +13,7 @@ from typing import Any
 
 from gestured.client.control import Control
 from gestured.client.lines import Refused, Unreachable
+from gestured.client.program import Commands
 from gestured.client.say import say, say_json
 from gestured.control.address import add_sockets, connect, finish_on_signals
 from gestured.core.address import Address
@@ -24,7 +25,7 @@ FLUSH_S = 1.0  # seconds of a recording that a crash or a power cut costs
 WAITING_LINES = 50_000  # lines; the daemon counts what finds no room
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "record",
@@ -32,7 +33,6 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         description="Record what reaches the daemon, packet by packet as it came, and the events that it makes of\n"
         "it, as MCAP. The daemon hands both over (no second listener, nothing slips past); what a slow\n"
         "disk makes it lose is counted. The file is new, and good up to the last second whatever happens.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl record drive.mcap --seconds 60\n  gesturectl record night.mcap --max-mib 2048",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="what to write; must not exist")

@@ -10,8 +10,10 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from gestured.client.address import find_socket, host_port
+from gestured.client.address import find_socket
+from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json, tell
+from gestured.client.values import host_port
 from gestured.control.diff import Answer, Knew, Line, Recorded
 from gestured.control.labelled import Labelled
 from gestured.control.listen import readable
@@ -29,7 +31,7 @@ DEFAULT_MODEL = "cnn_lstm"  # for a file that names none
 Playable = Recorded | Labelled
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "replay",
@@ -40,7 +42,6 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         "known again is not compared.\n"
         'At another speed than 1 the daemon must run with clock = "sensor" (gestured --clock sensor): by the\n'
         "time of arrival all would be too fast.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl replay drive.mcap --diff --model candidate.onnx\n"
         "  gesturectl replay drive.mcap --to 127.0.0.1:9000 --diff\n"
         "  gesturectl replay 07.npz --to 127.0.0.1:9000 --speed 10 --diff",

@@ -7,18 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from gestured.client.lines import Refused
+from gestured.client.program import Commands
 from gestured.client.say import say, say_json
 from gestured.control.address import add_sockets, connect
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "shadow",
         help="try a model beside the active one",
         description="Have the daemon run a candidate model on the same segments as the active one. It publishes\n"
         "nothing; without MODEL, how far the two agree is printed. A restart ends it.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl shadow candidate.onnx\n  gesturectl shadow\n  gesturectl shadow --stop",
     )
     parser.add_argument("model", metavar="MODEL", nargs="?", help="a path that the daemon can read, or a shipped name")

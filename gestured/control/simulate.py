@@ -1,14 +1,14 @@
 """`gesturectl simulate`: a simulated sensor, and a person who touches it."""
 
 import argparse
-import re
 import sys
 from collections.abc import Iterator
 from typing import Any
 
-from gestured.client.address import host_port
+from gestured.client.program import Commands
 from gestured.client.say import say, tell
 from gestured.client.sensor import BLOBS, Form, Sensor
+from gestured.client.values import host_port, sensor_name
 from gestured.control.play import add_arguments, frames, play_from
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
@@ -20,20 +20,19 @@ as OSC over UDP, in real time. Says what is performed as it ends, to be compared
 with what the daemon recognises."""
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "simulate",
         help="be a sensor that somebody touches",
         description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl simulate --to 127.0.0.1:9000 --sensor armrest\n"
         "  gesturectl simulate --kinds swipe_left,double_tap --seconds 30 --blob",
     )
     parser.add_argument("--to", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT",
                         help="where the daemon listens (default: 127.0.0.1:9000)")  # fmt: skip
     parser.add_argument(
-        "--sensor", type=_sensor, default="simulated", metavar="NAME", help="its name (default: simulated)"
+        "--sensor", type=sensor_name, default="simulated", metavar="NAME", help="its name (default: simulated)"
     )
     parser.add_argument("--seconds", type=float, metavar="S", help="end after so long (default: go on)")
     add_arguments(parser)
@@ -100,9 +99,3 @@ def _tell(event: Act, start: float, sensor: str, as_json: bool) -> None:
     name = event.label if event.label == event.kind else f"no gesture ({event.kind.replace('_', ' ')})"
     words = f"performed {name}, {event.speed}, {event.offset_s - event.onset_s:.2f} s"
     tell(as_json, performed, words)
-
-
-def _sensor(text: str) -> str:
-    if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", text):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected 1 to 64 of A-Z a-z 0-9 _ -")
-    return text

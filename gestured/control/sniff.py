@@ -10,11 +10,12 @@ import threading
 import time
 from collections.abc import Iterator
 
-from gestured.client.address import host_port
 from gestured.client.control import Control
 from gestured.client.holder import bind_failure
 from gestured.client.lines import Unreachable
+from gestured.client.program import Commands
 from gestured.client.say import say, shown, tell
+from gestured.client.values import host_port
 from gestured.control.address import add_sockets, connect, finish_on_signals
 from gestured.control.proposal import LONGEST_ADDRESS, TRAJECTORY, Known, propose, split_address
 from gestured.control.sight import Seen, Sight
@@ -25,14 +26,13 @@ SHOWN_CHARACTERS = 80  # characters of an address or of type tags
 NOT_TAKEN = {"d": "doubles", "h": "64-bit integers"}  # by type tag
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "sniff",
         help="show which OSC messages arrive",
         description="Show the OSC messages that reach the daemon (or, with --listen, a port where no daemon is),\n"
         "with type tags and rates, and propose [addresses] and grid for them.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl sniff --seconds 3\n  gesturectl sniff --listen 0.0.0.0:9000",
     )
     parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help="how long (default: 5)")

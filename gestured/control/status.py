@@ -12,6 +12,7 @@ from typing import Any
 from gestured.client.address import SYSTEM, find_all_controls
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable
+from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json, tell
 from gestured.control.address import add_sockets, connect
 from gestured.control.shadow import words as shadow_words
@@ -26,14 +27,13 @@ RATES = f"{RANGE_HZ[0]:.0f} to {RANGE_HZ[1]:.0f} Hz"
 SENSOR_LINES = 12  # lines; what is more is counted
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "status",
         help="how the daemon is, on one screen",
         description="Show sensors, rates, health, model and the last answers of a running daemon.\n"
         "Exit status 1 if it is not ready.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl status --watch\n  gesturectl status --all\n  gesturectl status --json",
     )
     parser.add_argument("--watch", action="store_true", help="again every second, until Ctrl-C")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gestured.client.program import Commands
 from gestured.client.say import say, say_json
 from gestured.control.diff import Recorded
 from gestured.control.labelled import Labelled
@@ -22,7 +23,7 @@ BAR = 36  # characters
 SHORTEST_S = 60.0  # of recordings without gestures: in less, nothing can be told
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "tune",
@@ -31,7 +32,6 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         "gestures is missed and wrong, and how many events an hour nobody meant. An .npz says what was\n"
         'performed; a tape of gesturectl record counts as "other things": whatever is published in it is\n'
         "false. A performance before the sensor was known is left out.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl tune recordings/07.npz recordings/08.npz\n"
         "  gesturectl tune recordings/07.npz evening.mcap --model my.onnx",
     )

@@ -5,6 +5,7 @@ import sys
 from typing import Any
 
 from gestured.client.lines import Unreachable
+from gestured.client.program import Commands
 from gestured.control.address import add_sockets, connect
 from gestured.control.screen import Felt, Screen, in_colour
 from gestured.core.errors import GesturedError
@@ -12,14 +13,13 @@ from gestured.core.errors import GesturedError
 SHOWN = ("provisional", "gesture", "unknown", "cancelled")
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "watch",
         help="a sensor at the terminal, the finger as it moves",
         description="Draw a sensor of the running daemon as it is felt, with the direction of the finger,\n"
         "phase, activity and answers, provisional ones too, until Ctrl-C. 80 x 24 characters are enough.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="example:\n  gesturectl watch armrest",
     )
     parser.add_argument("sensor", metavar="SENSOR", help="its name; gesturectl status lists them")

@@ -6,8 +6,9 @@ import os
 import signal
 from pathlib import Path
 
-from gestured.client.address import bind_address
+from gestured.client.program import Commands
 from gestured.client.say import tell
+from gestured.client.values import bind_address
 from gestured.control.address import add_sockets, connect, control_path
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
@@ -16,7 +17,7 @@ NICE = 10  # steps: a picture for the eye waits for the daemon, and for whoever 
 DEFAULT = Address("127.0.0.1", 9109)
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "view",
@@ -24,7 +25,6 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         description="Serve one page on this machine that shows the matrix as it is felt, the activity and its\n"
         "thresholds, and every answer with its scores. Prints the page's address: it works once, for the\n"
         "browser that opens it. Nothing is opened by itself.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl view\n  gesturectl view --listen 127.0.0.1:0 --folder flagged",
     )
     text = f"where the page is served, a loopback address (default: {DEFAULT}; port 0: any)"

@@ -6,10 +6,8 @@ from collections.abc import Callable
 from datetime import date
 from pathlib import Path
 
-from gestured.client.address import host_port
-from gestured.client.grid import rows_by_columns
+from gestured.client.values import host_port, number, rows_by_columns, sensor_name
 from gestured.core.address import Address
-from gestured.core.osc_address import is_sensor
 from gestured.core.own import is_name
 from gestured.lab.recordings.protocol import pseudonym
 from gestured.lab.recordings.sources import UNNAMED
@@ -43,7 +41,7 @@ def add_recordings(command: Add) -> None:
     collect.add_argument("--out", type=Path, default=FOLDER, help=f"folder for NAME.npz ({FOLDER})")
     collect.add_argument("--listen", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT",
                          help="where the sensor sends to (127.0.0.1:9000)")  # fmt: skip
-    collect.add_argument("--sensor", type=_sensor, metavar="NAME", help="which sensor (the first that sends)")
+    collect.add_argument("--sensor", type=sensor_name, metavar="NAME", help="which sensor (the first that sends)")
     collect.add_argument(
         "--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="its rows and columns (9x9)"
     )
@@ -82,12 +80,6 @@ def add_recordings(command: Add) -> None:
     forget.add_argument("--dry-run", action="store_true", help="say what would be removed, and remove nothing")
 
 
-def _sensor(text: str) -> str:
-    if not is_sensor(text):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected 1 to 64 of A-Z a-z 0-9 _ -")
-    return text
-
-
 def _gestures(text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(_own(name) for name in text.split(",")))
 
@@ -117,19 +109,5 @@ def _day(text: str) -> str:
         raise argparse.ArgumentTypeError(f"{text!r}: expected a day such as 2026-01-31") from None
 
 
-def _within(low: float, high: float, whole: bool) -> Callable[[str], float]:
-    def parse(text: str) -> float:
-        try:
-            value = int(text) if whole else float(text)
-        except ValueError:
-            value = float("nan")
-        if not low <= value <= high:
-            kind = "a whole number" if whole else "a number"
-            raise argparse.ArgumentTypeError(f"{text!r}: expected {kind} from {low:g} to {high:g}")
-        return value
-
-    return parse
-
-
-_count = _within(1, 100, whole=True)
-_seconds = _within(0, 60, whole=True)
+_count = number(1, 100, whole=True)
+_seconds = number(0, 60, whole=True)

@@ -1,19 +1,21 @@
-"""`gesturectl enrol`: a gesture of one's own, performed a few times."""
+"""`gesturectl enrol`, `gestures` and `forget`: gestures of one's own, taught, listed and forgotten."""
 
 import argparse
 from typing import Any
 
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable
+from gestured.client.program import Commands
 from gestured.client.say import say, say_json
 from gestured.control.address import add_sockets, connect
+from gestured.control.operate import asks
 from gestured.core.own import is_name
 
 EXAMPLES = 3
 
 
-def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the subcommand to gesturectl's command line."""
+def add(commands: Commands) -> None:
+    """Add the three subcommands to gesturectl's command line."""
     parser = commands.add_parser(
         "enrol",
         help="teach a gesture of your own",
@@ -21,7 +23,6 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
         "judged at once; one that is not kept is done again. From then on it is recognised on every sensor,\n"
         "without a restart. Ctrl-C gives it up, and nothing has changed. What is performed meanwhile is still\n"
         "published as whatever it is taken for.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="examples:\n  gesturectl enrol knock --sensor armrest\n"
         "  gesturectl enrol wave --sensor armrest --examples 5",
     )
@@ -32,10 +33,28 @@ def add(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None
     )
     add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=enrol)
+    parser = commands.add_parser(
+        "gestures",
+        help="list the gestures, and your own",
+        description="List the model's gestures that are in use, and your own with how many examples each has.",
+        epilog="example:\n  gesturectl gestures",
+    )
+    add_sockets(parser)
+    parser.add_argument("--json", action="store_true", help="print the daemon's answer as JSON")
+    parser.set_defaults(run=gestures)
+    parser = commands.add_parser(
+        "forget",
+        help="forget a gesture of your own",
+        description="Have the daemon recognise a gesture of your own no longer. Nothing of its examples stays in the\n"
+        "daemon's files; a recording that somebody made keeps what it holds.",
+        epilog="example:\n  gesturectl forget knock",
+    )
+    parser.add_argument("name", metavar="NAME", help="the gesture's name")
+    asks(parser, "forget", lambda answer: f"forgot {answer['forgotten']}", "name")
 
 
-def run(args: argparse.Namespace) -> int:
+def enrol(args: argparse.Namespace) -> int:
     """Enrol it; 1 where it was given up."""
     with connect(args) as control:
         control.ask("enrol", name=args.name, sensor=args.sensor, examples=args.examples)
@@ -45,6 +64,22 @@ def run(args: argparse.Namespace) -> int:
             return _follow(control, args)
         except KeyboardInterrupt:
             return 1
+
+
+def gestures(args: argparse.Namespace) -> int:
+    """Print the model's gestures and one's own."""
+    with connect(args) as control:
+        answer = control.ask("gestures")
+    if args.json:
+        say_json({key: value for key, value in answer.items() if key != "ok"})
+        return 0
+    own = answer["own"]
+    say(*(f"{name:<32} {answer['model']}" for name in answer["gestures"]))
+    say(*(f"{name:<32} your own, {count} examples" for name, count in own["gestures"].items()) or ["none of your own"])
+    for sentence in (own["fault"], own["gestures"] and own["off"], *own["doubtful"]):
+        if sentence:
+            say(f"  {sentence}")
+    return 0
 
 
 def _follow(control: Control, args: argparse.Namespace) -> int:

@@ -1,0 +1,43 @@
+"""What programs with subcommands have in common: their help, and what is said where one fails."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import gestured
+from gestured.client.lines import JOIN, Forbidden
+from gestured.client.say import say
+from gestured.core.errors import GesturedError
+
+
+class Parser(argparse.ArgumentParser):
+    """A command line, or that of a subcommand; descriptions and examples keep their line breaks."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{"formatter_class": argparse.RawDescriptionHelpFormatter} | options)
+
+
+# Where subcommands add themselves; argparse has no public name for it.
+Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
+
+
+def program(name: str, kind: str, description: str, epilog: str) -> tuple[Parser, Commands]:
+    """The command line of a program, and where its subcommands, each called a `kind`, add themselves and set `run`."""
+    parser = Parser(prog=name, description=description, epilog=epilog)
+    parser.add_argument("--version", action="version", version=f"{name} {gestured.__version__}")
+    return parser, parser.add_subparsers(metavar=kind, required=True)
+
+
+def run(parser: Parser, argv: Sequence[str] | None) -> int:
+    """Run the subcommand that is asked for: its exit status, 0 after Ctrl-C, 1 and a sentence where it fails."""
+    args = parser.parse_args(argv)
+    try:
+        status: int = args.run(args)
+    except GesturedError as error:
+        remedy = f" ({JOIN})" if isinstance(error, Forbidden) else ""
+        say(f"{parser.prog}: {error}{remedy}", to=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 0
+    return status

@@ -1,0 +1,71 @@
+"""Values on a command line, as argparse's `type` takes them: read, or refused in one sentence."""
+
+import re
+from argparse import ArgumentTypeError
+from collections.abc import Callable, Sequence
+
+from gestured.core.address import Address
+from gestured.core.osc_address import is_sensor
+
+
+def host_port(text: str) -> Address:
+    """The address of a peer, whose port is known."""
+    try:
+        address = Address.parse(text)
+        if address.port:
+            return address
+    except ValueError:
+        pass  # said below, with an example
+    raise ArgumentTypeError(f"{text!r}: expected HOST:PORT, such as 127.0.0.1:9000")
+
+
+def bind_address(text: str) -> Address:
+    """An address of our own, where port 0 means any free one."""
+    try:
+        return Address.parse(text)
+    except ValueError as error:
+        raise ArgumentTypeError(f"{text!r}: expected {error}") from None
+
+
+def rows_by_columns(text: str) -> tuple[int, int]:
+    """Rows and columns of a sensor."""
+    match = re.fullmatch(r"(\d{1,2})x(\d{1,2})", text)
+    if match is None or not all(2 <= int(number) <= 64 for number in match.groups()):
+        raise ArgumentTypeError(f"{text!r}: expected ROWSxCOLUMNS, each from 2 to 64, such as 9x9")
+    return int(match[1]), int(match[2])
+
+
+def sensor_name(text: str) -> str:
+    """The name of a sensor."""
+    if not is_sensor(text):
+        raise ArgumentTypeError(f"{text!r}: expected 1 to 64 of A-Z a-z 0-9 _ -")
+    return text
+
+
+def number(low: float, high: float, *, whole: bool = False) -> Callable[[str], float]:
+    """Reads a number in these bounds."""
+
+    def read(text: str) -> float:
+        try:
+            value = int(text) if whole else float(text)
+        except ValueError:
+            value = float("nan")
+        if not low <= value <= high:
+            kind = "a whole number" if whole else "a number"
+            raise ArgumentTypeError(f"{text!r}: expected {kind} from {low:g} to {high:g}")
+        return value
+
+    return read
+
+
+def some_of(known: Sequence[str]) -> Callable[[str], list[str]]:
+    """Reads words with commas between them, each of them `known`."""
+
+    def read(text: str) -> list[str]:
+        words = [word.strip() for word in text.split(",") if word.strip()]
+        unknown = [word for word in words if word not in known]
+        if unknown or not words:
+            raise ArgumentTypeError(f"{', '.join(unknown) or repr(text)}: expected some of {', '.join(known)}")
+        return words
+
+    return read
