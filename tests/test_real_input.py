@@ -1,12 +1,10 @@
 """Frames that nobody here wrote or made: an OSC tool of Debian's, python-osc's client, real fingers."""
 
-import json
 import shutil
+import signal
 import socket
 import subprocess
-import sys
 import time
-import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,10 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gestured.client.stream import Stream
-from gestured.core.address import Address
 from gestured.model.shipped import shipped
 from tests import encoding
+from tests.daemon.harness import Daemon
 
 ROOT = Path(__file__).resolve().parents[1]
 SESSIONS = ROOT.parent / "shared" / "data" / "capfingerid_sessions_dev.npz"
@@ -28,60 +25,13 @@ BATCH = 400  # frames on the way at once: fewer than a socket's buffer holds
 pytestmark = pytest.mark.e2e
 
 
-class Daemon:
-    """The real daemon as a process, with the shipped model."""
-
-    def __init__(self, folder: Path, *flags: str) -> None:
-        path = folder / "events.sock"
-        command = [
-            sys.executable,
-            "-m",
-            "gestured.daemon",
-            "--listen",
-            "127.0.0.1:0",
-            "--metrics",
-            "127.0.0.1:0",
-        ]
-        self.process = subprocess.Popen(
-            [*command, "--socket", str(path), "--model", str(shipped()["cnn_lstm"]), *flags],
-            cwd=ROOT,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )
-        assert self.process.stdout is not None
-        self.ready: dict[str, Any] = json.loads(self.process.stdout.readline())
-        self.ending = False
-        self.port = Address.parse(self.ready["listen"]).port
-
-    def stream(self, *types: str) -> Stream:
-        return Stream(Path(self.ready["socket"]), {"types": types})
-
-    def frames(self) -> int:
-        """How many frames it has looked at, whatever became of them."""
-        with urllib.request.urlopen(f"http://{self.ready['metrics']}/metrics", timeout=10) as answer:
-            lines = answer.read().decode().splitlines()
-        return int(sum(float(line.split()[-1]) for line in lines if line.startswith("gestured_frames_total")))
-
-    def end(self) -> None:
-        """Ask it to end, once; what it has still to say, it says before."""
-        if not self.ending:
-            self.ending = True
-            self.process.terminate()
-
-    def close(self) -> int:
-        self.end()
-        status = self.process.wait(20)
-        self.process.stdout.close()
-        return status
-
-
 @pytest.fixture
 def daemon(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Daemon]:
     if not shipped()["cnn_lstm"].exists():
         pytest.skip(f"{shipped()['cnn_lstm']} is not there")
-    running = Daemon(tmp_path, *getattr(request, "param", ()))
+    running = Daemon.start(tmp_path, "cnn_lstm", "--metrics", "127.0.0.1:0", *getattr(request, "param", ()))
     yield running
-    assert running.close() == 0
+    assert running.stop() == 0
 
 
 def tap() -> Iterator[list[int]]:
@@ -97,25 +47,17 @@ def tap() -> Iterator[list[int]]:
         yield frame.ravel().tolist()
 
 
-def answered(stream: Stream) -> dict[str, dict[str, Any]]:
-    """The events of one contact by type."""
-    seen: dict[str, dict[str, Any]] = {}
-    for event in stream:
-        seen[event["type"]] = event
-        if "release" in seen and {"gesture", "unknown", "cancelled"} & seen.keys():
-            return seen
-    raise AssertionError(f"the daemon closed the stream after {seen}")
-
-
 def check_tap(daemon: Daemon, send: Any) -> None:
-    stream = daemon.stream("onset", "gesture", "unknown", "cancelled", "release")
+    client = daemon.client().subscribe("onset", "gesture", "unknown", "cancelled", "release")
     for values in tap():
         send(values)
-    seen = answered(stream)
-    stream.close()
+    seen: dict[str, dict[str, Any]] = {}
+    while not ("release" in seen and {"gesture", "unknown", "cancelled"} & seen.keys()):
+        event = client.line()
+        seen[event["type"]] = event
     assert seen["onset"]["sensor"] == "armrest"
     assert seen["gesture"]["gesture"] == "one_tap"
-    assert seen["gesture"]["scores"].keys() == set(stream.hello["gestures"])
+    assert seen["gesture"]["scores"].keys() == set(client.hello["gestures"])
 
 
 def test_frames_from_oscsend(daemon: Daemon):
@@ -123,7 +65,7 @@ def test_frames_from_oscsend(daemon: Daemon):
         pytest.skip("oscsend is not installed: apt install liblo-tools")
 
     def send(values: list[int]) -> None:
-        address = ["oscsend", "127.0.0.1", str(daemon.port), "/armrest/pressure", "i" * len(values)]
+        address = ["oscsend", "127.0.0.1", str(daemon.address.port), "/armrest/pressure", "i" * len(values)]
         subprocess.run([*address, *map(str, values)], check=True, timeout=10)
 
     check_tap(daemon, send)
@@ -132,7 +74,7 @@ def test_frames_from_oscsend(daemon: Daemon):
 def test_frames_from_python_osc(daemon: Daemon):
     from pythonosc.udp_client import SimpleUDPClient
 
-    client = SimpleUDPClient("127.0.0.1", daemon.port)
+    client = SimpleUDPClient(*daemon.address)
     check_tap(daemon, lambda values: client.send_message("/armrest/pressure", [float(value) for value in values]))
 
 
@@ -144,11 +86,11 @@ def test_real_fingers(daemon: Daemon):
     with np.load(SESSIONS, allow_pickle=False) as data:
         sessions = dict(data)
     chosen = (1, 4, 8)
-    stream = daemon.stream("gesture", "release")
+    client = daemon.client().subscribe("gesture", "release")
     begun = {number: send_session(daemon, sessions, number) for number in chosen}
     assert daemon.process.poll() is None
-    daemon.end()
-    events = [event for event in stream if event["type"] == "gesture"]
+    daemon.signal(signal.SIGTERM)  # what it has still to say, it says before it ends
+    events = [event for event in client.rest() if event["type"] == "gesture"]
     right = wrong = performed = 0
     for number in chosen:
         heard = [event for event in events if event["sensor"] == f"session-{number}"]
@@ -174,19 +116,25 @@ def overlap(event: dict[str, Any], onset: float, offset: float) -> bool:
     return bool(min(event["offset"], offset) - max(event["onset"], onset) > -0.2)
 
 
+def frames(daemon: Daemon) -> int:
+    """How many frames it has looked at, whatever became of them."""
+    lines = daemon.get("/metrics")[1].splitlines()
+    return round(sum(float(line.split()[-1]) for line in lines if line.startswith("gestured_frames_total")))
+
+
 def send_session(daemon: Daemon, sessions: dict[str, np.ndarray], number: int) -> float:
     """Sends one session as fast as the daemon takes it; returns the epoch time of the recording's time 0."""
     first, last = sessions["offsets"][number : number + 2]
     times = sessions["times"][first:last]
-    before = daemon.frames()
+    before = frames(daemon)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.connect(("127.0.0.1", daemon.port))
+        sender.connect(daemon.address)
         begun = time.time()
         for n, (t, frame) in enumerate(zip(times.tolist(), sessions["frames"][first:last], strict=True)):
             address = f"/session-{number}/pressure"
             message = encoding.message(address, "ib", [n, frame.astype(np.uint8).tobytes()])
             sender.send(encoding.bundle([message], begun + t))
             if n % BATCH == BATCH - 1 or n == len(times) - 1:
-                while daemon.frames() < before + n + 1:
+                while frames(daemon) < before + n + 1:
                     pass  # each look is a request over HTTP: the daemon sets the pace
     return begun - float(times[0])
