@@ -1,4 +1,4 @@
-"""What the documents say is so: flags are described, commands are valid, examples run."""
+"""What the documents say is so: flags are described, and the README's examples run."""
 
 import argparse
 import json
@@ -6,16 +6,12 @@ import re
 import shlex
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
 
-from gestured.bridge.cli import parser as bridge_parser
-from gestured.control.cli import parser as gesturectl_parser
-from gestured.daemon.cli import parser as gestured_parser
-from gestured.lab.cli import parser as lab_parser  # imports no torch
 from gestured.model.shipped import shipped
+from tests.programs import PARSERS, subcommands
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
@@ -32,102 +28,40 @@ def flags(parser: argparse.ArgumentParser) -> set[str]:
     return found - {"--help"}
 
 
-def commands(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            return dict(action.choices)
-    return {}
-
-
 def row(start: str) -> str:
     """The line of a table in the documents that begins with this cell."""
     (line,) = [line for line in DOCUMENTS.splitlines() if line.startswith(f"| `{start}`")]
     return line
 
 
-@pytest.mark.parametrize("flag", sorted(flags(gestured_parser())))
+@pytest.mark.parametrize("flag", sorted(flags(PARSERS["gestured"])))
 def test_each_flag_of_the_daemon_has_its_row(flag: str):
     assert row(flag)
 
 
 def test_no_row_describes_a_flag_that_is_gone():
     rows = set(re.findall(r"^\| `(--[a-z0-9-]+)`", DOCUMENTS, re.MULTILINE))
-    assert rows == flags(gestured_parser())
+    assert rows == flags(PARSERS["gestured"])
 
 
-TOOLS = {
-    "gesturectl": commands(gesturectl_parser()),
-    "gestured-bridge": commands(bridge_parser()),
-    "gestured-lab": commands(lab_parser()),
-}
-EACH = [(tool, command) for tool, found in TOOLS.items() for command in sorted(found)]
+EACH = [(tool, command) for tool in PARSERS for command in sorted(subcommands(tool))]
 
 
 @pytest.mark.parametrize(("tool", "command"), EACH, ids=[" ".join(pair) for pair in EACH])
 def test_each_subcommand_has_its_row_and_flags(tool: str, command: str):
     described = row(f"{tool} {command}")
-    own = flags(TOOLS[tool][command])
+    own = flags(subcommands(tool)[command])
     named = set(re.findall(r"`(--[a-z0-9-]+)`", described))
     assert named <= own
     (other,) = re.findall(r"flags of `([a-z]+)`", described) or [None]
     if other is not None:
-        own -= flags(TOOLS[tool][other])
+        own -= flags(subcommands(tool)[other])
     assert own <= named
 
 
 def test_no_row_describes_a_subcommand_that_is_gone():
     rows = re.findall(r"^\| `(gesturectl|gestured-bridge|gestured-lab) ([a-z-]+)`", DOCUMENTS, re.MULTILINE)
     assert sorted(rows) == sorted(EACH)
-
-
-def test_shell_blocks_hold_valid_commands():
-    targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    seen = 0
-    for line in "".join(blocks("sh")).replace("\\\n", " ").splitlines():
-        program, *arguments = shlex.split(line, comments=True) or [""]
-        match program.rsplit("/", 1)[-1]:
-            case "":
-                continue
-            case "make":
-                assert [word for word in arguments if "=" not in word][0] in targets, line
-            case "gestured":
-                gestured_parser().parse_args(arguments)
-            case "gesturectl":
-                gesturectl_parser().parse_args(arguments)
-            case "gestured-bridge":
-                bridge_parser().parse_args(arguments)
-            case "gestured-lab" if arguments == ["--help"]:
-                pass
-            case "gestured-lab":
-                lab_parser().parse_args(arguments)
-            case "." | "pip" | "git" | "cd" | "mosquitto_sub":
-                continue
-            case _:
-                raise AssertionError(f"README: {line!r} is no command that a test knows")
-        seen += 1
-    assert seen > 5
-
-
-def test_the_configuration_in_the_readme_is_valid(tmp_path: Path):
-    (text,) = blocks("toml")
-    tomllib.loads(text)
-    (tmp_path / "gestured.toml").write_text(text)
-    command = [
-        sys.executable,
-        "-m",
-        "gestured.daemon",
-        "--config",
-        str(tmp_path / "gestured.toml"),
-        "--explain",
-    ]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
-    assert "armrest" in done.stdout
-
-
-def test_every_link_in_the_readme_leads_somewhere():
-    for target in re.findall(r"\]\(([^)#]+)\)", README):
-        assert (ROOT / target).exists(), target
 
 
 def test_the_subscriber_in_the_readme_prints_gestures(tmp_path: Path):

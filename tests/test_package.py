@@ -1,6 +1,5 @@
 """What is installed: the wheel's contents, its programs, and that it runs without the extras."""
 
-import argparse
 import importlib.util
 import os
 import shlex
@@ -16,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from gestured.control.cli import parser as gesturectl_parser
+from tests.programs import PARSERS, subcommands
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -41,13 +40,6 @@ for name in names:
     if not name.startswith("gestured.lab"):
         importlib.import_module(name)
 """
-
-
-def subcommands(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            return dict(action.choices)
-    return {}
 
 
 def python_without(
@@ -172,20 +164,20 @@ def test_without_the_extra_the_lab_says_what_to_install(installed: Path, tmp_pat
     assert "gestured[lab]" in done.stderr or "make lab" in done.stderr
 
 
-@pytest.mark.parametrize("command", sorted(subcommands(gesturectl_parser())))
+@pytest.mark.parametrize("command", sorted(subcommands("gesturectl")))
 def test_each_subcommand_shows_an_example_that_is_valid(command: str):
-    help_text = subcommands(gesturectl_parser())[command].format_help()
+    help_text = subcommands("gesturectl")[command].format_help()
     examples = [line.strip() for line in help_text.splitlines() if line.strip().startswith("gesturectl ")]
     assert examples
     for example in examples:
         program, *arguments = shlex.split(example)
         assert arguments[0] == command
-        gesturectl_parser().parse_args(arguments)
+        PARSERS["gesturectl"].parse_args(arguments)
 
 
 def test_what_prints_a_table_prints_json_too():
     others = {"watch", "names"}  # a picture, and one name a line: no tables
-    for name, parser in subcommands(gesturectl_parser()).items():
+    for name, parser in subcommands("gesturectl").items():
         assert ("--json" in parser.format_help()) != (name in others), name
 
 

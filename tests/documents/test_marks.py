@@ -2,17 +2,12 @@
 
 import re
 import shlex
-from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from gestured.bridge.cli import parser as bridge_parser
-from gestured.control.cli import parser as gesturectl_parser
-from gestured.daemon.cli import parser as gestured_parser
-from gestured.lab.cli import parser as lab_parser  # imports no torch
 from tests.documents.blocks import ROOT, Block, blocks, documents
+from tests.programs import PARSERS, subcommands
 
 CHECKED = {
     "the schema",  # these three by test_formats.py
@@ -20,12 +15,7 @@ CHECKED = {
     "gestured --explain",
     "the command line",  # below: its programs take it
 }
-PARSERS = {
-    "gestured": gestured_parser(),
-    "gesturectl": gesturectl_parser(),
-    "gestured-bridge": bridge_parser(),
-    "gestured-lab": lab_parser(),
-}
+TARGETS = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
 
 
 @pytest.mark.parametrize("block", blocks(), ids=str)
@@ -51,30 +41,26 @@ CONTAINER = {"docs/operating.md", "docs/troubleshooting.md", "docs/sensors.md", 
 
 
 def commands(block: Block) -> list[list[str]]:
-    """Calls of our programs in a shell example."""
+    """Calls of our programs, and of make, in a shell example."""
     text = re.sub(r"<<'EOF'.*?^EOF$", "", block.text.replace("\\\n", " "), flags=re.MULTILINE | re.DOTALL)
     parts = [part.strip() for line in text.splitlines() for part in re.split(r"\|\|?|&&|;", line.split("#")[0])]
     words = [shlex.split(part.removeprefix("sudo ")) for part in parts if part and "'*" not in part]
-    return [found for found in words if found and found[0] in PARSERS]
+    return [found for found in words if found and found[0] in (*PARSERS, "make")]
 
 
 @pytest.mark.parametrize("block", [block for block in blocks() if block.language == "sh"], ids=str)
 def test_each_command_is_valid(block: Block):
     for program, *arguments in commands(block):
-        PARSERS[program].parse_args(arguments)
+        if program == "make":
+            assert {word for word in arguments if "=" not in word} <= set(TARGETS)
+        else:
+            PARSERS[program].parse_args(arguments)
 
 
 def test_each_command_in_the_text_exists():
-    names = {command.prog.split()[-1] for command in subparsers()}
     for path in documents():
         for found in re.findall(r"`gesturectl ([a-z]+)", path.read_text()):
-            assert found in names, f"{path.name}: gesturectl {found}"
-
-
-def subparsers() -> Iterable[Any]:
-    """gesturectl's subcommands."""
-    (action,) = [a for a in PARSERS["gesturectl"]._actions if isinstance(getattr(a, "choices", None), dict)]
-    return action.choices.values()
+            assert found in subcommands("gesturectl"), f"{path.name}: gesturectl {found}"
 
 
 def heads(path: Path) -> set[str]:
