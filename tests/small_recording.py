@@ -1,5 +1,7 @@
 """Two small recordings, and what tests do with them."""
 
+import io
+import zipfile
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -71,3 +73,21 @@ def save(path: Path, recordings: Recordings, **changes: object) -> Path:
     arrays = {name: getattr(recordings, name) for name in FIELDS} | changes
     np.savez(path, allow_pickle=True, **{k: v for k, v in arrays.items() if v is not None})
     return path
+
+
+def archive_of(path: Path, **members: bytes) -> Path:
+    """The example as an archive with these members more, or others."""
+    save(path, example())
+    with zipfile.ZipFile(path) as archive:
+        held = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in (held | members).items():
+            archive.writestr(name, data)
+    return path
+
+
+def header(dtype: str, shape: tuple[int, ...]) -> bytes:
+    """What stands before an array's values in an .npy member."""
+    buffer = io.BytesIO()
+    np.lib.format.write_array_header_1_0(buffer, {"descr": dtype, "fortran_order": False, "shape": shape})
+    return buffer.getvalue()

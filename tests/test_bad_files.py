@@ -1,6 +1,5 @@
 """Files that are small and want to be large, and files that are damaged: one sentence, in bounded memory."""
 
-import io
 import os
 import struct
 import warnings
@@ -12,16 +11,10 @@ import numpy as np
 import pytest
 
 from tests.opening import in_bounds, refused
-from tests.small_recording import FIELDS, example, save
+from tests.small_recording import FIELDS, archive_of, example, header, save
 
 MIB = 128  # for a file; the bombs below want twice as much or more
 NPY = b"\x93NUMPY"
-
-
-def header(dtype: str, shape: tuple[int, ...]) -> bytes:
-    buffer = io.BytesIO()
-    np.lib.format.write_array_header_1_0(buffer, {"descr": dtype, "fortran_order": False, "shape": shape})
-    return buffer.getvalue()
 
 
 def bomb(path: Path, **big: tuple[str, tuple[int, ...]]) -> Path:
@@ -98,17 +91,6 @@ def test_what_is_good_takes_its_own_size_once(tmp_path: Path) -> None:
     assert in_bounds("npz_alone", tmp_path / "r.npz", 112)[0] == ""
 
 
-def archive_of(path: Path, **members: bytes) -> Path:
-    """The example with these members more, or others."""
-    save(path, example())
-    with zipfile.ZipFile(path) as archive:
-        held = {name: archive.read(name) for name in archive.namelist()}
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, data in (held | members).items():
-            archive.writestr(name, data)
-    return path
-
-
 def test_a_header_that_is_larger_than_any_is_not_read(tmp_path: Path) -> None:
     path = archive_of(tmp_path / "r.npz")
     with zipfile.ZipFile(path) as archive:
@@ -134,12 +116,13 @@ def test_names_that_lead_elsewhere_are_refused(tmp_path: Path, name: str) -> Non
     assert "expected names without folders" in refused("npz", archive_of(tmp_path / "r.npz", **{name: b""}))
 
 
-def test_a_name_that_is_there_twice_is_refused_whatever_it_names(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("name", "said"), [("mine.npy", "mine.npy"), ("times.npy", "times")])
+def test_a_name_that_is_there_twice_is_refused_whatever_it_names(tmp_path: Path, name: str, said: str) -> None:
     path = archive_of(tmp_path / "r.npz", **{"mine.npy": b"x"})
     with warnings.catch_warnings(), zipfile.ZipFile(path, "a") as archive:
         warnings.simplefilter("ignore", UserWarning)
-        archive.writestr("mine.npy", b"y")
-    assert "mine.npy: is there twice" in refused("npz", path)
+        archive.writestr(name, archive.read(name))
+    assert f": {said}: is there twice" in refused("npz", path)
 
 
 def test_the_size_that_the_archive_says_must_be_the_headers(tmp_path: Path) -> None:
