@@ -5,7 +5,9 @@ import json
 import locale
 import os
 import signal
+import socket
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ from hypothesis import HealthCheck, settings
 
 from gestured.model.shipped import LADDER
 from tests.small_model import build
+from tests.sockets import PATIENCE_S, FakeDaemon
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ("PATH", "LD_LIBRARY_PATH")  # programs and libraries are where this machine has them
@@ -55,6 +58,24 @@ _cleaned = clean_environment()  # before any test module is imported
 # No test asserts a time, and on a loaded machine Hypothesis' own limits would be one.
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")
+
+
+@pytest.fixture
+def udp() -> Iterator[socket.socket]:
+    """A UDP socket on the loopback that keeps what is sent to it."""
+    with socket.socket(type=socket.SOCK_DGRAM) as receiver:
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(PATIENCE_S)
+        yield receiver
+
+
+@pytest.fixture
+def fake(tmp_path: Path) -> Iterator[FakeDaemon]:
+    """An event socket that says what the test tells it to."""
+    daemon = FakeDaemon(tmp_path / "events.sock")
+    yield daemon
+    daemon.listener.close()
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,9 @@ from typing import Any
 import pytest
 
 from gestured.client.control import Control
-from tests.control.conftest import FakeDaemon
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon
+from tests.sockets import free_address
 
 
 class Process:
@@ -73,11 +74,10 @@ def wait(look: Callable[[], Any], explain: Callable[[], object] = lambda: "it di
     return found
 
 
-def free_port() -> int:
-    """A port that nobody has now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+def page(address: str) -> str:
+    """What Prometheus is told."""
+    with urllib.request.urlopen(f"http://{address}/metrics", timeout=DEADLINE_S) as answer:
+        return answer.read().decode()
 
 
 @pytest.fixture
@@ -110,14 +110,6 @@ def daemon(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Da
     assert daemon.stop() == 0, daemon.stderr()
 
 
-@pytest.fixture
-def fake(tmp_path: Path) -> Iterator[FakeDaemon]:
-    """An event socket that says what the test tells it to."""
-    daemon = FakeDaemon(tmp_path / "events.sock")
-    yield daemon
-    daemon.listener.close()
-
-
 def emit(daemon: Daemon, gesture: str, sensor: str = "armrest") -> None:
     """A made-up event of a real daemon."""
     with Control(daemon.socket.with_suffix(".ctl")) as control:
@@ -131,7 +123,7 @@ class Broker:
         program = shutil.which("mosquitto", path=f"{os.environ['PATH']}:/usr/sbin")
         if program is None:
             pytest.skip("mosquitto is not installed (apt-get install mosquitto)")
-        self.port = free_port()
+        self.port = free_address(socket.SOCK_STREAM).port
         self._log = folder / "mosquitto.txt"
         file = folder / "mosquitto.conf"
         file.write_text("\n".join([f"listener {self.port} 127.0.0.1", *(lines or ["allow_anonymous true"])]) + "\n")

@@ -4,18 +4,18 @@ import json
 import queue
 import re
 import signal
+import socket
 import ssl
 import subprocess
-import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.bridge.conftest import Broker, Process, emit, free_port, wait
-from tests.control.conftest import HELLO, FakeDaemon
+from tests.bridge.conftest import Broker, Process, emit, page, wait
 from tests.daemon.harness import DEADLINE_S, Daemon
+from tests.sockets import HELLO, FakeDaemon, free_address
 
 paho = pytest.importorskip("paho.mqtt.client", reason="the bridge to MQTT needs the extra [mqtt]")
 pytest.importorskip("aiomqtt", reason="the bridge to MQTT needs the extra [mqtt]")
@@ -337,12 +337,6 @@ def test_a_daemon_that_starts_again_is_found(bridge, broker, listen, fake):
     assert listener.events(1)[0]["instance"] == "b"
 
 
-def page(address: str) -> str:
-    """What Prometheus is told."""
-    with urllib.request.urlopen(f"http://{address}/metrics", timeout=DEADLINE_S) as answer:
-        return answer.read().decode()
-
-
 def test_metrics(bridge, broker, listen, fake):
     at = broker()
     listener = listen(at.port, "gestured/#")
@@ -473,8 +467,7 @@ def test_credentials_that_everybody_can_read_are_refused(bridge, tmp_path: Path)
 
 
 def test_a_broker_that_is_not_there_yet_is_waited_for(bridge, fake):
-    port = free_port()
-    process = bridge("mqtt", "--broker", f"127.0.0.1:{port}", "--socket", fake.path)
+    process = bridge("mqtt", "--broker", free_address(socket.SOCK_STREAM), "--socket", fake.path)
     assert "Connection refused" in process.until("trying again")
     assert process.stop() == 0
 

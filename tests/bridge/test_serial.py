@@ -17,9 +17,10 @@ import pytest
 
 from gestured.core.osc_address import Addresses
 from gestured.core.wire import Decoder
-from tests.bridge.conftest import Process, wait
+from tests.bridge.conftest import Process, page, wait
 from tests.bridge.test_protocols import written
 from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, blob, floats
+from tests.sockets import free_address
 
 pytest.importorskip("serial", reason="the bridge from serial lines needs the extra [serial]")
 
@@ -74,16 +75,6 @@ def line(tmp_path: Path) -> Iterator[Line]:
     line = Line(tmp_path / "ttyUSB0")
     yield line
     os.close(line.end)
-
-
-@pytest.fixture
-def udp() -> Iterator[socket.socket]:
-    """Where the frames go."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
-        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
-        receiver.bind(("127.0.0.1", 0))
-        receiver.settimeout(DEADLINE_S)
-        yield receiver
 
 
 def begin(bridge: Callable[..., Process], line: Line, protocol: str, udp: socket.socket, *more: object) -> Process:
@@ -248,12 +239,8 @@ def test_another_grid_is_recognised(bridge, line, udp):
 
 
 def test_nobody_who_listens_is_said_and_heals(bridge, line):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    process = bridge(
-        "serial", line.link, "--protocol", "flexitac", "--sensor", "a", "--grid", "9x9", "--to", f"127.0.0.1:{port}"
-    )
+    to = free_address()
+    process = bridge("serial", line.link, "--protocol", "flexitac", "--sensor", "a", "--grid", "9x9", "--to", to)
     process.ready()
 
     def refused() -> bool:
@@ -262,7 +249,7 @@ def test_nobody_who_listens_is_said_and_heals(bridge, line):
 
     wait(refused, process.said)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
-        receiver.bind(("127.0.0.1", port))
+        receiver.bind(to)
         receiver.settimeout(DEADLINE_S)
         line.say(written("flexitac", frame(2)))
         while bytes([2] * 81) not in receiver.recv(65536):
@@ -300,8 +287,6 @@ def test_a_device_of_another_program_and_one_that_is_not_ours(bridge, line, udp)
 
 
 def test_metrics(bridge, line, udp):
-    import urllib.request
-
     out = Out(udp)
     to = f"127.0.0.1:{udp.getsockname()[1]}"
     flags = ("--protocol", "flexitac", "--sensor", "armrest", "--grid", "9x9", "--to", to, "--metrics", "127.0.0.1:0")
@@ -309,10 +294,5 @@ def test_metrics(bridge, line, udp):
     where = address.ready()["metrics"]
     line.say(b"rubbish" + written("flexitac", frame(1)) + written("flexitac", frame(2)))
     out.next()
-
-    def page() -> str:
-        with urllib.request.urlopen(f"http://{where}/metrics", timeout=DEADLINE_S) as answer:
-            return answer.read().decode()
-
-    wait(lambda: 'gestured_bridge_frames_total{bridge="serial",result="sent"} 2.0' in page())
-    assert 'gestured_bridge_bytes_total{bridge="serial",result="passed"} 7.0' in page()
+    wait(lambda: 'gestured_bridge_frames_total{bridge="serial",result="sent"} 2.0' in page(where))
+    assert 'gestured_bridge_bytes_total{bridge="serial",result="passed"} 7.0' in page(where)

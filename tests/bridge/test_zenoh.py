@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.bridge.conftest import Process, emit, free_port, wait
-from tests.bridge.test_mqtt import STATUS, gesture, page
-from tests.control.conftest import HELLO, FakeDaemon
+from tests.bridge.conftest import Process, emit, page, wait
+from tests.bridge.test_mqtt import STATUS, gesture
 from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, counted
+from tests.sockets import HELLO, FakeDaemon, free_address
 
 zenoh = pytest.importorskip("zenoh", reason="the bridge to Zenoh needs the extra [zenoh]")
 
@@ -36,7 +36,7 @@ class Site:
     """A router, and a client of it that hears all."""
 
     def __init__(self) -> None:
-        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self.endpoint = f"tcp/{free_address(socket.SOCK_STREAM)}"
         self.router = opened("router", listen=self.endpoint)
         self.client = opened("client", connect=self.endpoint)
         self.samples: queue.Queue[Any] = queue.Queue()
@@ -170,7 +170,7 @@ def test_a_router_that_goes_and_comes_back(bridge, site, fake):
 
 
 def test_a_router_that_is_not_there_yet_is_waited_for(bridge, fake):
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    endpoint = f"tcp/{free_address(socket.SOCK_STREAM)}"
     process = bridge("zenoh", "--connect", endpoint, "--site", "car", "--socket", fake.path)
     fake.accept()
     assert endpoint in process.until("trying again")
@@ -181,7 +181,7 @@ def test_a_router_that_is_not_there_yet_is_waited_for(bridge, fake):
 
 
 def test_peers_need_no_router(bridge, fake):
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    endpoint = f"tcp/{free_address(socket.SOCK_STREAM)}"
     bridge("zenoh", "--listen", endpoint, "--site", "car", "--socket", fake.path)
     fake.accept()
 
@@ -227,18 +227,15 @@ def test_frames_of_another_machine_give_the_events_of_udp(bridge, site, model, t
         assert daemon.stop() == 0
 
 
-def test_frames_are_of_the_sensor_that_their_key_says(bridge, site, fake):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
-        receiver.bind(("127.0.0.1", 0))
-        receiver.settimeout(DEADLINE_S)
-        process = begin(bridge, site, fake, "--frames", "--to", f"127.0.0.1:{receiver.getsockname()[1]}")
-        fake.accept()
-        process.ready()
-        distant = site.publisher("gestured/car/distant/frames")
-        right = counted("/distant/pressure", np.zeros((9, 9)), 1)
-        for packet in (b"rubbish", counted("/other/pressure", np.zeros((9, 9)), 1), right):
-            distant.put(packet)
-        assert receiver.recv(65536) == right
+def test_frames_are_of_the_sensor_that_their_key_says(bridge, site, fake, udp):
+    process = begin(bridge, site, fake, "--frames", "--to", f"127.0.0.1:{udp.getsockname()[1]}")
+    fake.accept()
+    process.ready()
+    distant = site.publisher("gestured/car/distant/frames")
+    right = counted("/distant/pressure", np.zeros((9, 9)), 1)
+    for packet in (b"rubbish", counted("/other/pressure", np.zeros((9, 9)), 1), right):
+        distant.put(packet)
+    assert udp.recv(65536) == right
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
-"""gesturectl as a process, and a scripted stand-in for the daemon's event socket."""
+"""gesturectl as a process, and a real daemon for it."""
 
-import json
 import os
 import signal
 import socket
@@ -13,19 +12,12 @@ from typing import Any
 
 import pytest
 
+from gestured.client.control import Control
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor
+from tests.sockets import free_address
 
 ROOT = Path(__file__).resolve().parents[2]
-HELLO = {
-    "type": "hello",
-    "protocol": 1,
-    "version": "0.0",
-    "instance": "a",
-    "model": "cnn_lstm",
-    "gestures": ["one_tap"],
-    "sensors": {"armrest": 3},
-}
 Start = Callable[..., "subprocess.Popen[bytes]"]
 
 
@@ -71,48 +63,28 @@ def run(start: Start) -> Callable[..., tuple[int, str, str]]:
     return finish
 
 
-class FakeDaemon:
-    """An event socket that says exactly what the test tells it to."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self.listener.bind(str(path))
-        self.listener.listen()
-        self.listener.settimeout(30)
-        self.client: socket.socket
-
-    def accept(self, hello: object = HELLO) -> None:
-        self.client, _ = self.listener.accept()
-        self.client.settimeout(30)
-        self.say(hello)
-
-    def say(self, *messages: object) -> None:
-        for message in messages:
-            self.client.sendall(message if isinstance(message, bytes) else json.dumps(message).encode() + b"\n")
-
-    def request(self) -> Any:
-        return json.loads(self.client.makefile("rb").readline())
-
-    def close(self) -> None:
-        self.client.close()
-
-
 @pytest.fixture
-def fake(tmp_path: Path) -> Iterator[FakeDaemon]:
-    daemon = FakeDaemon(tmp_path / "events.sock")
-    yield daemon
-    daemon.listener.close()
+def sniffed(start: Start) -> Callable[..., tuple[int, bytes, bytes]]:
+    """What `gesturectl sniff` says, with these flags, of packets that are sent again and again while it listens."""
+
+    def sniff(packets: list[bytes], *flags: object) -> tuple[int, bytes, bytes]:
+        where = free_address()
+        process = start("sniff", "--listen", where, "--seconds", 0.5, *flags)
+        assert process.stderr is not None and b"listening" in process.stderr.readline()
+        with socket.socket(type=socket.SOCK_DGRAM) as sender:
+            while process.poll() is None:
+                for packet in packets:
+                    sender.sendto(packet, where)
+        out, err = process.communicate(timeout=30)
+        return process.returncode, out, err
+
+    return sniff
 
 
-@pytest.fixture
-def udp() -> Iterator[socket.socket]:
-    """A UDP socket on the loopback that keeps what is sent to it."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
-        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
-        receiver.bind(("127.0.0.1", 0))
-        receiver.settimeout(30)
-        yield receiver
+def asked(daemon: Daemon) -> dict[str, Any]:
+    """What a daemon answers to `status`."""
+    with Control(Path(daemon.ready["control"])) as control:
+        return control.ask("status")
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,6 @@ import ast
 import json
 import os
 import re
-import socket
 import subprocess
 import sys
 import tomllib
@@ -23,10 +22,11 @@ from gestured.core.errors import RecordingError
 from gestured.core.osc_address import Addresses, is_sensor
 from gestured.record import arrays as recording
 from gestured.record import tape_reader, tape_writer
-from tests.control.conftest import HELLO, ROOT, FakeDaemon, gestures
+from tests.control.conftest import ROOT, gestures
 from tests.control.test_listen import GESTURE
 from tests.daemon.harness import Hand, floats
 from tests.small_recording import example, save, session
+from tests.sockets import HELLO, FakeDaemon
 
 # Sets the title, clears the screen, turns the writing around, begins new lines, ends the string.
 HOSTILE = '\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp.exe\u2028new\nline\r\x7f\x00"x'
@@ -133,26 +133,16 @@ def test_what_cannot_be_proposed_is_said_and_not_written(address: str) -> None:
     assert sniffed("/arm/pressure", address)[:2] == ["[sensors.arm]", 'grid = "5x5"']
 
 
-def test_sniff_prints_no_foreign_byte(start) -> None:
-    with socket.socket(type=socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        where = free.getsockname()
+def test_sniff_prints_no_foreign_byte(sniffed) -> None:
     packets = [*map(raw, NASTY), b"/" + b"\x1b[2J" * 1000 + b"\0\0\0\0,i\0\0\0\0\0\1", b"\x9b\x1b]0;evil\x07"]
-    for more in ([], ["--json"]):
-        sniffer = start("sniff", "--listen", f"127.0.0.1:{where[1]}", "--seconds", "1", *more)
-        assert b"listening" in sniffer.stderr.readline()
-        with socket.socket(type=socket.SOCK_DGRAM) as sender:
-            while sniffer.poll() is None:
-                for packet in packets:
-                    sender.sendto(packet, where)
-        out, err = sniffer.communicate(timeout=30)
-        assert sniffer.returncode == 1 and err == b""
-        if more:
-            assert out.isascii() and out.count(b"\n") == 1 and b"\x1b" not in out
-            assert json.loads(out)["proposed"] == []
-        else:
-            said = plain(out.decode())
-            assert "\\x1b[2J" in said and "[sensors.evil]\n" not in said and "is not proposed" in said
+    status, out, err = sniffed(packets)
+    said = plain(out.decode())
+    assert (status, err) == (1, b"")
+    assert "\\x1b[2J" in said and "[sensors.evil]\n" not in said and "is not proposed" in said
+    status, out, err = sniffed(packets, "--json")
+    assert (status, err) == (1, b"")
+    assert out.isascii() and out.count(b"\n") == 1 and b"\x1b" not in out
+    assert json.loads(out)["proposed"] == []
 
 
 # A daemon

@@ -16,8 +16,10 @@ from gestured.control.sniff import lines
 from gestured.control.status import screen
 from gestured.core.address import Address
 from tests import encoding
+from tests.control.conftest import asked
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Hand, Sensor, blob, counted, floats, ints
+from tests.sockets import free_address
 
 
 def test_status_shows_sensors_model_and_answers(ctl, daemon: Daemon) -> None:
@@ -32,24 +34,39 @@ def test_status_shows_sensors_model_and_answers(ctl, daemon: Daemon) -> None:
     assert found["sensors"]["seat"]["gestures"] == 1 and found["ready"]["ready"] is True
 
 
+STATUS = {
+    "version": "1", "state": "degraded", "uptime_s": 7300.0, "pid": 1, "addresses": {"listen": "a:1"},
+    "ready": {"ready": False, "reason": "no model could classify the last segment"},
+    "model": {"active": "lstm", "asked": "cnn_lstm", "degraded": True, "failures": 2, "version": "1",
+              "sha256": "ab"},
+    "sensors": {f"s{i}": {"state": "no_data", "rate_hz": 0.0, "jitter_s": 0.0, "bad_taxels": 0, "drift": 0.0,
+                          "grid": "9x9"} for i in range(20)},
+    "answers": {"gestures": {}, "unknown": 3, "cancelled": {"held": 2}}, "recent": [],
+    "input": {"dropped": {"size": 4}, "kernel_drops": 0},
+    "output": {"subscribers": 0, "backlog_bytes": 0, "lines_lost": 0, "evicted": {}},
+    "loop_lag_s": 0.0, "internal_errors": 0, "shadow": None,
+    "shift": {"gestures": 40, "outside": {"strength": 0.5, "area": 0.0}, "unlike": ["strength"]},
+}  # fmt: skip
+
+
 def test_status_of_a_daemon_that_is_not_ready_and_shifted() -> None:
-    status = {
-        "version": "1", "state": "degraded", "uptime_s": 7300.0, "pid": 1, "addresses": {"listen": "a:1"},
-        "ready": {"ready": False, "reason": "no model could classify the last segment"},
-        "model": {"active": "lstm", "asked": "cnn_lstm", "degraded": True, "failures": 2, "version": "1",
-                  "sha256": "ab"},
-        "sensors": {f"s{i}": {"state": "no_data", "rate_hz": 0.0, "jitter_s": 0.0, "bad_taxels": 0, "drift": 0.0,
-                              "grid": "9x9"} for i in range(20)},
-        "answers": {"gestures": {}, "unknown": 3, "cancelled": {"held": 2}}, "recent": [],
-        "input": {"dropped": {"size": 4}, "kernel_drops": 0},
-        "output": {"subscribers": 0, "backlog_bytes": 0, "lines_lost": 0, "evicted": {}},
-        "loop_lag_s": 0.0, "internal_errors": 0, "shadow": None,
-        "shift": {"gestures": 40, "outside": {"strength": 0.5, "area": 0.0}, "unlike": ["strength"]},
-    }  # fmt: skip
-    text = "\n".join(screen(status))
+    text = "\n".join(screen(STATUS))
     assert "not ready: no model could classify" in text and "a fallback for cnn_lstm, 2 failures" in text
     assert "unlike those of the training in strength (50 %)" in text
     assert "and 8 more" in text and "4 size" in text and "2 held" in text
+
+
+def test_status_says_one_thing_of_the_shift() -> None:
+    def said(shares: dict[str, float], unlike: list[str]) -> str:
+        shift = {"gestures": 40, "outside": shares, "unlike": unlike}
+        (line,) = [line for line in screen(STATUS | {"shift": shift}) if line.startswith("shift:")]
+        return line
+
+    alike = said({"unknown": 0.24, "area": 0.0}, [])
+    assert alike == "shift: the last 40 gestures are like those of the training"
+    unlike = said({"strength": 0.5, "area": 0.0, "duration_s": 0.4}, ["strength", "duration_s"])
+    assert unlike.startswith("shift: the last 40 gestures are unlike those of the training in strength (50 %")
+    assert "duration (40 %" in unlike and "area" not in unlike
 
 
 def test_without_a_daemon_each_says_so_in_one_line(run, tmp_path: Path) -> None:
@@ -90,12 +107,16 @@ def test_recalibrate_and_reload(ctl, daemon: Daemon) -> None:
 def test_a_shadow_is_named_by_a_path_that_is_the_clients(ctl, run, start, daemon: Daemon, tmp_path: Path) -> None:
     tiny_model.make(tmp_path / "next.onnx")
     begin = start("shadow", "next.onnx", "--control", daemon.ready["control"], cwd=tmp_path)
-    assert b"next runs in the shadow from now on" in begin.communicate(timeout=60)[0]
+    started = "next runs in the shadow from now on: gesturectl shadow reports, gesturectl shadow --stop ends it\n"
+    assert begin.communicate(timeout=60)[0].decode() == started
+    assert ctl("shadow")[1].startswith("next in the shadow: 0 segments")
     client = daemon.client()
     Sensor(daemon, "lid").begin().perform("left", "tap")
     client.events("gesture", "lid", 2)
     status, out, _ = ctl("shadow", "--stop")
-    assert status == 0 and "2 segments, 0 failed" in out and "agreement 100.0 %" in out
+    first, second, *_ = out.splitlines()
+    assert (status, first) == (0, "next runs in the shadow no longer; what came of it:")
+    assert second.startswith("next in the shadow: 2 segments, 0 failed") and "agreement 100.0 %" in out
     assert ctl("shadow") == (1, "no model runs in the shadow\n", "")
 
 
@@ -104,13 +125,13 @@ def test_sniff_shows_what_reaches_the_daemon_and_what_to_set(start, daemon: Daem
     sensor, hand = Sensor(daemon, "odd"), Hand()
     with socket.socket(type=socket.SOCK_DGRAM) as sender:
         sender.connect(daemon.address)
-        while json.loads(_status(daemon))["taps"] == 0:
+        while asked(daemon)["taps"] == 0:
             pass
         for n in range(20):
             sender.send(floats("/textile/odd/matrix", hand.frame(), n))
         sender.send(b"rubbish!")
     sensor.begin()
-    while json.loads(_status(daemon))["sensors"].get("odd") is None:
+    while asked(daemon)["sensors"].get("odd") is None:
         pass
     sniffer.send_signal(2)
     out, _ = sniffer.communicate(timeout=30)
@@ -118,13 +139,6 @@ def test_sniff_shows_what_reaches_the_daemon_and_what_to_set(start, daemon: Daem
     message = next(m for m in found["messages"] if m["address"] == "/textile/odd/matrix")
     assert (message["types"], message["count"], len(message["sources"])) == ("f*81", 20, 1)
     assert found["errors"] == {"not_osc": 1}
-
-
-def _status(daemon: Daemon) -> str:
-    from gestured.client.control import Control
-
-    with Control(Path(daemon.ready["control"])) as control:
-        return json.dumps(control.ask("status"))
 
 
 @pytest.mark.parametrize(
@@ -170,10 +184,7 @@ def test_sniff_proposes_a_grid_and_is_bounded() -> None:
 
 
 def test_sniff_says_what_may_be_wrong(run) -> None:
-    with socket.socket(type=socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        nobodys = f"127.0.0.1:{free.getsockname()[1]}"
-    status, out, _ = run("sniff", "--listen", nobodys, "--seconds", "0.1")
+    status, out, _ = run("sniff", "--listen", free_address(), "--seconds", "0.1")
     assert status == 1 and "nothing arrives" in out
     two = Sight()
     for n, source in enumerate(("a:1", "a:2", "a:2")):
@@ -181,22 +192,10 @@ def test_sniff_says_what_may_be_wrong(run) -> None:
     assert "has several senders" in "\n".join(lines(two, []))
 
 
-def test_sniff_on_a_port_of_its_own(start, udp: socket.socket) -> None:
-    taken = f"127.0.0.1:{udp.getsockname()[1]}"
-    process = start("sniff", "--listen", taken)
-    _, err = process.communicate(timeout=30)
-    assert process.returncode == 1 and taken.encode() in err and b"Address already in use" in err
-    with socket.socket(type=socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    process = start("sniff", "--listen", f"127.0.0.1:{port}", "--seconds", "0.5", "--json")
-    assert b"listening" in process.stderr.readline()
-    with socket.socket(type=socket.SOCK_DGRAM) as sender:
-        while process.poll() is None:
-            sender.sendto(floats("/textile/arm/matrix", Hand().frame(), 0), ("127.0.0.1", port))
-    out, _ = process.communicate(timeout=30)
+def test_sniff_on_a_port_of_its_own(sniffed) -> None:
+    status, out, _ = sniffed([floats("/textile/arm/matrix", Hand().frame(), 0)], "--json")
     (message,) = json.loads(out)["messages"]
-    assert (message["address"], message["types"]) == ("/textile/arm/matrix", "f*81") and process.returncode == 0
+    assert (message["address"], message["types"], status) == ("/textile/arm/matrix", "f*81", 0)
 
 
 def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon) -> None:
@@ -205,7 +204,7 @@ def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon) -> 
     client.events("gesture", "hurt")
     sensor.sock.send(floats("/hurt/matrix", Hand().frame(), 0))
     sensor.sock.send(encoding.message("/hurt/pressure", "f" * 25, [0.0] * 25))
-    while not {"address", "size"} <= set(json.loads(_status(daemon))["input"]["dropped"]):
+    while not {"address", "size"} <= set(asked(daemon)["input"]["dropped"]):
         pass
     status, out, err = ctl("doctor", "--json")
     findings = [json.loads(line) for line in out.splitlines()]

@@ -13,7 +13,7 @@ import pytest
 
 from gestured.client.subscriber import Subscriber
 from gestured.core.errors import GesturedError
-from tests.control.conftest import HELLO
+from tests.sockets import HELLO
 
 OTHER, OPERATOR = 65_533, 65_532  # two accounts that nobody has
 

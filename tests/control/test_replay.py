@@ -2,7 +2,6 @@
 
 import json
 import signal
-import socket
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from tests.control.conftest import gestures
 from tests.daemon import tiny_model
 from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor
 from tests.hostile.grammar import violations
+from tests.sockets import free_address
 
 LEAD_S = 1.6  # untouched; 24 frames
 
@@ -159,11 +159,8 @@ def test_a_session_with_a_long_pause_is_compared_event_by_event(replay, serve, t
 
 
 def test_a_daemon_that_cannot_be_compared_with_is_one_sentence(replay, serve, daemon: Daemon, wrongly: Path) -> None:
-    with socket.socket(type=socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        nobody = f"127.0.0.1:{free.getsockname()[1]}"
     for way in ((), ("--socket", daemon.socket, "--diff")):
-        status, _, err = replay(wrongly, "--to", nobody, "--speed", 1000, *way)
+        status, _, err = replay(wrongly, "--to", free_address(), "--speed", 1000, *way)
         assert status == 1 and "nobody listened" in err
     _, listen, *_ = there = serve("--clock", "sensor")[:2]
     status, _, err = replay(wrongly, *there, "--speed", 100, "--socket", daemon.socket, "--diff")

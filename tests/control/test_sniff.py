@@ -1,6 +1,5 @@
 """What `gesturectl sniff` makes of packets: forms that are not taken, counters, grids, counts that fall."""
 
-import socket
 import tomllib
 from typing import Any
 
@@ -13,7 +12,6 @@ from gestured.control.sniff import lines
 from gestured.daemon.merge import load_settings
 from tests import encoding
 from tests.daemon.harness import Hand, counted, floats
-from tests.test_docs import ROOT
 
 
 def seen(packets, rate: float = 15.0) -> Sight:
@@ -98,7 +96,7 @@ def test_counts_that_fall(tmp_path, sign: float) -> None:
 
 
 @pytest.mark.parametrize(("types", "words"), [("d", "doubles"), ("[f", "arrays"), ("h", "64-bit integers")])
-def test_what_is_not_taken_is_named_and_fails(start, types: str, words: str) -> None:
+def test_what_is_not_taken_is_named_and_fails(sniffed, types: str, words: str) -> None:
     frame = [float(v) if types != "h" else int(v) for v in Hand().frame().ravel()]
     if types == "[f":
         packet = encoding._string("/arm/pressure") + encoding._string(",[" + "f" * 81 + "]") + bytes(4 * 81)
@@ -107,13 +105,5 @@ def test_what_is_not_taken_is_named_and_fails(start, types: str, words: str) -> 
     sight = seen([packet] * 4)
     text = "\n".join(lines(sight, propose(sight.rows())))
     assert f"{words} are not taken: send f" in text
-    with socket.socket(type=socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    process = start("sniff", "--listen", f"127.0.0.1:{port}", "--seconds", "0.5", cwd=ROOT)
-    assert b"listening" in process.stderr.readline()
-    with socket.socket(type=socket.SOCK_DGRAM) as sender:
-        while process.poll() is None:
-            sender.sendto(packet, ("127.0.0.1", port))
-    out, _ = process.communicate(timeout=30)
-    assert process.returncode == 1 and f"{words} are not taken: send f" in out.decode()
+    status, out, _ = sniffed([packet])
+    assert status == 1 and f"{words} are not taken: send f" in out.decode()

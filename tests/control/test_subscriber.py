@@ -17,9 +17,9 @@ from gestured.client.control import Control
 from gestured.client.lines import Forbidden, Refused, Unreachable
 from gestured.client.subscriber import LONGEST_S, Subscriber
 from gestured.core.errors import GesturedError
-from tests.control.conftest import HELLO, FakeDaemon
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
+from tests.sockets import HELLO, FakeDaemon
 
 GESTURE = {"type": "gesture", "sensor": "armrest", "gesture": "one_tap", "sequence": 4}
 

@@ -16,6 +16,7 @@ import pytest
 from gestured.daemon.metrics import Counter, Metrics
 from gestured.model.shipped import shipped
 from tests.daemon.harness import Daemon, Sensor
+from tests.sockets import free_address
 
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
 RULES = DEPLOY / "prometheus" / "gestured.rules.yml"
@@ -155,9 +156,7 @@ def test_a_real_prometheus_scrapes_the_daemon_and_answers_every_query(daemon: Da
     text = (RULES.parent / "prometheus.yml").read_text().replace("127.0.0.1:9108", daemon.ready["metrics"])
     (tmp_path / "prometheus.yml").write_text(text.replace("15s", "1s"))
     shutil.copy(RULES, tmp_path)
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    address = free_address(socket.SOCK_STREAM)
     flags = (f"--config.file={tmp_path}/prometheus.yml", f"--storage.tsdb.path={tmp_path}/data")
     command = ["prometheus", *flags, f"--web.listen-address={address}", "--log.level=error"]
 

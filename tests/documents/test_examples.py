@@ -19,6 +19,7 @@ from gestured.client.control import Control
 from gestured.model.shipped import shipped
 from tests.daemon.harness import RATE_HZ, Daemon, Hand, Sensor
 from tests.documents.blocks import ROOT, Block, blocks
+from tests.sockets import free_address
 
 WRAPPER = '#!/bin/sh\nPYTHONPATH={root} exec {python} -m gestured.{package} "$@"\n'
 # A phrase that only this example has, and so its name.
@@ -53,9 +54,7 @@ class Place:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
+        self.port = free_address().port
         self.daemon = Daemon.start(
             folder, "cnn_lstm", "--publish", f"osc://127.0.0.1:{self.port}", "--metrics", "127.0.0.1:0"
         )
@@ -179,10 +178,8 @@ def test_one_sensor_in_a_process_of_ones_own(place: Place):
 
 
 def test_many_sensors_in_a_process_of_ones_own(place: Place):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = probe.getsockname()
-    code = example("gestured.Hub").text.replace("9000", str(address[1]))
+    address = free_address()
+    code = example("gestured.Hub").text.replace("9000", str(address.port))
     with place.running(sys.executable, "-c", code) as process:
         sensor = Sensor(SimpleNamespace(address=address), "armrest")
         while refused(sensor.sock):

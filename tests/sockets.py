@@ -1,0 +1,53 @@
+"""Sockets for tests: addresses that nobody has, and a scripted stand-in for the daemon's event socket."""
+
+import json
+import socket
+from pathlib import Path
+from typing import Any
+
+from gestured.core.address import Address
+
+PATIENCE_S = 30.0  # for whatever a test waits for; only a failure takes so long
+HELLO = {
+    "type": "hello",
+    "protocol": 1,
+    "version": "0.0",
+    "instance": "a",
+    "model": "cnn_lstm",
+    "gestures": ["one_tap"],
+    "sensors": {"armrest": 3},
+}
+
+
+def free_address(kind: int = socket.SOCK_DGRAM) -> Address:
+    """An address of this machine that nobody has now, for UDP unless told."""
+    with socket.socket(type=kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return Address(*probe.getsockname())
+
+
+class FakeDaemon:
+    """An event socket that says exactly what the test tells it to."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.listener.bind(str(path))
+        self.listener.listen()
+        self.listener.settimeout(PATIENCE_S)
+        self.client: socket.socket
+
+    def accept(self, hello: object = HELLO) -> None:
+        self.client, _ = self.listener.accept()
+        self.client.settimeout(PATIENCE_S)
+        self.say(hello)
+
+    def say(self, *messages: object) -> None:
+        for message in messages:
+            self.client.sendall(message if isinstance(message, bytes) else json.dumps(message).encode() + b"\n")
+
+    def request(self) -> Any:
+        return json.loads(self.client.makefile("rb").readline())
+
+    def close(self) -> None:
+        self.client.close()
