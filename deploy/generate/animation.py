@@ -1,26 +1,14 @@
 """The animation on top of the README: a recording frame by frame, and what the daemon said when it said it."""
 
-import dataclasses
 from pathlib import Path
 from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.facts import Taken
-from gestured.core.hub import Hub
-from gestured.record.replay import Mute, maker
-from gestured.record.tape import Tape
-from gestured.record.tape_reader import read
+from gestured.record.replay import frames_used, opened
 
-STOPS = (
-    "00204d",
-    "31446b",
-    "666970",
-    "958f78",
-    "cab969",
-    "ffea46",
-)  # cividis: it can be told apart without red and green
+STOPS = ("00204d", "31446b", "666970", "958f78", "cab969", "ffea46")  # cividis: told apart without red and green
 LEVELS = 16  # shades: more cannot be seen, and cost room
 SIDE = 26  # pixels of a taxel
 LEFT, TOP = 20, 20  # pixels
@@ -31,13 +19,12 @@ SHOWN = 4  # gestures
 
 def animation(path: Path) -> str:
     """A recording's first gestures as an SVG that plays for ever."""
-    tape = read(path)
-    taken = list(_taken(tape))
-    sensor = taken[0].sensor
+    tape, known = opened(path)
+    sensor, frames = next(iter(frames_used(tape, known.scene).items()))
     said = [e for e in tape.events if e["type"] == "gesture" and e["sensor"] == sensor][:SHOWN]
     begin, end = said[0]["onset"] - BEFORE_S, said[-1]["decided"] + AFTER_S
-    times = np.array([one.frame.t for one in taken])
-    counts = np.array([np.asarray(one.frame.values, float) for one in taken])
+    times = np.array([frame.t for frame in frames])
+    counts = np.array([np.asarray(frame.values, float) for frame in frames])
     values = counts - np.median(counts[:IDLE_FRAMES], axis=0)
     inside = (times >= begin) & (times <= end)
     length = end - begin
@@ -58,14 +45,6 @@ def animation(path: Path) -> str:
             "",
         ]
     )
-
-
-def _taken(tape: Tape) -> list[Taken]:
-    """The frames that the daemon used, by its own path."""
-    scene = maker(tape.scene).scene
-    hub = Hub(dataclasses.replace(scene, frames=True), Mute(scene.gestures))
-    facts = (f for p in tape.packets for f in hub.receive([(p.data, p.source)], p.t_ns / 1e9))
-    return [fact for fact in facts if isinstance(fact, Taken)]
 
 
 def _matrix(levels: NDArray[np.int_], moments: NDArray[np.float64], length: float) -> list[str]:

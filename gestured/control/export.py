@@ -1,7 +1,6 @@
 """`gesturectl export`: a recording as frames, in the form that NumPy reads, or ROS 2."""
 
 import argparse
-import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +9,12 @@ import numpy as np
 from gestured.client.program import Commands
 from gestured.client.say import tell
 from gestured.core.errors import RecordingError
-from gestured.core.facts import Taken
 from gestured.core.frames import Frame
 from gestured.core.scene import Scene
 from gestured.record import arrays as recording
 from gestured.record import ros2
 from gestured.record.recordings import Recordings
-from gestured.record.replay import Mute, Replay, opened
+from gestured.record.replay import frames_used, opened
 from gestured.record.tape import Tape
 
 FINGERS = 3
@@ -69,7 +67,7 @@ def _run_ros2(args: argparse.Namespace) -> int:
 
 def _sessions(path: Path, found: Tape, scene: Scene, sensor: str | None) -> dict[str, list[Frame]]:
     """Sensor -> its frames, of all sensors or the one. Raises RecordingError where there are none."""
-    sessions = {name: used for name, used in _used(found, scene).items() if sensor in (None, name)}
+    sessions = {name: used for name, used in frames_used(found, scene).items() if sensor in (None, name)}
     if not sessions:
         raise RecordingError(f"{path}: holds no frame of {sensor or 'any sensor'}")
     return sessions
@@ -88,16 +86,6 @@ def sessions_of(path: Path, sensor: str | None = None) -> tuple[list[str], Recor
 
 def _count(labels: Any) -> int:
     return 0 if labels is None else len(labels)
-
-
-def _used(found: Tape, scene: Scene) -> dict[str, list[Frame]]:
-    """Sensor -> the frames that the daemon used, at the times that it gave them, in seconds since the epoch."""
-    replay = Replay(found, dataclasses.replace(scene, touches=True), Mute(scene.gestures))
-    used: dict[str, list[Frame]] = {}
-    for fact in replay.facts():
-        if isinstance(fact, Taken):
-            used.setdefault(fact.sensor, []).append(dataclasses.replace(fact.frame, t=fact.frame.t + replay.epoch))
-    return used
 
 
 def _recordings(sessions: dict[str, list[Frame]], found: Tape) -> Recordings:

@@ -13,7 +13,7 @@ from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import ModelError, RecordingError
 from gestured.core.events import Event, Onset
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
-from gestured.core.frames import Segment
+from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
 from gestured.core.mounting import Mounting
 from gestured.core.osc_address import Addresses
@@ -141,6 +141,16 @@ class Played:
         """Whether the idle sensor had been learned by `t` s, so that a touch could be told from it."""
         since = [known for new, known in self._learned if new <= t]
         return bool(since) and since[-1] <= t
+
+
+def frames_used(tape: Tape, scene: Scene) -> dict[str, list[Frame]]:
+    """Sensor -> the frames that the daemon used, at the times that it gave them, in seconds since the epoch."""
+    replay = Replay(tape, dataclasses.replace(scene, touches=True), Mute(scene.gestures))
+    used: dict[str, list[Frame]] = {}
+    for fact in replay.facts():
+        if isinstance(fact, Taken):
+            used.setdefault(fact.sensor, []).append(dataclasses.replace(fact.frame, t=fact.frame.t + replay.epoch))
+    return used
 
 
 class Replay:
