@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP
-from gestured.simulator.kinematics import Array, arc, ellipse, grid, polyline, stroke_progress, turning, wander
+from gestured.simulator.kinematics import Array, arc, ellipse, grid, polyline, stroke_progress, turned, turning, wander
 from gestured.simulator.occasion import Occasion
 from gestured.simulator.people import Press
 
@@ -21,8 +21,7 @@ def drawn(occasion: Occasion, t: Array, x: Array, y: Array) -> list[Press]:
 
 def _turned(points: list[tuple[float, float]], angle: float) -> list[tuple[float, float]]:
     """Points turned about the origin."""
-    c, s = math.cos(angle), math.sin(angle)
-    return [(x * c - y * s, x * s + y * c) for x, y in points]
+    return [turned(x, y, angle) for x, y in points]
 
 
 def _leg_s(occasion: Occasion, length: float) -> float:
@@ -97,8 +96,7 @@ def wave(occasion: Occasion) -> list[Press]:
     s = stroke_progress(t / t[-1], rng)
     x = length * s
     y = occasion.small * rng.uniform(0.12, 0.25) * np.sin(2.0 * math.pi * periods * s + rng.uniform(0.0, 6.3))
-    angle = rng.uniform(-math.pi, math.pi)
-    return drawn(occasion, t, x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle) + y * math.cos(angle))
+    return drawn(occasion, t, *turned(x, y, rng.uniform(-math.pi, math.pi)))
 
 
 def arc_stroke(occasion: Occasion) -> list[Press]:
@@ -120,9 +118,7 @@ def figure_eight(occasion: Occasion) -> list[Press]:
     phase = 2.0 * math.pi * (rng.random() + rng.uniform(0.9, 1.5) * turning(t / move, rng)) * rng.choice([-1.0, 1.0])
     size = occasion.small * rng.uniform(0.22, 0.42)
     x, y = size * np.sin(phase), size * rng.uniform(0.35, 0.6) * np.sin(2.0 * phase)
-    angle = rng.choice([0.0, math.pi / 2]) + rng.normal(0.0, 0.3)
-    c, s = math.cos(angle), math.sin(angle)
-    return drawn(occasion, t, x * c - y * s, x * s + y * c)
+    return drawn(occasion, t, *turned(x, y, rng.choice([0.0, math.pi / 2]) + rng.normal(0.0, 0.3)))
 
 
 def spiral(occasion: Occasion) -> list[Press]:

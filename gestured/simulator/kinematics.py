@@ -10,11 +10,13 @@ Lengths are millimetres, x to the right, y upward, times seconds, angles radians
 
 import math
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+N = TypeVar("N", float, Array)
 PATH_STEP_S = 0.004  # fine time grid: 250 Hz, ten steps within the fastest rise of a tap
 
 
@@ -97,7 +99,13 @@ def arc(s: Array, length: float, heading: float, bend: float) -> tuple[Array, Ar
 def ellipse(phase: Array, radius: Array, flatness: float, tilt: float) -> tuple[Array, Array]:
     """x, y (n,) around the origin: half axes radius * flatness and radius / flatness, turned by tilt."""
     u, v = radius * math.sqrt(flatness) * np.cos(phase), radius / math.sqrt(flatness) * np.sin(phase)
-    return u * math.cos(tilt) - v * math.sin(tilt), u * math.sin(tilt) + v * math.cos(tilt)
+    return turned(u, v, tilt)
+
+
+def turned(x: N, y: N, angle: float) -> tuple[N, N]:
+    """Points turned about the origin."""
+    c, s = math.cos(angle), math.sin(angle)
+    return x * c - y * s, x * s + y * c
 
 
 def turning(tau: Array, rng: np.random.Generator) -> Array:

@@ -51,11 +51,6 @@ class Take:
         """The label of the one event, or "session" where there are none or several."""
         return self.events[0].label if len(self.events) == 1 else "session"
 
-    @property
-    def kind(self) -> str:
-        """The kind of the one event, or "session"."""
-        return self.events[0].kind if len(self.events) == 1 else "session"
-
 
 @dataclass(frozen=True)
 class SimulatedSensor(Nature):
