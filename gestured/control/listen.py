@@ -50,16 +50,14 @@ def _listen(args: argparse.Namespace) -> int:
     path = event_path(args)
     wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture}
     left = args.count
-    early: dict[str, dict[str, Any]] = {}  # by sensor: what was said of a touch that has no answer yet
+    early: dict[str, dict[str, Any]] = {}  # for `readable`
     with Subscriber(path, **wanted, reconnect=args.reconnect) as subscriber:
         for line, event in subscriber.lines():
             kind = event.get("type")
             if args.json:
                 _repeat(line, event)
             elif kind != "hello":
-                say(readable(event, early.pop(event.get("sensor", ""), None)))
-            if kind == "provisional":
-                early[event["sensor"]] = event
+                say(readable(event, early))
             if kind == "hello":
                 _greet(event, args)
             elif left is not None and kind != "lost":
@@ -69,12 +67,13 @@ def _listen(args: argparse.Namespace) -> int:
     return 0
 
 
-def readable(event: dict[str, Any], early: dict[str, Any] | None = None) -> str:
-    """One event as one line for a person; `early` is the provisional event before an answer."""
-    kind = event.get("type")
+def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
+    """One event as one line for a person; `before` keeps the last provisional event of each sensor for its answer."""
+    kind, sensor = event.get("type"), event.get("sensor", "-")
+    early = before.pop(sensor, None)
     moment = next((event[key] for key in ("decided", "onset", "offset", "time") if key in event), time.time())
     clock = datetime.fromtimestamp(moment).strftime("%H:%M:%S.%f")[:-3]
-    head = f"{clock}  {event.get('sensor', '-'):<12} "
+    head = f"{clock}  {sensor:<12} "
     if kind in ("gesture", "unknown"):
         number = f"#{event['sequence']}" if kind == "gesture" else ""
         waited = 1000 * (event["decided"] - event["offset"])
@@ -87,6 +86,7 @@ def readable(event: dict[str, Any], early: dict[str, Any] | None = None) -> str:
         name = f"{event.get('gesture', why):<24} {event['confidence']:4.2f}"
         return f"{head}{name}  {number:<6} {waited:4.0f} ms{tail}"
     if kind == "provisional":
+        before[sensor] = event
         return f"{head}{event['gesture'] + '?':<24} {event['confidence']:4.2f}  provisional"
     if kind == "status":
         sensors = ", ".join(f"{name} {state}" for name, state in sorted(event["sensors"].items()))

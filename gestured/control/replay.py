@@ -108,11 +108,9 @@ def _here(args: argparse.Namespace, source: Playable) -> int:
     lines = (json.loads(messages.to_json(event, replay.epoch)) for event in replay.events())
     if args.diff:
         return _compare(args, source, list(lines), _knew(replay))
-    early: dict[str, dict[str, Any]] = {}  # by sensor: what was said of a touch that has no answer yet
+    early: dict[str, dict[str, Any]] = {}  # for `readable`
     for line in lines:
-        tell(args.json, line, readable(line, early.pop(line["sensor"], None)))
-        if line["type"] == "provisional":
-            early[line["sensor"]] = line
+        tell(args.json, line, readable(line, early))
     return 0
 
 

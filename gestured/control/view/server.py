@@ -140,19 +140,19 @@ class Handler(BaseHTTPRequestHandler):
         self._answer(status, "application/json", json.dumps(what).encode())
 
     def _answer(self, status: HTTPStatus, kind: str, body: bytes, more: dict[str, str] | None = None) -> None:
+        self._head(status, {"Content-Type": kind, "Content-Length": str(len(body))} | (more or {}))
+        self.wfile.write(body)
+
+    def _head(self, status: HTTPStatus, headers: dict[str, str]) -> None:
         self.send_response(status)
-        for name, value in (SAFE | {"Content-Type": kind, "Content-Length": str(len(body))} | (more or {})).items():
+        for name, value in (SAFE | headers).items():
             self.send_header(name, value)
         self.end_headers()
-        self.wfile.write(body)
 
     def _stream(self, outbox: Outbox) -> None:
         self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SENT_BYTES)
         self.connection.settimeout(SEND_S)
-        self.send_response(HTTPStatus.OK)
-        for name, value in (SAFE | {"Content-Type": "text/event-stream"}).items():
-            self.send_header(name, value)
-        self.end_headers()
+        self._head(HTTPStatus.OK, {"Content-Type": "text/event-stream"})
         outbox.put("hello", {"token": self.server.door.header})
         self.server.source.join(outbox)
         try:
