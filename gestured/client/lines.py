@@ -1,14 +1,17 @@
 """A Unix stream socket on which the daemon speaks JSON Lines."""
 
 import json
+import queue
 import socket
-from collections.abc import Iterator
+import threading
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from gestured.client.peer import Stranger, check_peer
 from gestured.core.errors import GesturedError
 
+T = TypeVar("T")
 JOIN = 'sudo adduser "$USER" gestured, and log in again'
 
 
@@ -76,6 +79,23 @@ class Lines:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def read_ahead(lines: Iterable[T], most: int = 0) -> "queue.Queue[T | None]":
+    """A queue that a thread fills with these lines, at most so many at a time; None where they end, or cannot go on."""
+    waiting: queue.Queue[T | None] = queue.Queue(most)
+
+    def read() -> None:
+        try:
+            for line in lines:
+                waiting.put(line)
+        except GesturedError:
+            pass  # whoever waits for the next line is told that there is none
+        finally:
+            waiting.put(None)
+
+    threading.Thread(target=read, daemon=True).start()
+    return waiting
 
 
 def parsed(line: bytes, path: Path) -> dict[str, Any]:

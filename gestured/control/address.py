@@ -3,6 +3,7 @@
 import argparse
 import os
 import signal
+import threading
 from pathlib import Path
 
 from gestured.client.address import find_control, find_socket, setting
@@ -40,6 +41,13 @@ def finish_on_signals(control: Control) -> None:
     """From now on Ctrl-C and SIGTERM let `control.lines()` end, after what the daemon has said by then."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: control.finish())
+
+
+def finish_after(control: Control, seconds: float) -> None:
+    """Let `control.lines()` end after so long."""
+    timer = threading.Timer(seconds, control.finish)
+    timer.daemon = True
+    timer.start()
 
 
 def connect(args: argparse.Namespace) -> Control:

@@ -7,15 +7,15 @@ import signal
 import sys
 import threading
 import time
-from contextlib import closing, nullcontext, suppress
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen
-from typing import Any
 
 from gestured.client.control import Control
 from gestured.client.engine import Engine
-from gestured.client.lines import Refused
+from gestured.client.lines import Refused, read_ahead
 from gestured.client.picture import trace
 from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json
@@ -38,7 +38,6 @@ HEARD = ("gesture", "unknown", "provisional")  # events that the daemon is asked
 
 def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
-
     parser = commands.add_parser(
         "demo",
         help="see it recognise simulated gestures",
@@ -55,7 +54,6 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show outcomes as they come, then the summary; Ctrl-C goes straight to the summary."""
-
     if not 5.0 <= args.seconds <= 600.0:
         raise GesturedError(f"--seconds {args.seconds:g}: expected 5 to 600")
     for signalled in (signal.SIGTERM, signal.SIGHUP):  # a closed terminal must not leave the daemon behind
@@ -67,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         try:
             with (
                 Control(Path(engine.ready["control"])) as control,
-                Page(control.path, args.json) as page,
+                nullcontext("") if args.json else page(control.path) as address,
                 closing(Stream(engine.socket, {"types": HEARD})) as stream,
                 closing(Sensor(engine.listen, Form(DEMO_SENSOR))) as sensor,
                 show.screen or nullcontext(),
@@ -76,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
                     f"The daemon listens on {engine.listen} with the model {engine.ready['model']}.",
                     f"A simulated sensor of {play.rows} x {play.columns} taxels sends OSC to it "
                     f"at {play.rate_hz:g} Hz.",
-                    *([f"In a browser it is seen at {page.address}"] if page.address else []),
+                    *([f"In a browser it is seen at {address}"] if address else []),
                     "For two seconds nobody touches it. Ctrl-C ends.",
                     "",
                 )
@@ -87,32 +85,21 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-class Page:
-    """`gesturectl view` in a process of its own, whose address is shown and never opened; a context manager."""
-
-    def __init__(self, control: Path, quiet: bool) -> None:
-        self.address = ""
-        self._process = (
-            None if quiet else Popen([*VIEW, "--control", str(control)], stdin=DEVNULL, stdout=PIPE, stderr=DEVNULL)
-        )
-
-    def __enter__(self) -> "Page":
-        if self._process is not None and self._process.stdout is not None:
-            self.address = self._process.stdout.readline().decode().strip()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._process is not None and self._process.stdout is not None:
-            self._process.terminate()
-            self._process.wait()
-            self._process.stdout.close()
+@contextmanager
+def page(control: Path) -> Iterator[str]:
+    """`gesturectl view` in a process of its own; the address of its page, which is shown and never opened."""
+    command = [*VIEW, "--control", str(control)]
+    with Popen(command, stdin=DEVNULL, stdout=PIPE, stderr=DEVNULL, text=True) as process:
+        try:
+            yield process.stdout.readline().strip() if process.stdout is not None else ""
+        finally:
+            process.terminate()
 
 
 class Show:
     """The running comparison of one take with the events that come of it."""
 
     def __init__(self, take: Take, model: str, as_json: bool) -> None:
-
         self.take, self.model = take, model
         self.as_json = as_json
         self.colour = in_colour()
@@ -126,15 +113,7 @@ class Show:
 
     def follow(self, sensor: Sensor, stream: Stream, control: Control) -> None:
         """Send the take and show what comes of it, until its end; at a terminal also the finger as it moves."""
-
-        heard: queue.SimpleQueue[tuple[float, dict[str, Any]] | None] = queue.SimpleQueue()
-
-        def listen() -> None:
-            for event in stream:
-                heard.put((time.time(), event))
-            heard.put(None)
-
-        threading.Thread(target=listen, daemon=True).start()
+        heard = read_ahead((time.time(), event) for event in stream)
         threading.Thread(target=sensor.send, args=(frames(0.0, self.take),), daemon=True).start()
         ahead = list(self.take.events)
         end = sensor.moment(float(self.take.times[-1]) + SLACK_S)
@@ -160,7 +139,6 @@ class Show:
 
     def conclude(self) -> None:
         """The summary of what was shown."""
-
         figures = self.tally.summary()
         if self.as_json:
             say_json({"type": "summary"} | figures)
@@ -182,7 +160,6 @@ class Show:
                 self.screen.draw(self.felt.lines(control.ask("view", sensor=DEMO_SENSOR)))
 
     def _show(self, outcome: Outcome, sensor: Sensor) -> None:
-
         if self.as_json:
             say_json(as_dict(outcome))
             return

@@ -4,18 +4,16 @@ import argparse
 import base64
 import queue
 import sys
-import threading
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from gestured.client.control import Control
-from gestured.client.lines import Refused, Unreachable
+from gestured.client.lines import Unreachable, read_ahead
 from gestured.client.program import Commands
 from gestured.client.say import say, say_json
-from gestured.control.address import add_sockets, connect, finish_on_signals
+from gestured.control.address import add_sockets, connect, finish_after, finish_on_signals
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.record.tape import library
@@ -56,9 +54,7 @@ def run(args: argparse.Namespace) -> int:
         with Writer(args.file, scene, args.max_mib << 20) as tape:
             say(f"recording into {args.file}; Ctrl-C ends", to=sys.stderr)
             if args.seconds:
-                timer = threading.Timer(args.seconds, control.finish)
-                timer.daemon = True
-                timer.start()
+                finish_after(control, args.seconds)
             keeper = Keeper(tape, scene)
             why = keeper.follow(control)
     summary = {"file": str(args.file), "packets": keeper.packets, "events": keeper.events, "lost": keeper.lost}
@@ -118,15 +114,7 @@ class Keeper:
 
 def _waiting(control: Control) -> Iterator[dict[str, Any] | None]:
     """The daemon's lines; None now and then where none come."""
-    lines: queue.Queue[dict[str, Any] | None] = queue.Queue(WAITING_LINES)
-
-    def read() -> None:
-        with suppress(Refused):  # half a line, where one of us closed the connection
-            for line in control.lines():
-                lines.put(line)
-        lines.put(None)
-
-    threading.Thread(target=read, daemon=True).start()
+    lines = read_ahead(control.lines(), WAITING_LINES)
     while True:
         try:
             line = lines.get(timeout=FLUSH_S / 4)

@@ -2,7 +2,6 @@
 
 import queue
 import socket
-import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.client import osc_out
-from gestured.client.lines import Unreachable
+from gestured.client.lines import Unreachable, read_ahead
 from gestured.client.sensor import sent_after_refusal
 from gestured.client.stream import Stream
 from gestured.control.diff import ONSET_S, Line
@@ -109,8 +108,7 @@ class Hearing:
         """Begins once the daemon says all that is asked for, and nobody else feeds these sensors."""
         self._sensors = sensors
         self._stream = Stream(path, {"types": EVENT_TYPES})
-        self._heard: queue.Queue[dict[str, Any] | None] = queue.Queue()
-        threading.Thread(target=self._read, daemon=True).start()
+        self._heard = read_ahead(self._stream)
         end = time.monotonic() + STATUS_TIMEOUT_S
         while live := self._live():  # a first status says that the subscription holds
             if time.monotonic() > end:
@@ -154,15 +152,6 @@ class Hearing:
                 f"the daemon on {self._stream.path} took no frame of {', '.join(deaf)}: "
                 "is it the one that listens there, and with that grid? gesturectl doctor says what it dropped"
             )
-
-    def _read(self) -> None:
-        try:
-            for line in self._stream:
-                self._heard.put(line)
-        except GesturedError:
-            pass  # whoever waits for the next line is told that there is none
-        finally:
-            self._heard.put(None)
 
     def _next(self) -> dict[str, Any]:
         try:

@@ -6,7 +6,6 @@ import errno
 import re
 import socket
 import sys
-import threading
 import time
 from collections.abc import Iterator
 
@@ -16,7 +15,7 @@ from gestured.client.lines import Unreachable
 from gestured.client.program import Commands
 from gestured.client.say import say, shown, tell
 from gestured.client.values import host_port
-from gestured.control.address import add_sockets, connect, finish_on_signals
+from gestured.control.address import add_sockets, connect, finish_after, finish_on_signals
 from gestured.control.proposal import LONGEST_ADDRESS, TRAJECTORY, Known, propose, split_address
 from gestured.control.sight import Seen, Sight
 from gestured.core.address import Address
@@ -107,9 +106,7 @@ def _remarks(seen: Seen) -> Iterator[str]:
 
 def _tap(control: Control, seconds: float) -> Iterator[tuple[float, str, bytes]]:
     finish_on_signals(control)
-    timer = threading.Timer(seconds, control.finish)
-    timer.daemon = True
-    timer.start()
+    finish_after(control, seconds)
     for line in control.lines():
         if line["type"] == "packet":
             yield line["t_ns"] / 1e9, str(Address(*line["source"])), base64.b64decode(line["data"])
