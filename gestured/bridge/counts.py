@@ -27,6 +27,7 @@ class Counts:
         self.values: Counter[tuple[str, str]] = Counter()
         self._words: dict[str, str] = {}  # side -> how it is, for systemd's status line
         self._ready = False
+        self._metrics: str | None = None  # where they are served
 
     def add(self, name: str, label: str, count: int = 1) -> None:
         """Count."""
@@ -46,20 +47,16 @@ class Counts:
         # gesturectl doctor reads its first word. READY: to be started does not mean that the others are there.
         notify(f"READY=1\nSTATUS={'connected' if here else 'waiting'}: {'; '.join(self._words.values())}")
 
-    def daemon(self, is_there: bool) -> None:
-        """Count and say whether the daemon is there, of a bridge that mirrors its events."""
-        self.connected("daemon", is_there, f"daemon {'is there' if is_there else 'went'}")
-
     def ready(self, **where: object) -> None:
         """Say once that it works, as one line of JSON on standard output."""
         if not self._ready:
             self._ready = True
-            say_json({"type": "ready", "bridge": self.bridge, **where})
+            say_json({"type": "ready", "bridge": self.bridge, **where, "metrics": self._metrics})
 
-    def serve(self, address: Address | None) -> str | None:
-        """Answer /metrics from a thread of its own, where an address is given; returns it with the real port."""
+    def serve(self, address: Address | None) -> None:
+        """Answer /metrics from a thread of its own, where an address is given."""
         if address is None:
-            return None
+            return
         import prometheus_client
         from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
@@ -82,4 +79,4 @@ class Counts:
             server, _ = prometheus_client.start_http_server(address.port, address.host, registry)
         except OSError as error:
             raise BridgeError(f"--metrics {address}: {error.strerror}: choose another address") from None
-        return str(Address(address.host, server.server_port))
+        self._metrics = str(Address(address.host, server.server_port))

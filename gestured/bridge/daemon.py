@@ -54,7 +54,7 @@ class Daemon:
                 self._gestures(line["gestures"])
                 for name in line["sensors"]:
                     self._state(name, self.states.get(name, "no_data"))
-                self._counts.daemon(True)
+                self._counts.connected("daemon", True, "daemon is there")
             case "gestures":
                 self._gestures(line["gestures"])
             case "status":
@@ -62,7 +62,7 @@ class Daemon:
                     self._state(name, state)
             case "gone":
                 self.hello = {}
-                self._counts.daemon(False)
+                self._counts.connected("daemon", False, "daemon went")
 
     def age(self, event: Line, now: float) -> float:
         """How many seconds ago an event was decided; `now` is in seconds since the epoch.

@@ -1,7 +1,6 @@
 """Frames that come in over Zenoh, on their way to the daemon's UDP port."""
 
 import socket
-from collections.abc import Callable
 from typing import Any
 
 from gestured.bridge.counts import Counts
@@ -21,7 +20,7 @@ class Forward:
         """Raises BridgeError where `to` is no address."""
         self._family, self._address = destination(to)
         self._counts = counts
-        self._senders: dict[str, Callable[[bytes], bool]] = {}
+        self._senders: dict[str, socket.socket] = {}
 
     def take(self, sample: Any) -> None:
         """A packet from Zenoh; what is none, or of another sensor than its key says, is dropped and counted."""
@@ -37,14 +36,14 @@ class Forward:
             self._counts.add("frames", "overflow")
             return
         try:
-            refused = self._sender(sensor)(packet)
+            refused = sent_after_refusal(self._sender(sensor), packet)
         except OSError:  # the network is down, or a packet is too long for it
             refused = True
         self._counts.add("frames", "unheard" if refused else "sent")
 
-    def _sender(self, sensor: str) -> Callable[[bytes], bool]:
+    def _sender(self, sensor: str) -> socket.socket:
         if sensor not in self._senders:
             sender = socket.socket(self._family, socket.SOCK_DGRAM)
             sender.connect(self._address)
-            self._senders[sensor] = lambda packet: sent_after_refusal(sender, packet)
+            self._senders[sensor] = sender
         return self._senders[sensor]

@@ -5,9 +5,10 @@ triggers in the editor of automations (home-assistant/core#158789). The keys are
 home-assistant.io/integrations/event.mqtt and home-assistant.io/integrations/device_trigger.mqtt.
 """
 
-import json
 from collections.abc import Iterator, Sequence
 from typing import Any
+
+from gestured.core.messages import json_object
 
 # What the event entity makes of a gesture's line: what it is, and some of what is known of it.
 EVENT = (
@@ -61,9 +62,5 @@ def discovery(
 
 def gesture_of(payload: bytes) -> str | None:
     """The gesture of a trigger that somebody published; None for an event entity and for what is none of ours."""
-    try:
-        found = json.loads(payload)
-    except (ValueError, RecursionError):
-        return None
-    gesture = found.get("subtype") if isinstance(found, dict) else None
+    gesture = (json_object(payload) or {}).get("subtype")
     return gesture if isinstance(gesture, str) else None

@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
 async def _main(args: argparse.Namespace) -> None:
     counts = Counts("mqtt")
     bridge = Mqtt(args, counts)
-    bridge.metrics = counts.serve(args.metrics)
+    counts.serve(args.metrics)
     source = subscriber(args, NOTICE_S)
     loop = asyncio.get_running_loop()
     loop.set_exception_handler(_pass_over_closed)

@@ -48,7 +48,6 @@ class Mqtt:
         self._retained = Retained(self._daemon, self._host, args.discovery, discovers=not args.no_discovery)
         self._stop = asyncio.Event()
         self._changed = asyncio.Event()  # what the broker should retain may be something else now
-        self.metrics: str | None = None  # where they are served
 
     def take(self, line: Line) -> None:
         """One line of `follow`."""
@@ -108,4 +107,4 @@ class Mqtt:
             for topic, payload in self._retained.changes():
                 await connection.retain(topic, payload)
             if self._daemon.hello:
-                self._counts.ready(broker=str(self._broker.address), host=self._host, metrics=self.metrics)
+                self._counts.ready(broker=str(self._broker.address), host=self._host)

@@ -88,7 +88,7 @@ class Serial:
         self._counter = 0
         self._stopped = False
         self._opened = False  # ever
-        self.metrics = counts.serve(args.metrics)
+        counts.serve(args.metrics)
 
     def stop(self) -> None:
         """Let `work` end; a signal handler may call it."""
@@ -104,7 +104,7 @@ class Serial:
             with port:
                 self._opened = True
                 self._counts.connected("device", True, f"{self._device} is open")
-                self._counts.ready(device=self._device, sensor=self._sensor, to=str(self._to), metrics=self.metrics)
+                self._counts.ready(device=self._device, sensor=self._sensor, to=str(self._to))
                 reason = self._forward(port)
             if reason:
                 self._counts.connected("device", False, f"{self._device} went: {reason}; waiting for it")

@@ -49,7 +49,8 @@ def run(args: argparse.Namespace) -> int:
     source = subscriber(args, NOTICE_S)
     on_stop(source.close)
     try:
-        bridge.begin(counts.serve(args.metrics))
+        counts.serve(args.metrics)
+        bridge.begin()
         for line in follow(source):
             bridge.take(line)
     finally:

@@ -39,11 +39,9 @@ class Zenoh:
         self._latest: dict[str, bytes] = {}  # sensor -> its last gesture
         self._closed = threading.Event()
         self._opening = threading.Thread(target=self._open, name="zenoh", daemon=True)
-        self._metrics: str | None = None
 
-    def begin(self, metrics: str | None) -> None:
-        """Reach the router, in a thread of its own; `metrics` is where they are served."""
-        self._metrics = metrics
+    def begin(self) -> None:
+        """Reach the router, in a thread of its own."""
         self._opening.start()
 
     def take(self, line: Line) -> None:
@@ -123,7 +121,7 @@ class Zenoh:
         for key in alive - self._tokens.keys():
             self._tokens[key] = self._session.liveliness().declare_token(key)
         if self._reached() and self._daemon.hello:
-            self._counts.ready(site=self._site, metrics=self._metrics)
+            self._counts.ready(site=self._site)
 
     def _answer(self, query: Any) -> None:
         """What a latecomer asks for; called by Zenoh in a thread of its own."""

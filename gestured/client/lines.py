@@ -1,6 +1,5 @@
 """A Unix stream socket on which the daemon speaks JSON Lines."""
 
-import json
 import queue
 import socket
 import threading
@@ -10,6 +9,7 @@ from typing import Any, Self, TypeVar
 
 from gestured.client.peer import Stranger, check_peer
 from gestured.core.errors import GesturedError
+from gestured.core.messages import json_object
 
 T = TypeVar("T")
 JOIN = 'sudo adduser "$USER" gestured, and log in again'
@@ -100,10 +100,7 @@ def read_ahead(lines: Iterable[T], most: int = 0) -> "queue.Queue[T | None]":
 
 def parsed(line: bytes, path: Path) -> dict[str, Any]:
     """One line as an object; raises Refused for anything else."""
-    try:
-        message = json.loads(line.decode())
-    except (ValueError, RecursionError):
-        message = None
-    if not isinstance(message, dict):
+    message = json_object(line)
+    if message is None:
         raise Refused(f"{path} sent a line that is no JSON object: {line[:80]!r}")
     return message

@@ -8,6 +8,15 @@ from typing import Any, get_args
 from gestured.core.events import Event
 
 
+def json_object(text: str | bytes) -> dict[str, Any] | None:
+    """The JSON object in somebody else's text, bytes as UTF-8; None where it is anything else, or nested too deeply."""
+    try:
+        found = json.loads(text.decode() if isinstance(text, bytes) else text)
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
 def event_type(event: Event) -> str:
     """What an event is called on the wire: "gesture", "onset" ..."""
     return type(event).__name__.lower()

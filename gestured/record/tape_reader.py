@@ -1,12 +1,12 @@
 """A tape that is read; the file may be cut off, damaged or hostile."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from gestured.core.address import Address
 from gestured.core.errors import RecordingError
+from gestured.core.messages import json_object
 from gestured.record.files import open_regular
 from gestured.record.mcap import CHANNEL, MESSAGE, METADATA, Budget, CutOff, Damaged, Fields, TooLarge, records
 from gestured.record.tape import EVENT_SCHEMA, EVENTS, PACKETS, SCENE, Packet, Tape, library
@@ -103,22 +103,16 @@ class _Reading:
 
 
 def _scene(metadata: Mapping[str, str]) -> Mapping[str, Any]:
-    try:
-        found = json.loads(metadata["json"])
-    except (KeyError, ValueError, RecursionError):
-        found = None
-    if not isinstance(found, dict):
+    found = json_object(metadata.get("json", ""))
+    if found is None:
         raise _Wrong(f"metadata {SCENE!r}: expected a JSON object, as gesturectl record writes it")
     return found
 
 
 def _event(line: bytes, number: int) -> Mapping[str, Any]:
     """A line of the event stream, held against what is asked of events later; what it says besides is left alone."""
-    try:
-        event = json.loads(line)
-    except (ValueError, RecursionError):
-        event = None
-    if not isinstance(event, dict):
+    event = json_object(line)
+    if event is None:
         raise _Wrong(f"event {number}: expected a JSON object")
     needed = ("type", *NEEDED.get(str(event.get("type")), ()))
     for key, form in FORMS.items():

@@ -10,16 +10,12 @@ import pytest
 from gestured.control.cli import main
 from gestured.control.doctor import _buffer, _clock, _permissions, _port
 from gestured.control.findings import BUFFER_BYTES
-from gestured.control.proposal import propose
-from gestured.control.sight import Sight
-from gestured.control.sniff import lines
 from gestured.control.status import screen
 from gestured.core.address import Address
 from tests import encoding
 from tests.control.conftest import asked
 from tests.daemon import tiny_model
-from tests.daemon.harness import Daemon, Hand, Sensor, blob, counted, floats, ints
-from tests.sockets import free_address
+from tests.daemon.harness import Daemon, Hand, Sensor, floats
 
 
 def test_status_shows_sensors_model_and_answers(ctl, daemon: Daemon) -> None:
@@ -139,63 +135,6 @@ def test_sniff_shows_what_reaches_the_daemon_and_what_to_set(start, daemon: Daem
     message = next(m for m in found["messages"] if m["address"] == "/textile/odd/matrix")
     assert (message["types"], message["count"], len(message["sources"])) == ("f*81", 20, 1)
     assert found["errors"] == {"not_osc": 1}
-
-
-@pytest.mark.parametrize(
-    ("address", "encode", "proposed"),
-    [
-        ("/arm/pressure", floats, ["the defaults fit what arrives"]),
-        ("/arm/pressure", counted, ["the defaults fit what arrives"]),
-        ("/arm/pressure", blob(">u2"), ["the defaults fit what arrives"]),
-        ("/textile/arm/matrix", ints, ["[addresses]", 'pressure = "/textile/{sensor}/matrix"']),
-        ("/arm", floats, ["[addresses]", 'pressure = "/{sensor}"']),
-    ],
-)
-def test_what_sniff_proposes_is_taken_by_the_daemon(address: str, encode, proposed: list[str]) -> None:
-    from gestured.core.osc_address import Addresses
-    from gestured.core.wire import Decoder
-
-    sight = Sight()
-    packets = [encode(address, Hand().frame(), n) for n in range(5)]
-    for n, packet in enumerate(packets):
-        sight.packet(n / 15, "127.0.0.1:5", packet)
-    found = propose(list(sight.seen.values()))
-    assert found == proposed
-    pattern = re.findall(r'pressure = "(.*)"', "\n".join(found)) or ["/{sensor}/pressure"]
-    decoder = Decoder(Addresses(pattern[0]), lambda sensor: (9, 9))
-    assert [len(decoder.decode(packet)[0]) for packet in packets] == [1] * 5
-
-
-def test_sniff_proposes_a_grid_and_is_bounded() -> None:
-    sight = Sight()
-    for n in range(1000):
-        sight.packet(n, "a:1", encoding.message(f"/s{n}/pressure", "f" * 25, [0.0] * 25))
-    assert len(sight.seen) <= 257 and sum(seen.count for seen in sight.seen.values()) == 1000
-    one = Sight()
-    one.packet(0, "a:1", encoding.message("/arm/pressure", "f" * 25, [0.0] * 25))
-    assert propose(list(one.seen.values())) == ["[sensors.arm]", 'grid = "5x5"']
-    one.packet(0, "a:1", encoding.message("/foo/7/matrix", "f" * 49, [0.0] * 49))
-    one.packet(0, "a:1", encoding.message("/arm/pressure", "f" * 25, [0.0] * 25))
-    assert propose(list(one.seen.values())) == [
-        "[sensors.arm]",
-        'grid = "5x5"',
-        "# /foo/{sensor}/matrix looks like frames, too; a daemon takes one pattern",
-    ]
-
-
-def test_sniff_says_what_may_be_wrong(run) -> None:
-    status, out, _ = run("sniff", "--listen", free_address(), "--seconds", "0.1")
-    assert status == 1 and "nothing arrives" in out
-    two = Sight()
-    for n, source in enumerate(("a:1", "a:2", "a:2")):
-        two.packet(n, source, floats("/arm/pressure", Hand().frame(), n))
-    assert "has several senders" in "\n".join(lines(two, []))
-
-
-def test_sniff_on_a_port_of_its_own(sniffed) -> None:
-    status, out, _ = sniffed([floats("/textile/arm/matrix", Hand().frame(), 0)], "--json")
-    (message,) = json.loads(out)["messages"]
-    assert (message["address"], message["types"], status) == ("/textile/arm/matrix", "f*81", 0)
 
 
 def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon) -> None:

@@ -1,5 +1,7 @@
 """What `gesturectl sniff` makes of packets: forms that are not taken, counters, grids, counts that fall."""
 
+import json
+import re
 import tomllib
 from typing import Any
 
@@ -9,9 +11,12 @@ import pytest
 from gestured.control.proposal import Known, propose
 from gestured.control.sight import Sight
 from gestured.control.sniff import lines
+from gestured.core.osc_address import Addresses
+from gestured.core.wire import Decoder
 from gestured.daemon.merge import load_settings
 from tests import encoding
-from tests.daemon.harness import Hand, counted, floats
+from tests.daemon.harness import Hand, blob, counted, floats, ints
+from tests.sockets import free_address
 
 
 def seen(packets, rate: float = 15.0) -> Sight:
@@ -96,7 +101,7 @@ def test_counts_that_fall(tmp_path, sign: float) -> None:
 
 
 @pytest.mark.parametrize(("types", "words"), [("d", "doubles"), ("[f", "arrays"), ("h", "64-bit integers")])
-def test_what_is_not_taken_is_named_and_fails(sniffed, types: str, words: str) -> None:
+def test_what_is_not_taken_is_named(types: str, words: str) -> None:
     frame = [float(v) if types != "h" else int(v) for v in Hand().frame().ravel()]
     if types == "[f":
         packet = encoding._string("/arm/pressure") + encoding._string(",[" + "f" * 81 + "]") + bytes(4 * 81)
@@ -104,6 +109,52 @@ def test_what_is_not_taken_is_named_and_fails(sniffed, types: str, words: str) -
         packet = encoding.message("/arm/pressure", types * 81, frame)
     sight = seen([packet] * 4)
     text = "\n".join(lines(sight, propose(sight.rows())))
-    assert f"{words} are not taken: send f" in text
-    status, out, _ = sniffed([packet])
-    assert status == 1 and f"{words} are not taken: send f" in out.decode()
+    assert f"{words} are not taken: send f" in text and "nothing that looks like a pressure frame" in text
+
+
+@pytest.mark.parametrize(
+    ("address", "encode", "proposed"),
+    [
+        ("/arm/pressure", floats, ["the defaults fit what arrives"]),
+        ("/arm/pressure", counted, ["the defaults fit what arrives"]),
+        ("/arm/pressure", blob(">u2"), ["the defaults fit what arrives"]),
+        ("/textile/arm/matrix", ints, ["[addresses]", 'pressure = "/textile/{sensor}/matrix"']),
+        ("/arm", floats, ["[addresses]", 'pressure = "/{sensor}"']),
+    ],
+)
+def test_what_sniff_proposes_is_taken_by_the_daemon(address: str, encode, proposed: list[str]) -> None:
+    packets = [encode(address, Hand().frame(), n) for n in range(5)]
+    found = propose(seen(packets).rows())
+    assert found == proposed
+    pattern = re.findall(r'pressure = "(.*)"', "\n".join(found)) or ["/{sensor}/pressure"]
+    decoder = Decoder(Addresses(pattern[0]), lambda sensor: (9, 9))
+    assert [len(decoder.decode(packet)[0]) for packet in packets] == [1] * 5
+
+
+def test_what_was_seen_is_bounded() -> None:
+    sight = seen(encoding.message(f"/s{n}/pressure", "f" * 25, [0.0] * 25) for n in range(1000))
+    assert len(sight.seen) <= 257 and sum(one.count for one in sight.seen.values()) == 1000
+
+
+def test_another_pattern_is_mentioned() -> None:
+    arm = encoding.message("/arm/pressure", "f" * 25, [0.0] * 25)
+    grid = ["[sensors.arm]", 'grid = "5x5"']
+    assert propose(seen([arm]).rows()) == grid
+    other = encoding.message("/foo/7/matrix", "f" * 49, [0.0] * 49)
+    said = "# /foo/{sensor}/matrix looks like frames, too; a daemon takes one pattern"
+    assert propose(seen([arm, other, arm]).rows()) == [*grid, said]
+
+
+def test_sniff_says_what_may_be_wrong(run) -> None:
+    status, out, _ = run("sniff", "--listen", free_address(), "--seconds", "0.1")
+    assert status == 1 and "nothing arrives" in out
+    two = Sight()
+    for n, source in enumerate(("a:1", "a:2", "a:2")):
+        two.packet(n, source, floats("/arm/pressure", Hand().frame(), n))
+    assert "has several senders" in "\n".join(lines(two, []))
+
+
+def test_sniff_on_a_port_of_its_own(sniffed) -> None:
+    status, out, _ = sniffed([floats("/textile/arm/matrix", Hand().frame(), 0)], "--json")
+    (message,) = json.loads(out)["messages"]
+    assert (message["address"], message["types"], status) == ("/textile/arm/matrix", "f*81", 0)

@@ -1,11 +1,10 @@
 """gestured.Subscriber, against scripted daemons and a real one."""
 
 import json
-import queue
 import signal
 import socket
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,48 +13,14 @@ from typing import Any
 import pytest
 
 from gestured.client.control import Control
-from gestured.client.lines import Forbidden, Refused, Unreachable
+from gestured.client.lines import Forbidden, Refused, Unreachable, read_ahead
 from gestured.client.subscriber import LONGEST_S, Subscriber
 from gestured.core.errors import GesturedError
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
-from tests.sockets import HELLO, FakeDaemon
+from tests.sockets import HELLO, PATIENCE_S, FakeDaemon
 
 GESTURE = {"type": "gesture", "sensor": "armrest", "gesture": "one_tap", "sequence": 4}
-
-
-@pytest.fixture
-def iterate() -> Iterator[Callable[[Subscriber], "Reader"]]:
-    """Iterates over a subscriber in a thread of its own, to its end."""
-    readers: list[Reader] = []
-
-    def begin(subscriber: Subscriber) -> "Reader":
-        readers.append(Reader(subscriber))
-        return readers[-1]
-
-    yield begin
-    for reader in readers:
-        reader.subscriber.close()
-        reader.thread.join(30)
-
-
-class Reader:
-    """A thread that keeps what a subscriber gives."""
-
-    def __init__(self, subscriber: Subscriber) -> None:
-        self.subscriber = subscriber
-        self.events: queue.Queue[dict[str, Any]] = queue.Queue()
-        self.thread = threading.Thread(target=self._read, daemon=True)
-        self.thread.start()
-
-    def _read(self) -> None:
-        for event in self.subscriber:
-            self.events.put(event)
-
-    def ended(self) -> bool:
-        """Whether the iteration comes to its end."""
-        self.thread.join(30)
-        return not self.thread.is_alive()
 
 
 @contextmanager
@@ -156,21 +121,23 @@ def test_a_pause_is_told_and_loses_nothing(fake: FakeDaemon):
         assert events == [GESTURE]
 
 
-def test_close_in_another_thread_ends_the_iteration(fake: FakeDaemon, iterate):
-    reader = iterate(Subscriber(fake.path))
+def test_close_in_another_thread_ends_the_iteration(fake: FakeDaemon):
+    subscriber = Subscriber(fake.path)
+    events = read_ahead(subscriber)
     fake.accept()
     fake.say(GESTURE)
-    assert reader.events.get(timeout=30) == GESTURE
-    reader.subscriber.close()
-    assert reader.ended() and reader.events.empty()
+    assert events.get(timeout=PATIENCE_S) == GESTURE
+    subscriber.close()
+    assert events.get(timeout=PATIENCE_S) is None
     assert fake.client.recv(1) == b""
-    reader.subscriber.close()
+    subscriber.close()
 
 
-def test_close_ends_the_wait_for_a_daemon_that_is_not_there(tmp_path: Path, iterate):
-    reader = iterate(Subscriber(tmp_path / "none.sock"))
-    reader.subscriber.close()
-    assert reader.ended() and reader.events.empty()
+def test_close_ends_the_wait_for_a_daemon_that_is_not_there(tmp_path: Path):
+    subscriber = Subscriber(tmp_path / "none.sock")
+    events = read_ahead(subscriber)
+    subscriber.close()
+    assert events.get(timeout=PATIENCE_S) is None
 
 
 def test_close_in_a_signal_handler_ends_the_iteration(fake: FakeDaemon):
