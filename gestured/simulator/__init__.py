@@ -24,7 +24,7 @@ from gestured.simulator.cohort import (
     wide,
     wide_plan,
 )
-from gestured.simulator.people import INCLINATIONS, SPEEDS, Artefact, Participant, Performance, Press, generator
+from gestured.simulator.people import INCLINATIONS, SPEEDS, Participant, Performance, generator
 from gestured.simulator.sensor import Act, SimulatedSensor, Take
 from gestured.simulator.variety import any_sensor
 
@@ -35,8 +35,6 @@ __all__ = [
     "NON_GESTURES",
     "SEQUENCES",
     "SPEEDS",
-    "Artefact",
-    "Press",
     "Act",
     "Participant",
     "Performance",
