@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from gestured.core.errors import RecordingError
 from gestured.record import arrays as recording
@@ -185,19 +183,3 @@ def test_what_is_no_recording_file(tmp_path: Path, kind: str) -> None:
     elif kind == "nul":
         path = Path("a\0b.npz")
     refusal(path)
-
-
-@given(st.data())
-def test_damaged_files_are_read_or_refused(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
-    path = tmp_path_factory.getbasetemp() / "damaged.npz"
-    write(path, session())
-    content = bytearray(path.read_bytes())
-    for _ in range(data.draw(st.integers(0, 4))):
-        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    path.write_bytes(content[: data.draw(st.integers(len(content) // 2, len(content)))])
-    try:
-        found = read(path)
-    except RecordingError as error:
-        assert str(error).startswith(f"{path}: ")
-    else:
-        assert len(found) == 2
