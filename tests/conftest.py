@@ -7,13 +7,15 @@ import os
 import signal
 import socket
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 from gestured.model.shipped import LADDER
+from tests.daemon import tiny_model
+from tests.daemon.harness import Daemon
 from tests.small_model import build
 from tests.sockets import PATIENCE_S, FakeDaemon
 
@@ -76,6 +78,30 @@ def fake(tmp_path: Path) -> Iterator[FakeDaemon]:
     daemon = FakeDaemon(tmp_path / "events.sock")
     yield daemon
     daemon.listener.close()
+
+
+@pytest.fixture(scope="session")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A valid model file named tiny."""
+    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
+    return tiny_model.make(tmp_path_factory.mktemp("model") / "tiny.onnx")
+
+
+@pytest.fixture
+def serve(model: Path, tmp_path: Path) -> Iterator[Callable[..., Daemon]]:
+    """Starts daemons with these flags, each in a folder of its own; they end with the test, and end well."""
+    daemons: list[Daemon] = []
+
+    def begin(*flags: object, model: object = model) -> Daemon:
+        folder = tmp_path / f"daemon{len(daemons)}"
+        folder.mkdir()
+        daemons.append(Daemon.start(folder, model, *flags))
+        return daemons[-1]
+
+    yield begin
+    for daemon in daemons:
+        assert daemon.stop() == 0, daemon.stderr()
+        assert "Traceback" not in daemon.stderr()
 
 
 @pytest.fixture

@@ -17,7 +17,6 @@ from typing import Any
 import pytest
 
 from gestured.client.control import Control
-from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon
 from tests.sockets import free_address
 
@@ -93,13 +92,6 @@ def bridge(tmp_path: Path) -> Iterator[Callable[..., Process]]:
     for process in running:
         process.stop()
         assert "Traceback" not in process.said()
-
-
-@pytest.fixture(scope="session")
-def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A valid model file named tiny."""
-    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
-    return tiny_model.make(tmp_path_factory.mktemp("model") / "tiny.onnx")
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from gestured.core.osc_address import Addresses
 from gestured.core.wire import Decoder
 from tests.bridge.conftest import Process, page, wait
 from tests.bridge.test_protocols import written
-from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, blob, floats
+from tests.daemon.harness import DEADLINE_S, Hand, Sensor, blob, floats
 from tests.sockets import free_address
 
 pytest.importorskip("serial", reason="the bridge from serial lines needs the extra [serial]")
@@ -99,49 +99,38 @@ class Out:
         return arrival
 
 
-@pytest.fixture
-def start(model: Path, tmp_path: Path) -> Callable[..., Daemon]:
-    """Starts a daemon with these flags."""
-    return lambda *flags: Daemon.start(tmp_path, model, *flags)
-
-
 @pytest.mark.parametrize("protocol", sorted(GRID))
-def test_simulator_to_pty_to_bridge_to_daemon_gives_the_events_of_udp(bridge, line, udp, start, protocol):
+def test_simulator_to_pty_to_bridge_to_daemon_gives_the_events_of_udp(bridge, line, udp, serve, protocol):
     """Each frame goes to one sensor by UDP and to another one through the line, with the same time."""
-    daemon = start("--clock", "sensor", "--stale-s", 30, "--grid", GRID[protocol])
-    try:
-        process = begin(bridge, line, protocol, udp)
-        client = daemon.client().subscribe("gesture", "unknown", "cancelled")
-        hand = Hand()
-        direct = Sensor(daemon, "direct", floats if protocol in ("csv", "osc-slip") else blob("u1"))
-        around = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        around.connect(daemon.address)
-        performed = [*hand.idle(2.0)]
-        for motion in (hand.swipe("left"), hand.tap(), hand.swipe("up"), hand.swipe("down")):
-            performed += [*motion, *hand.idle(1.0)]
-        if protocol == "csv":
-            line.say(b"cut off\n")
-        for frame in performed:
-            if protocol == "e256":
-                frame = np.pad(frame, ((3, 4), (3, 4)), "edge")
-                assert line.hear(10) == b"\xc0/r\0\0,\0\0\0\xc0"
-            sent = direct.packet(frame)
-            direct.sock.send(sent)
-            line.say(written(protocol, frame))
-            packet = udp.recv(65536)
-            around.send(packet[:8] + sent[8:16] + packet[16:])  # at the same time
-        events = {"direct": [], "armrest": []}
-        while min(map(len, events.values())) < 4:
-            event = client.line()
-            events[event["sensor"]].append(
-                {key: event.get(key) for key in ("type", "gesture", "id", "confidence", "scores", "frames", "lost")}
-            )
-        assert events["direct"] == events["armrest"]
-        assert [event["gesture"] for event in events["direct"]] == ["swipe_left", "one_tap", "swipe_up", "swipe_down"]
-        assert process.stop() == 0
-    finally:
-        around.close()
-        assert daemon.stop() == 0, daemon.stderr()
+    daemon = serve("--clock", "sensor", "--stale-s", 30, "--grid", GRID[protocol])
+    process = begin(bridge, line, protocol, udp)
+    client = daemon.client().subscribe("gesture", "unknown", "cancelled")
+    hand = Hand()
+    direct = Sensor(daemon, "direct", floats if protocol in ("csv", "osc-slip") else blob("u1"))
+    around = Sensor(daemon, "armrest").sock
+    performed = [*hand.idle(2.0)]
+    for motion in (hand.swipe("left"), hand.tap(), hand.swipe("up"), hand.swipe("down")):
+        performed += [*motion, *hand.idle(1.0)]
+    if protocol == "csv":
+        line.say(b"cut off\n")
+    for frame in performed:
+        if protocol == "e256":
+            frame = np.pad(frame, ((3, 4), (3, 4)), "edge")
+            assert line.hear(10) == b"\xc0/r\0\0,\0\0\0\xc0"
+        sent = direct.packet(frame)
+        direct.sock.send(sent)
+        line.say(written(protocol, frame))
+        packet = udp.recv(65536)
+        around.send(packet[:8] + sent[8:16] + packet[16:])  # at the same time
+    events = {"direct": [], "armrest": []}
+    while min(map(len, events.values())) < 4:
+        event = client.line()
+        events[event["sensor"]].append(
+            {key: event.get(key) for key in ("type", "gesture", "id", "confidence", "scores", "frames", "lost")}
+        )
+    assert events["direct"] == events["armrest"]
+    assert [event["gesture"] for event in events["direct"]] == ["swipe_left", "one_tap", "swipe_up", "swipe_down"]
+    assert process.stop() == 0
 
 
 def frame(value: int, shape: tuple[int, int] = (9, 9)) -> np.ndarray:

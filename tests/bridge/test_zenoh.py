@@ -199,32 +199,29 @@ def test_peers_need_no_router(bridge, fake):
     peer.close()
 
 
-def test_frames_of_another_machine_give_the_events_of_udp(bridge, site, model, tmp_path):
+def test_frames_of_another_machine_give_the_events_of_udp(bridge, site, serve):
     """The same packets go by UDP and through Zenoh, with their counter and time."""
-    daemon = Daemon.start(tmp_path, model, "--clock", "sensor", "--stale-s", 30)
-    try:
-        begin(bridge, site, daemon, "--frames", "--to", str(daemon.address)).ready()
-        distant = site.publisher("gestured/car/distant/frames")
-        client = daemon.client().subscribe("gesture")
-        hand = Hand()
-        sensors = {name: Sensor(daemon, name, counted) for name in ("direct", "distant")}
-        swipes = [part for name in ("left", "up", "down") for part in (*hand.swipe(name), *hand.idle(1.0))]
-        for n, frame in enumerate([*hand.idle(2.0), *swipes]):
-            packets = {name: sensor.packet(frame) for name, sensor in sensors.items()}
-            if n == 33:  # this one is lost: its counter tells
-                continue
-            sensors["direct"].sock.send(packets["direct"])
-            distant.put(packets["distant"])
-        keys = ("gesture", "id", "sequence", "confidence", "scores", "frames", "lost")
-        events: dict[str, list[Any]] = {"direct": [], "distant": []}
-        while min(map(len, events.values())) < 3:
-            event = client.line()
-            events[event["sensor"]].append([event[key] for key in keys])
-        assert events["direct"] == events["distant"]
-        assert [event[0] for event in events["distant"]] == ["swipe_left", "swipe_up", "swipe_down"]
-        assert any(event[-1] for event in events["distant"]), "the frame that is missing was noticed"
-    finally:
-        assert daemon.stop() == 0
+    daemon = serve("--clock", "sensor", "--stale-s", 30)
+    begin(bridge, site, daemon, "--frames", "--to", str(daemon.address)).ready()
+    distant = site.publisher("gestured/car/distant/frames")
+    client = daemon.client().subscribe("gesture")
+    hand = Hand()
+    sensors = {name: Sensor(daemon, name, counted) for name in ("direct", "distant")}
+    swipes = [part for name in ("left", "up", "down") for part in (*hand.swipe(name), *hand.idle(1.0))]
+    for n, frame in enumerate([*hand.idle(2.0), *swipes]):
+        packets = {name: sensor.packet(frame) for name, sensor in sensors.items()}
+        if n == 33:  # this one is lost: its counter tells
+            continue
+        sensors["direct"].sock.send(packets["direct"])
+        distant.put(packets["distant"])
+    keys = ("gesture", "id", "sequence", "confidence", "scores", "frames", "lost")
+    events: dict[str, list[Any]] = {"direct": [], "distant": []}
+    while min(map(len, events.values())) < 3:
+        event = client.line()
+        events[event["sensor"]].append([event[key] for key in keys])
+    assert events["direct"] == events["distant"]
+    assert [event[0] for event in events["distant"]] == ["swipe_left", "swipe_up", "swipe_down"]
+    assert any(event[-1] for event in events["distant"]), "the frame that is missing was noticed"
 
 
 def test_frames_are_of_the_sensor_that_their_key_says(bridge, site, fake, udp):

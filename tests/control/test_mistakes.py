@@ -4,7 +4,7 @@ import json
 import os
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ import pytest
 from gestured.control.findings import RECENT_S, examine_status
 from tests import encoding
 from tests.control.conftest import asked
-from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, counted, floats
 from tests.sockets import free_address
 
@@ -53,20 +52,15 @@ def test_the_variables_that_the_daemon_takes_find_it(run, daemon: Daemon, tmp_pa
 
 
 @pytest.fixture
-def own(tmp_path: Path) -> Iterator[Callable[..., Daemon]]:
+def own(serve, tmp_path: Path) -> Callable[..., Daemon]:
     """Starts a daemon with this configuration file, which the test alone uses."""
-    pytest.importorskip("onnx", reason="the tests' own model is made with the onnx package")
-    daemons: list[Daemon] = []
 
     def begin(config: str = "", *flags: object) -> Daemon:
-        (tmp_path / "gestured.toml").write_text(config)
-        model = tiny_model.make(tmp_path / "tiny.onnx")
-        daemons.append(Daemon.start(tmp_path, model, "--config", tmp_path / "gestured.toml", *flags))
-        return daemons[-1]
+        path = tmp_path / "gestured.toml"
+        path.write_text(config)
+        return serve("--config", path, *flags)
 
-    yield begin
-    for daemon in daemons:
-        daemon.stop()
+    return begin
 
 
 def awaited(daemon: Daemon, name: str, *states: str) -> dict[str, Any]:

@@ -4,7 +4,6 @@ import json
 import os
 import socket
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -95,15 +94,8 @@ def test_whatever_is_cut_off_the_rest_is_read(recorded, daemon: Daemon, tmp_path
     assert read and read == sorted(read)
 
 
-@pytest.fixture
-def flooded(tmp_path: Path) -> Iterator[Daemon]:
-    """A daemon of its own for a flood, which would fill the others' flight recorder and wait in their socket."""
-    daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"))
-    yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
-
-
-def test_a_recording_ends_at_its_size_and_never_replaces_a_file(run, start, flooded: Daemon, tmp_path: Path) -> None:
+def test_a_recording_ends_at_its_size_and_never_replaces_a_file(run, start, serve, tmp_path: Path) -> None:
+    flooded = serve()  # of its own: a flood would fill the others' flight recorder, and wait in their socket
     path = tmp_path / "full.mcap"
     recorder = start("record", path, "--control", flooded.ready["control"], "--max-mib", "1", "--json")
     with socket.socket(type=socket.SOCK_DGRAM) as sender:
@@ -117,8 +109,8 @@ def test_a_recording_ends_at_its_size_and_never_replaces_a_file(run, start, floo
     assert status == 1 and str(path) in err and "File exists" in err
 
 
-def test_a_recording_whose_daemon_goes_is_good_and_says_so(start, tmp_path: Path) -> None:
-    daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"), "--clock", "sensor")
+def test_a_recording_whose_daemon_goes_is_good_and_says_so(start, serve, tmp_path: Path) -> None:
+    daemon = serve("--clock", "sensor")
     path = tmp_path / "gone.mcap"
     recorder = start("record", path, "--control", daemon.ready["control"])
     assert b"recording into" in recorder.stderr.readline()

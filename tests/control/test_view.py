@@ -84,13 +84,10 @@ class Stream:
 
 
 @pytest.fixture
-def real(tmp_path: Path) -> Iterator[Daemon]:
+def real(serve, tmp_path: Path) -> Daemon:
     """A daemon that the test alone looks at, without a flight recorder."""
     model = tiny_model.make(tmp_path / "tiny.onnx", provisional=tiny_model.PROVISIONAL)
-    daemon = Daemon.start(tmp_path, model, "--clock", "sensor", "--stale-s", 30)
-    yield daemon
-    assert daemon.stop() == 0, daemon.stderr()
-    assert "Traceback" not in daemon.stderr()
+    return serve("--clock", "sensor", "--stale-s", 30, model=model)
 
 
 @pytest.fixture

@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 from gestured.client.control import Control
-from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
 
 ARROWS = set("→↘↓↙←↖↑↗")
@@ -89,8 +88,8 @@ def test_a_sensor_is_drawn_as_it_is_touched(terminal, daemon: Daemon) -> None:
     assert watch.process.wait(DEADLINE_S) == 0
 
 
-def test_a_sensor_that_falls_silent_and_a_daemon_that_ends_are_told(terminal, tmp_path: Path) -> None:
-    daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"))
+def test_a_sensor_that_falls_silent_and_a_daemon_that_ends_are_told(terminal, serve) -> None:
+    daemon = serve()
     Sensor(daemon, "drawn").begin()
     with Control(Path(daemon.ready["control"])) as control:
         while "drawn" not in control.ask("status")["sensors"]:

@@ -14,8 +14,7 @@ import pytest
 
 from deploy.generate import animation, completion, configuration, dashboard, man, programs
 from gestured.daemon.settings import FLAGS, TABLES, Settings
-from tests.daemon import tiny_model
-from tests.daemon.harness import Daemon, Sensor
+from tests.daemon.harness import Sensor
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = {program.name: program for program in programs.all_programs()}
@@ -106,7 +105,7 @@ def test_bash_completes_commands_flags_choices_and_files():
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
-def test_bash_completes_names_of_gestures_types_and_sensors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_bash_completes_names_of_gestures_types_and_sensors(serve, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     program = tmp_path / "gesturectl"
     program.write_text(f'#!/bin/sh\nexec {sys.executable} -m gestured.control "$@"\n')
     program.chmod(0o755)
@@ -116,15 +115,12 @@ def test_bash_completes_names_of_gestures_types_and_sensors(tmp_path: Path, monk
     assert complete("gesturectl", "listen", "--sensor", "") == set()
     assert complete("gesturectl", "emit", "circle_") == {"circle_clockwise", "circle_counter_clockwise"}
     assert complete("gestured", "--gestures", "one_tap,swipe_l") == {"one_tap,swipe_left"}
-    daemon = Daemon.start(tmp_path, tiny_model.make(tmp_path / "tiny.onnx"), "--clock", "sensor")
-    try:
-        monkeypatch.setenv("GESTURED_SOCKET", str(daemon.socket))
-        client = daemon.client().subscribe("gesture")
-        Sensor(daemon, "armrest").begin().perform("left")
-        client.events("gesture", "armrest")
-        assert complete("gesturectl", "listen", "--sensor", "arm") == {"armrest"}
-    finally:
-        daemon.stop()
+    daemon = serve("--clock", "sensor")
+    monkeypatch.setenv("GESTURED_SOCKET", str(daemon.socket))
+    client = daemon.client().subscribe("gesture")
+    Sensor(daemon, "armrest").begin().perform("left")
+    client.events("gesture", "armrest")
+    assert complete("gesturectl", "listen", "--sensor", "arm") == {"armrest"}
 
 
 class Zsh:

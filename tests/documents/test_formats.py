@@ -14,7 +14,7 @@ from gestured.core import messages
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.subscription import parse_subscription
 from gestured.model.shipped import shipped
-from tests.daemon.harness import Daemon, Sensor
+from tests.daemon.harness import Sensor
 from tests.documents.blocks import ROOT, Block, blocks
 
 SCHEMA = json.loads((ROOT / "docs" / "events.schema.json").read_text())
@@ -69,19 +69,16 @@ def test_lines_of_every_kind_are_valid(valid: Any):
 
 
 @pytest.mark.e2e
-def test_a_daemons_lines_are_valid(valid: Any, tmp_path: Path):
+def test_a_daemons_lines_are_valid(valid: Any, serve):
     if not shipped()["cnn_lstm"].exists():
         pytest.skip(f"{shipped()['cnn_lstm']} is not there")
-    daemon = Daemon.start(tmp_path, "cnn_lstm", "--clock", "sensor")
-    try:
-        client = daemon.client().subscribe(*TYPES).ask(b"rubbish\n")
-        Sensor(daemon, "armrest").begin().perform("left", "tap", "up")
-        lines = [client.hello]
-        while not {line["type"] for line in lines} >= {"error", "onset", "release", "status"}:
-            lines.append(client.line())
-        client.close()
-    finally:
-        daemon.stop()
+    daemon = serve("--clock", "sensor", model="cnn_lstm")
+    client = daemon.client().subscribe(*TYPES).ask(b"rubbish\n")
+    Sensor(daemon, "armrest").begin().perform("left", "tap", "up")
+    lines = [client.hello]
+    while not {line["type"] for line in lines} >= {"error", "onset", "release", "status"}:
+        lines.append(client.line())
+    client.close()
     for line in lines:
         valid(line)
 
