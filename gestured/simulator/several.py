@@ -11,28 +11,27 @@ from gestured.simulator.people import Press
 from gestured.simulator.strokes import touch_down
 
 
+def _row(middle: tuple[float, float], angle: float, gap: float, count: int) -> list[tuple[float, float]]:
+    """Places (mm) of so many fingers in a row about their middle, `gap` millimetres apart."""
+    x, y = middle
+    along = [(k - (count - 1) / 2) * gap for k in range(count)]
+    return [(x + a * math.cos(angle), y + a * math.sin(angle)) for a in along]
+
+
 def knuckles(occasion: Occasion) -> list[Press]:
     """A knock with three or four knuckles at once, once or twice."""
     rng = occasion.rng
     count, gap = int(rng.integers(3, 5)), rng.uniform(14.0, 22.0)
     angle = rng.normal(0.0, 0.5)
-    x, y = occasion.spot(gap, 4.0)
+    places = _row(occasion.spot(gap, 4.0), angle, min(gap, 0.8 * occasion.small / (count - 1)), count)
     made: list[Press] = []
     start = 0.0
     for _ in range(int(rng.integers(1, 3))):
         duration = rng.uniform(0.05, 0.2)
-        for k in range(count):
-            along = (k - (count - 1) / 2) * min(gap, 0.8 * occasion.small / (count - 1))
-            made.append(
-                touch_down(
-                    occasion,
-                    x + along * math.cos(angle),
-                    y + along * math.sin(angle),
-                    duration,
-                    start + rng.uniform(0.0, 0.02),
-                    force=rng.uniform(0.5, 1.5),
-                )
-            )
+        made += [
+            touch_down(occasion, x, y, duration, start + rng.uniform(0.0, 0.02), rng.uniform(0.5, 1.5))
+            for x, y in places
+        ]
         start += duration + rng.uniform(0.15, 0.3)
     return made
 
@@ -42,22 +41,14 @@ def drumming(occasion: Occasion) -> list[Press]:
     rng = occasion.rng
     fingers = int(rng.integers(2, 5))
     gap = min(occasion.spacing(), 0.8 * occasion.small / (fingers - 1))
-    x, y = occasion.spot(gap * (fingers - 1) / 2, 6.0)
-    angle = rng.normal(0.0, 0.35)
+    middle = occasion.spot(gap * (fingers - 1) / 2, 6.0)
+    places = _row(middle, rng.normal(0.0, 0.35), gap, fingers)
     made, start = [], 0.0
     order = int(rng.choice([-1, 1]))
     for k in range(int(rng.integers(4, 11))):
-        along = ((order * k) % fingers - (fingers - 1) / 2) * gap
-        made.append(
-            touch_down(
-                occasion,
-                x + along * math.cos(angle),
-                y + along * math.sin(angle) + rng.normal(0.0, 2.0),
-                occasion.tap_s(),
-                start,
-                force=rng.uniform(0.6, 1.2),
-            )
-        )
+        x, y = places[(order * k) % fingers]
+        y += rng.normal(0.0, 2.0)
+        made.append(touch_down(occasion, x, y, occasion.tap_s(), start, rng.uniform(0.6, 1.2)))
         start += rng.uniform(0.06, 0.2)
     return made
 
@@ -68,23 +59,16 @@ def two_finger_tap(occasion: Occasion) -> list[Press]:
     count = int(rng.choice([2, 3], p=[0.75, 0.25]))
     gap = min(occasion.spacing(), 0.8 * occasion.small / (count - 1))
     angle = rng.uniform(-0.9, 0.9)
-    x, y = occasion.spot(gap * (count - 1) / 2, gap / 3)
+    places = _row(occasion.spot(gap * (count - 1) / 2, gap / 3), angle, gap, count)
     made: list[Press] = []
     start, held = 0.0, rng.random() < 0.2
     for _ in range(1 if held else int(rng.choice([1, 2], p=[0.7, 0.3]))):
         duration = rng.uniform(0.5, 1.6) if held else occasion.tap_s() * rng.uniform(1.0, 1.3)
-        for k in range(count):
-            along = (k - (count - 1) / 2) * gap
-            made.append(
-                touch_down(
-                    occasion,
-                    x + along * math.cos(angle),
-                    y + along * math.sin(angle),
-                    duration,
-                    start + rng.uniform(0.0, min(0.05, 0.3 * duration)),
-                    rng.uniform(0.5, 1.1),
-                )
-            )
+        late_s = min(0.05, 0.3 * duration)  # of one finger after the other
+        made += [
+            touch_down(occasion, x, y, duration, start + rng.uniform(0.0, late_s), rng.uniform(0.5, 1.1))
+            for x, y in places
+        ]
         start += duration + occasion.gap_s()
     return made
 
