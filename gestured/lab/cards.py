@@ -5,7 +5,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from gestured.lab.made_of import kept, made_of, models_and_manifest, renew
+from gestured.lab.made_of import kept, made_of, renew
+from gestured.lab.manifest import NAME
 from gestured.lab.recordings.origin import said
 from gestured.lab.train import TrainingPlan
 from gestured.model.opening import open_model
@@ -31,23 +32,16 @@ def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: Tr
         (folder / f"{name}.md").write_text(_card(folder / f"{name}.onnx", name, found, plan))
 
 
-def write_block(readme: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
-    """Renew the tables of figures in a README; GesturedError where their marks are missing.
+def write_block(readme: Path, folder: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
+    """Renew the tables of a folder's models in a README; GesturedError where their marks are missing.
 
     The one of kinds that nobody taught stays where it was not measured.
     """
-    rows = [
-        _row(f"`{name}.onnx`, {title}", values)
-        for name, found in figures.items()
-        for title, values in [
-            *((f"simulated, {test}", values) for test, values in found["simulated"].items()),
-            *((f"real, {k}", v) for k, v in found.get("real", {}).items() if k != "kinds"),
-        ]
-    ]
-    origin = made_of("gestured-lab evaluate --readme README.md", models_and_manifest())
-    renew(readme, "figures", [origin, "", *HEAD, *rows])
+    files = [*(folder / f"{name}.onnx" for name in figures), folder / NAME]
+    rows = [row for name, found in figures.items() for row in _rows(found, f"`{name}.onnx`, ")]
+    renew(readme, "figures", [made_of("gestured-lab evaluate --readme README.md", files), "", *HEAD, *rows])
     if "whole_left_out" in figures["cnn_lstm"]:
-        origin = made_of("gestured-lab evaluate --whole --readme README.md", models_and_manifest())
+        origin = made_of("gestured-lab evaluate --whole --readme README.md", files)
         renew(readme, "unseen", [origin, "", *_unseen(figures["cnn_lstm"])])
 
 
@@ -60,9 +54,7 @@ HEAD = (
 def _card(path: Path, name: str, found: Mapping[str, Any], plan: TrainingPlan) -> str:
     model = open_model(path)
     real = bool(said(path))
-    rows = [(f"simulated, {test} ", values) for test, values in found["simulated"].items()]
-    rows += [(f"real, {k}", v) for k, v in found.get("real", {}).items() if k != "kinds"]
-    table = "\n".join(_row(title.strip(), values) for title, values in rows)
+    table = "\n".join([*HEAD, *_rows(found)])
     extra = "".join(f"\n{line}" for line in ["", *_unseen(found)]) if "held_out_kinds" in found else ""
     return f"""# {name}
 
@@ -92,8 +84,6 @@ nominal 9 x 9 sensor, *wide* other people on randomised sensors of every quality
 each subject judged by networks that have not seen them (three folds). Shares of the gestures that were performed; *right\\** is
 before rejection, *lost* is unknown or never cut out; *rejected* is of the non-gestures. In brackets: 95 % intervals over people.
 
-{HEAD[0]}
-{HEAD[1]}
 {table}{extra}
 
 {kept(path.with_suffix(".md"), "judged")}
@@ -102,6 +92,13 @@ before rejection, *lost* is unknown or never cut out; *rejected* is of the non-g
 
 {LIMITS}
 """
+
+
+def _rows(found: Mapping[str, Any], before: str = "") -> list[str]:
+    """A row for each set that a model was judged on; `before` stands before its name."""
+    sets = {f"simulated, {test}": values for test, values in found["simulated"].items()}
+    sets |= {f"real, {test}": values for test, values in found.get("real", {}).items() if test != "kinds"}
+    return [_row(f"{before}{title}", values) for title, values in sets.items()]
 
 
 def _row(title: str, values: Mapping[str, Any]) -> str:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from gestured.core.errors import GesturedError
 from gestured.lab.digest import file_digest
-from gestured.model.shipped import shipped
 
 SHOWN = 12  # digits of a SHA-256 that are written: no two files of a project share them
 LINE = re.compile(r"<!-- made by `([^`]+)` of ((?:\S+ [0-9a-f]{12}(?:, )?)+) -->")
@@ -40,12 +39,6 @@ def kept(document: Path, name: str) -> str:
 
 def _marks(name: str) -> tuple[str, str]:
     return f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-
-
-def models_and_manifest() -> list[Path]:
-    """What tables of figures are made of: the shipped models and the figures beside them."""
-    paths = list(shipped().values())
-    return [*paths, paths[0].parent / "manifest.json"]
 
 
 def stale(text: str, files: Iterable[Path]) -> list[str]:

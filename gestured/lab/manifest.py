@@ -8,18 +8,29 @@ from pathlib import Path
 from typing import Any
 
 from gestured.core.errors import ModelError
+from gestured.lab.digest import file_digest
 from gestured.model.file import inspect
 from gestured.record.files import PUBLIC, atomic_write
 
+NAME = "manifest.json"
 
-def write_manifest(directory: str | Path, figures: Mapping[str, Any]) -> Path:
+
+def measured(model: Path) -> dict[str, Any]:
+    """What the manifest beside a model file holds of figures of this very file; empty where it knows another one."""
+    manifest = model.with_name(NAME)
+    entry = json.loads(manifest.read_text())["models"].get(model.name, {}) if manifest.exists() else {}
+    figures: dict[str, Any] = entry["figures"] if entry.get("sha256") == file_digest(model) else {}
+    return figures
+
+
+def write_manifest(directory: Path, figures: Mapping[str, Any]) -> None:
     """Write `manifest.json` over the directory's .onnx files.
 
     `figures` holds what was measured of each, by file name without suffix. Raises ModelError for a file that
     has no metadata.
     """
     models = {}
-    for path in sorted(Path(directory).glob("*.onnx")):
+    for path in sorted(directory.glob("*.onnx")):
         data = path.read_bytes()
         try:
             said = inspect(data)
@@ -33,10 +44,8 @@ def write_manifest(directory: str | Path, figures: Mapping[str, Any]) -> Path:
             }
         except (ValueError, KeyError) as error:
             raise ModelError(f"{path}: {error}") from error
-    target = Path(directory) / "manifest.json"
-    with atomic_write(target, PUBLIC) as file:
+    with atomic_write(directory / NAME, PUBLIC) as file:
         file.write((json.dumps({"models": _plain(models)}, indent=2, allow_nan=False) + "\n").encode())
-    return target
 
 
 def _plain(value: Any) -> Any:

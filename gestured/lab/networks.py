@@ -5,7 +5,6 @@ import tempfile
 import time
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 import numpy as np
 import torch
@@ -60,56 +59,46 @@ def cold_ms(model: Model) -> float:
     return 1e3 * median(took)
 
 
-def compare(trained: Trained, data: TrainingData, plan: TrainingPlan, cache: Path) -> dict[str, Any]:
+def compare(trained: Trained, calibrated: Calibrated, data: TrainingData, plan: TrainingPlan, cache: Path) -> None:
     """Print a row for each network and test set, with wrong and lost together and the time of a cold run.
 
     Candidates that no shipped model is made of are trained on the same data, in the same way.
     """
-    trained = trained.beside(learn(plan, data, cache, CANDIDATES))
-    calibrated = calibration_set(trained, data, plan)
-    tests = {test: (logits(trained.nets, samples, plan.fit), targets(samples)) for test, samples in data.tests.items()}
-    figures: dict[str, Any] = {}
+    candidates = learn(plan, data, cache, CANDIDATES)
+    nets = nn.ModuleDict({**trained.nets, **candidates.nets})
+    said = calibrated.logits | calibration_set(candidates, data, plan).logits
+    tests = {test: (logits(nets, samples, plan.fit), targets(samples)) for test, samples in data.tests.items()}
     print(f"{Evaluation.HEAD}{'error':>8}{'cold ms':>9}", flush=True)
-    for first, second in ((name, other) for name in trained.nets for other in (name, SECOND)):
-        if first == second == SECOND and f"{SECOND} alone" in figures:
-            continue
+    for first, second in dict.fromkeys((name, other) for name in nets for other in (name, SECOND)):
         title = f"{first} alone" if first == second else f"{first} and {second}"
-        decision = fit_decision(calibrated.logits[first], calibrated.logits[second], calibrated.labels, len(GESTURES))
-        one, two = trained.nets[first], trained.nets[second]
+        decision = fit_decision(said[first], said[second], calibrated.labels, len(GESTURES))
+        one, two = nets[first], nets[second]
         assert isinstance(one, Opinion)
         assert isinstance(two, Opinion)
         module = Alone(one, decision) if first == second else Judged(one, two, decision)
         with torch.no_grad():
-            scores, unknown = decision(calibrated.logits[first], calibrated.logits[second])
+            scores, unknown = decision(said[first], said[second])
             least = threshold(scores.numpy(), unknown.numpy(), calibrated.labels, calibrated.sets)
             facts = Facts("candidate", gestured.__version__, GESTURES, WINDOW, {"threshold": least}, "0" * 64, {})
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "candidate.onnx"
                 export_net(module, path, facts)
                 took = cold_ms(open_model(path))
-            figures[title] = {"cold_ms": took}
             for test, (found, labels) in tests.items():
                 scores, unknown = decision(found[first], found[second])
                 result = outcome((scores.numpy(), unknown.numpy()), labels, least, data.performed[test])
-                figures[title][test] = result.wrong + result.lost
                 print(f"{result.row(f'{title}, {test}')}{result.wrong + result.lost:>8.3f}{took:>9.2f}", flush=True)
-    return figures
 
 
-def compare_rules(
-    trained: Trained, calibrated: Calibrated, data: TrainingData, plan: TrainingPlan, path: Path
-) -> dict[str, Any]:
+def compare_rules(trained: Trained, calibrated: Calibrated, data: TrainingData, plan: TrainingPlan, path: Path) -> None:
     """Print how early and how rightly each rule of `field` decides on the test sets, with the network in `path`."""
     name = path.stem
     module, _, _ = judged(trained, name, calibrated)
     rule = json.loads(inspect(path.read_bytes())["provisional"])
     teach = Foretold.of([(trained.nets, data.calibrate)], plan.fit).contacts(name, module.decision)
-    figures: dict[str, Any] = {}
     print(f"{'rule':<40}{'earliness':>10}{'accuracy':>10}{'harmonic mean':>15}", flush=True)
     for test, samples in data.tests.items():
         contacts = Foretold.of([(trained.nets, samples)], plan.fit).contacts(name, module.decision)
-        figures[test] = table(teach, contacts, rule, GESTURES)
-        for title, row in figures[test].items():
+        for title, row in table(teach, contacts, rule, GESTURES).items():
             cells = f"{row['earliness']:>10.3f}{row['accuracy']:>10.3f}{row['harmonic_mean']:>15.3f}"
             print(f"{f'{title}, {test}':<40}{cells}", flush=True)
-    return figures

@@ -154,11 +154,6 @@ class Trained:
     held_out: dict[str, Tensor] | None  # (G, K) logits of each net over the real samples, None without any
     folds: list[nn.ModuleDict] = field(default_factory=list)  # those that had not seen the subjects of `folds`
 
-    def beside(self, other: "Trained") -> "Trained":
-        """These networks and another's, which learned from the same data."""
-        held = {**self.held_out, **(other.held_out or {})} if self.held_out is not None else None
-        return Trained(nn.ModuleDict({**self.nets, **other.nets}), held)
-
 
 def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[str] = NETS) -> Trained:
     """Both stages and the folds of these networks; what is done already is read from the cache."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gestured.lab.made_of import LINE, OLDER, kept, made_of, models_and_manifest, renew, stale
+from gestured.lab.made_of import LINE, OLDER, kept, made_of, renew, stale
 from gestured.lab.recordings.origin import said
 from gestured.model.shipped import shipped
 from tests.documents.blocks import ROOT, documents
@@ -22,7 +22,8 @@ GENERATED = {
 
 
 def files() -> list[Path]:
-    return [*models_and_manifest(), *(ROOT / "docs").glob("*.json"), *(ROOT / "docs").glob("*.svg")]
+    docs = ROOT / "docs"
+    return [*shipped().values(), ROOT / "models" / "manifest.json", *docs.glob("*.json"), *docs.glob("*.svg")]
 
 
 CARDS = [path.with_suffix(".md") for path in shipped().values()]

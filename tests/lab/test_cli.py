@@ -208,3 +208,8 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     assert set(figures["cnn_lstm"]["real"]) >= {"taps and swipes", "with non-gestures"}
     assert np.isfinite(figures["cnn_lstm"]["held_out_kinds"]["rejected"])
     assert {path.name: path.read_bytes() for path in sorted(out.glob("*.onnx"))} == before
+
+    assert main(["evaluate", "--models", str(out), *arguments]) == 0  # the same models: what took a training stays
+    manifest = json.loads((out / "manifest.json").read_text())["models"]
+    assert manifest["cnn_lstm.onnx"]["figures"]["whole_left_out"] == apart
+    assert ", ".join(apart["kinds"]) in (out / "cnn_lstm.md").read_text()

@@ -27,7 +27,7 @@ from gestured.core.frames import Segment
 from gestured.core.window import Window
 from gestured.lab.export import Facts, export_forest, export_net
 from gestured.lab.forest_graph import forest_outputs
-from gestured.lab.manifest import write_manifest
+from gestured.lab.manifest import measured, write_manifest
 from gestured.lab.recordings.origin import Origin, said
 from gestured.model.file import inspect
 from gestured.model.opening import open_model
@@ -297,14 +297,26 @@ def test_a_model_says_whose_recordings_it_learned_from(learned: list[Origin] | N
 def test_manifest_knows_every_file(net: tuple[Net, Path, dict[str, float]], tmp_path: Path) -> None:
     (tmp_path / "cnn_lstm.onnx").write_bytes(net[1].read_bytes())
     export_forest(forest(5), tmp_path / "touch_pattern_rf.onnx", Facts(**CARD), FEATURES)
-    path = write_manifest(tmp_path, {"cnn_lstm": {"accuracy": 0.97}})
-    models = json.loads(path.read_text())["models"]
+    write_manifest(tmp_path, {"cnn_lstm": {"accuracy": 0.97}})
+    models = json.loads((tmp_path / "manifest.json").read_text())["models"]
     assert sorted(models) == ["cnn_lstm.onnx", "touch_pattern_rf.onnx"]
     for name, entry in models.items():
         data = (tmp_path / name).read_bytes()
         assert entry["sha256"] == hashlib.sha256(data).hexdigest()
         assert (entry["size"], entry["version"], entry["gestures"]) == (len(data), "1.2.0", list(GESTURES))
     assert models["cnn_lstm.onnx"]["figures"] == {"accuracy": 0.97}
+
+
+def test_figures_are_of_the_very_file_that_was_measured(
+    net: tuple[Net, Path, dict[str, float]], tmp_path: Path
+) -> None:
+    path = tmp_path / "cnn_lstm.onnx"
+    path.write_bytes(net[1].read_bytes())
+    assert measured(path) == {}
+    write_manifest(tmp_path, {"cnn_lstm": {"accuracy": 0.97}})
+    assert measured(path) == {"accuracy": 0.97}
+    export_net(net[0], path, Facts(**CARD | {"version": "1.2.1"}))
+    assert measured(path) == {}
 
 
 def test_manifest_refuses_a_file_that_says_nothing_of_itself(net: Any, tmp_path: Path) -> None:

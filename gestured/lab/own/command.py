@@ -10,7 +10,7 @@ import onnx
 
 from gestured.core.errors import ModelError
 from gestured.core.prototypes import Space
-from gestured.lab.manifest import write_manifest
+from gestured.lab.manifest import NAME, measured, write_manifest
 from gestured.lab.own.learn import Figures, Seen, figures, learn, played_through
 from gestured.lab.own.play import played
 from gestured.lab.own.signs import JUDGED
@@ -53,6 +53,7 @@ def teach(path: Path, cache: Path, people: int, jobs: int) -> Space:
     Raises ModelError for a model without one.
     """
     space = learn(Seen.by(_embedding(path), played(cache, people, jobs)))
+    figures_of = {model.stem: measured(model) for model in path.parent.glob("*.onnx")}  # the graph stays the same
     proto = onnx.load(path)
     kept = {one.key: one.value for one in proto.metadata_props} | {"own": space.to_json()}
     onnx.helper.set_model_props(proto, kept)
@@ -63,10 +64,8 @@ def teach(path: Path, cache: Path, people: int, jobs: int) -> Space:
         raise ModelError(f"{path}: not written: {error}") from error
     with atomic_write(path, PUBLIC) as file:
         file.write(data)
-    manifest = path.parent / "manifest.json"
-    if manifest.exists():
-        figures_of = json.loads(manifest.read_text())["models"]
-        write_manifest(path.parent, {Path(name).stem: one.get("figures", {}) for name, one in figures_of.items()})
+    if path.with_name(NAME).exists():
+        write_manifest(path.parent, figures_of)
     return space
 
 

@@ -5,7 +5,6 @@ cells of these protocols (every gesture that was cut out is answered); of the sh
 other generator's windows, and the manifest's figures of real subjects, each judged by networks that never saw it.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from gestured.core.features import touch_pattern
 from gestured.lab.digest import file_digest
+from gestured.lab.manifest import measured
 from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.study.material import SHIFT, UNCHANGED, classes
 from gestured.lab.study.protocols import FOREIGN, REAL
@@ -72,8 +72,7 @@ def _published(name: str, judges: Samples, performed: int) -> dict[str, Any]:
 
 def _manifest(name: str) -> dict[str, Any] | None:
     """The manifest's figures of real subjects; one that was written by an older version has no intervals."""
-    entry = json.loads((shipped()[name].parent / "manifest.json").read_text())["models"].get(f"{name}.onnx", {})
-    row = entry.get("figures", {}).get("real", {}).get(REAL_SETS[0])
+    row = measured(shipped()[name]).get("real", {}).get(REAL_SETS[0])
     if row is None:
         return None
     found = {"wrong": row["wrong"], "error": row["wrong"] + row["lost"]}
@@ -86,11 +85,11 @@ def _manifest(name: str) -> dict[str, Any] | None:
 
 def renewed(study: Mapping[str, Any]) -> dict[str, Any]:
     """The same study with the manifest's real figures of the shipped models, where it timed those that are here."""
-    here = {name: file_digest(path) for name, path in shipped().items() if path.exists()}
+    here = {name: file_digest(path) for name, path in shipped().items()}
     rows = []
     for row in study["run_time"]:
         name = SHIPPED.get(row["method"]) if row["settings"] == "shipped" else None
-        same = name in here and (study["about"].get("models") or {}).get(name) == here[name]
+        same = name and (study["about"].get("models") or {}).get(name) == here[name]
         real = _manifest(name) if name and same else None
         rows.append({**row, "fields": row["fields"] | {"real": real}} if real else row)
     return {**study, "run_time": rows}

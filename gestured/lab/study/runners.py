@@ -120,4 +120,4 @@ def runners(plan: Plan, tuned: Mapping[str, Values], data: Data) -> list[Runner]
             out.append(Learned(method.id, "float32", values, onnx_form.of_boosting(model.fitted), from_frames=True))
         else:
             out.append(Learned(method.id, "float64", values, model))
-    return out + [Shipped(method, shipped()[name]) for method, name in SHIPPED.items() if shipped()[name].exists()]
+    return out + [Shipped(method, shipped()[name]) for method, name in SHIPPED.items()]
