@@ -19,8 +19,8 @@ def measured(model: Path) -> dict[str, Any]:
     """What the manifest beside a model file holds of figures of this very file; empty where it knows another one."""
     manifest = model.with_name(NAME)
     entry = json.loads(manifest.read_text())["models"].get(model.name, {}) if manifest.exists() else {}
-    figures: dict[str, Any] = entry["figures"] if entry.get("sha256") == file_digest(model) else {}
-    return figures
+    figures: dict[str, Any] = entry.get("figures", {})
+    return figures if entry.get("sha256") == file_digest(model) else {}
 
 
 def write_manifest(directory: Path, figures: Mapping[str, Any]) -> None:

@@ -1,13 +1,15 @@
-"""Judge a model, or the front end alone, on the independent generator.
+"""Judge models, or the front end alone, on the independent generator.
 
+    python -m tests.foreign.judge --n 20 --level nominal hard --readme README.md
     python -m tests.foreign.judge --model cnn_lstm --n 40 --level nominal hard
     python -m tests.foreign.judge --front-end --n 40
     python -m tests.foreign.judge --model cnn_lstm --grids --sessions 5 --json
     python -m tests.foreign.judge --model cnn_lstm --provisional --sessions 10
 
-A take's outcome is one of: `missed` (no segment), `cancelled:REASON`, `split` (more than one segment or
-event), or its one segment's label. Takes that nobody can
-recognise (see `visible`) are counted as `unseen` and left out.
+Without --model or --front-end all shipped models are judged, a row for each; --readme puts the table into a README, and
+each model's rows into its card. A take's outcome is one of: `missed` (no segment), `cancelled:REASON`, `split` (more
+than one segment or event), or its one segment's label. Takes that nobody can recognise (see `visible`) are counted as
+`unseen` and left out.
 """
 
 import argparse
@@ -16,6 +18,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from gestured.core.events import Cancelled, Gesture, Onset, Unknown
@@ -26,13 +29,23 @@ from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Recognizer
 from gestured.lab.ahead import Ahead, heard, table
 from gestured.lab.dataset import Truth
-from gestured.lab.made_of import made_of
+from gestured.lab.made_of import made_of, renew
+from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from tests.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
 
 SEEN = 4.0  # times the noise
-SESSION_S = 120.0  # of those with provisional events
+SESSION_S = 120.0
 Take = dict[str, Any]
+HEAD = (
+    "| model and sensors | gestures | right\\* | right | wrong | lost | non-gestures | rejected |",
+    "|---|---|---|---|---|---|---|---|",
+)
+OF_A_CARD = (
+    "The hardest honest figure: people and sensors of a second simulator (`tests/foreign`), written independently of "
+    "the first, from",
+    "which no model learns. Sensors are as good as the nominal one, or much worse (hard).",
+)
 
 
 @dataclass
@@ -141,17 +154,9 @@ def judge(recording: Take, seed: int, level: str, classifier: Any | None) -> Out
     return result
 
 
-def _open(source: str | None) -> Any | None:
-    if source is None:
-        return None
-    from gestured.model.opening import open_model
-
-    return open_model(source)
-
-
 def _batch(task: tuple[str | None, str, str, int, bool, int, bool]) -> tuple[list[Outcome], int]:
     source, kind, level, count, grids, first, whole = task
-    classifier = _open(source)
+    classifier = source and open_model(source)
     outcomes: list[Outcome] = []
     unseen = 0
     for seed in range(first, first + count):
@@ -215,6 +220,28 @@ def summary(outcomes: list[Outcome], unseen: dict[str, int]) -> dict[str, Any]:
     return result
 
 
+def row(model: str, level: str, found: dict[str, Any]) -> str:
+    """A line of the table; what is unknown, missed, cancelled or split is lost."""
+    lost = sum(found[name] for name in ("unknown", "missed", "cancelled", "split"))
+    shares = [f"{share:.3f}" for share in (found["before_rejection"], found["right"], found["wrong"], lost)]
+    cells = (found["gestures"], *shares, found["non_gestures"], f"{found['rejected']:.3f}")
+    return f"| `{model}.onnx`, another generator, {level} | {' | '.join(map(str, cells))} |"
+
+
+def show_shipped(args: argparse.Namespace) -> None:
+    """Print the table of all shipped models; put it where --readme wants it."""
+    results = {name: judged(name, args)[0] for name in shipped()}
+    rows = {name: [row(name, level, found) for level, found in result.items()] for name, result in results.items()}
+    command = f"python -m tests.foreign.judge --n {args.n} --level {' '.join(args.level)}"
+    above = [made_of(command, shipped().values()), "", *HEAD]
+    table = [*above, *(line for lines in rows.values() for line in lines)]
+    print(json.dumps(results, indent=1) if args.json else "\n".join(table))
+    if args.readme:
+        renew(args.readme, "judged", table)
+        for name, path in shipped().items():
+            renew(path.with_suffix(".md"), "judged", [*OF_A_CARD, "", *above, *rows[name]])
+
+
 def _show(result: dict[str, Any], front_end: bool) -> None:
     for level, row in result.items():
         print(f"\n== {level}: {row['gestures']} gestures, {row['non_gestures']} non-gestures", end="")
@@ -252,19 +279,19 @@ def _show(result: dict[str, Any], front_end: bool) -> None:
                 print(f"   {title}: " + "; ".join(f"{a} {c}" for a, c in row[title]))
 
 
-def sessions(source: str, level: str, count: int, first: int, seconds: float = 120.0) -> dict[str, Any]:
+def sessions(source: str, level: str, count: int, first: int) -> dict[str, Any]:
     """Continuous sessions: gestures right and wrong, and events that answer to no gesture."""
-    classifier = _open(source)
+    classifier = open_model(source)
     right = wrong = lost = false = total = 0
     errors: Counter[str] = Counter()
     for seed in range(first, first + count):
-        recording = session(seed, level, seconds)
+        recording = session(seed, level, SESSION_S)
         front = FrontEnd("foreign", 9, 9)
         machine = Recognizer(front, classifier)
         events: list[Any] = []
         for frame in _frames(recording):
             events += machine.push(frame)
-        events += machine.flush(seconds + 5.0)
+        events += machine.flush(SESSION_S + 5.0)
         found = [e for e in events if isinstance(e, Gesture)]
         used: set[int] = set()
         for truth in recording["events"]:
@@ -293,7 +320,7 @@ def sessions(source: str, level: str, count: int, first: int, seconds: float = 1
                 errors[f"{truth['kind']} lost"] += 1
         false += len(found) - len(used)
         errors["event from nothing"] += len(found) - len(used)
-    minutes = count * seconds / 60.0
+    minutes = count * SESSION_S / 60.0
     return {
         "level": level,
         "gestures": total,
@@ -307,8 +334,7 @@ def sessions(source: str, level: str, count: int, first: int, seconds: float = 1
 
 def provisional(source: str, level: str, share: float, seeds: range) -> Ahead:
     """What became of provisional events in sessions with that share of non-gestures."""
-    classifier, found = _open(source), Ahead()
-    assert classifier is not None
+    classifier, found = open_model(source), Ahead()
     for seed in seeds:
         recording = session(seed, level, SESSION_S, share)
         acts = [
@@ -319,11 +345,28 @@ def provisional(source: str, level: str, share: float, seeds: range) -> Ahead:
     return found
 
 
+def judged(source: str | None, args: argparse.Namespace) -> tuple[dict[str, Any], list[Outcome]]:
+    """What a model, or without one the front end, makes of the takes that are asked for; and each outcome."""
+    levels = ["grids"] if args.grids else args.level
+    tasks = [(source, k, lv, args.n, args.grids, args.first, args.whole) for lv in levels for k in args.kinds]
+    outcomes: list[Outcome] = []
+    unseen: dict[str, int] = defaultdict(int)
+    with ProcessPoolExecutor(args.jobs) as pool:
+        for task, (some, dark) in zip(tasks, pool.map(_batch, tasks), strict=True):
+            outcomes += some
+            unseen[task[2]] += dark
+    return summary(outcomes, unseen), outcomes
+
+
 def main() -> None:
+    """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("--model", help="a shipped model's name or a path")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--model", help="a shipped model's name or a path; its figures kind by kind")
     what.add_argument("--front-end", action="store_true", help="segmentation alone; needs no model")
+    what.add_argument(
+        "--readme", type=Path, help="a README whose table is renewed, and the shipped models' cards with it"
+    )
     parser.add_argument("--n", type=int, default=40, help="takes of each kind and level (%(default)s)")
     parser.add_argument("--first", type=int, default=0, help="first seed (%(default)s)")
     parser.add_argument("--level", nargs="+", choices=LEVELS, default=list(LEVELS))
@@ -336,6 +379,8 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1, help="processes (%(default)s)")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
+    if args.provisional and args.model is None:
+        parser.error("--provisional: expected a --model")
     if args.provisional:
         sets = {level: (level, 0.25) for level in args.level} | {"non-gestures": ("nominal", 1.0)}
         rows = {
@@ -344,15 +389,10 @@ def main() -> None:
         }
         print(json.dumps(rows, indent=1) if args.json else table(rows))
         return
-    levels = ["grids"] if args.grids else args.level
-    tasks = [(args.model, k, lv, args.n, args.grids, args.first, args.whole) for lv in levels for k in args.kinds]
-    outcomes: list[Outcome] = []
-    unseen: dict[str, int] = defaultdict(int)
-    with ProcessPoolExecutor(args.jobs) as pool:
-        for task, (some, dark) in zip(tasks, pool.map(_batch, tasks), strict=True):
-            outcomes += some
-            unseen[task[2]] += dark
-    result = summary(outcomes, unseen)
+    if not (args.model or args.front_end):
+        show_shipped(args)
+        return
+    result, outcomes = judged(args.model, args)
     long = (
         [sessions(args.model, lv, args.sessions, args.first) for lv in args.level]
         if args.model and args.sessions
@@ -364,15 +404,15 @@ def main() -> None:
     if args.model in shipped():
         print(made_of("python -m tests.foreign.judge", [shipped()[args.model]]))
     _show(result, args.front_end)
-    for row in long:
-        print(f"\n== sessions, {row['level']}: {row['gestures']} gestures", end="")
+    for found in long:
+        print(f"\n== sessions, {found['level']}: {found['gestures']} gestures", end="")
         print(
-            f"  right {100 * row['right']:.1f} %  wrong {100 * row['wrong']:.1f} %",
-            f" lost {100 * row['lost']:.1f} %",
+            f"  right {100 * found['right']:.1f} %  wrong {100 * found['wrong']:.1f} %",
+            f" lost {100 * found['lost']:.1f} %",
             end="",
         )
-        print(f"  false events a minute {row['false_a_minute']:.2f}")
-        print("   " + "; ".join(f"{a} {c}" for a, c in row["errors"]))
+        print(f"  false events a minute {found['false_a_minute']:.2f}")
+        print("   " + "; ".join(f"{a} {c}" for a, c in found["errors"]))
     if args.list:
         for o in outcomes:
             if o.kind in GESTURES and o.answer not in (o.kind, "segment"):

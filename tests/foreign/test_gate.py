@@ -8,8 +8,10 @@ shipped: they lie in the cache of the training, where `gestured-lab evaluate` ju
 not seen it (the rows *real* in the models' cards). A gate on real people needs people whom no training was given.
 """
 
+import sys
 from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from gestured.core.frames import Segment
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from tests.foreign import GESTURES, NON_GESTURES, take
-from tests.foreign.judge import Outcome, Take, judge, summary, visible
+from tests.foreign.judge import Outcome, Take, judge, main, summary, visible
 
 SEEDS = range(9000, 9006)  # of each kind; `judge` counts from 0 unless told
 BOUNDS = {  # least right, most wrong of the gestures, least rejected of the others
@@ -83,3 +85,20 @@ def test_a_model_that_is_worse_does_not_pass(level: str) -> None:
         pytest.skip(f"{shipped()['cnn_lstm']} is not there")
     good, words = passes(Damaged(open_model("cnn_lstm")), "cnn_lstm", level)
     assert not good, words
+
+
+def test_the_table_of_a_readme_and_of_the_cards_is_renewed(
+    shelf: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    documents = [Path("README.md"), *(path.with_suffix(".md") for path in shipped().values())]
+    for document in documents:
+        document.write_text("before\n<!-- judged: begin -->\nold\n<!-- judged: end -->\nafter\n")
+    monkeypatch.setattr(sys, "argv", "judge --n 1 --kinds one_tap palm --level nominal --readme README.md".split())
+    main()
+    printed = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| `")]
+    assert [line.split("`")[1] for line in printed] == [f"{name}.onnx" for name in shipped()]
+    readme, *cards = (document.read_text().splitlines() for document in documents)
+    assert [line for line in readme if line.startswith("| `")] == printed
+    assert [line for card in cards for line in card if line.startswith("| `")] == printed
+    for lines in (readme, *cards):
+        assert (lines[0], lines[-1]) == ("before", "after") and "old" not in lines
