@@ -4,6 +4,7 @@ All of it is fitted on people that the networks have not learned from.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
@@ -15,6 +16,8 @@ from gestured.lab.nets import Decision
 THRESHOLDS = tuple(round(0.05 + 0.01 * k, 2) for k in range(91))
 WRONG = 2.0  # points of lost gestures that a point of gestures taken for another one counts as much as
 ACCEPTED = 0.25  # points of lost gestures that a point of non-gestures taken for a gesture counts as much as
+
+Answers = tuple[NDArray[np.float32], NDArray[np.float32]]  # scores (N, G), unknown (N,)
 
 
 def fit_decision(first: Tensor, second: Tensor, labels: NDArray[np.int64], gestures: int) -> Decision:
@@ -64,14 +67,37 @@ def minimise(parameters: list[Tensor], loss: Callable[[], Tensor]) -> None:
     optimiser.step(closure)  # type: ignore[no-untyped-call]
 
 
-def curve(scores: NDArray[np.float32], unknown: NDArray[np.float32], labels: NDArray[np.int64]) -> NDArray[np.float64]:
+def decided(decision: Decision, first: Tensor, second: Tensor) -> Answers:
+    """What a decision makes of both opinions' logits (N, K)."""
+    with torch.no_grad():
+        scores, unknown = decision(first, second)
+    return scores.numpy(), unknown.numpy()
+
+
+def confidence(answers: Answers) -> NDArray[np.float32]:
+    """(N,) how sure each answer is of its best gesture."""
+    scores, unknown = answers
+    return np.asarray(scores.max(axis=1) * (1 - unknown))
+
+
+def calibration_of(decision: Decision, least: float) -> dict[str, Any]:
+    """The metadata `calibration` of networks that decide so, and publish from a confidence of `least` on."""
+    return {
+        "temperature": (1 / decision.share.clamp(min=1e-6)).tolist(),  # of the network and of the trajectory net
+        "unknown_weight": decision.weight.tolist(),
+        "unknown_bias": float(decision.bias),
+        "threshold": least,
+    }
+
+
+def curve(answers: Answers, labels: NDArray[np.int64]) -> NDArray[np.float64]:
     """(len(THRESHOLDS), 3): right, wrong and accepted at each threshold, for classes (N,); from G on they are none.
 
     Right and wrong are shares of the gestures, accepted is one of the non-gestures; NaN where there are none.
     """
-    confidence, known = scores.max(axis=1) * (1 - unknown), labels < scores.shape[1]
-    right = scores.argmax(axis=1) == labels
-    published = confidence[None, :] >= np.array(THRESHOLDS)[:, None]
+    scores, _ = answers
+    known, right = labels < scores.shape[1], scores.argmax(axis=1) == labels
+    published = confidence(answers)[None, :] >= np.array(THRESHOLDS)[:, None]
     with np.errstate(invalid="ignore"):
         gestures, others = np.float64(known.sum()), np.float64((~known).sum())
         return np.stack(
@@ -84,18 +110,14 @@ def curve(scores: NDArray[np.float32], unknown: NDArray[np.float32], labels: NDA
         )
 
 
-def threshold(
-    scores: NDArray[np.float32],
-    unknown: NDArray[np.float32],
-    labels: NDArray[np.int64],
-    sets: NDArray[np.int64] | None = None,
-) -> float:
+def threshold(answers: Answers, labels: NDArray[np.int64], sets: NDArray[np.int64] | None = None) -> float:
     """The confidence from which on answers are published: where right ones are worth most against wrong and accepted.
 
     `sets` (N,) says to which set each belongs (simulated, real ...): every set counts the same, however large.
     """
     of = np.zeros(len(labels), np.int64) if sets is None else sets
-    worth = [_worth(curve(scores[of == k], unknown[of == k], labels[of == k])) for k in np.unique(of)]
+    scores, unknown = answers
+    worth = [_worth(curve((scores[of == k], unknown[of == k]), labels[of == k])) for k in np.unique(of)]
     return THRESHOLDS[int(np.mean(worth, axis=0).argmax())]
 
 

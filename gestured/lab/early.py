@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.measures import ACTIVE
+from gestured.lab.decide import Answers, confidence
 from gestured.lab.prefixes import floors
 from gestured.lab.samples import Samples
 
@@ -47,15 +48,23 @@ class Asked:
         return np.searchsorted(STRETCHES, self.elapsed_s + 1e-9, side="right") - 1
 
 
-def chance_of(people: NDArray[np.int64], revoked: NDArray[np.bool_]) -> float:
-    """How likely so few revoked events would be if less than `CONFIRMED` were confirmed: a binomial test over people.
+def given(sure_enough: NDArray[np.bool_], contact: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The questions at which events are given: of each contact the first one that is sure enough, in order."""
+    reached = np.flatnonzero(sure_enough)
+    return reached[np.unique(contact[reached], return_index=True)[1]]
 
-    A person counts once, with the share of that person's events that were revoked.
-    """
+
+def _revoked(people: NDArray[np.int64], revoked: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(P,) of each person, who counts once, the share of the events that were revoked."""
     _, who = np.unique(people, return_inverse=True)
-    if not len(who):
+    return np.bincount(who, revoked) / np.bincount(who)
+
+
+def chance_of(people: NDArray[np.int64], revoked: NDArray[np.bool_]) -> float:
+    """How likely so few revoked events are if less than `CONFIRMED` are confirmed: a binomial test over people."""
+    if not len(people):
         return 1.0
-    each = np.bincount(who, revoked) / np.bincount(who)
+    each = _revoked(people, revoked)
     return at_most(math.ceil(each.sum() - 1e-9), len(each), 1 - CONFIRMED)
 
 
@@ -77,9 +86,7 @@ def safe_from(
     """
     chances: list[tuple[float, int, float]] = []
     for threshold in LADDER:
-        reached = np.flatnonzero(sure >= threshold)
-        _, first = np.unique(contact[reached], return_index=True)
-        events = reached[first]
+        events = given(sure >= threshold, contact)
         chances.append((threshold, len(np.unique(person[events])), chance_of(person[events], wrong[events])))
     found: float | None = None
     for start in STARTS:
@@ -95,13 +102,10 @@ def safe_from(
 def deceives(questions: Questions, level: float) -> bool:
     """Whether events at this threshold are surely revoked more often than allowed, though others' are not."""
     sure, contact, wrong, person = questions
-    reached = np.flatnonzero(sure >= level)
-    _, first = np.unique(contact[reached], return_index=True)
-    events = reached[first]
-    _, who = np.unique(person[events], return_inverse=True)
-    if not len(who):
+    events = given(sure >= level, contact)
+    if not len(events):
         return False
-    each = np.bincount(who, wrong[events]) / np.bincount(who)
+    each = _revoked(person[events], wrong[events])
     return 1 - at_most(math.floor(each.sum() + 1e-9) - 1, len(each), 1 - CONFIRMED) <= DOUBT
 
 
@@ -109,12 +113,12 @@ def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None) -> dict
     """The metadata `provisional`: for each stretch, and for each gesture with enough data, the threshold."""
     stretch, wrong = asked.stretch, asked.answer[asked.contact] != asked.best
     person = asked.person[asked.contact]
-    given = np.zeros(len(asked.answer), bool)
+    over = np.zeros(len(asked.answer), bool)  # contacts whose event is given
     general: list[float | None] = []
     rows: dict[str, list[float | None]] = {name: [] for name in gestures}
 
     for k in range(len(STRETCHES)):
-        now = (stretch == k) & ~given[asked.contact]
+        now = (stretch == k) & ~over[asked.contact]
 
         def of(chosen: NDArray[np.bool_]) -> Questions:
             return asked.confidence[chosen], asked.contact[chosen], wrong[chosen], person[chosen]
@@ -129,7 +133,7 @@ def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None) -> dict
             else:
                 rows[name].append(min((t for t in (own, everybody) if t is not None), default=None))
         level = np.array([row[-1] if row[-1] is not None else np.inf for row in rows.values()])[asked.best]
-        given[asked.contact[now & (asked.confidence >= level)]] = True
+        over[asked.contact[now & (asked.confidence >= level)]] = True
     return {
         "in_a_row": IN_A_ROW,
         "elapsed_s": list(STRETCHES),
@@ -146,21 +150,19 @@ def events(asked: Asked, provisional: dict[str, Any], gestures: Sequence[str]) -
     """
     rows = [provisional["gestures"].get(name, provisional["thresholds"]) for name in gestures]
     level = np.array([[np.inf if value is None else value for value in row] for row in rows])
-    reached = np.flatnonzero(asked.confidence >= level[asked.best, asked.stretch])
-    found = np.full(len(asked.answer), -1, np.int64)
-    who, first = np.unique(asked.contact[reached], return_index=True)
-    found[who] = reached[first]
+    return by_contact(asked.confidence >= level[asked.best, asked.stretch], asked)
+
+
+def by_contact(sure_enough: NDArray[np.bool_], asked: Asked) -> NDArray[np.int64]:
+    """(G,) the first question about each contact that is sure enough, -1 for none."""
+    found, first = np.full(len(asked.answer), -1, np.int64), given(sure_enough, asked.contact)
+    found[asked.contact[first]] = first
     return found
-
-
-Answers = tuple[NDArray[np.float32], NDArray[np.float32]]  # scores (N, G), unknown (N,)
 
 
 def published(answers: Answers, least: float) -> NDArray[np.int64]:
     """(N,) the gesture that is published from a confidence of `least` on, -1 for none."""
-    scores, unknown = answers
-    best = scores.argmax(axis=1)
-    return np.where(scores.max(axis=1) * (1 - unknown) >= least, best, -1)
+    return np.where(confidence(answers) >= least, answers[0].argmax(axis=1), -1)
 
 
 def at_release(samples: Samples) -> Samples:
@@ -184,6 +186,6 @@ def tap_threshold(answers: Answers, answer: NDArray[np.int64], person: NDArray[n
     Contacts that a second tap follows are to be left out: nobody can know of it.
     """
     scores, unknown = answers
-    confidence = scores.max(axis=1).astype(np.float64) * (1 - unknown)
-    sure = np.where(scores.argmax(axis=1) == tap, confidence, 0.0)
+    exactly = scores.max(axis=1).astype(np.float64) * (1 - unknown)
+    sure = np.where(scores.argmax(axis=1) == tap, exactly, 0.0)
     return safe_from(sure, np.arange(len(person)), answer != tap, person)

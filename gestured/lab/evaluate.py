@@ -13,8 +13,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from gestured.lab.decide import THRESHOLDS, curve
-from gestured.lab.fit import padded, targets
+from gestured.lab.decide import THRESHOLDS, Answers, confidence, curve, decided
+from gestured.lab.fit import RECURRENT, padded, targets
 from gestured.lab.samples import Samples
 from gestured.lab.study.bootstrap import interval
 from gestured.lab.train import REAL_SETS, Calibrated, Trained, TrainingData, folds, is_of, judged
@@ -57,9 +57,6 @@ class Evaluation:
         return "\n".join(lines)
 
 
-Answers = tuple[NDArray[np.float32], NDArray[np.float32]]  # scores (N, G), unknown (N,)
-
-
 def outcome(
     answers: Answers,
     labels: NDArray[np.int64],
@@ -72,10 +69,10 @@ def outcome(
     `performed`: how many gestures were performed, where some were never cut out. With `people` (N,) there are
     intervals; as nobody knows whose the gestures are that were never cut out, these are lost in all that is drawn.
     """
-    scores, unknown = answers
+    scores, _ = answers
     known = (labels >= 0) & (labels < scores.shape[1])
     total = max(performed or 0, int(known.sum()))
-    published = scores.max(axis=1) * (1 - unknown) >= least
+    published = confidence(answers) >= least
     right = scores.argmax(axis=1) == labels
 
     def share(chosen: NDArray[np.bool_], of: int) -> float:
@@ -141,7 +138,7 @@ def simulated_figures(models: Mapping[str, Path], data: TrainingData) -> dict[st
 def print_curve(name: str, path: Path, data: TrainingData) -> None:
     """Right, wrong and accepted of a model on the test sets by the threshold from which answers are published."""
     model = open_model(path)
-    points = {test: curve(*model_answers(model, s), targets(s)) for test, s in data.tests.items()}
+    points = {test: curve(model_answers(model, s), targets(s)) for test, s in data.tests.items()}
     print(f"{name}: published from {model.threshold:.2f}", flush=True)
     print(f"{'threshold':>9}" + "".join(f"  {test + ': right':>16}{'wrong':>8}{'accepted':>10}" for test in points))
     for k, least in list(enumerate(THRESHOLDS))[::5]:
@@ -151,9 +148,8 @@ def print_curve(name: str, path: Path, data: TrainingData) -> None:
 
 def by_kind(given: Answers, samples: Samples, least: float) -> dict[str, float]:
     """Share of each gesture's samples named rightly, and of each non-gesture's rejected."""
-    scores, unknown = given
-    published = scores.max(axis=1) * (1 - unknown) >= least
-    good = np.where(samples.labels == NONE, ~published, published & (scores.argmax(axis=1) == targets(samples)))
+    published = confidence(given) >= least
+    good = np.where(samples.labels == NONE, ~published, published & (given[0].argmax(axis=1) == targets(samples)))
     return {str(kind): round(float(good[samples.kinds == kind].mean()), 3) for kind in np.unique(samples.kinds)}
 
 
@@ -173,18 +169,16 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
         return {}
     labels = targets(real)
     found: dict[str, Any] = {}
-    for name in ("cnn_lstm", "lstm"):
+    for name in RECURRENT:
         scores = np.zeros((len(real), len(GESTURES)), np.float32)
         unknown = np.zeros(len(real), np.float32)
         levels = []
         for held in folds(real):
             module, calibration, _ = judged(trained, name, without(calibrated, real, held))
-            with torch.no_grad():
-                out = module.decision(*(trained.held_out[n][torch.from_numpy(held)] for n in (name, "trajectory")))
-            scores[held], unknown[held] = out[0].numpy(), out[1].numpy()
+            both = (trained.held_out[n][torch.from_numpy(held)] for n in (name, "trajectory"))
+            scores[held], unknown[held] = decided(module.decision, *both)
             levels.append(calibration["threshold"])
         least = float(np.mean(levels))
-        both = (scores, unknown)
         judged_once = np.arange(len(real)) < data.real_judged
         for title in REAL_SETS:
             chosen = is_of(real.labels, title) & judged_once
@@ -192,5 +186,5 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
             result = outcome(answers, labels[chosen], least, data.performed.get(title), real.people[chosen])
             found.setdefault(name, {})[title] = asdict(result)
             print(result.rows(f"{name}, real, {title}"), flush=True)
-        found[name]["kinds"] = by_kind(both, real, least)
+        found[name]["kinds"] = by_kind((scores, unknown), real, least)
     return found

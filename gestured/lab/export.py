@@ -22,11 +22,13 @@ from sklearn.ensemble import RandomForestClassifier
 
 from gestured.core.errors import ModelError
 from gestured.core.window import Window
-from gestured.lab.forest_graph import OPSET, Outputs, around_thresholds, forest_graph, forest_outputs
+from gestured.lab.forest_graph import OPSET, around_thresholds, forest_graph, forest_outputs
 from gestured.lab.recordings import origin
 from gestured.model.file import SelfTest
 from gestured.model.model import Model
 from gestured.record.files import PUBLIC, atomic_write
+
+Outputs = tuple[NDArray[np.float32], ...]  # scores (B, G), unknown (B,), perhaps an embedding (B, E)
 
 PARITY = 1e-4
 BATCHES = (1, 2, 7)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.kernel_ridge import KernelRidge
 
-from gestured.lab.early import Asked, events
+from gestured.lab.early import Asked, by_contact, events
 
 LONGEST = 60  # frames; 4 s
 MOST = 1500  # contacts that a regression learns from
@@ -50,11 +50,7 @@ class Contacts:
 
 def probability_threshold(contacts: Contacts, least: float) -> NDArray[np.int64]:
     """(G,) the first question whose best score reaches `least`, -1 for none."""
-    reached = np.flatnonzero(contacts.scores.max(axis=1) >= least)
-    found = np.full(len(contacts.truth), -1, np.int64)
-    who, first = np.unique(contacts.asked.contact[reached], return_index=True)
-    found[who] = reached[first]
-    return found
+    return by_contact(contacts.scores.max(axis=1) >= least, contacts.asked)
 
 
 def calimera(teach: Contacts, test: Contacts, wrong_cost: float) -> NDArray[np.int64]:

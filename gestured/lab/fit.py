@@ -26,6 +26,7 @@ from gestured.simulator import GESTURES, NON_GESTURES, NONE
 
 REAL_KINDS = {"tap_hold": "long_press", "drag_diagonal": "diagonal_swipe"}  # what real non-gestures are
 CLASSES: list[str] = [*GESTURES, *NON_GESTURES]  # non-gestures are classes of their own: they reject better so
+LONGEST = 80  # frames that a network is shown: five seconds and their context
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,6 @@ class FitConfig:
     decay: float = 1e-2
     smoothing: float = 0.03  # of labels: keeps the scores calibrated
     clip: float = 1.0
-    longest: int = 80  # frames: five seconds and their context
     unfinished: float = 0.4  # share of the windows that are cut short
     real_epochs: int = 3
     real_rate: float = 0.15  # of the rates above
@@ -46,7 +46,8 @@ class FitConfig:
     seed: int = 1
 
 
-NETS = ("cnn_lstm", "lstm", "trajectory")  # those that the shipped models are made of
+RECURRENT = ("cnn_lstm", "lstm")  # networks that ship, each with the trajectory net as its second opinion
+NETS = (*RECURRENT, "trajectory")
 KINDS: dict[str, tuple[type[Opinion], float]] = {  # each with its learning rate, which falls to 0 with a cosine
     "cnn_lstm": (CnnLstm, 4e-3),
     "lstm": (Lstm, 8e-3),
@@ -77,9 +78,29 @@ def padded(samples: Samples, index: NDArray[np.int64], longest: int) -> Tensor:
     return torch.from_numpy(out)
 
 
-def lengths_of(samples: Samples, index: NDArray[np.int64], longest: int) -> Tensor:
-    """(B,) frames of each window as `padded` gives it."""
-    return torch.from_numpy(np.minimum(samples.lengths()[index], longest))
+def batch_of(samples: Samples, index: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
+    """(B, T, R, C) windows as `padded` gives them, at most `LONGEST` frames, and (B,) frames of each."""
+    return padded(samples, index, LONGEST), torch.from_numpy(np.minimum(samples.lengths()[index], LONGEST))
+
+
+class Shown:
+    """Samples as networks learn from them: a share of the windows is cut short, all are turned and varied."""
+
+    def __init__(self, samples: Samples, unfinished: float) -> None:
+        self._samples, self._unfinished = samples, unfinished
+        self._asked, self._least = askable(samples), floors(samples)
+
+    def batch(
+        self, index: NDArray[np.int64], rng: np.random.Generator, generator: torch.Generator
+    ) -> tuple[Tensor, Tensor, int]:
+        """(B, T, R, C) windows, (B,) frames of each, and the row of `symmetry_table` that names what they show."""
+        symmetry = int(rng.integers(8))
+        x, lengths = batch_of(self._samples, index)
+        cut = torch.from_numpy(np.minimum(drawn(index, self._samples, self._asked, self._unfinished, rng), LONGEST))
+        lengths = torch.where(cut > 0, cut, lengths)
+        short = shortened(x, lengths, torch.from_numpy(self._least[index]))
+        x = torch.where((cut > 0)[:, None, None, None], short, x)
+        return varied(turned(x, symmetry), generator), lengths, symmetry
 
 
 def one_epoch(
@@ -98,40 +119,44 @@ def one_epoch(
     table = symmetry_table(CLASSES)
     criterion = nn.CrossEntropyLoss(label_smoothing=config.smoothing)
     nets.train()
-    streams = [list(_plan(s, y, config, rng, chosen)) for s, y, chosen in sets]
-    plan = [item for stream in streams for item in stream]
-    known = {id(samples): (askable(samples), floors(samples)) for samples, _, _ in sets}
+    plan = [(k, index) for k, (s, _, chosen) in enumerate(sets) for index in _plan(s, config, rng, chosen)]
+    shown = [Shown(samples, config.unfinished) for samples, _, _ in sets]
     total = 0.0
-    for k in progress(rng.permutation(len(plan)), len(plan), title):
-        samples, labels, index = plan[k]
-        symmetry = int(rng.integers(8))
-        asked, least = known[id(samples)]
-        x, lengths = padded(samples, index, config.longest), lengths_of(samples, index, config.longest)
-        cut = torch.from_numpy(np.minimum(drawn(index, samples, asked, config.unfinished, rng), config.longest))
-        lengths = torch.where(cut > 0, cut, lengths)
-        x = torch.where((cut > 0)[:, None, None, None], shortened(x, lengths, torch.from_numpy(least[index])), x)
-        x = varied(turned(x, symmetry), generator)
-        y = table[symmetry][torch.from_numpy(labels[index])]
+    for place in progress(rng.permutation(len(plan)), len(plan), title):
+        k, index = plan[place]
+        x, lengths, symmetry = shown[k].batch(index, rng, generator)
+        y = table[symmetry][torch.from_numpy(sets[k][1][index])]
         loss = torch.stack([criterion(net(x, lengths), y) for net in nets.values()]).sum()
-        optimiser.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        nn.utils.clip_grad_norm_(nets.parameters(), config.clip)
-        optimiser.step()
-        schedule.step()
+        step(loss, nets, optimiser, schedule, config.clip)
         total += float(loss.detach())
     return total / len(plan)
 
 
+def step(
+    loss: Tensor,
+    nets: nn.Module,
+    optimiser: torch.optim.Optimizer,
+    schedule: torch.optim.lr_scheduler.LRScheduler,
+    clip: float,
+) -> None:
+    """Change the weights once, by gradients of at most the norm `clip`."""
+    optimiser.zero_grad()
+    loss.backward()  # type: ignore[no-untyped-call]
+    nn.utils.clip_grad_norm_(nets.parameters(), clip)
+    optimiser.step()
+    schedule.step()
+
+
 def _plan(
-    samples: Samples, labels: NDArray[np.int64], config: FitConfig, rng: np.random.Generator, chosen: NDArray[np.int64]
-) -> Iterator[tuple[Samples, NDArray[np.int64], NDArray[np.int64]]]:
+    samples: Samples, config: FitConfig, rng: np.random.Generator, chosen: NDArray[np.int64]
+) -> Iterator[NDArray[np.int64]]:
     """Groups of samples of similar length, so that little is padded."""
     lengths, order = samples.lengths(), rng.permutation(chosen)
     for start in range(0, len(order), 20 * config.batch):
         pool = order[start : start + 20 * config.batch]
         pool = pool[np.argsort(lengths[pool] + rng.random(len(pool)) * 3)]
         for i in range(0, len(pool), config.batch):
-            yield samples, labels, pool[i : i + config.batch]
+            yield pool[i : i + config.batch]
 
 
 def pretrain(samples: Samples, config: FitConfig, checkpoint: Path, names: Sequence[str] = NETS) -> nn.ModuleDict:
@@ -143,7 +168,7 @@ def pretrain(samples: Samples, config: FitConfig, checkpoint: Path, names: Seque
     for net in nets.values():
         if isinstance(net, TrajectoryNet):
             _fit_scale(net, samples, chosen, config)
-    steps = config.epochs * len(list(_plan(samples, labels, config, np.random.default_rng(0), chosen)))
+    steps = config.epochs * len(list(_plan(samples, config, np.random.default_rng(0), chosen)))
     optimiser, schedule = _optimiser(nets, config, 1.0, steps)
     done = restore(checkpoint, nets, optimiser, schedule)
     for epoch in range(done, config.epochs):
@@ -158,10 +183,7 @@ def _fit_scale(net: TrajectoryNet, samples: Samples, chosen: NDArray[np.int64], 
     """Standardise its features by some of the chosen samples."""
     some = np.random.default_rng(config.seed).choice(chosen, min(4000, len(chosen)), replace=False)
     with torch.no_grad():
-        found = [
-            trajectory_features(padded(samples, part, config.longest), lengths_of(samples, part, config.longest))
-            for part in (some[i : i + 256] for i in range(0, len(some), 256))
-        ]
+        found = [trajectory_features(*batch_of(samples, some[i : i + 256])) for i in range(0, len(some), 256)]
         net.perceptron.fit_scale(torch.cat(found))
 
 
@@ -200,22 +222,28 @@ def _optimiser(
     nets: nn.ModuleDict, config: FitConfig, share: float, steps: int
 ) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler]:
     rates = [share * KINDS[name][1] for name in nets]
-    groups = [{"params": list(net.parameters()), "lr": rate} for net, rate in zip(nets.values(), rates, strict=True)]
-    optimiser = torch.optim.AdamW(groups, weight_decay=config.decay)
+    return optimiser_of(list(nets.values()), rates, config.decay, max(steps, 11))
+
+
+def optimiser_of(
+    nets: Sequence[nn.Module], rates: Sequence[float], decay: float, steps: int
+) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler]:
+    """AdamW with a rate for each network, which rises in a tenth of the steps and falls to 0."""
+    groups = [{"params": list(net.parameters()), "lr": rate} for net, rate in zip(nets, rates, strict=True)]
+    optimiser = torch.optim.AdamW(groups, weight_decay=decay)
     return optimiser, torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, rates, total_steps=max(steps, 11), pct_start=0.1, div_factor=10, cycle_momentum=False
+        optimiser, list(rates), total_steps=steps, pct_start=0.1, div_factor=10, cycle_momentum=False
     )
 
 
-def logits(nets: nn.ModuleDict, samples: Samples, config: FitConfig) -> dict[str, Tensor]:
+def logits(nets: nn.ModuleDict, samples: Samples) -> dict[str, Tensor]:
     """(G, K) logits of each network for all samples, in their order."""
     nets.eval()
     order = np.argsort(samples.lengths(), kind="stable")
     found: dict[str, list[Tensor]] = {name: [] for name in nets}
     with torch.no_grad():
         for i in range(0, len(order), 256):
-            x = padded(samples, order[i : i + 256], config.longest)
-            lengths = lengths_of(samples, order[i : i + 256], config.longest)
+            x, lengths = batch_of(samples, order[i : i + 256])
             for name, net in nets.items():
                 found[name].append(net(x, lengths))
     back = torch.from_numpy(np.argsort(order, kind="stable"))

@@ -15,14 +15,13 @@ from onnx import TensorProto, helper, numpy_helper
 from sklearn.ensemble import RandomForestClassifier
 
 from gestured.core.errors import ModelError
+from gestured.lab.decide import Answers
 
 OPSET = 17
 LEAST_CHANCE = 1e-3  # a forest's probabilities are not trusted below this, nor above 1 - this
 
-Outputs = tuple[NDArray[np.float32], ...]  # scores (B, G), unknown (B,), perhaps an embedding (B, E)
 
-
-def forest_outputs(probabilities: NDArray[Any], gestures: int, calibration: Mapping[str, Any]) -> Outputs:
+def forest_outputs(probabilities: NDArray[Any], gestures: int, calibration: Mapping[str, Any]) -> Answers:
     """(B, classes) probabilities of a forest -> calibrated scores (B, G) and unknown (B,), as in the file.
 
     scores = softmax(log p / `temperature`) over the gestures; unknown = sigmoid(`unknown_scale` * logit(none)

@@ -9,9 +9,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from gestured.lab.early import Answers, Asked, at_release, calibrated, published, tap_threshold
+from gestured.lab.decide import Answers, decided
+from gestured.lab.early import Asked, at_release, calibrated, published, tap_threshold
 from gestured.lab.field import Contacts
-from gestured.lab.fit import FitConfig, logits, targets
+from gestured.lab.fit import logits, targets
 from gestured.lab.nets import Decision
 from gestured.lab.prefixes import prefixes
 from gestured.lab.samples import WINDOW, Samples, join
@@ -35,12 +36,12 @@ class Foretold:
     second: NDArray[np.bool_]  # (N,) whether the finger had left and come back
 
     @classmethod
-    def sessions(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]], config: FitConfig) -> "Foretold":
+    def sessions(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]]) -> "Foretold":
         """As `of`, with so many non-gestures of each part as sessions hold (`OTHERS`), drawn at random."""
-        return cls.of([(nets, samples.take(as_in_sessions(samples))) for nets, samples in parts], config)
+        return cls.of([(nets, samples.take(as_in_sessions(samples))) for nets, samples in parts])
 
     @classmethod
-    def of(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]], config: FitConfig) -> "Foretold":
+    def of(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]]) -> "Foretold":
         """Ask each part's networks about its samples."""
         whole: list[Logits] = []
         released: list[Logits] = []
@@ -48,9 +49,9 @@ class Foretold:
         contact, since, second, before = [], [], [], 0
         for nets, samples in parts:
             cut, of, frames = prefixes(samples, np.arange(len(samples)))
-            whole.append(logits(nets, samples, config))
-            released.append(logits(nets, at_release(samples), config))
-            early.append(logits(nets, cut, config))
+            whole.append(logits(nets, samples))
+            released.append(logits(nets, at_release(samples)))
+            early.append(logits(nets, cut))
             contact.append(of + before)
             since.append(frames)
             asked_before = np.arange(len(of)) - np.searchsorted(of, of)
@@ -65,9 +66,8 @@ class Foretold:
         labels = targets(self.samples)
         chosen = (labels >= 0) & (labels < len(GESTURES)) & ~np.isin(self.samples.labels, (TAP, DOUBLE))
         of = chosen[self.contact]
-        with torch.no_grad():
-            scores = decision(self.prefixes[name], self.prefixes["trajectory"])[0].numpy()[of]
-            whole = decision(self.whole[name], self.whole["trajectory"])[0].numpy()[chosen]
+        scores = _said(self.prefixes, name, decision)[0][of]
+        whole = _said(self.whole, name, decision)[0][chosen]
         place = np.cumsum(chosen) - 1
         asked = Asked(
             place[self.contact[of]], self.since[of] / WINDOW.rate_hz, scores.argmax(axis=1),
@@ -77,14 +77,8 @@ class Foretold:
 
     def rule(self, name: str, decision: Decision, least: float) -> dict[str, Any]:
         """The metadata `provisional` of a network with its decision, that publishes from `least` on."""
-
-        def answers(of: Logits) -> Answers:
-            with torch.no_grad():
-                scores, unknown = decision(of[name], of["trajectory"])
-            return scores.numpy(), unknown.numpy()
-
-        scores, unknown = answers(self.prefixes)
-        final = published(answers(self.whole), least)
+        scores, unknown = _said(self.prefixes, name, decision)
+        final = published(_said(self.whole, name, decision), least)
         best, confidence = scores.argmax(axis=1), scores.max(axis=1).astype(np.float64) * (1 - unknown)
         # As the run time has it: no tap while the finger is down, and in a second contact two taps or nothing.
         possible = np.where(self.second, best == GESTURES.index(DOUBLE), best != GESTURES.index(DOUBLE))
@@ -92,11 +86,16 @@ class Foretold:
         asked = Asked(self.contact, self.since / WINDOW.rate_hz, best, confidence, final, self.samples.people)
         # Where the finger comes back nobody can know it at the release: that depends on how often people do so.
         single = at_release(self.samples).lengths() == self.samples.lengths()
-        scores, unknown = answers(self.released)
+        scores, unknown = _said(self.released, name, decision)
         tap = tap_threshold(
             (scores[single], unknown[single]), final[single], self.samples.people[single], GESTURES.index(TAP)
         )
         return calibrated(asked, GESTURES, tap)
+
+
+def _said(of: Logits, name: str, decision: Decision) -> Answers:
+    """What a network and its second opinion answer together."""
+    return decided(decision, of[name], of["trajectory"])
 
 
 def _joined(parts: Sequence[Logits]) -> Logits:

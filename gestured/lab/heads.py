@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from gestured.lab.augment import varied
-from gestured.lab.decide import fit_decision, threshold
-from gestured.lab.evaluate import Answers
-from gestured.lab.fit import CLASSES, lengths_of, padded, targets
+from gestured.lab.decide import Answers, decided, fit_decision, threshold
+from gestured.lab.fit import CLASSES, batch_of, targets
 from gestured.lab.nets import Perceptron, Recurrent
 from gestured.lab.samples import Samples
 from gestured.lab.train import Trained, TrainingData, TrainingPlan
@@ -41,8 +40,7 @@ class Cues(NamedTuple):
         with torch.no_grad():
             for start in range(0, len(index), 256):
                 chosen = index[start : start + 256]
-                x = padded(samples, chosen, plan.fit.longest)
-                lengths = lengths_of(samples, chosen, plan.fit.longest)
+                x, lengths = batch_of(samples, chosen)
                 for y in (x, varied(x, generator)) if vary else (x,):
                     embedded.append(net.embed(y, lengths))
                     features.append(trajectory_features(y, lengths))
@@ -76,12 +74,10 @@ class Heads(NamedTuple):
         labels = self.calibrate.labels[seen]
         one, two = first(self.calibrate.embedded[seen]).detach(), second(self.calibrate.features[seen]).detach()
         decision = fit_decision(one, two, labels, len(GESTURES))
-        with torch.no_grad():
-            scores, unknown = decision(one, two)
-            least = threshold(scores.numpy(), unknown.numpy(), labels)
-            for test, (cues, samples) in self.tests.items():
-                scores, unknown = decision(first(cues.embedded), second(cues.features))
-                yield test, (scores.numpy(), unknown.numpy()), samples.take(cues.of), least
+        least = threshold(decided(decision, one, two), labels)
+        for test, (cues, samples) in self.tests.items():
+            answers = decided(decision, first(cues.embedded).detach(), second(cues.features).detach())
+            yield test, answers, samples.take(cues.of), least
 
 
 def _refit(cues: Cues, which: int, hidden: Sequence[int], plan: TrainingPlan) -> nn.Module:

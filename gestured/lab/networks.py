@@ -7,11 +7,10 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-import torch
 from torch import Tensor, nn
 
 import gestured
-from gestured.lab.decide import fit_decision, threshold
+from gestured.lab.decide import decided, fit_decision, threshold
 from gestured.lab.evaluate import Evaluation, outcome
 from gestured.lab.export import Facts, export_net
 from gestured.lab.field import table
@@ -67,7 +66,7 @@ def compare(trained: Trained, calibrated: Calibrated, data: TrainingData, plan: 
     candidates = learn(plan, data, cache, CANDIDATES)
     nets = nn.ModuleDict({**trained.nets, **candidates.nets})
     said = calibrated.logits | calibration_set(candidates, data, plan).logits
-    tests = {test: (logits(nets, samples, plan.fit), targets(samples)) for test, samples in data.tests.items()}
+    tests = {test: (logits(nets, samples), targets(samples)) for test, samples in data.tests.items()}
     print(f"{Evaluation.HEAD}{'error':>8}{'cold ms':>9}", flush=True)
     for first, second in dict.fromkeys((name, other) for name in nets for other in (name, SECOND)):
         title = f"{first} alone" if first == second else f"{first} and {second}"
@@ -76,18 +75,15 @@ def compare(trained: Trained, calibrated: Calibrated, data: TrainingData, plan: 
         assert isinstance(one, Opinion)
         assert isinstance(two, Opinion)
         module = Alone(one, decision) if first == second else Judged(one, two, decision)
-        with torch.no_grad():
-            scores, unknown = decision(said[first], said[second])
-            least = threshold(scores.numpy(), unknown.numpy(), calibrated.labels, calibrated.sets)
-            facts = Facts("candidate", gestured.__version__, GESTURES, WINDOW, {"threshold": least}, "0" * 64, {})
-            with tempfile.TemporaryDirectory() as folder:
-                path = Path(folder) / "candidate.onnx"
-                export_net(module, path, facts)
-                took = cold_ms(open_model(path))
-            for test, (found, labels) in tests.items():
-                scores, unknown = decision(found[first], found[second])
-                result = outcome((scores.numpy(), unknown.numpy()), labels, least, data.performed[test])
-                print(f"{result.row(f'{title}, {test}')}{result.wrong + result.lost:>8.3f}{took:>9.2f}", flush=True)
+        least = threshold(decided(decision, said[first], said[second]), calibrated.labels, calibrated.sets)
+        facts = Facts("candidate", gestured.__version__, GESTURES, WINDOW, {"threshold": least}, "0" * 64, {})
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "candidate.onnx"
+            export_net(module, path, facts)
+            took = cold_ms(open_model(path))
+        for test, (found, labels) in tests.items():
+            result = outcome(decided(decision, found[first], found[second]), labels, least, data.performed[test])
+            print(f"{result.row(f'{title}, {test}')}{result.wrong + result.lost:>8.3f}{took:>9.2f}", flush=True)
 
 
 def compare_rules(trained: Trained, calibrated: Calibrated, data: TrainingData, plan: TrainingPlan, path: Path) -> None:
@@ -95,10 +91,10 @@ def compare_rules(trained: Trained, calibrated: Calibrated, data: TrainingData, 
     name = path.stem
     module, _, _ = judged(trained, name, calibrated)
     rule = json.loads(inspect(path.read_bytes())["provisional"])
-    teach = Foretold.of([(trained.nets, data.calibrate)], plan.fit).contacts(name, module.decision)
+    teach = Foretold.of([(trained.nets, data.calibrate)]).contacts(name, module.decision)
     print(f"{'rule':<40}{'earliness':>10}{'accuracy':>10}{'harmonic mean':>15}", flush=True)
     for test, samples in data.tests.items():
-        contacts = Foretold.of([(trained.nets, samples)], plan.fit).contacts(name, module.decision)
+        contacts = Foretold.of([(trained.nets, samples)]).contacts(name, module.decision)
         for title, row in table(teach, contacts, rule, GESTURES).items():
             cells = f"{row['earliness']:>10.3f}{row['accuracy']:>10.3f}{row['harmonic_mean']:>15.3f}"
             print(f"{f'{title}, {test}':<40}{cells}", flush=True)

@@ -25,10 +25,10 @@ from gestured.core.measures import MEASURES, measures
 from gestured.lab.adapt.material import own_recordings
 from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import OTHER_TRIALS, TRIALS, recorded, simulated
-from gestured.lab.decide import fit_decision, threshold
+from gestured.lab.decide import calibration_of, confidence, decided, fit_decision, threshold
 from gestured.lab.digest import code_digest
 from gestured.lab.export import Facts, export_forest, export_net
-from gestured.lab.fit import CLASSES, NETS, FitConfig, finetune, load_nets, logits, pretrain, targets
+from gestured.lab.fit import CLASSES, NETS, RECURRENT, FitConfig, finetune, load_nets, logits, pretrain, targets
 from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.foretold import Foretold
 from gestured.lab.manifest import write_manifest
@@ -171,7 +171,7 @@ def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[s
     for k, held in enumerate(folds(data.real)):
         seen, path = data.real.take(~held), cache / f"fold{k}-{key}.npz"
         apart.append(_kept(path, start, data, seen, plan, f"fold {k + 1}/{FOLDS}"))
-        for name, found in logits(apart[-1], data.real.take(held), plan.fit).items():
+        for name, found in logits(apart[-1], data.real.take(held)).items():
             held_out[name][torch.from_numpy(held)] = found
     return Trained(_kept(cache / f"final-{key}.npz", start, data, data.real, plan, "final"), held_out, apart)
 
@@ -195,7 +195,7 @@ class Calibrated:
 
 def calibration_set(trained: Trained, data: TrainingData, plan: TrainingPlan) -> Calibrated:
     """People that no network has seen: simulated ones, and each real subject by the fold that left it out."""
-    found, labels = logits(trained.nets, data.calibrate, plan.fit), targets(data.calibrate)
+    found, labels = logits(trained.nets, data.calibrate), targets(data.calibrate)
     sets = (data.calibrate.people < COHORT).astype(np.int64)
     if data.real is not None and trained.held_out is not None:
         found = {name: torch.cat([found[name], trained.held_out[name]]) for name in found}
@@ -211,28 +211,21 @@ def foretold(trained: Trained, data: TrainingData, plan: TrainingPlan, cache: Pa
     parts = [(trained.nets, data.calibrate), (trained.nets, further)]
     if data.real is not None:
         parts += [(nets, data.real.take(held)) for nets, held in zip(trained.folds, folds(data.real), strict=True)]
-    return Foretold.sessions(parts, plan.fit)
+    return Foretold.sessions(parts)
 
 
 def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged, dict[str, Any], dict[str, Any]]:
     """A network with its second opinion, their calibration, and how it answers then (`answer_figures`)."""
     first, second = calibrated.logits[name], calibrated.logits["trajectory"]
     decision = fit_decision(first, second, calibrated.labels, len(GESTURES))
-    with torch.no_grad():
-        scores, unknown = decision(first, second)
-    known = calibrated.labels < len(GESTURES)
-    least = threshold(scores.numpy(), unknown.numpy(), calibrated.labels, calibrated.sets)
-    calibration = {
-        "temperature": (1 / decision.share.clamp(min=1e-6)).tolist(),  # of the network and of the trajectory net
-        "unknown_weight": decision.weight.tolist(),
-        "unknown_bias": float(decision.bias),
-        "threshold": least,
-    }
+    answers = decided(decision, first, second)
+    least = threshold(answers, calibrated.labels, calibrated.sets)
     net, trajectory = trained.nets[name], trained.nets["trajectory"]
     assert isinstance(net, Opinion)
     assert isinstance(trajectory, Opinion)
     module = Judged(net, trajectory, decision).eval()
-    return module, calibration, answer_figures(scores.numpy().max(axis=1) * (1 - unknown.numpy()), known, least)
+    answered = answer_figures(confidence(answers), calibrated.labels < len(GESTURES), least)
+    return module, calibration_of(decision, least), answered
 
 
 def grow_forest(
@@ -257,9 +250,8 @@ def grow_forest(
     labels = np.minimum(_classes(data.calibrate), len(GESTURES))
     chances = forest.predict_proba(data.calibrate.features())
     calibration = _forest_calibration(chances, labels)
-    scores, unknown = forest_outputs(chances, len(GESTURES), calibration)
-    confidence = scores.max(axis=1) * (1 - unknown)
-    return forest, calibration, answer_figures(confidence, labels < len(GESTURES), calibration["threshold"])
+    sure = confidence(forest_outputs(chances, len(GESTURES), calibration))
+    return forest, calibration, answer_figures(sure, labels < len(GESTURES), calibration["threshold"])
 
 
 def _classes(samples: Samples) -> NDArray[np.int64]:
@@ -279,12 +271,11 @@ def _forest_calibration(chances: NDArray[np.float64], labels: NDArray[np.int64])
             best = loss, calibration
     assert best is not None
     calibration = best[1]
-    scores, unknown = forest_outputs(chances, len(GESTURES), calibration)
-    confidence = scores.max(axis=1) * (1 - unknown)
-    wrong = known & (scores.argmax(axis=1) != labels)
+    answers = forest_outputs(chances, len(GESTURES), calibration)
+    sure, wrong = confidence(answers), known & (answers[0].argmax(axis=1) != labels)
     for least in np.linspace(0.05, 0.95, 91):
         calibration["threshold"] = round(float(least), 3)
-        if (wrong & (confidence >= least)).sum() <= 0.06 * known.sum() and (confidence[~known] >= least).mean() <= 0.1:
+        if (wrong & (sure >= least)).sum() <= 0.06 * known.sum() and (sure[~known] >= least).mean() <= 0.1:
             break
     return calibration
 
@@ -313,7 +304,7 @@ def answer_figures(confidence: NDArray[np.floating], known: NDArray[np.bool_], l
 
 def train(
     plan: TrainingPlan, out: Path, cache: Path, real: Path | None, jobs: int, recordings: Sequence[Path] = ()
-) -> TrainingData:
+) -> None:
     """Make the three models in `out`, with an empty manifest; the figures come from `evaluate`."""
     torch.set_num_threads(max(jobs, 1))
     data = load_data(plan, cache, real, jobs, recordings)
@@ -327,7 +318,7 @@ def train(
     seen = quantiles(data.teach)
     out.mkdir(parents=True, exist_ok=True)
     contacts = foretold(trained, data, plan, cache, jobs)
-    for name in ("cnn_lstm", "lstm"):
+    for name in RECURRENT:
         module, calibration, answered = judged(trained, name, calibrated)
         common |= {"kind": name, "calibration": calibration, "quantiles": seen | answered}
         rule = contacts.rule(name, module.decision, calibration["threshold"])
@@ -337,4 +328,3 @@ def train(
     path = out / "touch_pattern_rf.onnx"
     export_forest(forest, path, Facts(**common), feature_names(WINDOW.rows, WINDOW.columns))
     write_manifest(out, {})
-    return data

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from gestured.lab.augment import symmetry_table
-from gestured.lab.evaluate import Answers, Evaluation, model_answers, outcome
+from gestured.lab.decide import Answers, confidence, decided
+from gestured.lab.evaluate import Evaluation, model_answers, outcome
 from gestured.lab.fit import CLASSES, logits, targets
 from gestured.lab.heads import Heads
 from gestured.lab.samples import Samples
@@ -84,10 +84,9 @@ def rejected(found: Sequence[Said]) -> dict[str, Any]:
     for said in found:
         known = targets(said.samples)
         chosen = np.isin(known, said.classes)
-        scores, unknown = said.answers
         labels.append(known[chosen])
         people.append(said.samples.people[chosen])
-        hit.append((scores.max(axis=1) * (1 - unknown) < said.least)[chosen])
+        hit.append((confidence(said.answers) < said.least)[chosen])
     classes, hits = np.concatenate(labels), np.concatenate(hit)
     share, low, high = interval(hits, np.concatenate(people))
     kinds = {CLASSES[k]: round(float(hits[classes == k].mean()), 3) for k in np.unique(classes)}
@@ -138,8 +137,7 @@ def _answers(trained: Trained, data: TrainingData, plan: TrainingPlan, classes: 
     module, calibration, _ = judged(trained, NAME, calibration_set(trained, data, plan))
     found = []
     for test, samples in data.tests.items():
-        of = logits(trained.nets, samples, plan.fit)
-        with torch.no_grad():
-            scores, unknown = module.decision(of[NAME], of["trajectory"])
-        found.append(Said(test, (scores.numpy(), unknown.numpy()), samples, calibration["threshold"], classes))
+        of = logits(trained.nets, samples)
+        answers = decided(module.decision, of[NAME], of["trajectory"])
+        found.append(Said(test, answers, samples, calibration["threshold"], classes))
     return found

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.lab.adapt.adaptation import decided
 from gestured.lab.adapt.judging import Answers
 from gestured.lab.adapt.learning import opinions
 from gestured.lab.dataset import simulated
+from gestured.lab.decide import decided
 from gestured.lab.fit import FitConfig
 from gestured.lab.nets import Judged
 from gestured.lab.samples import Samples
@@ -83,8 +83,7 @@ def network(cache: Path, kind: str | None) -> tuple[Judged, float]:
 
 def asked(model: Judged, samples: Samples) -> Answers:
     """What a network says of each sample."""
-    said = decided(model.decision, opinions(model, samples, PLAN.fit.longest))
-    return Answers.of(samples, *said, np.zeros(0, np.int64))
+    return Answers.of(samples, decided(model.decision, *opinions(model, samples)), np.zeros(0, np.int64))
 
 
 def row(title: str, every: Answers, without: Answers, least: float) -> str:

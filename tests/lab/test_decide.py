@@ -169,7 +169,7 @@ def worth(scores: np.ndarray, unknown: np.ndarray, labels: np.ndarray, least: fl
 @pytest.mark.parametrize("seed", range(4))
 def test_no_other_threshold_is_worth_more(seed: int) -> None:
     made = answers(3000, seed)
-    best = threshold(*made)
+    best = threshold(made[:2], made[2])
     assert worth(*made, best) >= max(worth(*made, least) for least in np.linspace(0.05, 0.95, 91)) - 1e-3
 
 
@@ -179,14 +179,13 @@ def test_every_set_counts_the_same_however_large() -> None:
     unknown[:300] = unknown[:300] * 0.1
     sets = np.repeat([0, 1], [300, 30_000])
     again = np.concatenate([np.tile(np.arange(300), 50), np.arange(300, 30_300)])
-    assert threshold(scores, unknown, labels, sets) == threshold(
-        scores[again], unknown[again], labels[again], sets[again]
-    )
+    one = threshold((scores, unknown), labels, sets)
+    assert one == threshold((scores[again], unknown[again]), labels[again], sets[again])
 
 
 def test_the_curve_counts_what_a_user_sees() -> None:
     scores = np.float32([[0.9, 0.1], [0.9, 0.1], [0.2, 0.8], [0.6, 0.4]])
-    points = curve(scores, np.zeros(4, np.float32), np.array([0, 1, 1, 2]))
+    points = curve((scores, np.zeros(4, np.float32)), np.array([0, 1, 1, 2]))
     at = dict(zip(THRESHOLDS, points.tolist(), strict=True))
     assert at[0.5] == pytest.approx([2 / 3, 1 / 3, 1])
     assert at[0.7] == pytest.approx([2 / 3, 1 / 3, 0])
@@ -196,4 +195,4 @@ def test_the_curve_counts_what_a_user_sees() -> None:
 def test_the_threshold_stays_within_its_bounds() -> None:
     sure = np.tile(np.float32([1, 0, 0]), (50, 1))
     for label in (0, 1):
-        assert 0.05 <= threshold(sure, np.zeros(50, np.float32), np.full(50, label)) <= 0.95
+        assert 0.05 <= threshold((sure, np.zeros(50, np.float32)), np.full(50, label)) <= 0.95

@@ -21,7 +21,7 @@ from gestured.lab.adapt.material import Groups, Own, held_out
 from gestured.lab.adapt.refitting import refitted
 from gestured.lab.adapt.takes import Simulated
 from gestured.lab.adapt.weights import Base
-from gestured.lab.fit import FitConfig
+from gestured.lab.decide import decided
 from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Decision, Judged
 from gestured.lab.samples import Samples
@@ -31,48 +31,6 @@ WAYS = (0.25, 0.5, 0.75, 1.0)  # of the way from the old weights to the new ones
 LOSS = 0.01  # share of the simulated gestures that may be lost, and of simulated non-gestures that may be accepted more
 
 Opinions = tuple[Tensor, Tensor]  # (G, K) logits of the network and of its second opinion
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a model answers own recordings and the simulated nominal ones."""
-
-    own: Shares
-    simulated: Shares
-
-
-@dataclass(frozen=True)
-class Adapted:
-    """The new model, and what both are worth."""
-
-    judged: Judged
-    least: float  # its threshold
-    provisional: Mapping[str, Any]  # when it may answer before the end
-    before: Outcome
-    after: Outcome
-    way: float  # of the way to the new weights
-    unit: str  # of what the groups are made that were held out in turn
-    groups: int
-    answers: Answers  # of the new model, to those held out
-
-    def reasons(self) -> list[str]:
-        """Why it is no better; empty where it is."""
-        found = []
-        old, new = self.before.own, self.after.own
-        if not new.right[0] > old.right[0]:
-            found.append(f"right does not go up ({old.right[0]:.3f} -> {new.right[0]:.3f})")
-        if new.wrong[0] > old.wrong[0]:
-            found.append(f"wrong goes up ({old.wrong[0]:.3f} -> {new.wrong[0]:.3f})")
-        lost = self.before.simulated.right[0] - self.after.simulated.right[0]
-        if lost > LOSS:
-            found.append(f"{100 * lost:.1f} points of the simulated gestures are lost, expected 1 at most")
-        taken = self.after.simulated.accepted[0] - self.before.simulated.accepted[0]
-        if taken > LOSS:
-            remedy = "" if new.others else "; record non-gestures of your own, too (gestured-lab collect)"
-            found.append(
-                f"{100 * taken:.1f} points more of the simulated non-gestures are accepted, expected 1 at most{remedy}"
-            )
-        return found
 
 
 @dataclass(frozen=True)
@@ -89,25 +47,47 @@ class Settled:
     apart: Sequence[tuple[Judged, Samples]]  # the networks that left out a group, and that group
 
 
+@dataclass(frozen=True)
+class Adapted:
+    """The new model, and what both are worth on the simulated nominal recordings."""
+
+    new: Settled
+    provisional: Mapping[str, Any]  # when it may answer before the end
+    before: Shares
+    after: Shares
+
+    def reasons(self) -> list[str]:
+        """Why it is no better; empty where it is."""
+        found = []
+        old, new = self.new.before, self.new.after
+        if not new.right[0] > old.right[0]:
+            found.append(f"right does not go up ({old.right[0]:.3f} -> {new.right[0]:.3f})")
+        if new.wrong[0] > old.wrong[0]:
+            found.append(f"wrong goes up ({old.wrong[0]:.3f} -> {new.wrong[0]:.3f})")
+        lost = self.before.right[0] - self.after.right[0]
+        if lost > LOSS:
+            found.append(f"{100 * lost:.1f} points of the simulated gestures are lost, expected 1 at most")
+        taken = self.after.accepted[0] - self.before.accepted[0]
+        if taken > LOSS:
+            remedy = "" if new.others else "; record non-gestures of your own, too (gestured-lab collect)"
+            found.append(
+                f"{100 * taken:.1f} points more of the simulated non-gestures are accepted, expected 1 at most{remedy}"
+            )
+        return found
+
+
 def adapt(base: Base, own: Own, takes: Simulated, course: Course) -> Adapted:
     """Learn, hold out, fit, judge."""
     start, least = base.judged, base.model.threshold
     new = settled(start, least, own, takes, course)
-    return Adapted(
-        new.judged, new.least,
-        _early(
-            [(new.judged, takes.check), (new.judged, takes.early), *new.apart], new.judged.decision, new.least, course
-        ),
-        Outcome(new.before, _nominal(start, least, takes, course)),
-        Outcome(new.after, _nominal(new.judged, new.least, takes, course)),
-        new.way, new.groups.unit, new.groups.count, new.answers,
-    )  # fmt: skip
+    before, after = _nominal(start, least, takes), _nominal(new.judged, new.least, takes)
+    return Adapted(new, _early(new, takes), before, after)
 
 
 def settled(start: Judged, least: float, own: Own, takes: Simulated, course: Course) -> Settled:
     """Go on from networks that publish from `least` on, with own recordings."""
     groups = held_out(own)
-    run = _Run(start, own, groups.of_samples, takes, course)
+    run = _Run(start, own, groups.of_samples, takes)
     ends = [
         learned(start, takes.teach, own.samples.take(groups.of_samples != k), course, f"without {k + 1}/{groups.count}")
         for k in range(groups.count)
@@ -115,15 +95,15 @@ def settled(start: Judged, least: float, own: Own, takes: Simulated, course: Cou
     run.listen(ends)
     samples = replace(own.samples, people=groups.unit_of_samples)
 
-    def answers(found: tuple[NDArray[np.float32], NDArray[np.float32]]) -> Answers:
-        return Answers.of(samples, *found, groups.unit_of_missed)
+    def answers(decision: Decision, said: Opinions) -> Answers:
+        return Answers.of(samples, decided(decision, *said), groups.unit_of_missed)
 
     of_rows = np.concatenate([groups.of_samples, groups.of_missed])
-    before = answers(decided(start.decision, opinions(start, own.samples, course.longest))).shares(least)
+    before = answers(start.decision, opinions(start, own.samples)).shares(least)
     new: Answers | None = None
     for k in range(groups.count):
         decision, way = run.decision(ends[k], groups.of_samples != k)
-        found = answers(decided(decision, run.said[way]))
+        found = answers(decision, run.said[way])
         new = found if new is None else new.where(of_rows == k, found)
     assert new is not None
 
@@ -131,7 +111,7 @@ def settled(start: Judged, least: float, own: Own, takes: Simulated, course: Cou
     decision, way = run.decision(end, np.ones(len(own.samples), bool))
     judged = between(start, end, way)
     judged.decision = decision
-    chosen = _least(answers(decided(decision, run.said[way])), before)
+    chosen = _least(answers(decision, run.said[way]), before)
     apart = [(between(start, ends[k], way), own.samples.take(groups.of_samples == k)) for k in range(groups.count)]
     return Settled(judged, chosen, before, new.shares(_least(new, before)), way, groups, new, apart)
 
@@ -139,8 +119,8 @@ def settled(start: Judged, least: float, own: Own, takes: Simulated, course: Cou
 class _Run:
     """What the networks without each group say of it, at each way, and the decisions that follow."""
 
-    def __init__(self, start: Judged, own: Own, groups: NDArray[np.int64], takes: Simulated, course: Course) -> None:
-        self._start, self._own, self._groups, self._takes, self._course = start, own, groups, takes, course
+    def __init__(self, start: Judged, own: Own, groups: NDArray[np.int64], takes: Simulated) -> None:
+        self._start, self._own, self._groups, self._takes = start, own, groups, takes
         self._classes = classes_of(own.samples)
         self.said: dict[float, Opinions] = {}
         self._loss: dict[float, NDArray[np.float64]] = {}
@@ -151,7 +131,7 @@ class _Run:
         back = torch.from_numpy(np.argsort(np.concatenate(parts)))
         for way in WAYS:
             found = [
-                opinions(between(self._start, end, way), self._own.samples.take(part), self._course.longest)
+                opinions(between(self._start, end, way), self._own.samples.take(part))
                 for end, part in zip(ends, parts, strict=True)
             ]
             first, second = (torch.cat([one[n] for one in found])[back] for n in (0, 1))
@@ -161,8 +141,8 @@ class _Run:
     def decision(self, end: Judged, others: NDArray[np.bool_]) -> tuple[Decision, float]:
         """Fitted for networks that go to `end`, on those of `others` who were held out; and the way that suits them."""
         way = min(WAYS, key=lambda one: float(self._loss[one][others].mean()))
-        check, course = self._takes.check, self._course
-        both = opinions(between(self._start, end, way), check, course.longest)
+        check = self._takes.check
+        both = opinions(between(self._start, end, way), check)
         rows = torch.from_numpy(others)
         first, second = (torch.cat([own[rows], made]) for own, made in zip(self.said[way], both, strict=True))
         own, made = int(others.sum()), len(check)
@@ -171,33 +151,24 @@ class _Run:
         return refitted(self._start.decision, first, second, classes, weight), way
 
 
-def decided(decision: Decision, said: Opinions) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Scores (G, C) and unknown (G,) of both opinions' logits."""
-    with torch.no_grad():
-        scores, unknown = decision(*said)
-    return scores.numpy(), unknown.numpy()
-
-
 def _losses(decision: Decision, said: Opinions, classes: NDArray[np.int64]) -> NDArray[np.float64]:
     """(G,) how little each answer was expected."""
-    scores, unknown = decided(decision, said)
+    scores, unknown = decided(decision, *said)
     known = classes < len(GESTURES)
     named = scores[np.arange(len(classes)), np.minimum(classes, len(GESTURES) - 1)] * (1 - unknown)
     return -np.log(np.maximum(np.where(known, named, unknown), 1e-6)).astype(np.float64)
 
 
-def _early(
-    parts: Sequence[tuple[Judged, Samples]], decision: Decision, least: float, course: Course
-) -> Mapping[str, Any]:
+def _early(new: Settled, takes: Simulated) -> Mapping[str, Any]:
     """The rule for provisional events, from what networks say of samples that they have not learned from."""
-    name = "net"
-    asked = [(nn.ModuleDict({name: one.net, "trajectory": one.trajectory}), samples) for one, samples in parts]
-    return Foretold.sessions(asked, FitConfig(longest=course.longest)).rule(name, decision, least)
+    parts = [(new.judged, takes.check), (new.judged, takes.early), *new.apart]
+    asked = [(nn.ModuleDict({"net": one.net, "trajectory": one.trajectory}), samples) for one, samples in parts]
+    return Foretold.sessions(asked).rule("net", new.judged.decision, new.least)
 
 
-def _nominal(judged: Judged, least: float, takes: Simulated, course: Course) -> Shares:
-    found = decided(judged.decision, opinions(judged, takes.nominal, course.longest))
-    return Answers.of(takes.nominal, *found, takes.missed).shares(least)
+def _nominal(judged: Judged, least: float, takes: Simulated) -> Shares:
+    found = decided(judged.decision, *opinions(judged, takes.nominal))
+    return Answers.of(takes.nominal, found, takes.missed).shares(least)
 
 
 def _least(answers: Answers, before: Shares) -> float:

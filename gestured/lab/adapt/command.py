@@ -19,6 +19,7 @@ from gestured.lab.adapt.learning import Course
 from gestured.lab.adapt.material import Own, own_recordings
 from gestured.lab.adapt.takes import simulate
 from gestured.lab.adapt.weights import Base, base_of
+from gestured.lab.decide import calibration_of
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
 from gestured.lab.own.command import PEOPLE, teach
@@ -78,7 +79,7 @@ def _write(found: Adapted, out: Path, facts: Facts, cache: Path) -> None:
     """All of the model or nothing: what it needs for gestures of its user's own depends on the new weights."""
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / out.name
-        export_net(found.judged, made, facts)
+        export_net(found.new.judged, made, facts)
         teach(made, cache, PEOPLE, JOBS)
         with atomic_write(out, PUBLIC) as file:
             file.write(made.read_bytes())
@@ -86,8 +87,8 @@ def _write(found: Adapted, out: Path, facts: Facts, cache: Path) -> None:
 
 def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, recordings: list[Path]) -> Facts:
     """What the new file says of itself."""
-    decision, gestures = found.judged.decision, own.samples.take(own.samples.labels != NONE)
-    cut = found.answers.confidence >= 0
+    new, gestures = found.new, own.samples.take(own.samples.labels != NONE)
+    cut = new.answers.confidence >= 0
     before = json.loads(base.properties.get(KEY, "[]"))
     learned = base.model.metadata.training_data + own.samples.digest() + simulated.digest()
     return Facts(
@@ -95,15 +96,9 @@ def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, recordings:
         version=base.model.metadata.version,
         gestures=list(GESTURES),
         window=WINDOW,
-        calibration={
-            "temperature": (1 / decision.share.clamp(min=1e-6)).tolist(),
-            "unknown_weight": decision.weight.tolist(),
-            "unknown_bias": float(decision.bias),
-            "threshold": found.least,
-        },
+        calibration=calibration_of(new.judged.decision, new.least),
         training_data=hashlib.sha256(learned.encode()).hexdigest(),
-        quantiles=quantiles(gestures)
-        | answer_figures(found.answers.confidence[cut], found.answers.known[cut], found.least),
+        quantiles=quantiles(gestures) | answer_figures(new.answers.confidence[cut], new.answers.known[cut], new.least),
         classes=CLASSES,
         provisional=found.provisional,
         learned_from=[*before, *origins(recordings)],
@@ -111,28 +106,27 @@ def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, recordings:
 
 
 def _figures(own: Own, found: Adapted) -> dict[str, Any]:
+    new, groups = found.new, found.new.groups
     return {
         "people": len(own.names),
-        "held_out": {"unit": found.unit, "groups": found.groups, "worth": WORTH[found.unit]},
+        "held_out": {"unit": groups.unit, "groups": groups.count, "worth": WORTH[groups.unit]},
         "left_out": own.left_out,
-        "before": {"own": found.before.own.as_dict(), "simulated": found.before.simulated.as_dict()},
-        "after": {"own": found.after.own.as_dict(), "simulated": found.after.simulated.as_dict()},
-        "threshold": round(found.least, 4),
-        "way": found.way,
+        "before": {"own": new.before.as_dict(), "simulated": found.before.as_dict()},
+        "after": {"own": new.after.as_dict(), "simulated": found.after.as_dict()},
+        "threshold": round(new.least, 4),
+        "way": new.way,
     }
 
 
 def _tell(own: Own, found: Adapted) -> None:
-    shares = found.before.own
+    new, shares = found.new, found.new.before
     say(f"{len(own.names)} people, {shares.gestures} gestures, {shares.others} non-gestures")
     for name, count in sorted(own.left_out.items()):
         say(f"left out: {name} ({count}), neither taught nor rejected, so that it can be enrolled")
     say(f"{'':<16}{'right':>16}{'wrong':>16}{'unknown':>16}{'others taken':>16}")
-    for title, before, after in (
-        ("own", found.before.own, found.after.own), ("simulated", found.before.simulated, found.after.simulated),
-    ):  # fmt: skip
+    for title, before, after in (("own", new.before, new.after), ("simulated", found.before, found.after)):
         say(_row(f"{title} before", before), _row(f"{title} after", after))
-    say(f"threshold {found.least:.3f}, where no more are wrong than before", WORTH[found.unit])
+    say(f"threshold {new.least:.3f}, where no more are wrong than before", WORTH[new.groups.unit])
 
 
 def _row(title: str, shares: Shares) -> str:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.lab import decide
 from gestured.lab.adapt.learning import classes_of
 from gestured.lab.samples import Samples
 from gestured.lab.study.bootstrap import interval
@@ -25,16 +26,14 @@ class Answers:
     unit: NDArray[np.int64]  # (N,) who performed it: what intervals are drawn over
 
     @classmethod
-    def of(
-        cls, samples: Samples, scores: NDArray[np.float32], unknown: NDArray[np.float32], missed: NDArray[np.int64]
-    ) -> "Answers":
-        """`scores` (G, C) and `unknown` (G,) of the samples; `missed` (M,) are the units of what was never cut out."""
+    def of(cls, samples: Samples, said: decide.Answers, missed: NDArray[np.int64]) -> "Answers":
+        """What is `said` of the samples; `missed` (M,) are the units of what was never cut out."""
         lost = np.zeros(len(missed))
         known = samples.labels != NONE
         return cls(
             np.concatenate([known, lost == 0]),
-            np.concatenate([known & (scores.argmax(axis=1) == classes_of(samples)), lost > 0]),
-            np.concatenate([scores.max(axis=1) * (1.0 - unknown), lost - 1]),
+            np.concatenate([known & (said[0].argmax(axis=1) == classes_of(samples)), lost > 0]),
+            np.concatenate([decide.confidence(said), lost - 1]),
             np.concatenate([samples.people, missed]),
         )
 

@@ -19,7 +19,7 @@ from torch import Tensor, nn
 
 from gestured.core.errors import ModelError
 from gestured.lab.export import PARITY
-from gestured.lab.fit import CLASSES, build
+from gestured.lab.fit import CLASSES, RECURRENT, build
 from gestured.lab.nets import Decision, Judged, Opinion
 from gestured.lab.samples import WINDOW
 from gestured.model.file import inspect, read_bytes
@@ -28,7 +28,6 @@ from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.simulator import GESTURES
 
-ADAPTABLE = ("cnn_lstm", "lstm")
 GATES = [0, 2, 3, 1]  # torch's order i f g o, in ONNX's i o f c
 
 
@@ -42,7 +41,7 @@ class Base:
 
     @property
     def kind(self) -> str:
-        """Which of `ADAPTABLE` it is."""
+        """Which of `RECURRENT` it is."""
         return self.model.metadata.kind
 
 
@@ -51,8 +50,8 @@ def base_of(source: str) -> Base:
     model = open_model(source if source in shipped() else Path(source))
     path = shipped().get(source, Path(source))
     metadata = model.metadata
-    if metadata.kind not in ADAPTABLE:
-        raise ModelError(f"{path}: is not adaptable: its kind is {metadata.kind}, expected {' or '.join(ADAPTABLE)}")
+    if metadata.kind not in RECURRENT:
+        raise ModelError(f"{path}: is not adaptable: its kind is {metadata.kind}, expected {' or '.join(RECURRENT)}")
     if metadata.gestures != tuple(GESTURES) or metadata.window != WINDOW:
         raise ModelError(f"{path}: is not adaptable: expected the gestures and the window that this version trains")
     data = read_bytes(path)

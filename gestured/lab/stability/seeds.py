@@ -70,6 +70,6 @@ def _trained(taught: Samples, judged: Samples, config: FitConfig) -> dict[str, S
     try:
         with tempfile.TemporaryDirectory() as folder:
             nets = pretrain(taught, config, Path(folder) / "checkpoint.npz")
-        return {name: found.softmax(dim=1).double().numpy() for name, found in logits(nets, judged, config).items()}
+        return {name: found.softmax(dim=1).double().numpy() for name, found in logits(nets, judged).items()}
     finally:
         torch.set_num_threads(before)

@@ -13,12 +13,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from gestured.lab.fit import padded
+from gestured.lab.fit import LONGEST, optimiser_of, padded, step
 from gestured.lab.nets import last_active
 from gestured.lab.samples import Samples
 
 BATCH_SEQUENCES = 64
-LONGEST = 80  # frames
 Indices = NDArray[np.int64]
 
 
@@ -86,19 +85,12 @@ def train_net(
     torch.set_num_threads(1)
     torch.manual_seed(seed)
     module = make()
-    optimiser = torch.optim.AdamW(module.parameters(), rate, weight_decay=1e-2)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, rate, total_steps=max(steps, 11), pct_start=0.1, div_factor=10, cycle_momentum=False
-    )
+    optimiser, schedule = optimiser_of([module], [rate], 1e-2, max(steps, 11))
     criterion = nn.CrossEntropyLoss(label_smoothing=0.03)
     module.train()
     for _, chosen in zip(range(steps), _batches(inputs, index, np.random.default_rng(seed)), strict=False):
         loss = criterion(module(*inputs.batch(chosen)), torch.from_numpy(labels[chosen]))
-        optimiser.zero_grad()
-        loss.backward()
-        nn.utils.clip_grad_norm_(module.parameters(), 1.0)
-        optimiser.step()
-        schedule.step()
+        step(loss, module, optimiser, schedule, 1.0)
     return Net(module.eval())
 
 

@@ -8,9 +8,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from gestured.lab.fit import lengths_of, padded
+from gestured.lab.fit import batch_of
 from gestured.lab.samples import Samples
-from gestured.lab.study.training import LONGEST
 from gestured.lab.trajectory import trajectory_features
 
 BATCH_WINDOWS = 256
@@ -21,9 +20,7 @@ def trajectory_matrix(samples: Samples) -> NDArray[np.float32]:
     order = np.argsort(samples.lengths(), kind="stable")
     batches = [order[i : i + BATCH_WINDOWS] for i in range(0, len(order), BATCH_WINDOWS)]
     with torch.no_grad():
-        parts = [
-            trajectory_features(padded(samples, b, LONGEST), lengths_of(samples, b, LONGEST)).numpy() for b in batches
-        ]
+        parts = [trajectory_features(*batch_of(samples, batch)).numpy() for batch in batches]
     found = np.concatenate(parts)
     return np.asarray(found[np.argsort(order, kind="stable")], np.float32)
 

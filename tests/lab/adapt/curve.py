@@ -15,11 +15,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from gestured.lab.adapt.adaptation import decided, settled
+from gestured.lab.adapt.adaptation import settled
 from gestured.lab.adapt.judging import Answers, Interval, Shares
 from gestured.lab.adapt.learning import Course, opinions
 from gestured.lab.adapt.material import Own, own_recordings
 from gestured.lab.adapt.takes import simulate
+from gestured.lab.decide import decided
 from gestured.lab.evaluate import without
 from gestured.lab.nets import Judged
 from gestured.lab.train import REAL_FILES, Trained, TrainingPlan, calibration_set, folds, judged, learn, load_data
@@ -45,8 +46,8 @@ class Said:
 
     def add(self, model: Judged, least: float, judges: Own) -> None:
         """Ask a model that publishes from a confidence of `least` on."""
-        scores, unknown = decided(model.decision, opinions(model, judges.samples, Course().longest))
-        self.take(Answers.of(judges.samples, scores, unknown, judges.missed[:, 0]), least)
+        said = decided(model.decision, *opinions(model, judges.samples))
+        self.take(Answers.of(judges.samples, said, judges.missed[:, 0]), least)
 
     def take(self, found: Answers, least: float) -> None:
         """One group's answers."""

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("torch")
 
-from gestured.lab.adapt.adaptation import Adapted, Outcome
+from gestured.lab.adapt.adaptation import Adapted, Settled
 from gestured.lab.adapt.judging import Shares
 
 NOTHING: Any = None  # what no reason looks at
@@ -18,14 +18,14 @@ def shares(right: float, wrong: float = 0.02, accepted: float = 0.04, others: in
     return Shares(100, others, *((value, value, value) for value in values))
 
 
-def reasons(after: Outcome) -> list[str]:
+def reasons(own: Shares, simulated: Shares) -> list[str]:
     """Of a model that was 0.80 right here, and 0.95 right on simulated takes."""
-    before = Outcome(shares(0.80), shares(0.95))
-    return Adapted(NOTHING, 0.5, {}, before, after, 1.0, "person", 5, NOTHING).reasons()
+    new = Settled(NOTHING, 0.5, shares(0.80), own, 1.0, NOTHING, NOTHING, [])
+    return Adapted(new, {}, shares(0.95), simulated).reasons()
 
 
 def test_what_is_better_here_and_no_worse_there_is_written() -> None:
-    assert reasons(Outcome(shares(0.85), shares(0.945, accepted=0.045))) == []
+    assert reasons(shares(0.85), shares(0.945, accepted=0.045)) == []
 
 
 @pytest.mark.parametrize(
@@ -38,13 +38,13 @@ def test_what_is_better_here_and_no_worse_there_is_written() -> None:
     ],
 )
 def test_what_is_worse_is_said(own: Shares, simulated: Shares, words: str) -> None:
-    (reason,) = reasons(Outcome(own, simulated))
+    (reason,) = reasons(own, simulated)
     assert reason.startswith(words)
 
 
 def test_who_recorded_no_non_gestures_is_told_to() -> None:
     worse = shares(0.95, accepted=0.11)
-    (reason,) = reasons(Outcome(shares(0.85, others=0), worse))
+    (reason,) = reasons(shares(0.85, others=0), worse)
     assert "record non-gestures of your own" in reason
-    (reason,) = reasons(Outcome(shares(0.85), worse))
+    (reason,) = reasons(shares(0.85), worse)
     assert "record" not in reason
