@@ -73,12 +73,11 @@ class Facts:
         )
 
 
-def export_net(module: torch.nn.Module, path: str | Path, facts: Facts) -> dict[str, float]:
+def export_net(module: torch.nn.Module, path: Path, facts: Facts) -> None:
     """Write a torch module whose `forward` takes frames (B, T, R, C) and gives calibrated outputs.
 
     `forward` returns (scores (B, G), unknown (B,)), and perhaps an embedding (B, E). B and T stay open.
-    Gives the file's size in bytes and the largest difference from torch; raises ModelError where it is above `PARITY`
-    or a check fails.
+    Raises ModelError where the file's outputs differ from torch's by more than `PARITY`, or a check fails.
     """
     module = module.eval()
     rows, columns = facts.window.rows, facts.window.columns
@@ -107,16 +106,14 @@ def export_net(module: torch.nn.Module, path: str | Path, facts: Facts) -> dict[
         )
         proto = onnx.load(traced)
     inputs = [_windows(b, t, rows, columns) for b in BATCHES for t in CHECKED_LENGTHS]
-    return _finish(proto, Path(path), facts.metadata(), example, truth, inputs)
+    _finish(proto, path, facts.metadata(), example, truth, inputs)
 
 
-def export_forest(
-    forest: RandomForestClassifier, path: str | Path, facts: Facts, features: Sequence[str]
-) -> dict[str, float]:
+def export_forest(forest: RandomForestClassifier, path: Path, facts: Facts, features: Sequence[str]) -> None:
     """Write a random forest over `features`; its classes are 0 .. G-1 for the gestures, the others for none.
 
-    The outputs are those of `forest_outputs`. Gives the file's size in bytes and the largest difference from
-    scikit-learn; raises ModelError where it is above `PARITY` or a check fails.
+    The outputs are those of `forest_outputs`. Raises ModelError where the file's differ from the forest's own by more
+    than `PARITY`, or a check fails.
     """
     count = len(facts.gestures)
     if not np.array_equal(forest.classes_, np.arange(len(forest.classes_))) or len(forest.classes_) < count:
@@ -130,7 +127,7 @@ def export_forest(
     sample = around_thresholds(forest, 508)
     metadata = facts.metadata() | {"features": json.dumps(list(features))}
     inputs = [sample[start : start + size] for start, size in ((0, 1), (1, 2), (3, 5), (8, 500))]
-    return _finish(forest_graph(forest, count, facts.calibration), Path(path), metadata, sample[:4], truth, inputs)
+    _finish(forest_graph(forest, count, facts.calibration), path, metadata, sample[:4], truth, inputs)
 
 
 def _finish(
@@ -140,7 +137,7 @@ def _finish(
     example: NDArray[np.float32],
     truth: Callable[[NDArray[np.float32]], Outputs],
     inputs: Sequence[NDArray[np.float32]],
-) -> dict[str, float]:
+) -> None:
     """Metadata and self-test into the model, everything checked, then the file at once."""
     proto.producer_name, proto.producer_version, proto.doc_string = "gestured", metadata["version"], ""
     proto.graph.name, proto.graph.doc_string = metadata["kind"], ""
@@ -151,22 +148,22 @@ def _finish(
     try:
         onnx.checker.check_model(proto, full_check=True)
         data = proto.SerializeToString(deterministic=True)
-        largest = _compare(Model(data, path.stem), truth, inputs)
+        _compare(Model(data, path.stem), truth, inputs)
     except (ValueError, onnx.checker.ValidationError, onnx.shape_inference.InferenceError) as error:
         raise ModelError(f"{path}: not written: {error}") from error
-    _write(path, data)
-    return {"size": len(data), "largest_difference": largest}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_write(path, PUBLIC) as file:
+        file.write(data)
 
 
 def _compare(
     model: Model, truth: Callable[[NDArray[np.float32]], Outputs], inputs: Sequence[NDArray[np.float32]]
-) -> float:
-    """The largest difference between the file and the trained model, and between a batch and its members."""
+) -> None:
+    """ValueError where the file and the trained model answer differently, or a batch and its members."""
 
     def outputs(batch: NDArray[np.float32]) -> Outputs:
         return (*model.run(batch), model.embed(batch)) if model.embeds else model.run(batch)
 
-    largest = 0.0
     for batch in inputs:
         found, expected = outputs(batch), truth(batch)
         alone = [outputs(batch[k : k + 1]) for k in range(min(len(batch), 7))]
@@ -175,13 +172,11 @@ def _compare(
             *((found[n][: len(alone)], np.concatenate([a[n] for a in alone])) for n in range(len(found))),
         ):
             difference = float(np.abs(one - other).max()) if one.shape == other.shape else math.inf
-            largest = max(largest, difference)
             if not difference <= PARITY:
                 raise ValueError(
                     f"outputs differ by {difference:.3g} from the trained model's, or a batch's from its "
                     f"members', for an input of shape {batch.shape}; expected {PARITY} at most"
                 )
-    return largest
 
 
 def _windows(batch: int, length: int, rows: int, columns: int) -> NDArray[np.float32]:
@@ -205,10 +200,3 @@ def _windows(batch: int, length: int, rows: int, columns: int) -> NDArray[np.flo
         out[3] = 0.0
         out[4] = random.random(out[4].shape)
     return out.astype(np.float32)
-
-
-def _write(path: Path, data: bytes) -> None:
-    """All of it or nothing, also when the machine stops half-way."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path, PUBLIC) as file:
-        file.write(data)

@@ -55,8 +55,6 @@ def passes(classifier: Classifier, name: str, level: str) -> tuple[bool, str]:
 
 @pytest.mark.parametrize(("name", "level"), BOUNDS)
 def test_a_shipped_network_is_as_good_as_it_was(name: str, level: str) -> None:
-    if not shipped()[name].exists():
-        pytest.skip(f"{shipped()[name]} is not there")
     good, words = passes(open_model(name), name, level)
     print(words)
     assert good, f"{words}; expected {BOUNDS[name, level]}"
@@ -81,8 +79,6 @@ class Damaged:
 
 @pytest.mark.parametrize("level", ["nominal", "hard"])
 def test_a_model_that_is_worse_does_not_pass(level: str) -> None:
-    if not shipped()["cnn_lstm"].exists():
-        pytest.skip(f"{shipped()['cnn_lstm']} is not there")
     good, words = passes(Damaged(open_model("cnn_lstm")), "cnn_lstm", level)
     assert not good, words
 

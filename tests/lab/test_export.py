@@ -5,7 +5,6 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -73,20 +72,12 @@ class Net(nn.Module):
         return torch.softmax(self.head(state) / 1.7, 1), torch.sigmoid(self.judge(cues / 10))[:, 0]
 
 
-@pytest.fixture(autouse=True, scope="module")
-def one_thread() -> Iterator[None]:
-    """Nets this small are slower on several threads, above all where something else computes."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
-
-
 @pytest.fixture(scope="module")
-def net(tmp_path_factory: pytest.TempPathFactory) -> tuple[Net, Path, dict[str, float]]:
+def net(tmp_path_factory: pytest.TempPathFactory) -> tuple[Net, Path]:
     module = Net()
     path = tmp_path_factory.mktemp("net") / "test_net.onnx"
-    return module, path, export_net(module, path, Facts(**CARD))
+    export_net(module, path, Facts(**CARD))
+    return module, path
 
 
 def segment() -> Segment:
@@ -98,8 +89,8 @@ def segment() -> Segment:
 
 @pytest.mark.parametrize("batch", [1, 3])
 @pytest.mark.parametrize("length", [1, 2, 37, 200])
-def test_file_equals_torch(net: tuple[Net, Path, dict[str, float]], batch: int, length: int) -> None:
-    module, path, _ = net
+def test_file_equals_torch(net: tuple[Net, Path], batch: int, length: int) -> None:
+    module, path = net
     frames = np.random.default_rng(length).random((batch, length, 9, 9), np.float32) ** 4
     scores, unknown = open_model(path).run(frames)
     with torch.no_grad():
@@ -108,8 +99,8 @@ def test_file_equals_torch(net: tuple[Net, Path, dict[str, float]], batch: int, 
     np.testing.assert_allclose(unknown, expected[1].numpy(), atol=1e-4)
 
 
-def test_daemon_reads_back_what_was_said_of_the_model(net: tuple[Net, Path, dict[str, float]]) -> None:
-    module, path, report = net
+def test_daemon_reads_back_what_was_said_of_the_model(net: tuple[Net, Path]) -> None:
+    module, path = net
     model = open_model(path)
     known = model.metadata
     assert (model.name, known.kind, known.version) == ("test_net", "test_net", "1.2.0")
@@ -117,8 +108,6 @@ def test_daemon_reads_back_what_was_said_of_the_model(net: tuple[Net, Path, dict
     assert known.calibration == CARD["calibration"]
     assert known.quantiles == CARD["quantiles"]
     assert known.training_data == CARD["training_data"]
-    assert report["size"] == path.stat().st_size
-    assert 0 <= report["largest_difference"] <= 1e-4
     with torch.no_grad():
         scores, unknown = module(torch.from_numpy(WINDOW.apply(segment())[np.newaxis]))
     found = model.classify(segment())
@@ -126,13 +115,13 @@ def test_daemon_reads_back_what_was_said_of_the_model(net: tuple[Net, Path, dict
     assert found.unknown == pytest.approx(float(unknown[0]), abs=1e-4)
 
 
-def test_file_names_no_place_on_this_machine(net: tuple[Net, Path, dict[str, float]]) -> None:
+def test_file_names_no_place_on_this_machine(net: tuple[Net, Path]) -> None:
     data = net[1].read_bytes()
     for place in (str(Path.home()), str(net[1].parent), str(Path(__file__).parent), sys.prefix):
         assert place.encode() not in data
 
 
-def test_the_same_module_is_the_same_file(net: tuple[Net, Path, dict[str, float]], tmp_path: Path) -> None:
+def test_the_same_module_is_the_same_file(net: tuple[Net, Path], tmp_path: Path) -> None:
     export_net(net[0], tmp_path / "again.onnx", Facts(**CARD))
     assert (tmp_path / "again.onnx").read_bytes() == net[1].read_bytes()
 
@@ -176,9 +165,7 @@ class MixedEmbedding(Embedding):
         return scores, unknown, embedding - embedding.mean(0)
 
 
-def test_a_file_holds_the_embedding_and_older_ones_have_none(
-    net: tuple[Net, Path, dict[str, float]], tmp_path: Path
-) -> None:
+def test_a_file_holds_the_embedding_and_older_ones_have_none(net: tuple[Net, Path], tmp_path: Path) -> None:
     rule = {"in_a_row": 2, "elapsed_s": [0.0, 0.3], "thresholds": [None, 0.9], "gestures": {}, "tap": None}
     more = {"classes": [*GESTURES, "palm"], "provisional": rule}
     export_net(Embedding(), tmp_path / "new.onnx", Facts(**CARD, **more))
@@ -226,8 +213,7 @@ def forest(classes: int, trees: int = 12, depth: int | None = 5, seed: int = 0) 
 @pytest.mark.parametrize(("classes", "trees", "depth"), [(3, 1, 1), (3, 12, 5), (5, 12, 5), (4, 3, None), (6, 40, 9)])
 def test_forest_equals_scikit_learn(classes: int, trees: int, depth: int | None, tmp_path: Path) -> None:
     trained = forest(classes, trees, depth)
-    report = export_forest(trained, tmp_path / "rf.onnx", Facts(**CARD), FEATURES)
-    assert report["largest_difference"] <= 1e-4
+    export_forest(trained, tmp_path / "rf.onnx", Facts(**CARD), FEATURES)
     model = open_model(tmp_path / "rf.onnx")
     values = np.random.default_rng(5).normal(size=(300, len(FEATURES))).astype(np.float32) * 3
     scores, unknown = model.run(values)
@@ -294,7 +280,7 @@ def test_a_model_says_whose_recordings_it_learned_from(learned: list[Origin] | N
 # --- the manifest ---
 
 
-def test_manifest_knows_every_file(net: tuple[Net, Path, dict[str, float]], tmp_path: Path) -> None:
+def test_manifest_knows_every_file(net: tuple[Net, Path], tmp_path: Path) -> None:
     (tmp_path / "cnn_lstm.onnx").write_bytes(net[1].read_bytes())
     export_forest(forest(5), tmp_path / "touch_pattern_rf.onnx", Facts(**CARD), FEATURES)
     write_manifest(tmp_path, {"cnn_lstm": {"accuracy": 0.97}})
@@ -307,9 +293,7 @@ def test_manifest_knows_every_file(net: tuple[Net, Path, dict[str, float]], tmp_
     assert models["cnn_lstm.onnx"]["figures"] == {"accuracy": 0.97}
 
 
-def test_figures_are_of_the_very_file_that_was_measured(
-    net: tuple[Net, Path, dict[str, float]], tmp_path: Path
-) -> None:
+def test_figures_are_of_the_very_file_that_was_measured(net: tuple[Net, Path], tmp_path: Path) -> None:
     path = tmp_path / "cnn_lstm.onnx"
     path.write_bytes(net[1].read_bytes())
     assert measured(path) == {}
@@ -319,7 +303,7 @@ def test_figures_are_of_the_very_file_that_was_measured(
     assert measured(path) == {}
 
 
-def test_manifest_refuses_a_file_that_says_nothing_of_itself(net: Any, tmp_path: Path) -> None:
+def test_manifest_refuses_a_file_that_says_nothing_of_itself(net: tuple[Net, Path], tmp_path: Path) -> None:
     proto = onnx.load(net[1])
     del proto.metadata_props[:]
     onnx.save(proto, tmp_path / "silent.onnx")
@@ -327,7 +311,7 @@ def test_manifest_refuses_a_file_that_says_nothing_of_itself(net: Any, tmp_path:
         write_manifest(tmp_path, {})
 
 
-def test_exported_file_opens_without_the_lab(net: tuple[Net, Path, dict[str, float]]) -> None:
+def test_exported_file_opens_without_the_lab(net: tuple[Net, Path]) -> None:
     script = (
         "import sys\nfor name in ('torch', 'onnx', 'sklearn'): sys.modules[name] = None\n"
         "from gestured.model.opening import open_model\nprint(open_model(sys.argv[1]).gestures[0])"

@@ -2,14 +2,10 @@
 
 import json
 
-import pytest
-
 from gestured.lab import taps
 from gestured.lab.cli import main
-from gestured.model.shipped import shipped
 
 
-@pytest.mark.skipif(not shipped()["cnn_lstm"].exists(), reason=f"{shipped()['cnn_lstm']} is not there")
 def test_a_shorter_wait_answers_sooner_and_reads_more_double_taps_as_two(monkeypatch, capsys):
     monkeypatch.setattr(taps, "WAITS_S", (0.2, 0.5))
     monkeypatch.setattr(taps, "SESSION_S", 40.0)

@@ -9,14 +9,12 @@ from functools import partial
 
 import numpy as np
 
-from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
-from gestured.lab.samples import WINDOW
 from gestured.lab.stability.made import IDLE_LEVEL, NOISE
 from gestured.lab.stability.path import Array
 from gestured.lab.stability.table import Table, Value
-from gestured.lab.stability.ways import NET_CLASSES, WindowList, by_onnxruntime, difference
+from gestured.lab.stability.ways import WindowList, by_onnxruntime, difference, inputs_of
 from gestured.model.shipped import LADDER, shipped
 
 DENORMAL = 1e-41  # of the peak; float32's least normal number is 1.2e-38
@@ -31,10 +29,7 @@ def denormals_table(windows: WindowList) -> Table:
     small = [np.where(window > 0, window, np.float32(DENORMAL)).astype(np.float32) for window in windows]
     for name in LADDER:
         run = by_onnxruntime(shipped()[name].read_bytes())
-        before, after = (
-            some if name in NET_CLASSES else [touch_pattern(window, WINDOW.rate_hz) for window in some]
-            for some in (windows, small)
-        )
+        before, after = inputs_of(name, windows), inputs_of(name, small)
         cost = _in_turns(partial(run, before), partial(run, after), len(windows))
         rows.append((f"{name}, zeros of the windows", "window", *cost, *difference(run(after), run(before))))
     idle = IDLE_LEVEL + NOISE * np.random.default_rng(6).standard_normal((IDLE_FRAMES, 9, 9))

@@ -3,11 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.features import touch_pattern
 from gestured.lab.samples import WINDOW
 from gestured.lab.stability.segments import segment_cases
 from gestured.lab.stability.table import Table, Value
-from gestured.lab.stability.ways import NET_CLASSES, WindowList, by_onnxruntime, by_reference, difference
+from gestured.lab.stability.ways import WindowList, by_onnxruntime, by_reference, difference, inputs_of
 from gestured.model.shipped import LADDER, shipped
 
 LONGEST = 80  # frames; float64, operator by operator, takes minutes for more, and no front end gives more at 15 Hz
@@ -38,7 +37,7 @@ def exactness_table(quick: bool) -> Table:
         data = shipped()[name].read_bytes()
         run, reference = by_onnxruntime(data), by_reference(data)
         for family, windows in families.items():
-            inputs = windows if name in NET_CLASSES else [touch_pattern(w, WINDOW.rate_hz) for w in windows]
+            inputs = inputs_of(name, windows)
             error, others = difference(run(inputs), reference(inputs))
             rows[family].append(error)
             changed[family] += others

@@ -2,13 +2,12 @@
 
 import time
 
-import numpy as np
 import torch
 
-from gestured.core.features import touch_pattern
+from gestured.lab.adapt.weights import base_of
+from gestured.lab.fit import RECURRENT
 from gestured.lab.stability.table import Table, Value
 from gestured.lab.stability.ways import (
-    NET_CLASSES,
     ScoreTable,
     Way,
     WindowList,
@@ -17,9 +16,9 @@ from gestured.lab.stability.ways import (
     by_reference,
     by_torch,
     difference,
-    loaded,
+    in_a_row,
+    inputs_of,
 )
-from gestured.model.model import Model
 from gestured.model.shipped import LADDER, shipped
 
 LONG = (80, 10_000)  # frames; no segment at 15 Hz is longer than the first
@@ -28,27 +27,22 @@ LONG = (80, 10_000)  # frames; no segment at 15 Hz is longer than the first
 def models_table(windows: WindowList, quick: bool) -> Table:
     """Every way against the reference: on windows of simulated gestures, and on one of `LONG` frames."""
     rows: list[tuple[Value, ...]] = []
-    row = np.concatenate(list(windows) * (max(LONG) // sum(map(len, windows)) + 1))
+    row = in_a_row(windows, max(LONG))
     long = {f"one of {count} frames": [row[:count]] for count in LONG[: 1 if quick else None]}
     for name in LADDER:
         data = shipped()[name].read_bytes()
         ways: dict[str, Way] = {"onnxruntime, as the daemon": by_onnxruntime(data)}
-        own = windows
-        if name in NET_CLASSES:
-            module = loaded(name, data)
-            ways["onnxruntime, batch of all"] = by_onnxruntime(data, batch=True)
-            ways["onnxruntime, two threads"] = by_onnxruntime(data, threads=2)
+        own = inputs_of(name, windows)
+        ways["onnxruntime, batch of all"] = by_onnxruntime(data, batch=True)
+        ways["onnxruntime, two threads"] = by_onnxruntime(data, threads=2)
+        if name in RECURRENT:
+            module = base_of(name).judged
             ways["torch float32"] = by_torch(module)
             ways["torch float32, batch of all"] = by_torch(module, batch=True)
             ways["torch float32, two threads"] = by_torch(module, threads=2)
             ways["torch, frame by frame"] = by_frames(module)
             ways["torch float64"] = by_torch(module, torch.float64)
-        else:
-            metadata = Model(data, name).metadata
-            own = [touch_pattern(window, metadata.rate_hz) for window in windows]
-            ways["onnxruntime, batch of all"] = by_onnxruntime(data, batch=True)
-            ways["onnxruntime, two threads"] = by_onnxruntime(data, threads=2)
-        inputs: dict[str, WindowList] = {f"{len(own)} gestures": own, **(long if name in NET_CLASSES else {})}
+        inputs: dict[str, WindowList] = {f"{len(own)} gestures": own, **(long if name in RECURRENT else {})}
         for title, some in inputs.items():
             reference = by_reference(data) if some is own else ways["torch float64"]
             right, reference_s = _timed(reference, some, 1)

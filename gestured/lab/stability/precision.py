@@ -8,16 +8,10 @@ from typing import Any
 import numpy as np
 import torch
 
+from gestured.lab.adapt.weights import base_of
+from gestured.lab.fit import RECURRENT
 from gestured.lab.stability.table import Table, Value
-from gestured.lab.stability.ways import (
-    NET_CLASSES,
-    ScoreTable,
-    Way,
-    WindowList,
-    by_onnxruntime,
-    difference,
-    loaded,
-)
+from gestured.lab.stability.ways import WindowList, by_onnxruntime, difference, each, in_a_row, unchecked
 from gestured.lab.study.onnx_form import Graph, quantised
 from gestured.model.shipped import shipped
 
@@ -28,7 +22,7 @@ STATE_FRAMES = (100, 1_000, 10_000)
 def precision_table(windows: WindowList) -> Table:
     """Every comparison, net by net."""
     rows: list[tuple[Value, ...]] = []
-    for name in NET_CLASSES:
+    for name in RECURRENT:
         data = shipped()[name].read_bytes()
         run = by_onnxruntime(data)
         plain = run(windows)
@@ -40,7 +34,7 @@ def precision_table(windows: WindowList) -> Table:
         smaller = quantised(Graph(data))
         if smaller is not None:
             what = f"int8 weights, {len(smaller.data) / len(data):.2f} of the bytes"
-            rows.append((name, what, len(windows), *difference(_unchecked(smaller.data)(windows), plain)))
+            rows.append((name, what, len(windows), *difference(each(unchecked(smaller.data))(windows), plain)))
     return Table(
         "Fewer digits: largest change of any score against float32",
         ("model", "what", "windows", "change", "labels changed"),
@@ -56,9 +50,9 @@ def precision_table(windows: WindowList) -> Table:
 def state_table(windows: WindowList) -> Table:
     """The recurrent state over a very long contact: the norm of what the net remembers, and of what it says."""
     rows: list[tuple[Value, ...]] = []
-    row = np.concatenate(list(windows) * (max(STATE_FRAMES) // sum(map(len, windows)) + 1))[: max(STATE_FRAMES)]
-    for name in NET_CLASSES:
-        net: Any = loaded(name, shipped()[name].read_bytes()).net
+    row = in_a_row(windows, max(STATE_FRAMES))
+    for name in RECURRENT:
+        net: Any = base_of(name).judged.net
         state, most = None, 0.0
         with torch.no_grad():
             for k in range(len(row)):
@@ -76,16 +70,3 @@ def state_table(windows: WindowList) -> Table:
             "and 1; the cell's are bounded by nothing.",
         ),
     )
-
-
-def _unchecked(data: bytes) -> Way:
-    """A graph whose outputs need not be those of its self-test."""
-    import onnxruntime
-
-    session = onnxruntime.InferenceSession(data, providers=["CPUExecutionProvider"])
-
-    def run(windows: WindowList) -> ScoreTable:
-        found = [session.run(("scores", "unknown"), {"frames": window[None]}) for window in windows]
-        return np.stack([np.append(scores[0], unknown[0]) for scores, unknown in found]).astype(np.float64)
-
-    return run

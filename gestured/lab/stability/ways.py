@@ -1,7 +1,7 @@
 """Every way to run a shipped model, and the reference: the same graph in float64.
 
 The reference evaluates the .onnx file itself with `onnx.reference` (numpy, operator by operator), all its weights,
-constants and casts widened to float64. The torch modules get their weights from the file's initialisers.
+constants and casts widened to float64. The torch modules are those that `adapt` starts from.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,17 +15,16 @@ from onnx import TensorProto, numpy_helper
 from onnx.reference import ReferenceEvaluator
 from onnx.reference.op_run import OpRun
 
-from gestured.lab.nets import CnnLstm, Decision, Judged, Lstm, read_at
-from gestured.lab.trajectory import TrajectoryNet
+from gestured.core.features import touch_pattern
+from gestured.lab.fit import RECURRENT
+from gestured.lab.nets import Judged, read_at
+from gestured.lab.samples import WINDOW
 from gestured.model.model import Model
 
 WindowList = Sequence[NDArray[np.float32]]  # (T, R, C) each
 ScoreTable = NDArray[np.float64]  # (B, G + 1): the gestures' scores, then unknown
 ModelRun = Callable[[NDArray[np.float32]], ScoreTable]  # (B, T, R, C) or (B, F)
 Way = Callable[[WindowList], ScoreTable]
-
-NET_CLASSES = {"cnn_lstm": CnnLstm, "lstm": Lstm}
-ONNX_GATES = (0, 2, 3, 1)  # torch's order i f g o, by ONNX's i o f c
 
 
 class GatherElements(OpRun):  # type: ignore[misc, unused-ignore]
@@ -58,66 +57,39 @@ def widened(data: bytes) -> onnx.ModelProto:
     return proto
 
 
-def loaded(name: str, data: bytes) -> Judged:
-    """The torch module with the file's weights; those of the LSTM are stored under names of the tracer's."""
-    proto = onnx.load_from_string(data)
-    found = {tensor.name: numpy_helper.to_array(tensor) for tensor in proto.graph.initializer}
-    (lstm,) = [node for node in proto.graph.node if node.op_type == "LSTM"]
-    inputs, hidden, bias = (found[key][0] for key in lstm.input[1:4])
-
-    def gates(values: NDArray[Any]) -> NDArray[Any]:
-        return np.concatenate([np.split(values, 4)[gate] for gate in ONNX_GATES])
-
-    state = {
-        "net.lstm.weight_ih_l0": gates(inputs),
-        "net.lstm.weight_hh_l0": gates(hidden),
-        "net.lstm.bias_ih_l0": gates(np.split(bias, 2)[0]),
-        "net.lstm.bias_hh_l0": gates(np.split(bias, 2)[1]),
-        "decision.share": np.array(_shares(proto, found), np.float32),
-    }
-    classes = len(found["net.head.bias"])
-    gestures = proto.graph.output[0].type.tensor_type.shape.dim[1].dim_value
-    rows, columns = (dim.dim_value for dim in proto.graph.input[0].type.tensor_type.shape.dim[2:])
-    module = Judged(
-        NET_CLASSES[name](rows, columns, classes), TrajectoryNet(rows, columns, classes), Decision(gestures)
-    )
-    state |= {key: found[key] for key in module.state_dict() if key in found}
-    module.load_state_dict({key: torch.from_numpy(np.array(value)) for key, value in state.items()})
-    return module.eval()
+def inputs_of(name: str, windows: WindowList) -> WindowList:
+    """What a shipped model takes of windows: themselves, or their features."""
+    return windows if name in RECURRENT else [touch_pattern(window, WINDOW.rate_hz) for window in windows]
 
 
-def _shares(proto: onnx.ModelProto, found: dict[str, NDArray[Any]]) -> list[float]:
-    """The two opinions' weights: nameless scalars, in the order in which the graph multiplies by them."""
-    scalars = [key for node in proto.graph.node if node.op_type == "Mul" for key in node.input if key in found]
-    return [float(found[key]) for key in scalars if found[key].ndim == 0 and key != "decision.bias"]
+def in_a_row(windows: WindowList, frames: int) -> NDArray[np.float32]:
+    """(frames, R, C): the windows one after the other, again and again."""
+    return np.concatenate(list(windows) * (frames // sum(map(len, windows)) + 1))[:frames]
 
 
 def by_reference(data: bytes) -> Way:
     """One after the other, in float64."""
     runner = ReferenceEvaluator(widened(data), new_ops=[GatherElements])
     (name,) = runner.input_names
-    return _each(lambda batch: _joined(*runner.run(["scores", "unknown"], {name: batch.astype(np.float64)})))
+    return each(lambda batch: _joined(*runner.run(["scores", "unknown"], {name: batch.astype(np.float64)})))
 
 
 def by_onnxruntime(data: bytes, threads: int = 1, batch: bool = False) -> Way:
     """As the daemon does; or on more threads, or all at once."""
     model = Model(data, "stability")  # also sees to it that onnxruntime is imported without its telemetry
-    if threads == 1:
+    run = _scores(model.run) if threads == 1 else unchecked(data, threads)
+    return _whole(run) if batch else each(run)
 
-        def run(values: NDArray[np.float32]) -> ScoreTable:
-            return _joined(*model.run(values))
-    else:
-        import onnxruntime
 
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = threads
-        session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
-        (name,) = (value.name for value in session.get_inputs())
+def unchecked(data: bytes, threads: int = 1) -> ModelRun:
+    """A graph whose outputs need not be those of its self-test."""
+    import onnxruntime
 
-        def run(values: NDArray[np.float32]) -> ScoreTable:
-            return _joined(*session.run(("scores", "unknown"), {name: values}))
-
-    return _whole(run) if batch else _each(run)
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+    (name,) = (value.name for value in session.get_inputs())
+    return _scores(lambda values: session.run(("scores", "unknown"), {name: values}))
 
 
 def by_torch(module: Judged, dtype: torch.dtype = torch.float32, threads: int = 1, batch: bool = False) -> Way:
@@ -129,7 +101,7 @@ def by_torch(module: Judged, dtype: torch.dtype = torch.float32, threads: int = 
         return _joined(scores.numpy(), unknown.numpy())
 
     limited = _on_threads(threads, run)
-    return _whole(limited) if batch else _each(limited)
+    return _whole(limited) if batch else each(limited)
 
 
 def by_frames(module: Judged) -> Way:
@@ -147,7 +119,7 @@ def by_frames(module: Judged) -> Way:
         return _joined(scores.numpy(), unknown.numpy())
 
     module.to(torch.float32)
-    return _each(_on_threads(1, run))
+    return each(_on_threads(1, run))
 
 
 def _on_threads(threads: int, run: ModelRun) -> ModelRun:
@@ -162,12 +134,18 @@ def _on_threads(threads: int, run: ModelRun) -> ModelRun:
     return limited
 
 
-def _each(run: ModelRun) -> Way:
+def each(run: ModelRun) -> Way:
+    """Window by window."""
     return lambda windows: np.concatenate([run(window[None]) for window in windows])
 
 
 def _whole(run: ModelRun) -> Way:
     return lambda windows: run(_stacked(windows))
+
+
+def _scores(run: Callable[[NDArray[np.float32]], Any]) -> ModelRun:
+    """A run that gives scores and unknown, as one table."""
+    return lambda values: _joined(*run(values))
 
 
 def _joined(scores: NDArray[Any], unknown: NDArray[Any]) -> ScoreTable:

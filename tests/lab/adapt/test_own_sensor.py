@@ -12,9 +12,7 @@ from gestured.control.cli import main as gesturectl
 from gestured.lab.adapt import command
 from gestured.lab.cli import main as lab
 from gestured.lab.own import command as own
-from gestured.model.file import inspect
 from gestured.model.opening import open_model
-from gestured.model.shipped import shipped
 from gestured.record.arrays import write
 from gestured.simulator import GESTURES
 from tests.documents.blocks import blocks
@@ -27,8 +25,6 @@ from tests.lab.test_own import drawn
 def test_the_document_leads_to_a_model(
     tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    if "classes" not in inspect(shipped()["cnn_lstm"].read_bytes()):
-        pytest.skip("the shipped models were trained by a version before this one, which reads a network elsewhere")
     monkeypatch.setattr(command, "simulate", lambda *_, **__: request.getfixturevalue("small_world"))
     monkeypatch.setattr(own, "played", lambda *_, **__: drawn())
     monkeypatch.chdir(tmp_path)

@@ -21,7 +21,7 @@ WINDOWS = [gestures()["swipe_up"], gestures()["circle_clockwise"]]
 
 
 def test_the_fewer_steps_a_window_has_the_more_changes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(precision, "NET_CLASSES", {"lstm": None})
+    monkeypatch.setattr(precision, "RECURRENT", ("lstm",))
     rows: dict[str, Any] = {str(row[1]): row for row in precision.precision_table(WINDOWS).rows}
     assert rows["float16 windows, as in training"][3] < rows["windows of 10 steps"][3] < rows["windows of 2 steps"][3]
     assert sum(what.startswith("int8 weights") for what in rows) == 1
@@ -37,7 +37,7 @@ def test_a_model_of_int8_fails_its_self_test() -> None:
 def test_the_states_norm_is_told_at_each_length(monkeypatch: pytest.MonkeyPatch) -> None:
     torch.manual_seed(0)
     net = CnnLstm(9, 9, 12).eval()
-    monkeypatch.setattr(precision, "loaded", lambda name, data: SimpleNamespace(net=net))
+    monkeypatch.setattr(precision, "base_of", lambda name: SimpleNamespace(judged=SimpleNamespace(net=net)))
     monkeypatch.setattr(precision, "STATE_FRAMES", (3, 40))
     rows: list[Any] = precision.state_table(WINDOWS).rows
     assert [row[1] for row in rows] == [3, 40, 3, 40]

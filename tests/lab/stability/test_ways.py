@@ -10,17 +10,11 @@ pytest.importorskip("sklearn", reason="needs the extra [lab]")
 import onnx
 from onnx import TensorProto
 
+from gestured.lab.adapt.weights import base_of
 from gestured.lab.dataset import cuts
+from gestured.lab.fit import RECURRENT
 from gestured.lab.stability.path import simulated_series
-from gestured.lab.stability.ways import (
-    NET_CLASSES,
-    by_frames,
-    by_onnxruntime,
-    by_reference,
-    by_torch,
-    loaded,
-    widened,
-)
+from gestured.lab.stability.ways import by_frames, by_onnxruntime, by_reference, by_torch, widened
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped
 
@@ -29,16 +23,14 @@ TOLERANCE = 2e-6
 
 @pytest.fixture(scope="module")
 def windows() -> list[np.ndarray]:
-    if not all(path.exists() for path in shipped().values()):
-        pytest.skip("the shipped models are not there")
     window = open_model(LADDER[0]).metadata.window
     return [window.apply(segment) for _, stream in simulated_series(6) for segment in cuts(stream.frames, stream.times)]
 
 
-@pytest.mark.parametrize("name", NET_CLASSES)
+@pytest.mark.parametrize("name", RECURRENT)
 def test_every_way_to_run_a_net_gives_the_same(name: str, windows: list[np.ndarray]) -> None:
     data = shipped()[name].read_bytes()
-    module = loaded(name, data)
+    module = base_of(name).judged
     right = by_reference(data)(windows)
     assert np.abs(right[:, :-1].sum(axis=1) - 1.0).max() < 1e-9  # it is computed in float64
     ways = {
@@ -64,10 +56,7 @@ def test_the_forest_walks_as_in_float64(windows: list[np.ndarray]) -> None:
 
 
 def test_a_widened_graph_holds_no_float32() -> None:
-    path = shipped()["lstm"]
-    if not path.exists():
-        pytest.skip(f"{path} is not there")
-    graph = widened(path.read_bytes()).graph
+    graph = widened(shipped()["lstm"].read_bytes()).graph
     tensors = [
         *graph.initializer,
         *(a.t for n in graph.node for a in n.attribute if a.type == onnx.AttributeProto.TENSOR),
