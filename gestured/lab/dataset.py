@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.lab.samples import WINDOW, Sample, Samples, collect, sample
 from gestured.record.files import PUBLIC, atomic_write
+from gestured.record.recordings import Recordings
 from gestured.simulator import (
     NON_GESTURES,
     NONE,
@@ -37,8 +38,7 @@ from gestured.simulator import (
     wide,
 )  # fmt: skip
 
-if TYPE_CHECKING:
-    from gestured.record.recordings import Recordings
+T = TypeVar("T")
 
 IDLE = 20  # frames that are put on each side of a cut recording
 OVERLAP = 0.5  # of a performed gesture must lie in a segment for it to carry its label
@@ -118,28 +118,32 @@ def _cohort(seed: int, index: int) -> list[Sample]:
 STREAMS = {"wide": _wide, "cohort": _cohort, "others": _others}
 
 
+def in_processes(make: Callable[[int], T], todo: Sequence[int], jobs: int, title: str) -> Iterator[T]:
+    """What is made of each number, in order, by so many processes; an interruption ends all of them."""
+    with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+        yield from progress(pool.imap(make, todo, chunksize=50), len(todo), title)
+
+
 def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
     """The first `count` takes of one of `STREAMS`, from `cache` where they were made before."""
     path = cache / f"{stream}-{seed}-{count}-{code_digest(__name__)[:12]}.npz"
     if path.exists():
         with np.load(path, allow_pickle=False) as stored:
             return Samples(*(stored[name] for name in Samples.__slots__))
-    make: Callable[[int], list[Sample]] = partial(STREAMS[stream], seed)
-    with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
-        made = pool.imap(make, range(count), chunksize=50)
-        samples = collect(s for found in progress(made, count, f"simulating {stream}") for s in found)
+    made = in_processes(partial(STREAMS[stream], seed), range(count), jobs, f"simulating {stream}")
+    samples = collect(s for found in made for s in found)
     cache.mkdir(parents=True, exist_ok=True)
     with atomic_write(path, PUBLIC, durable=False) as file:
         np.savez(file, **{name: getattr(samples, name) for name in Samples.__slots__})
     return samples
 
 
-def recorded(recordings: "Recordings") -> Samples:
+def recorded(recordings: Recordings) -> Samples:
     """Cut gestures or whole sessions as samples; what the truth does not name is left out."""
     return collect(s for i in range(len(recordings)) for s in _recorded(recordings, i))
 
 
-def _recorded(recordings: "Recordings", i: int) -> Iterator[Sample]:
+def _recorded(recordings: Recordings, i: int) -> Iterator[Sample]:
     frames, times = recordings.frames_of(i), recordings.times_of(i)
     person = int(recordings.subjects[i])
     # Marks are frames, and a frame stands for the time around it: a tap of one frame has a duration, too.
@@ -164,7 +168,7 @@ def _recorded(recordings: "Recordings", i: int) -> Iterator[Sample]:
     yield from matched(cuts(frames, times), [Truth(label, kind, person, onset, offset)])
 
 
-def _needed(recordings: "Recordings", field: str) -> NDArray[Any]:
+def _needed(recordings: Recordings, field: str) -> NDArray[Any]:
     found: NDArray[Any] | None = getattr(recordings, field)
     if found is None:
         raise RecordingError(f"{field}: missing; without it nobody knows what was performed when")

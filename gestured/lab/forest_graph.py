@@ -121,6 +121,12 @@ def around_thresholds(forest: RandomForestClassifier, count: int) -> NDArray[np.
     return np.where(aside == 0, out, np.nextafter(out, np.where(aside > 0, np.inf, -np.inf).astype(np.float32)))
 
 
+def rounded_down(exact: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Thresholds as float32, so that a float32 value goes the way it goes against the float64 itself."""
+    rounded = exact.astype(np.float32)
+    return np.where(rounded > exact, np.nextafter(rounded, np.float32(-np.inf)), rounded)
+
+
 def _calibration(calibration: Mapping[str, Any]) -> tuple[float, float, float]:
     values = (
         float(calibration.get("temperature", 1.0)),
@@ -133,11 +139,7 @@ def _calibration(calibration: Mapping[str, Any]) -> tuple[float, float, float]:
 
 
 def _flatten(forest: RandomForestClassifier) -> dict[str, NDArray[Any]]:
-    """All trees in one set of tables. A right child stands behind its left one; a leaf leads to itself.
-
-    Thresholds are rounded down to float32, so that a float32 value goes the way it goes in scikit-learn,
-    which compares with the float64.
-    """
+    """All trees in one set of tables. A right child stands behind its left one; a leaf leads to itself."""
     features, thresholds, lefts, leaves, values, roots = [], [], [], [], [], []
     base = rows = 0
     for estimator in forest.estimators_:
@@ -151,11 +153,8 @@ def _flatten(forest: RandomForestClassifier) -> dict[str, NDArray[Any]]:
                 left[new] = len(order)
                 order += [tree.children_left[old], tree.children_right[old]]
         leaf = tree.children_left[order] < 0
-        exact = tree.threshold[order]
-        rounded = exact.astype(np.float32)
-        rounded = np.where(rounded > exact, np.nextafter(rounded, np.float32(-np.inf)), rounded)
         features.append(np.where(leaf, 0, tree.feature[order]))
-        thresholds.append(np.where(leaf, np.float32(np.inf), rounded))
+        thresholds.append(np.where(leaf, np.float32(np.inf), rounded_down(tree.threshold[order])))
         lefts.append(left + base)
         leaves.append(np.where(leaf, np.cumsum(leaf) - 1 + rows, 0))
         shares = tree.value[order, 0][leaf]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingClassifier
 from torch import Tensor, nn
 
+from gestured.lab.forest_graph import rounded_down
 from gestured.lab.trajectory import trajectory_features
 
 
@@ -53,13 +54,11 @@ class Boosted(nn.Module):
 
 
 def _tables(trees: list[NDArray[Any]], bases: NDArray[np.int64]) -> dict[str, NDArray[Any]]:
-    """Nodes of all trees; a leaf leads to itself. Thresholds are rounded down, so that float32 goes as float64 does."""
+    """Nodes of all trees; a leaf leads to itself."""
     parts: dict[str, list[NDArray[Any]]] = {name: [] for name in ("feature", "threshold", "left", "right", "value")}
     for nodes, base in zip(trees, bases, strict=True):
         own, leaf = np.arange(len(nodes)) + base, nodes["is_leaf"].astype(bool)
-        exact = np.where(leaf, np.inf, nodes["num_threshold"])
-        rounded = exact.astype(np.float32)
-        parts["threshold"].append(np.where(rounded > exact, np.nextafter(rounded, np.float32(-np.inf)), rounded))
+        parts["threshold"].append(rounded_down(np.where(leaf, np.inf, nodes["num_threshold"])))
         parts["feature"].append(np.where(leaf, 0, nodes["feature_idx"]).astype(np.int64))
         parts["left"].append(np.where(leaf, own, nodes["left"].astype(np.int64) + base))
         parts["right"].append(np.where(leaf, own, nodes["right"].astype(np.int64) + base))

@@ -9,7 +9,7 @@ DRAWS = 1000
 CONFIDENCE_LEVEL = 0.95
 
 
-def interval(right: ArrayLike, people: ArrayLike, seed: int = 0) -> tuple[float, float, float]:
+def interval(right: ArrayLike, people: ArrayLike) -> tuple[float, float, float]:
     """(N,) answers right or not, (N,) who gave the gesture -> share right, and its interval's ends.
 
     The percentile bootstrap (Efron 1979) over participants. Three times NaN for no gesture at all.
@@ -19,7 +19,7 @@ def interval(right: ArrayLike, people: ArrayLike, seed: int = 0) -> tuple[float,
         return float("nan"), float("nan"), float("nan")
     _, person = np.unique(owners, return_inverse=True)
     good, all_of = np.bincount(person, hits), np.bincount(person)
-    rng = np.random.default_rng([seed, 0xB0])
+    rng = np.random.default_rng([0, 0xB0])
     drawn = rng.integers(0, len(all_of), (DRAWS, len(all_of)))
     shares: NDArray[np.float64] = good[drawn].sum(axis=1) / all_of[drawn].sum(axis=1)
     low, high = np.quantile(shares, [(1 - CONFIDENCE_LEVEL) / 2, (1 + CONFIDENCE_LEVEL) / 2])

@@ -5,8 +5,6 @@ counted; where several segments hold parts of it, the one that holds most of it 
 """
 
 import hashlib
-import multiprocessing
-import signal
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -16,9 +14,8 @@ from numpy.typing import NDArray
 
 from gestured.core.frames import Segment
 from gestured.core.window import Window
-from gestured.lab.dataset import TRIALS, cuts, matched, truths
+from gestured.lab.dataset import TRIALS, cuts, in_processes, matched, truths
 from gestured.lab.digest import code_digest
-from gestured.lab.progress import progress
 from gestured.lab.samples import WINDOW, Samples, collect, sample
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import Trial, cohort_take
@@ -85,10 +82,7 @@ def load_cohort(cache: Path, trials: NDArray[np.int64], jobs: int, seed: int = S
     key = hashlib.sha256(code_digest(__name__).encode() + trials.tobytes()).hexdigest()
     path = cache / f"study-cohort-{seed}-{len(trials)}-{key[:12]}.npz"
     if not path.exists():
-        with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
-            made = pool.imap(partial(_cut, seed), trials.tolist(), chunksize=30)
-            segments = list(progress(made, len(trials), "simulating the cohort"))
-        _write(path, trials, segments)
+        _write(path, trials, list(in_processes(partial(_cut, seed), trials.tolist(), jobs, "simulating the cohort")))
     with np.load(path, allow_pickle=False) as stored:
         return Cohort(**{name: stored[name] for name in stored.files}, performed=len(trials))
 

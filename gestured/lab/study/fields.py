@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from gestured.core.features import touch_pattern
+from gestured.lab.decide import confidence
 from gestured.lab.digest import file_digest
+from gestured.lab.evaluate import model_answers
 from gestured.lab.manifest import measured
 from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.study.material import SHIFT, UNCHANGED, classes
@@ -60,14 +61,10 @@ def _published(name: str, judges: Samples, performed: int) -> dict[str, Any]:
     model = open_model(shipped()[name])
     if model.metadata.window != WINDOW:
         return {}
-    named, said = [], []
-    for i in range(len(judges)):
-        window = judges.window(i)
-        seen = window if model.metadata.features is None else touch_pattern(window, WINDOW.rate_hz)
-        scores, unknown = model.run(seen[None])
-        named.append(GESTURES.index(model.gestures[int(scores[0].argmax())]))
-        said.append(float(scores[0].max()) * (1 - float(unknown[0])) >= model.threshold)
-    return told(np.array(named), np.array(said), classes(judges), judges.people, performed - len(judges))
+    answers = model_answers(model, judges)
+    named = np.array([GESTURES.index(name) for name in model.gestures])[answers[0].argmax(axis=1)]
+    said = confidence(answers) >= model.threshold
+    return told(named, said, classes(judges), judges.people, performed - len(judges))
 
 
 def _manifest(name: str) -> dict[str, Any] | None:

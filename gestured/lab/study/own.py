@@ -15,11 +15,11 @@ from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.dataset import recorded
 from gestured.lab.recordings.safe import read_what_is_good
 from gestured.lab.samples import Samples, join
+from gestured.lab.train import REAL_FILES
 from gestured.record.arrays import read
 from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES, NONE
 
-REAL_FILE = "capfingerid_gestures_dev.npz"
 REAL_NAME = "CapFingerId, development subjects: a capacitive touchscreen, no textile"
 FEWEST = 2  # participants without whom nothing can be held out
 
@@ -29,7 +29,7 @@ def real(folder: Path, of_each: int | None) -> tuple[Samples, dict[str, Any]] | 
 
     Only the file of cut gestures: the whole sessions hold the same touches again.
     """
-    path = folder / REAL_FILE
+    path = folder / REAL_FILES[0]
     if not path.exists():
         return None
     found = read(path)

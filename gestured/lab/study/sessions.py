@@ -24,14 +24,13 @@ from gestured.lab.study.bootstrap import interval
 from gestured.lab.study.material import SHIFT, Data, pool
 from gestured.lab.study.methods import METHODS, Estimator
 from gestured.lab.study.plan import Plan
+from gestured.lab.study.runners import SHIPPED
 from gestured.lab.study.training import Net
 from gestured.lab.study.views import Values
 from gestured.simulator import GESTURES, Take
 
 FIRST_PERSON = 900  # the cohort's are 0 to 33
 SPEED = 100.0  # times real time
-PLAYED = ("tp_rf", "lstm", "cnn_lstm")
-SHIPPED = {"tp_rf": "touch_pattern_rf", "lstm": "lstm", "cnn_lstm": "cnn_lstm"}
 CALIBRATION = {"threshold": 0.0}  # nothing is rejected
 
 
@@ -100,7 +99,7 @@ def online(
     sessions = [take for _, take in takes(plan.minutes, 0.0, FIRST_PERSON)]
     folder.mkdir(parents=True, exist_ok=True)
     ours, shipped = [], []
-    for name in PLAYED:
+    for name in ("tp_rf", "lstm", "cnn_lstm"):
         path = folder / f"{name}.onnx"
         export(name, tuned[name], data, plan.seed, path)
         published = METHODS[name].published_online

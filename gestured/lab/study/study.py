@@ -107,11 +107,12 @@ def compute(
     tasks = {cell: tables.tasks_of(cell, tuned, plan) for cell in cells}
     results = schedule.results([task for some in tasks.values() for task in some], sets, "cells")
     found = {cell: tables.pooled([results[task] for task in some]) for cell, some in tasks.items()}
+    figures = {cell: tables.row(cell, result) for cell, result in found.items()}
+    models = {name: file_digest(path) for name, path in shipped().items()}
     study: dict[str, Any] = {
         "about": {
             "version": gestured.__version__, "command": "", "seed": plan.seed, "seeds": plan.seeds, "quick": plan.quick,
-            "paper": PAPER_CITED,
-            "gestures": list(GESTURES),
+            "paper": PAPER_CITED, "gestures": list(GESTURES), "models": models,
         },
         "machine": machine(),
         "data": {
@@ -124,7 +125,7 @@ def compute(
             "own": mine.files, "left_out": mine.left_out,
         },
         "methods": {method.id: _about(method.id, tuned) for method in METHODS.values()},
-        "cells": [tables.row(cell, result) for cell, result in found.items()],
+        "cells": list(figures.values()),
         "copies": tables.copies(found),
         "tuning": tuning,
         "elapsed": tables.elapsed_rows(found, elapsed.POINTS),
@@ -137,18 +138,15 @@ def compute(
     }  # fmt: skip
     # What is timed comes last and alone: nothing else of ours runs beside it.
     simulated_data = sets["simulated"]
-    models = [file_digest(path) for path in shipped().values()]
     judges = cohort.load_cohort(schedule.cache, plan.trials_of(plan.new_people), schedule.jobs, cohort.NEW_SEED)
-    key = [simulated_data.key, asdict(plan), tuned, judges.samples.digest(), models]
+    key = [simulated_data.key, asdict(plan), tuned, judges.samples.digest(), list(models.values())]
     study["run_time"] = schedule.once(
         "run-time", measure.__module__, key, lambda: measure(plan, tuned, judges, simulated_data)
     )
-    figures = {cell: tables.row(cell, result) for cell, result in found.items()}
     judged = (foreign[0], int(foreign[1]["performed"])) if foreign else None
     study["run_time"] = with_fields(study["run_time"], figures, judged)
     study["said"] = said(open_model(shipped()["cnn_lstm"]), plan.minutes) if plan.minutes else []
     study["online"], study["online_shipped"] = played(plan, tuned, simulated_data, schedule)
-    study["about"]["models"] = {name: file_digest(path) for name, path in shipped().items()}
     study["machine"]["minutes"] = round((time.monotonic() - start) / 60, 1)
     return study
 

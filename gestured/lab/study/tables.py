@@ -39,13 +39,13 @@ def wanted(plan: Plan, sets: Mapping[str, Data]) -> list[Cell]:
             for data in sets.values():
                 for protocol in ASKED.get(data.name, (PAPER, PADDED, CLEAN, PARTICIPANTS)):
                     for augmentation in AUGMENTATIONS:
-                        if _skipped(plan, method, settings, protocol, augmentation, data):
+                        if _skipped(plan, settings, protocol, augmentation, data):
                             continue
                         cells.append(Cell(method.id, settings, augmentation, protocol, data.name))
     return cells
 
 
-def _skipped(plan: Plan, method: Method, settings: str, protocol: str, augmentation: str, data: Data) -> bool:
+def _skipped(plan: Plan, settings: str, protocol: str, augmentation: str, data: Data) -> bool:
     if augmentation == WIDE:  # it leads to other people and other sensors: asked there alone
         return data.wide is None or protocol not in (PARTICIPANTS, REAL, FOREIGN) or settings != TUNED
     if protocol == REAL and (augmentation == SHIFT or settings == GIVEN):
@@ -58,7 +58,12 @@ def _skipped(plan: Plan, method: Method, settings: str, protocol: str, augmentat
 
 def tasks_of(cell: Cell, tuned: Mapping[str, Values], plan: Plan) -> list[Task]:
     """What has to be computed for a cell: the same with each seed."""
-    first = task_of(cell, tuned, plan)
+    method, values = METHODS[cell.method], tuned[cell.method]
+    if cell.settings == GIVEN:
+        assert method.paper is not None
+        values = method.paper[cell.augmentation]
+    early = (cell.settings, cell.augmentation, cell.protocol) == (TUNED, SHIFT, PARTICIPANTS) and method.elapses
+    first = task(method, values, cell.augmentation, cell.protocol, cell.data, plan, elapsed=early)
     return [replace(first, seed=plan.seed + k) for k in range(plan.seeds)]
 
 
@@ -71,17 +76,6 @@ def pooled(results: Sequence[Result]) -> Result:
         "seconds": round(sum(result["seconds"] for result in results) / len(results), 3),
         "shares": [round(float(right(result).mean()), 4) for result in results],
     }
-
-
-def task_of(cell: Cell, tuned: Mapping[str, Values], plan: Plan) -> Task:
-    """A cell's first task."""
-    method = METHODS[cell.method]
-    values = dict(tuned[cell.method])
-    if cell.settings == GIVEN:
-        assert method.paper is not None
-        values = dict(method.paper[cell.augmentation])
-    early = (cell.settings, cell.augmentation, cell.protocol) == (TUNED, SHIFT, PARTICIPANTS)
-    return task(method, values, cell.augmentation, cell.protocol, cell.data, plan, elapsed=early and method.elapses)
 
 
 def task(

@@ -20,14 +20,9 @@ def run_time(study: Study) -> Markup:
     drawing = Drawing(960, 540)
     axes = drawing.figure.subplots()
     errors = [_error(row) for row in rows]
-    axes.loglog()
+    error_against_run_time(axes)
     axes.set_xlim(min(row["median_us"] for row in rows) / 1.5, 1.8 * max(map(_p95, rows)))
     axes.set_ylim(min(errors) / 1.5, min(1.0, 1.3 * max(errors)))
-    axes.minorticks_off()
-    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda error, _: f"{100 * error:g}"))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda time, _: formats.duration(time)))
-    axes.grid(axis="x")
     label = "run time of one gesture on one core: median, and a line to the 95th percentile"
     axes.set(title="error, per cent", xlabel=label)
     names = []
@@ -50,6 +45,21 @@ def run_time(study: Study) -> Markup:
                 axes.plot(*ends, color=INK, linewidth=1.4, linestyle=(0, (1, 3)))
     place(drawing, axes, names)
     return drawing.svg("Error against run time, simulated data", "; ".join(told(study, row) for row in rows))
+
+
+def error_against_run_time(axes: Axes) -> None:
+    """Make both axes logarithmic, of errors in per cent and of microseconds."""
+    axes.loglog()
+    axes.minorticks_off()
+    axes.grid(axis="x")
+    in_per_cent(axes)
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda time, _: formats.duration(time)))
+
+
+def in_per_cent(axes: Axes) -> None:
+    """Write shares on a logarithmic axis as per cent."""
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g}" if share <= 1 else ""))
 
 
 def place(drawing: Drawing, axes: Axes, names: list[Name]) -> None:

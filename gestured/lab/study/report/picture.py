@@ -7,10 +7,9 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator
 
 from . import formats, reading
-from .charts_run_time import Name, place
+from .charts_run_time import Name, error_against_run_time, in_per_cent, place
 from .drawing import INK, SOFT, Drawing, Mark, families, mark_of, styled
 from .reading import Row, Study
 
@@ -81,11 +80,7 @@ def operating_points(study: Study) -> str:
 def _run_time(study: Study, drawing: Drawing, axes: Axes, rows: list[Row], field: str) -> list[Name]:
     """Draw one field; returns the names of its points, for `place`."""
     names: list[Name] = []
-    axes.loglog()
-    axes.minorticks_off()
-    axes.grid(axis="x")
-    _percent(axes)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda time, _: formats.duration(time)))
+    error_against_run_time(axes)
     for row in rows:
         of, ships = row["fields"][field], row["settings"] == "shipped"
         mark = mark_of(study, row["method"])._replace(filling=3 if ships else int(row["precision"] == "int8"))
@@ -109,7 +104,7 @@ def _run_time(study: Study, drawing: Drawing, axes: Axes, rows: list[Row], field
 
 def _legend(study: Study, figure: FigureBase, rows: list[Row]) -> None:
     """Which mark is which family, and the marks' parts."""
-    marks = [(mark, words) for mark, words in families(study, rows)]
+    marks = families(study, rows)
     lines = [Line2D([], [], **mark.style | {"linestyle": ""}) for mark, _ in marks]
     lines += [Line2D([], [], linestyle="", marker="_", color=INK, markersize=9)]
     words = [*(words for _, words in marks), "wrong alone, the rest is lost"]
@@ -123,7 +118,7 @@ def _said(drawing: Drawing, axes: Axes, said: list[Row]) -> None:
     axes.grid(axis="x")
     axes.axvline(0.0, color=SOFT, linewidth=1)
     axes.set_xlabel("seconds after the last touched frame: median, and a line from the first to the last tenth")
-    _percent(axes)
+    in_per_cent(axes)
     for row in said:
         mark = GROUP_MARKS[row["group"]]._replace(filling=KINDS[row["kind"]])
         wrong, low, high = (max(LEAST, row[name]) for name in ("wrong", "low", "high"))
@@ -140,9 +135,3 @@ def _said(drawing: Drawing, axes: Axes, said: list[Row]) -> None:
     lines = [Line2D([], [], **mark.style | {"linestyle": ""}) for mark in marks.values()]
     axes.set_ylim(top=8.0)  # room for the legend
     axes.legend(lines, list(marks), loc="upper center", ncols=4, frameon=False)
-
-
-def _percent(axes: Axes) -> None:
-    """Write shares on a logarithmic axis as per cent."""
-    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g}" if share <= 1 else ""))
