@@ -14,7 +14,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from benchmarks.timing import Row, percentile, ratio
+from benchmarks.timing import Row, cpu_s_of, percentile, ratio
 from gestured.client.control import Control
 from gestured.client.engine import Engine
 from gestured.client.subscriber import Subscriber
@@ -162,7 +162,7 @@ def router() -> Row:
                 with session("client", "connect/endpoints", endpoint) as receiver:
                     came: list[str] = []
                     hears = receiver.declare_subscriber("gestured/**", lambda sample: came.append(str(sample.key_expr)))
-                    used, begin = cpu_s(started.pid), time.monotonic()
+                    used, begin = cpu_s_of(started.pid), time.monotonic()
                     for n in range(NAMES):
                         sender.put(f"gestured/site{n % 100}/s{n}/gesture", payload)
                         if n % 100 == 99:
@@ -170,20 +170,12 @@ def router() -> Row:
                     end = time.monotonic() + PATIENCE_S
                     while len(came) < NAMES and time.monotonic() < end:
                         time.sleep(0.01)
-                    took, work = time.monotonic() - begin, cpu_s(started.pid) - used
+                    took, work = time.monotonic() - begin, cpu_s_of(started.pid) - used
                     hears.undeclare()
         finally:
             started.kill()
     ours = f"{len(set(came))} of {NAMES} names there after {took:.2f} s"
     return Row("a router of Zenoh, an event of each name", ours, f"its processor time: {work:.2f} s", "", "", None)
-
-
-def cpu_s(pid: int) -> float:
-    """Processor time of a process so far."""
-    import os
-
-    words = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def buses(model: str) -> list[Row]:

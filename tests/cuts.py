@@ -26,6 +26,7 @@ from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Recognizer
+from gestured.lab.dataset import Truth, truths
 from gestured.model.opening import open_model
 from gestured.simulator import Participant, SimulatedSensor, any_sensor, generator, session
 from tests import foreign
@@ -39,21 +40,12 @@ EDGE_S = 0.07  # a frame at the model's rate: a contact is known to one frame on
 LEVELS = ("nominal", "hard", "faint")
 
 
-class Performed(NamedTuple):
-    """What was really done, and when."""
-
-    label: str
-    kind: str
-    onset: float  # s
-    offset: float  # s
-
-
 class Recording(NamedTuple):
     """Raw frames with the truth."""
 
     frames: NDArray[np.generic]  # (N, R, C)
     times: NDArray[np.float64]  # (N,) s
-    performed: tuple[Performed, ...]
+    performed: list[Truth]
 
 
 def ours(level: str, seed: int) -> Recording:
@@ -70,9 +62,7 @@ def ours(level: str, seed: int) -> Recording:
         sensor = replace(sensor, noise=1 / strength)
     person = Participant(int(rng.integers(1 << 40)) + 1_000_000)
     take = session(person, sensor, rng, SESSION_S, NON_GESTURE_SHARE, IDLE_S)
-    return Recording(
-        take.frames, take.times, tuple(Performed(a.label, a.kind, a.onset_s, a.offset_s) for a in take.events)
-    )
+    return Recording(take.frames, take.times, truths(take))
 
 
 def lossy(recording: Recording, burst: int, seed: int) -> Recording:
@@ -88,7 +78,7 @@ def lossy(recording: Recording, burst: int, seed: int) -> Recording:
 def others(level: str, seed: int) -> Recording:
     """A session of the independent generator."""
     made = foreign.session(seed, level, SESSION_S, NON_GESTURE_SHARE)
-    performed = tuple(Performed(e["label"], e["kind"], e["onset"], e["release"]) for e in made["events"])
+    performed = [Truth(e["label"], e["kind"], seed, e["onset"], e["release"]) for e in made["events"]]
     return Recording(made["frames"], made["times"], performed)
 
 
@@ -180,9 +170,7 @@ def measure(recording: Recording, model: Any) -> Sheet:
     return sheet
 
 
-def at_marks(
-    front: FrontEnd, recording: Recording, act: Performed, baseline: NDArray[np.float64], noise: float
-) -> Segment:
+def at_marks(front: FrontEnd, recording: Recording, act: Truth, baseline: NDArray[np.float64], noise: float) -> Segment:
     """The segment of somebody who knows when the finger came and left."""
     times = recording.times
     first = int(np.searchsorted(times, act.onset))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gestured.core.classifier import Classifier
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
@@ -18,13 +19,13 @@ from gestured.core.facts import events_of
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.recognizer import Recognizer
+from gestured.core.scene import DOUBLE_TAP, ONE_TAP
 from gestured.lab.dataset import Truth, truths
 from gestured.lab.online import NON_GESTURE_SHARE, SESSION_S
 from gestured.lab.progress import progress
 from gestured.model.opening import open_model
 from gestured.simulator import NONE, Participant, SimulatedSensor, Take, any_sensor, generator, session
 
-TAPS = ("one_tap", "double_tap")
 SLACK_S = 0.2  # an onset may be found so far from the true one
 HARD = 0.9  # hardness of the simulator's hard sensors
 SETS = ("nominal", "hard", "non-gestures")
@@ -52,7 +53,7 @@ class Ahead:
         answers = [event for event in events if isinstance(event, Gesture | Unknown)]
         ends = {event.id: event.provisional for event in events if isinstance(event, Gesture | Unknown | Cancelled)}
         for number, event in said.items():
-            counts = self.taps if event.gesture == TAPS[0] else self.confirmed
+            counts = self.taps if event.gesture == ONE_TAP else self.confirmed
             counts[ends.get(number) == "confirmed"] += 1
         used: set[int] = set()
         for act in acts:
@@ -72,7 +73,7 @@ class Ahead:
         hit = any(answer.gesture == act.label for answer in named)
         self.right += hit
         self.wrong += bool(named) and not hit
-        moved = act.label not in TAPS
+        moved = act.label not in (ONE_TAP, DOUBLE_TAP)
         self.moved += moved
         after = []
         for answer in near:
@@ -86,7 +87,7 @@ class Ahead:
                 answer.id in said and said[answer.id].gesture == act.label
                 and said[answer.id].decided <= answer.offset + 1e-6 for answer in near
             )  # fmt: skip
-        if after and (moved or act.label == TAPS[0]):
+        if after and (moved or act.label == ONE_TAP):
             (self.moved_s if moved else self.tap_s).append(after[0])
 
     def figures(self) -> dict[str, Any]:
@@ -118,17 +119,13 @@ def _median(values: Sequence[float]) -> float | None:
     return round(float(np.median(values)), 3) if values else None
 
 
-def heard(frames: Iterable[Frame], grid: tuple[int, int], classifier: Classifier) -> list[Event]:
-    """The events of a session, provisional ones among them."""
-    front = FrontEnd("lab", *grid)
+def heard(times: NDArray[np.float64], frames: NDArray[np.generic], classifier: Classifier) -> list[Event]:
+    """The events of a session, (N,) s and (N, R, C) counts, provisional ones among them."""
+    front = FrontEnd("lab", *frames.shape[1:])
     front.previews = True
     recognizer = Recognizer(front, classifier)
-    events: list[Event] = []
-    last = 0.0
-    for frame in frames:
-        events += events_of(recognizer.push(frame))
-        last = frame.t
-    return events + events_of(recognizer.flush(last + 5.0))
+    found = [one for t, values in zip(times, frames, strict=True) for one in recognizer.push(Frame(float(t), values))]
+    return events_of([*found, *recognizer.flush(float(times[-1]) + 5.0)])
 
 
 def takes(which: str, count: int, seed: int) -> Iterator[Take]:
@@ -149,9 +146,7 @@ def run(args: argparse.Namespace) -> int:
     for which in SETS:
         ahead = Ahead()
         for take in progress(takes(which, count, args.seed), count, which):
-            frames = (Frame(float(t), values) for t, values in zip(take.times, take.frames, strict=True))
-            rows, columns = take.frames.shape[1:]
-            ahead.add(heard(frames, (rows, columns), model), truths(take), SESSION_S / 60)
+            ahead.add(heard(take.times, take.frames, model), truths(take), SESSION_S / 60)
         figures[which] = ahead.figures()
     if args.json:
         print(json.dumps(figures, indent=2))

@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from gestured.core.scene import DOUBLE_TAP, ONE_TAP
 from gestured.lab.decide import Answers, decided
 from gestured.lab.early import Asked, at_release, calibrated, published, tap_threshold
 from gestured.lab.field import Contacts
@@ -19,7 +20,6 @@ from gestured.lab.samples import WINDOW, Samples, join
 from gestured.simulator import GESTURES, NONE
 
 Logits = Mapping[str, Tensor]  # (N, K) of each network
-TAP, DOUBLE = "one_tap", "double_tap"
 OTHERS = 0.2  # share of non-gestures among what is performed, as in `gestured-lab online`'s sessions
 
 
@@ -64,7 +64,7 @@ class Foretold:
     def contacts(self, name: str, decision: Decision) -> Contacts:
         """The gestures that are no taps, as a network with its decision sees them."""
         labels = targets(self.samples)
-        chosen = (labels >= 0) & (labels < len(GESTURES)) & ~np.isin(self.samples.labels, (TAP, DOUBLE))
+        chosen = (labels >= 0) & (labels < len(GESTURES)) & ~np.isin(self.samples.labels, (ONE_TAP, DOUBLE_TAP))
         of = chosen[self.contact]
         scores = _said(self.prefixes, name, decision)[0][of]
         whole = _said(self.whole, name, decision)[0][chosen]
@@ -81,16 +81,15 @@ class Foretold:
         final = published(_said(self.whole, name, decision), least)
         best, confidence = scores.argmax(axis=1), scores.max(axis=1).astype(np.float64) * (1 - unknown)
         # As the run time has it: no tap while the finger is down, and in a second contact two taps or nothing.
-        possible = np.where(self.second, best == GESTURES.index(DOUBLE), best != GESTURES.index(DOUBLE))
-        confidence[~possible | (best == GESTURES.index(TAP))] = 0.0
+        tap, two_taps = GESTURES.index(ONE_TAP), best == GESTURES.index(DOUBLE_TAP)
+        confidence[(two_taps != self.second) | (best == tap)] = 0.0
         asked = Asked(self.contact, self.since / WINDOW.rate_hz, best, confidence, final, self.samples.people)
         # Where the finger comes back nobody can know it at the release: that depends on how often people do so.
         single = at_release(self.samples).lengths() == self.samples.lengths()
         scores, unknown = _said(self.released, name, decision)
-        tap = tap_threshold(
-            (scores[single], unknown[single]), final[single], self.samples.people[single], GESTURES.index(TAP)
-        )
-        return calibrated(asked, GESTURES, tap)
+        people = self.samples.people[single]
+        released = tap_threshold((scores[single], unknown[single]), final[single], people, tap)
+        return calibrated(asked, GESTURES, released)
 
 
 def _said(of: Logits, name: str, decision: Decision) -> Answers:

@@ -218,7 +218,7 @@ def test_a_replay_knows_who_may_send_and_how_many(tmp_path: Path) -> None:
 
 @pytest.fixture
 def live() -> Iterator[LiveSensor]:
-    sensor = LiveSensor(("127.0.0.1", 0), 9, 9, None)
+    sensor = LiveSensor(("127.0.0.1", 0), (9, 9), None, Sure())
     yield sensor
     sensor.close()
 

@@ -127,7 +127,7 @@ def _corners(control: Array, round_off: float) -> Array:
     """A polyline (N, 2) with its corners cut, for strokes that have corners: check marks and zigzags."""
     points = [control[0]]
     for a, b, c in zip(control[:-2], control[1:-1], control[2:], strict=True):
-        points += [b + (a - b) * round_off, b * 0.8 + 0.1 * (a + c) * 1.0 if round_off > 0.2 else b]
+        points += [b + (a - b) * round_off, b * 0.8 + 0.1 * (a + c) if round_off > 0.2 else b]
         points += [b + (c - b) * round_off]
     points.append(control[-1])
     return np.asarray(points)
@@ -242,7 +242,7 @@ def _two_fingers(rng: Rng, person: Person, kind: str, heading: float) -> Perform
     seed = int(rng.integers(2**32))
     a = _stroke(np.random.default_rng(seed), person, first, move, rest=rest)
     b = _stroke(np.random.default_rng(seed), person, second, move, rest=rest)  # one hand: the same timing
-    b = Pad(b.t, b.x, b.y, b.force * rng.uniform(0.65, 1.35), b.points, b.weights * 1.0, b.half)
+    b = Pad(b.t, b.x, b.y, b.force * rng.uniform(0.65, 1.35), b.points, b.weights, b.half)
     late = float(np.abs(rng.normal(0.0, 0.03 if person.light else 0.015)))
     return _performed(kind, [_delayed(a, 0.0), _delayed(b, min(late, 0.08))])
 

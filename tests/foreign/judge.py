@@ -341,7 +341,7 @@ def provisional(source: str, level: str, share: float, seeds: range) -> Ahead:
             Truth(event["label"], event["label"], seed, event["onset"], event["release"])
             for event in recording["events"]
         ]
-        found.add(heard(_frames(recording), (9, 9), classifier), acts, SESSION_S / 60)
+        found.add(heard(recording["times"], recording["frames"], classifier), acts, SESSION_S / 60)
     return found
 
 

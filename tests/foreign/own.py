@@ -13,10 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gestured.core.found import Cut
-from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import FrontEnd
+from gestured.core.frames import Segment
 from gestured.core.prototypes import EXAMPLES, NEAR, Array, Prototype, Space, nearest
+from gestured.lab.dataset import cuts
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.own import place, taken_for
@@ -47,10 +46,7 @@ def segments(performed: Performance, sensor: object, rng: np.random.Generator) -
     """What the front end cuts out of one performance."""
     start = 1.4 + float(rng.uniform(0.0, 0.4))
     frames, times, _ = record(sensor, rng, [(start, performed)], start + performed.duration + 1.4)
-    front = FrontEnd("foreign", *frames.shape[1:])
-    found = [x for t, values in zip(times, frames, strict=True) for x in front.push(Frame(float(t), values))]
-    found += front.flush(float(times[-1]) + 5.0)
-    return [x.segment for x in found if isinstance(x, Cut)]
+    return cuts(frames, times)
 
 
 def done(model: Model, seed: int, level: str) -> Iterator[Seen]:

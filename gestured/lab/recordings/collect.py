@@ -24,8 +24,7 @@ def run(args: argparse.Namespace) -> int:
     kept = already(path, args.participant, args.grid)
     model = open_model(args.model)
     trials = order(args.participant, args.seed, args.gestures, args.repeats)
-    rows, columns = args.grid
-    with closing(LiveSensor(args.listen, rows, columns, args.sensor, model)) as sensor, terminal:
+    with closing(LiveSensor(args.listen, args.grid, args.sensor, model)) as sensor, terminal:
         session = Session(args.participant, path, kept, sensor, terminal, args.countdown)
         session.run(trials)
     if args.json:

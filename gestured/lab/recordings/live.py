@@ -13,11 +13,11 @@ from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled, Event, Onset, Release, Status
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
-from gestured.core.frames import Frame, Segment
+from gestured.core.frames import Frame
 from gestured.core.hub import Hub
 from gestured.core.owner import Source
 from gestured.core.reading import Reading
-from gestured.core.scene import DOUBLE_TAP, Scene
+from gestured.core.scene import Scene
 from gestured.lab.recordings.quality import Captured
 
 PACKET_BYTES = 65_536
@@ -34,33 +34,20 @@ WHY = {
 }
 
 
-class Listening:
-    """A `Classifier` that calls everything unknown: what is collected gets its name from whoever performs it."""
-
-    gestures: tuple[str, ...] = (DOUBLE_TAP,)  # so that a tap waits for a second one
-
-    def classify(self, segment: Segment) -> Scores:
-        """No gesture at all."""
-        return Scores(np.ones(1, np.float32), 1.0, "none")
-
-
 class LiveSensor:
     """The first sensor that sends to `address`, or the one called `name`. Raises GesturedError where it cannot listen.
 
     `classifier` says what each take looks like. `pump` reads; what the hub found of it since `begin` is `found`.
     """
 
-    def __init__(
-        self, address: Address, rows: int, columns: int, name: str | None, classifier: Classifier | None = None
-    ) -> None:
+    def __init__(self, address: Address, grid: tuple[int, int], name: str | None, classifier: Classifier) -> None:
         self.where = str(address)
         self.name = name
-        self.grid = (rows, columns)
+        self.grid = grid
         self.ready = False  # the idle sensor is known
         self.found: list[Event | Decided] = []
-        classifier = classifier or Listening()
         self._gestures = classifier.gestures
-        self._hub = Hub(Scene(classifier.gestures, self.grid, touches=True, frames=True), classifier)
+        self._hub = Hub(Scene(classifier.gestures, grid, touches=True, frames=True), classifier)
         self._frames: deque[Frame] = deque()
         self._free = -math.inf  # s, when the last contact was over
         self._before = -math.inf  # s, the same at `begin`

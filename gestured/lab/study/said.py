@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from gestured.core.events import Gesture
-from gestured.core.frames import Frame
-from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Recognizer
+from gestured.core.events import Gesture, Provisional
+from gestured.lab.ahead import heard
 from gestured.lab.online import takes
 from gestured.lab.study.bootstrap import interval
 from gestured.model.model import Model
@@ -53,17 +51,10 @@ def _row(answers: list[tuple[float, bool, int]]) -> dict[str, Any]:
 
 def _answers(model: Model, take: Take) -> Iterator[tuple[str, str, float, bool]]:
     """(kind, what was performed, seconds after its last touched frame, wrong or not) of each answer to a gesture."""
-    front_end = FrontEnd("said", *take.frames.shape[1:])
-    front_end.previews = True  # somebody asks for provisional events
-    recognizer = Recognizer(front_end, model)
-    events: list[Any] = []
-    for t, values in zip(take.sensor_times, take.frames, strict=True):
-        events += recognizer.push(Frame(float(t), values))
-    events += recognizer.flush(float(take.sensor_times[-1]) + 2.0)
-    for event in events:
-        kind = "final" if isinstance(event, Gesture) else type(event).__name__.lower()
-        if kind not in ("final", "provisional"):
+    for event in heard(take.sensor_times, take.frames, model):
+        if not isinstance(event, Gesture | Provisional):
             continue
+        kind = "final" if isinstance(event, Gesture) else "provisional"
         for act in take.events:
             if act.label in GESTURES and act.onset_s - SLACK_S <= event.onset <= act.offset_s + SLACK_S:
                 yield kind, act.label, event.decided - act.offset_s, event.gesture != act.label

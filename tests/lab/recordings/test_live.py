@@ -11,6 +11,7 @@ from gestured.control.play import frames
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.lab.recordings.live import LiveSensor
+from gestured.model.opening import open_model
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, gesture_take, session
 
 Send = Callable[..., None]
@@ -21,7 +22,7 @@ def live() -> Iterator[LiveSensor]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         address = probe.getsockname()
-    sensor = LiveSensor(Address(*address), 9, 9, None)
+    sensor = LiveSensor(Address(*address), (9, 9), None, open_model("lstm"))
     yield sensor
     sensor.close()
 
@@ -113,4 +114,4 @@ def test_an_address_that_is_taken_is_named() -> None:
         taken.bind(("127.0.0.1", 0))
         host, port = taken.getsockname()
         with pytest.raises(GesturedError, match=f"cannot listen on {host}:{port}: Address already in use"):
-            LiveSensor(Address(host, port), 9, 9, None)
+            LiveSensor(Address(host, port), (9, 9), None, open_model("lstm"))
