@@ -29,7 +29,7 @@ HEAD = """\
 Configuration of gestured: every key there is, commented out, with its default or an example as its value.
 Made from the program's settings by `python -m deploy.generate configuration`.
 After a change: gestured --config FILE --explain, then systemctl reload gestured. Flags and GESTURED_* variables
-win over this file. An unknown key is an error; what is invalid changes nothing."""
+win over this file. An unknown key or an invalid value is an error, and a reload then changes nothing."""
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,9 @@ class SensorSettings(Part):
     rotate: Literal[0, 90, 180, 270] = Field(default=0, description="how far it is turned, in degrees clockwise")
     mirror: bool = Field(default=False, description="whether left and right are exchanged")
     invert: bool = Field(default=False, description="whether its counts fall under pressure")
-    clock: Literal["arrival", "sensor"] | None = Field(default=None, description="by default the general `clock`")
+    clock: Literal["arrival", "sensor"] | None = Field(
+        default=None, description="where its frames' times come from; by default the general `clock`"
+    )
 
 
 class GestureSettings(Part):
@@ -45,7 +47,9 @@ class GestureSettings(Part):
     threshold: float | None = Field(
         default=None, ge=0, le=1, description="confidence below which it is unknown; by default the model's own"
     )
-    refractory_s: float = Field(default=0, ge=0, le=3600, description="seconds after it in which it is not repeated")
+    refractory_s: float = Field(
+        default=0, ge=0, le=3600, description="seconds in which the same gesture is not published again"
+    )
 
 
 class AddressSettings(Part):
@@ -86,7 +90,8 @@ class Settings(Part):
     )
     control: SocketField | None = Field(
         default=None,
-        description="Unix socket of gesturectl's requests; by default beside the event socket, .ctl in place of .sock",
+        description="Unix socket for the requests of gesturectl; by default the event socket's path, "
+        "with .ctl in place of .sock",
     )
     metrics: AddressField | None = Field(
         default=None, description="HTTP address of /metrics, /healthz and /readyz; off unless set"
@@ -96,11 +101,12 @@ class Settings(Part):
     )
     gestures: Annotated[tuple[str, ...], Listed] | None = Field(
         default=None,
-        description="the gestures to use, all of the model's unless set; `[gestures] use` beside tables",
+        description="the gestures in use; all of the model's unless set. A file with tables [gestures.NAME] "
+        "names them as `use` under [gestures]",
     )
     clock: Literal["arrival", "sensor"] = Field(
         default="arrival",
-        description="what a frame's time is: its arrival, or the increments of the sensor's time tags",
+        description="where a frame's time comes from: its arrival, or the increments of the sensor's time tags",
     )
     stale_s: float = Field(
         default=1.0, ge=0.2, le=60, description="seconds of silence after which a sensor counts as gone"
@@ -112,24 +118,28 @@ class Settings(Part):
         description="seconds that a tap waits for a second one",
     )
     provisional_taps: bool = Field(
-        default=True, description="whether one tap is said provisionally before a second one may come"
+        default=True,
+        description="whether a single tap gets a provisional event before it is sure that no second one follows",
     )
     publish_provisional: bool = Field(
-        default=False, description="whether provisional events, and that they are revoked, are sent to `publish`, too"
+        default=False, description="whether provisional events and their revocations are also sent to `publish`"
     )
     max_sensors: int = Field(
-        default=64, ge=1, le=4096, description="sensors at a time; further ones are dropped and counted"
+        default=64, ge=1, le=4096, description="how many sensors at a time; further ones are dropped and counted"
     )
     allow: Annotated[tuple[NetworkField, ...], Listed] = Field(
         default=(), description="addresses or networks that may send frames; any unless set"
     )
     flight_recorder: int = Field(
-        default=0, ge=0, le=1024, description="MiB that the last 30 s of packets may take in memory; 0: none are kept"
+        default=0,
+        ge=0,
+        le=1024,
+        description="MiB of memory in which the last 30 s of packets are kept; 0: none are kept",
     )
     own_gestures: Path | None = Field(
         default=None,
-        description="file of the user's own gestures, which the daemon writes; by default "
-        "$STATE_DIRECTORY/own-gestures.json, else none can be enrolled",
+        description="file in which the daemon keeps gestures of your own; by default "
+        "$STATE_DIRECTORY/own-gestures.json; without either, none can be enrolled",
     )
     log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="how much is logged")
     sensors: dict[Annotated[str, Field(pattern=SENSOR_NAME)], SensorSettings] = Field(
