@@ -20,6 +20,7 @@ from gestured.daemon.sockets import (
     stamp_arrivals,
 )
 
+FIRST_FD = 3  # sd_listen_fds(3)
 INTERNET = (socket.AF_INET, socket.AF_INET6)
 # FileDescriptorName= -> what such a socket must be, in systemd's words
 SOCKET_NAMES = {
@@ -58,9 +59,9 @@ class Bound:
             self.http.close()
 
 
-def bind_all(settings: Settings, passed: Sequence[tuple[str, socket.socket]]) -> Bound:
-    """Take what was passed and bind the rest. All or nothing; raises AddressError."""
-    given = _by_name(passed)
+def bind_all(settings: Settings) -> Bound:
+    """Take what systemd passed and bind the rest. All or nothing; raises AddressError."""
+    given = _by_name(_passed())
     opened: list[socket.socket | Listener] = list(given.values())
     try:
         if (udp := given.get("osc")) is None:
@@ -93,6 +94,21 @@ def bind_all(settings: Settings, passed: Sequence[tuple[str, socket.socket]]) ->
     for name, sock in given.items():
         log.info("socket from systemd", name=name, address=_where(sock))
     return Bound(udp, since, events, control, http)
+
+
+def _passed() -> list[tuple[str, socket.socket]]:
+    """(name, socket) of each socket that systemd holds for us; names as FileDescriptorName= gives them.
+
+    Once: the variables are removed, so that no child takes them for its own.
+    """
+    mine = os.environ.pop("LISTEN_PID", "") == str(os.getpid())
+    count, names = os.environ.pop("LISTEN_FDS", ""), os.environ.pop("LISTEN_FDNAMES", "").split(":")
+    if not mine or not count.isdigit():
+        return []
+    fds = range(FIRST_FD, FIRST_FD + int(count))
+    for fd in fds:
+        os.set_inheritable(fd, False)
+    return [(name, socket.socket(fileno=fd)) for fd, name in zip(fds, names + [""] * int(count), strict=False)]
 
 
 def _where(sock: socket.socket) -> str:

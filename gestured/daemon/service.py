@@ -11,14 +11,12 @@ from gestured.core import messages
 from gestured.core.events import Status
 from gestured.core.hub import Hub
 from gestured.daemon import log as logging
-from gestured.daemon import systemd
 from gestured.daemon.asked import Asked, scene_of
 from gestured.daemon.bound import Bound
-from gestured.daemon.canary import Canary
 from gestured.daemon.clients import EventServer
 from gestured.daemon.control import ControlServer
 from gestured.daemon.desk import Desk
-from gestured.daemon.health import TICK_S, Pulse
+from gestured.daemon.health import TICK_S, Canary, Pulse, watchdog_period
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.operations import Operations
@@ -147,7 +145,7 @@ class Service:
 
     async def serve(self, stop: asyncio.Event, reload: asyncio.Event) -> None:
         """Look after timers, until `stop`; then finish what is in flight."""
-        watchdog = systemd.watchdog_period()
+        watchdog = watchdog_period()
         canary = Canary(self._desk)
         period = min(TICK_S, watchdog or TICK_S)
         status_at = time.monotonic()

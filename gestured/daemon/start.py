@@ -18,7 +18,6 @@ from typing import Any
 
 from gestured.client.notify import notify
 from gestured.daemon import log as logging
-from gestured.daemon import systemd
 from gestured.daemon.asked import open_all
 from gestured.daemon.bound import Bound, bind_all
 from gestured.daemon.log import Throttle, log
@@ -58,7 +57,7 @@ async def _run(settings: Settings, load: Loader) -> None:
     )
     _when(signal.SIGHUP, partial(loop.call_soon_threadsafe, reload.set))
     _end_surely(loop)
-    bound = bind_all(settings, systemd.passed_sockets())
+    bound = bind_all(settings)
     for number in STOPS:
         _when(number, partial(_end_at_once, bound))
     try:

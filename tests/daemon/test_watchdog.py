@@ -11,7 +11,7 @@ import pytest
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable
 from gestured.core.front_end import FrontEnd
-from gestured.daemon.canary import Canary
+from gestured.daemon.health import Canary
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
 from tests.daemon.parts import Parts
 
