@@ -1,11 +1,9 @@
-"""Frames that nobody here wrote or made: an OSC tool of Debian's, python-osc's client, real fingers."""
+"""Frames that nobody here made: real fingers."""
 
-import shutil
 import signal
 import socket
-import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,73 +16,20 @@ from tests.daemon.harness import Daemon
 
 ROOT = Path(__file__).resolve().parents[1]
 SESSIONS = ROOT.parent / "shared" / "data" / "capfingerid_sessions_dev.npz"
-RATE_HZ = 15.0
-IDLE_S, PRESS_S = 1.6, 0.2
 BATCH = 400  # frames on the way at once: fewer than a socket's buffer holds
 
 pytestmark = pytest.mark.e2e
 
 
-@pytest.fixture
-def daemon(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Daemon]:
+def test_real_fingers(serve: Callable[..., Daemon]) -> None:
+    """Swipes and taps on a touchscreen come out as what they were, mostly."""
     if not shipped()["cnn_lstm"].exists():
         pytest.skip(f"{shipped()['cnn_lstm']} is not there")
-    running = Daemon.start(tmp_path, "cnn_lstm", "--metrics", "127.0.0.1:0", *getattr(request, "param", ()))
-    yield running
-    assert running.stop() == 0
-
-
-def tap() -> Iterator[list[int]]:
-    """A finger on row 2, column 6 for a moment, on a sensor of 9 x 9 that is idle otherwise; at its rate."""
-    start = time.monotonic()
-    press = round(IDLE_S * RATE_HZ), round((IDLE_S + PRESS_S) * RATE_HZ)
-    for n in range(round((2 * IDLE_S + PRESS_S) * RATE_HZ)):
-        time.sleep(max(0.0, start + n / RATE_HZ - time.monotonic()))  # this is the sensor's own clock
-        frame = np.full((9, 9), 300 + n % 2)
-        if press[0] <= n < press[1]:
-            frame[1:4, 5:8] += 150
-            frame[2, 6] += 450
-        yield frame.ravel().tolist()
-
-
-def check_tap(daemon: Daemon, send: Any) -> None:
-    client = daemon.client().subscribe("onset", "gesture", "unknown", "cancelled", "release")
-    for values in tap():
-        send(values)
-    seen: dict[str, dict[str, Any]] = {}
-    while not ("release" in seen and {"gesture", "unknown", "cancelled"} & seen.keys()):
-        event = client.line()
-        seen[event["type"]] = event
-    assert seen["onset"]["sensor"] == "armrest"
-    assert seen["gesture"]["gesture"] == "one_tap"
-    assert seen["gesture"]["scores"].keys() == set(client.hello["gestures"])
-
-
-def test_frames_from_oscsend(daemon: Daemon):
-    if shutil.which("oscsend") is None:
-        pytest.skip("oscsend is not installed: apt install liblo-tools")
-
-    def send(values: list[int]) -> None:
-        address = ["oscsend", "127.0.0.1", str(daemon.address.port), "/armrest/pressure", "i" * len(values)]
-        subprocess.run([*address, *map(str, values)], check=True, timeout=10)
-
-    check_tap(daemon, send)
-
-
-def test_frames_from_python_osc(daemon: Daemon):
-    from pythonosc.udp_client import SimpleUDPClient
-
-    client = SimpleUDPClient(*daemon.address)
-    check_tap(daemon, lambda values: client.send_message("/armrest/pressure", [float(value) for value in values]))
-
-
-@pytest.mark.parametrize("daemon", [("--grid", "27x15", "--clock", "sensor")], indirect=True)
-def test_real_fingers(daemon: Daemon):
-    """Swipes and taps on a touchscreen come out as what they were, mostly."""
     if not SESSIONS.exists():
         pytest.skip(f"{SESSIONS} is not there")
     with np.load(SESSIONS, allow_pickle=False) as data:
         sessions = dict(data)
+    daemon = serve("--metrics", "127.0.0.1:0", "--grid", "27x15", "--clock", "sensor", model="cnn_lstm")
     chosen = (1, 4, 8)
     client = daemon.client().subscribe("gesture", "release")
     begun = {number: send_session(daemon, sessions, number) for number in chosen}

@@ -1,4 +1,4 @@
-"""One small model for all, and daemons that tests share where they do not change them."""
+"""Daemons that tests share where they do not change them, and others that may end as they like."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -6,14 +6,7 @@ from typing import Any
 
 import pytest
 
-from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
-
-
-@pytest.fixture(scope="session")
-def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A valid model file named tiny."""
-    return tiny_model.make(tmp_path_factory.mktemp("model") / "tiny.onnx")
 
 
 @pytest.fixture(scope="session")

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from pythonosc.osc_message_builder import OscMessageBuilder
+from pythonosc.udp_client import SimpleUDPClient, UDPClient
 
 from tests.daemon.harness import Client, Daemon, Frame, Hand
 
@@ -31,9 +33,8 @@ def stream(client: Client, send: Callable[[Frame], None], sensor: str) -> dict[s
 
 
 def test_python_osc(start) -> None:
-    udp_client = pytest.importorskip("pythonosc.udp_client")
     daemon: Daemon = start()
-    sender = udp_client.SimpleUDPClient(*daemon.address)
+    sender = SimpleUDPClient(*daemon.address)
     event = stream(daemon.client(), lambda frame: sender.send_message("/arm/pressure", frame.ravel().tolist()), "arm")
     assert (event["type"], event.get("gesture")) == ("gesture", "swipe_right")
 
@@ -56,16 +57,14 @@ def test_oscsend(start) -> None:
 
 
 def test_a_plain_message_without_a_bundle_can_be_a_blob(start) -> None:
-    builder = pytest.importorskip("pythonosc.osc_message_builder")
-    udp_client = pytest.importorskip("pythonosc.udp_client")
     daemon: Daemon = start()
-    sender = udp_client.UDPClient(*daemon.address)
+    sender = UDPClient(*daemon.address)
     count = 0
 
     def send(frame: Frame) -> None:
         nonlocal count
         count += 1
-        message = builder.OscMessageBuilder("/arm/pressure")
+        message = OscMessageBuilder("/arm/pressure")
         message.add_arg(count, "i")
         message.add_arg(frame.astype("u1").tobytes(), "b")
         sender.send(message.build())

@@ -15,13 +15,15 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pythonosc.osc_message import OscMessage
+from pythonosc.osc_packet import OscPacket
 
 from gestured.client.control import Control
 from gestured.client.lines import Refused, Unreachable
 from gestured.daemon.operations import Operations
 from gestured.daemon.request import Parameter, Refusal, Verb, parse_request
 from tests.daemon import tiny_model
-from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor
+from tests.daemon.harness import Daemon, Hand, Sensor
 
 SLOW = ("--stale-s", 30)  # on a busy machine no sensor is stale
 
@@ -131,22 +133,18 @@ def test_status_says_how_the_daemon_is(daemon: Daemon) -> None:
     assert status["flight_recorder"]["held_bytes"] > 0
 
 
-def test_a_test_event_is_marked_on_every_output_and_keeps_the_numbers(start) -> None:
-    osc_message = pytest.importorskip("pythonosc.osc_packet")
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-        out.bind(("127.0.0.1", 0))
-        out.settimeout(DEADLINE_S)
-        daemon = start("--clock", "sensor", "--publish", f"osc://127.0.0.1:{out.getsockname()[1]}")
-        client = daemon.client().subscribe("gesture", "onset", "release")
-        with Control(Path(daemon.ready["control"])) as control:
-            assert control.ask("emit", gesture="swipe_up", sensor="arm")["sequence"] == 1
-        assert [(e["type"], e["id"], e["test"]) for e in (client.line() for _ in range(3))] == [
-            ("onset", 1, True), ("gesture", 1, True), ("release", 1, True),
-        ]  # fmt: skip
-        found = []
-        while len(found) < 2:
-            packet = osc_message.OscPacket(out.recv(9999))
-            found += [timed.message for timed in packet.messages if timed.message.address != "/gestured/status"]
+def test_a_test_event_is_marked_on_every_output_and_keeps_the_numbers(start, udp: socket.socket) -> None:
+    daemon = start("--clock", "sensor", "--publish", f"osc://127.0.0.1:{udp.getsockname()[1]}")
+    client = daemon.client().subscribe("gesture", "onset", "release")
+    with Control(Path(daemon.ready["control"])) as control:
+        assert control.ask("emit", gesture="swipe_up", sensor="arm")["sequence"] == 1
+    assert [(e["type"], e["id"], e["test"]) for e in (client.line() for _ in range(3))] == [
+        ("onset", 1, True), ("gesture", 1, True), ("release", 1, True),
+    ]  # fmt: skip
+    found: list[OscMessage] = []
+    while len(found) < 2:
+        messages = [timed.message for timed in OscPacket(udp.recv(9999)).messages]
+        found += [message for message in messages if message.address != "/gestured/status"]
     assert (found[0].address, found[0].params) == ("/gestured/test", ["arm"])
     assert found[1].address == "/gestured/arm/gesture" and found[1].params[:3] == ["swipe_up", 1.0, 1]
     assert daemon.client().hello["sensors"] == {"arm": 1}

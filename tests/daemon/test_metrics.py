@@ -51,7 +51,6 @@ def everything() -> Iterator[Event]:
 
 
 def test_there_are_at_most_200_series_whatever_arrives() -> None:
-    pytest.importorskip("prometheus_client")
     metrics = Metrics()
     for event in everything():
         metrics.event(event)
@@ -104,7 +103,6 @@ def test_prometheus_itself_finds_nothing_to_say(shared: Daemon) -> None:
 
 
 def test_several_sensors_together_are_as_their_worst() -> None:
-    pytest.importorskip("prometheus_client")
     still, gone = np.zeros(81), np.full(81, 3.0)
     one = Reading("ok", (9, 9), 1 / 15, 0.001, 1, 1.0, first=still, baseline=still)
     other = Reading("stale", (9, 9), 1 / 15, 0.1, 2, 1.0, first=still, baseline=gone)

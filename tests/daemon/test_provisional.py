@@ -12,7 +12,7 @@ from pythonosc.osc_message import OscMessage
 import gestured
 from gestured.client.control import Control
 from tests.daemon import tiny_model
-from tests.daemon.harness import DEADLINE_S, Client, Daemon, Hand, Sensor
+from tests.daemon.harness import Client, Daemon, Hand, Sensor
 from tests.hostile.grammar import TYPES, violations
 
 ALL = (*TYPES, "provisional")
@@ -182,26 +182,17 @@ def test_a_made_up_gesture_is_said_before_too(daemon: Daemon) -> None:
         assert plain.line()["provisional"] is None
 
 
-@pytest.fixture
-def osc() -> Iterator[socket.socket]:
-    """Where a daemon publishes."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-        out.bind(("127.0.0.1", 0))
-        out.settimeout(DEADLINE_S)
-        yield out
-
-
 def published_to(out: socket.socket) -> tuple[str, ...]:
     return "--clock", "sensor", "--publish", f"osc://127.0.0.1:{out.getsockname()[1]}"
 
 
 @pytest.mark.parametrize("taps", ["true", "false"])
-def test_over_osc(start: Callable[..., Daemon], early: Path, osc: socket.socket, taps: str) -> None:
-    daemon = start(*published_to(osc), "--publish-provisional", "true", "--provisional-taps", taps, model=early)
+def test_over_osc(start: Callable[..., Daemon], early: Path, udp: socket.socket, taps: str) -> None:
+    daemon = start(*published_to(udp), "--publish-provisional", "true", "--provisional-taps", taps, model=early)
     two_taps(Sensor(daemon, "arm").begin().perform("left"))
     found: list[tuple[str, str, list[Any]]] = []
     while len([one for one in found if one[0].endswith("gesture")]) < 2:
-        message = OscMessage(osc.recv(9999))
+        message = OscMessage(udp.recv(9999))
         if message.address != "/gestured/status":
             types = message.dgram[message.dgram.index(b",") :].split(b"\0")[0].decode()
             found.append((message.address.removeprefix("/gestured/arm/"), types, message.params))
@@ -216,15 +207,15 @@ def test_over_osc(start: Callable[..., Daemon], early: Path, osc: socket.socket,
 
 
 def test_without_the_setting_osc_says_only_what_it_said_before(
-    start: Callable[..., Daemon], early: Path, osc: socket.socket
+    start: Callable[..., Daemon], early: Path, udp: socket.socket
 ) -> None:
-    daemon = start(*published_to(osc), model=early)
+    daemon = start(*published_to(udp), model=early)
     client = daemon.client().subscribe(*ALL)
     two_taps(Sensor(daemon, "arm").begin())
     assert "one_tap?" in said(client, "arm")
     addresses = set()
     while "/gestured/arm/gesture" not in addresses:
-        addresses.add(OscMessage(osc.recv(9999)).address)
+        addresses.add(OscMessage(udp.recv(9999)).address)
     assert addresses <= {"/gestured/arm/gesture", "/gestured/status"}
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pythonosc.osc_message import OscMessage
 
 from tests import encoding
 from tests.daemon import harness
@@ -194,15 +195,14 @@ def test_osc_goes_out_to_every_destination(start) -> None:
         nobody.bind(("127.0.0.1", 0))
         flags += ["--publish", f"osc://127.0.0.1:{nobody.getsockname()[1]}"]
     daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", *flags)
-    osc_message = pytest.importorskip("pythonosc.osc_message")
-    assert osc_message.OscMessage(outs[0].recv(9999)).address == "/gestured/status"
+    assert OscMessage(outs[0].recv(9999)).address == "/gestured/status"
     client = daemon.client()
     Sensor(daemon, "arm").begin().perform("up")
     (event,) = client.events("gesture", "arm")
     for out in outs:
         seen: dict[str, list[Any]] = {}
         while len(seen) < 2:
-            message = osc_message.OscMessage(out.recv(9999))
+            message = OscMessage(out.recv(9999))
             seen[message.address] = message.params
         assert seen["/gestured/status"] in (["no_data", 0], ["ok", 1])
         label, confidence, sequence, onset, offset = seen["/gestured/arm/gesture"]
@@ -215,7 +215,6 @@ def test_osc_goes_out_to_every_destination(start) -> None:
 
 
 def test_metrics_count_what_happened(shared: Daemon) -> None:
-    pytest.importorskip("prometheus_client")
     client = shared.client()
     before = shared.metric("gestured_gestures_total", gesture="swipe_left")
     Sensor(shared, "counting").begin().perform("left")
@@ -235,7 +234,6 @@ def test_metrics_count_what_happened(shared: Daemon) -> None:
 
 def test_the_names_of_metrics_are_an_interface(shared: Daemon) -> None:
     """`metrics.txt` holds name, type and help of each; a change shows in its diff, and in the changelog."""
-    pytest.importorskip("prometheus_client")
     found = [line for line in shared.get("/metrics")[1].splitlines() if line.startswith("#")]
     assert "\n".join(found) + "\n" == (Path(__file__).parent / "metrics.txt").read_text()
 

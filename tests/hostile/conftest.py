@@ -1,5 +1,5 @@
 """The daemons of the daemon's own tests."""
 
-from tests.daemon.conftest import model, start
+from tests.daemon.conftest import start
 
-__all__ = ["model", "start"]
+__all__ = ["start"]
