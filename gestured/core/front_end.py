@@ -79,7 +79,7 @@ class FrontEnd:
     @property
     def bad_taxels(self) -> int:
         """How many taxels are bridged from their neighbours."""
-        return int(np.count_nonzero(self.conditioner.taxels.bad))
+        return self.conditioner.taxels.count
 
     @property
     def interval_s(self) -> float:

@@ -100,12 +100,14 @@ class Taxels:
         self.stuck = Stuck(rows * columns)
         self.frozen = Frozen(rows * columns)
         self.bad: Mask = np.zeros(rows * columns, dtype=bool)  # replaced, never changed in place
+        self.count = 0  # of the bad ones
 
     def review(self, sigma: Array, noise: float) -> None:
         """Say which are bad, by each taxel's noise (N,) and the sensor's. Were it all of them, none would be left."""
         self.bad = self.stuck.mask | self.frozen.mask | (sigma > NOISY * noise)
         if self.bad.all():
             self.bad = np.zeros_like(self.bad)
+        self.count = int(np.count_nonzero(self.bad))
 
     def inspect(self, frames: Array, noise: float) -> Inspection:
         """Look at the frames of a contact, (T, N) counts above the baseline, not yet bridged."""
