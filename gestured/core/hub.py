@@ -9,7 +9,7 @@ a bug does not end the program: a daemon in a vehicle that dies of one sensor's 
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
 
 from gestured.core.classifier import Classifier
 from gestured.core.facts import Changed, Dropped, Fact, Fault
@@ -37,7 +37,7 @@ class Hub:
         self._missed = 0  # times that this machine had no room for a packet,
         self._told: dict[str, int] = {}  # and how many of them a sensor knows of
         self._owners: frozenset[Source] = frozenset()
-        self._asked: Callable[[str], bool] = lambda sensor: False
+        self._asked: frozenset[str] | None = frozenset()  # sensors that are foreseen; None is all
         self._waits: dict[str, Feed] = {}  # those in which a contact may be over before the next frame
         self._due = math.inf  # s, when the first of them may
         self._set(scene, classifier)
@@ -126,18 +126,18 @@ class Hub:
             feed.change(scene, classifier, now, facts)
         return facts
 
-    def foresee(self, asked: Callable[[str], bool]) -> None:
-        """Give provisional events of the sensors that are `asked` for, by name. Answers stay what they are.
+    def foresee(self, sensors: Collection[str] | None) -> None:
+        """Give provisional events of these sensors, by name, or of all (None). Answers stay what they are.
 
         It costs up to 15 runs of the model a second and sensor while it is touched.
         """
-        self._asked = asked
+        self._asked = None if sensors is None else frozenset(sensors)
         for feed in self._feeds.values():
-            feed.foresee(asked=asked(feed.name))
+            feed.foresee(asked=self.foreseen(feed.name))
 
     def foreseen(self, name: str) -> bool:
         """Whether somebody asks for a sensor's provisional events."""
-        return self._asked(name)
+        return self._asked is None or name in self._asked
 
     def number(self, name: str) -> tuple[int, int]:
         """The next sequence and id of a sensor, for an event that is made up; they count as used."""
@@ -207,7 +207,7 @@ class Hub:
                 return None
             numbers = self._numbers.pop(name, (0, 0))
             feed = self._feeds[name] = Feed(name, source, self._scene, self._classifier, numbers)
-            feed.foresee(asked=self._asked(name))
+            feed.foresee(asked=self.foreseen(name))
             self._told[name] = self._missed
             facts.append(Changed(name, "new", source))
         if not feed.owner.admits(source, now, self._scene.stale_s):

@@ -13,7 +13,7 @@ from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.own_file import OwnFile
 from gestured.daemon.settings import Settings
-from gestured.daemon.sinks import OscSink
+from gestured.daemon.sinks import Output, outputs
 from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, require_gestures
 
 SLIP = 0.8  # of difflib's ratio: a name so near to one of the model's gestures was meant to be that
@@ -25,15 +25,16 @@ class Asked:
 
     settings: Settings
     ladder: Ladder
-    osc: list[OscSink]
+    outputs: list[Output]
     own: OwnFile
 
 
 def open_all(settings: Settings, metrics: Metrics, *, insist: bool = False) -> Asked:
     """Open what may take long: models, names of hosts, and the file of own gestures. Raises as `open_ladder`."""
     ladder = open_ladder(settings, insist=insist)
-    osc = [OscSink(address, metrics, provisional=settings.publish_provisional) for address in settings.publish]
-    return Asked(settings, ladder, osc, own_file.load(own_file.where(settings.own_gestures, os.environ)))
+    return Asked(
+        settings, ladder, outputs(settings, metrics), own_file.load(own_file.where(settings.own_gestures, os.environ))
+    )
 
 
 def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:

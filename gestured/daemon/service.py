@@ -64,7 +64,7 @@ class Service:
             gestures=self._gestures,
             changed=self._foresee,
         )
-        self._osc = asked.osc
+        self._outputs = asked.outputs
         self._views = Views(self._hub, self._state, self._foresee)
         self._foresee()
         self._publisher = Publisher(self._metrics, self._sinks())
@@ -116,7 +116,7 @@ class Service:
 
     def _sinks(self) -> tuple[Sink, ...]:
         """Where events go. Who acts on them comes before who looks on."""
-        return (self._clients, *self._osc, self._taps, self._views)
+        return (self._clients, *self._outputs, self._taps, self._views)
 
     def _hello(self) -> bytes:
         """The first line to a client."""
@@ -136,8 +136,8 @@ class Service:
         """Have the hub give provisional events where somebody asks for them now."""
         named, every = self._clients.foresees()
         named |= self._views.sensors
-        every = every or bool(self._settings.publish_provisional and self._osc)
-        self._hub.foresee(lambda sensor: every or sensor in named)
+        every = every or any(output.foresees for output in self._outputs)
+        self._hub.foresee(None if every else named)
 
     async def start(self) -> None:
         """Take what needs a loop that turns: the operators' connections."""
@@ -198,8 +198,8 @@ class Service:
         self._control.close()
         self._desk.take(self._hub.flush(time.monotonic()))
         await self._clients.close(DRAIN_S)
-        for sink in self._osc:
-            sink.close()
+        for output in self._outputs:
+            output.close()
         if self._http is not None:
             self._http.close()
         log.info("ended")
@@ -218,9 +218,9 @@ class Service:
         self._desk.take(self._hub.change(scene_of(settings, ladder), ladder, time.monotonic()))
         if self._gestures() != before:
             self._clients.tell(messages.gestures_json(self._gestures()))
-        for sink in self._osc:
-            sink.close()
-        self._osc = asked.osc
+        for output in self._outputs:
+            output.close()
+        self._outputs = asked.outputs
         self._publisher.sinks = self._sinks()
         self._foresee()
         log.info("reloaded", model=ladder.active)

@@ -8,6 +8,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Provisional, Status,
 from gestured.core.reading import SILENT
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
+from gestured.daemon.settings import Settings
 from gestured.daemon.sockets import resolve
 
 
@@ -20,6 +21,21 @@ class Sink(Protocol):
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
         """Deliver or count; never block, never raise."""
         ...
+
+
+class Output(Sink, Protocol):
+    """A sink that the configuration names; a reload replaces it."""
+
+    foresees: bool  # whether it wants provisional events
+
+    def close(self) -> None:
+        """Nothing more will come."""
+        ...
+
+
+def outputs(settings: Settings, metrics: Metrics) -> list[Output]:
+    """All that a configuration names. Looks up names of hosts, which may take long."""
+    return [OscSink(address, metrics, provisional=settings.publish_provisional) for address in settings.publish]
 
 
 class OscSink:
@@ -39,7 +55,7 @@ class OscSink:
         self._metrics, self._throttle = metrics, Throttle()
         self._socket: socket.socket | None = None
         self._connected = False
-        self._provisional = provisional
+        self.foresees = provisional
         self._said: dict[str, Provisional] = {}  # by sensor, until its answer
         try:
             family, self._where = resolve(destination, socket.SOCK_DGRAM)  # once: a look-up may block for seconds
@@ -54,7 +70,7 @@ class OscSink:
         """
         if isinstance(event, Gesture | Unknown | Cancelled):
             self._judge(event)
-        if isinstance(event, Provisional) and self._provisional:
+        if isinstance(event, Provisional) and self.foresees:
             self._said[event.sensor] = event
             said = (event.gesture, event.confidence, event.id)
             self._send(self._out.message(f"/gestured/{event.sensor}/provisional", "sfi", said).dgram)

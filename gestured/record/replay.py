@@ -165,7 +165,7 @@ class Replay:
             self._hub = Hub(dataclasses.replace(scene, frames=True), classifier)
         except ValueError as error:
             raise RecordingError(str(error)) from None
-        self._hub.foresee(lambda sensor: provisional)
+        self._hub.foresee(None if provisional else ())
         self.played: dict[str, Played] = {}
         self._start = tape.packets[0].t_ns if tape.packets else 0
         self.epoch = self._start / 1e9

@@ -447,14 +447,14 @@ def test_only_sensors_that_somebody_asks_for_cost_a_run() -> None:
     hub = Hub(SCENE, seer)
     for name in ("before", "other"):
         feed(hub, name, Hand().idle(2.0), 0.0)
-    hub.foresee(lambda sensor: sensor in ("before", "after"))
+    hub.foresee(("before", "after"))
     assert hub.foreseen("after") and not hub.foreseen("other")
     for name in ("before", "after", "other"):
         hand = Hand()
         facts = feed(hub, name, [*hand.idle(2.0), *hand.swipe("left"), *hand.idle(1.0)], 10.0)
         assert any(isinstance(fact, Provisional) for fact in facts) == (name != "other")
     looked = len(seer.looked)
-    hub.foresee(lambda sensor: False)
+    hub.foresee(())
     assert not any(isinstance(fact, Provisional) for fact in feed(hub, "before", hand.swipe("left"), 20.0))
     assert len(seer.looked) == looked > 0
 
@@ -462,7 +462,7 @@ def test_only_sensors_that_somebody_asks_for_cost_a_run() -> None:
 @pytest.mark.parametrize("how", ["reload", "no longer asked", "bug"])
 def test_what_was_said_is_judged_whatever_happens_meanwhile(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
     hub, hand = Hub(SCENE, Seer()), Hand()
-    hub.foresee(lambda sensor: True)
+    hub.foresee(None)
     swipe = hand.swipe("left")
     facts = feed(hub, "arm", [*hand.idle(2.0), *swipe[:-2]], 0.0)
     assert names([fact for fact in facts if isinstance(fact, Event)]) == ["onset", "left?"]
@@ -470,7 +470,7 @@ def test_what_was_said_is_judged_whatever_happens_meanwhile(how: str, monkeypatc
     if how == "reload":
         hub.change(replace(SCENE, thresholds={"left": 0.1}), Seer(), now)
     elif how == "no longer asked":
-        hub.foresee(lambda sensor: False)
+        hub.foresee(())
     else:
         monkeypatch.setattr("gestured.core.front_end.FrontEnd.push", lambda *_: 1 / 0)
     facts = feed(hub, "arm", [*swipe[-2:], *hand.idle(1.0)], now)

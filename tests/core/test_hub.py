@@ -157,7 +157,7 @@ def test_when_time_is_looked_at_changes_no_event(seed: int, clock: Literal["arri
 
     def events(looks: int) -> list[Event]:
         hub, found, before = Hub(replace(SCENE, clock=clock, gestures=Early.gestures), Early()), list[object](), 0.0
-        hub.foresee(lambda sensor: asked)
+        hub.foresee(None if asked else ())
         for t, packets in come:
             for at in sorted(rng.uniform(before, t, looks)):
                 found += hub.tick(at)
