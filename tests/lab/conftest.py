@@ -1,18 +1,38 @@
-"""What the lab's tests share."""
+"""What the lab's tests share. Without the packages of the extra [lab], most of them are left out."""
 
 from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
+
+from gestured.lab.cli import LAB_PACKAGES
+
+MISSING = [package for package in LAB_PACKAGES if find_spec(package) is None]
+NEED_NO_LAB = {"recordings", "test_ahead.py", "test_cli.py", "test_dataset.py", "test_digest.py", "test_taps.py"}
+
+
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    """Whether a test file or a folder of them cannot be imported here."""
+    inside = collection_path.relative_to(Path(__file__).parent).parts
+    return True if MISSING and inside and inside[0] not in NEED_NO_LAB else None
+
+
+@pytest.fixture
+def lab() -> None:
+    """For a test that needs the extra [lab] among others that do not."""
+    if MISSING:
+        pytest.skip(f"needs of the extra [lab]: {', '.join(MISSING)}")
 
 
 @pytest.fixture(autouse=True, scope="session")
 def one_thread() -> Iterator[None]:
     """Nets this small are slower on several threads, above all where something else computes."""
-    try:
-        import torch
-    except ImportError:
+    if "torch" in MISSING:
         yield
         return
+    import torch
+
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     yield

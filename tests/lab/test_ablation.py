@@ -1,9 +1,6 @@
 """The ablation compares what it says it compares: as many takes, the kind left out, equally many wrong."""
 
 import numpy as np
-import pytest
-
-pytest.importorskip("torch", reason="needs the extra [lab]")
 
 from gestured.lab.adapt.judging import Answers
 from gestured.lab.dataset import from_take

@@ -4,9 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-
-torch = pytest.importorskip("torch", reason="needs the extra [lab]")
-
+import torch
 from torch import Tensor
 
 from gestured.core.measures import ACTIVE

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gestured.lab import cli, progress
+from gestured.lab import progress
 from gestured.lab.cli import main, parser
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
@@ -76,11 +76,10 @@ def test_arguments_that_mean_nothing_are_usage_errors(line: str, capsys: pytest.
         *((f"{command} --real nowhere", "--real: nowhere is no folder") for command in ("train", "evaluate", "study")),
     ],
 )  # fmt: skip
+@pytest.mark.usefixtures("lab")
 def test_what_no_command_can_work_with_is_named(
     line: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for package in cli.LAB_PACKAGES:
-        pytest.importorskip(package, reason="needs the extra [lab]")
     monkeypatch.chdir(tmp_path)
     assert main(line.split()) == 1
     assert capsys.readouterr().err == f"gestured-lab: {reason}\n"
@@ -88,11 +87,10 @@ def test_what_no_command_can_work_with_is_named(
 
 
 @pytest.mark.parametrize("flag", ["--out", "--cache"])
+@pytest.mark.usefixtures("lab")
 def test_a_folder_that_cannot_be_made_is_named_before_anything_is_simulated(
     flag: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for package in cli.LAB_PACKAGES:
-        pytest.importorskip(package, reason="needs the extra [lab]")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").write_text("a file")
     assert main(["train", flag, "taken"]) == 1
@@ -138,12 +136,11 @@ def kinds_of(arguments: Sequence[object]) -> list[str]:
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
+@pytest.mark.usefixtures("lab")
 def test_train_makes_three_models_and_evaluate_their_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Everything that `train` does, with a plan much smaller than --quick, in one process."""
-    for package in cli.LAB_PACKAGES:
-        pytest.importorskip(package, reason="needs the extra [lab]")
     from gestured.lab import train, unseen
     from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
     from gestured.lab.fit import FitConfig

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("torch", reason="needs the extra [lab]")
-
 from gestured.lab.early import CONFIRMED, STRETCHES, Asked, calibrated, chance_of, events
 
 GESTURES = ("swipe_up", "swipe_down")

@@ -3,10 +3,6 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("torch", reason="needs the extra [lab]")
-pytest.importorskip("sklearn", reason="needs the extra [lab]")
-pytest.importorskip("onnx", reason="needs the extra [lab]")
-
 from gestured.lab.evaluate import Evaluation, outcome
 
 THREE = np.eye(3, dtype=np.float32)

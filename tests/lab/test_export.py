@@ -10,13 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
-
-torch = pytest.importorskip("torch", reason="needs the extra [lab]")
-pytest.importorskip("onnx", reason="needs the extra [lab]")
-pytest.importorskip("sklearn", reason="needs the extra [lab]")
-
 import onnx
+import pytest
+import torch
 from sklearn.ensemble import RandomForestClassifier
 from torch import Tensor, nn
 

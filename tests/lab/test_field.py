@@ -3,9 +3,6 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("torch", reason="needs the extra [lab]")
-pytest.importorskip("sklearn", reason="needs the extra [lab]")
-
 from gestured.lab.early import Asked
 from gestured.lab.field import Contacts, calimera, probability_threshold
 

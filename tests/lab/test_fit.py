@@ -7,11 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-torch = pytest.importorskip("torch", reason="needs the extra [lab]")
-pytest.importorskip("sklearn", reason="needs the extra [lab]")
-pytest.importorskip("onnx", reason="needs the extra [lab]")
-
+import torch
 from torch import nn
 
 from gestured.lab import fit, train

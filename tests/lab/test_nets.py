@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-
-torch = pytest.importorskip("torch", reason="needs the extra [lab]")
-
+import torch
 from torch import Tensor, nn
 
 from gestured.core.measures import ACTIVE

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-torch = pytest.importorskip("torch", reason="needs the extra [lab]")
+import torch
 
 from gestured.core.frames import Segment
 from gestured.lab.dataset import STREAMS, cuts

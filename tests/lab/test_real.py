@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("torch")
-
 from gestured.lab import train
 from gestured.lab.evaluate import outcome
 from gestured.lab.fit import targets

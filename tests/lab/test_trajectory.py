@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-
-torch = pytest.importorskip("torch", reason="needs the extra [lab]")
-
+import torch
 from torch import Tensor
 
 from gestured.lab.trajectory import PATCH, PATH_POINTS, trajectory_features

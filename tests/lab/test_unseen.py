@@ -4,11 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip("torch", reason="needs the extra [lab]")
-pytest.importorskip("sklearn", reason="needs the extra [lab]")
-pytest.importorskip("onnx", reason="needs the extra [lab]")
-
 import torch
 
 from gestured.lab.augment import symmetry_table, turned

@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("torch")
-
 from gestured.lab.adapt import command
 from gestured.lab.cli import main
 from gestured.lab.own import command as own

@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("torch")
-
 from gestured.core.errors import GesturedError
 from gestured.lab.adapt.learning import OTHER, classes_of
 from gestured.lab.adapt.material import held_out, own_recordings

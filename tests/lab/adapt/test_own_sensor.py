@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("torch")
-
 from gestured.control.cli import main as gesturectl
 from gestured.lab.adapt import command
 from gestured.lab.cli import main as lab

@@ -4,8 +4,6 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("torch")
-
 from gestured.lab.adapt.adaptation import Adapted, Settled
 from gestured.lab.adapt.judging import Shares
 

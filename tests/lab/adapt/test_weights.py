@@ -6,9 +6,7 @@ from pathlib import Path
 import numpy as np
 import onnx
 import pytest
-
-torch = pytest.importorskip("torch")
-
+import torch
 from onnx import numpy_helper
 
 from gestured.core.errors import ModelError

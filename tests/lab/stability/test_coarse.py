@@ -5,8 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("torch", reason="needs the extra [lab]")
-
 from gestured.lab.stability import coarse
 from gestured.lab.stability.path import simulated_series
 from gestured.model.opening import open_model

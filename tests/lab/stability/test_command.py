@@ -7,11 +7,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("torch", reason="needs the extra [lab]")
-pytest.importorskip("onnx", reason="needs the extra [lab]")
-pytest.importorskip("sklearn", reason="needs the extra [lab]")
-pytest.importorskip("mpmath", reason="needs the extra [lab]")
-
 from gestured.lab.stability import command
 from gestured.lab.stability.table import Table
 

@@ -5,9 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("torch", reason="needs the extra [lab]")
-pytest.importorskip("onnx", reason="needs the extra [lab]")
-
 from gestured.lab.stability import denormals, exactness
 from gestured.lab.stability.ways import by_reference
 from gestured.model.shipped import LADDER, shipped

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("torch", reason="needs the extra [lab]")
-
 from gestured.core.classifier import Scores
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Segment

@@ -4,10 +4,6 @@ import math
 from xml.etree import ElementTree
 
 import numpy as np
-import pytest
-
-pytest.importorskip("matplotlib", reason="needs the extra [lab]")
-pytest.importorskip("jinja2", reason="needs the extra [lab]")
 
 from gestured.lab.stability.figure import svg
 from gestured.lab.stability.textbook import Point, points

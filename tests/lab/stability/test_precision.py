@@ -5,10 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-torch = pytest.importorskip("torch")
-pytest.importorskip("onnx")
-pytest.importorskip("sklearn")
+import torch
 
 from gestured.lab.nets import CnnLstm
 from gestured.lab.stability import precision

@@ -7,8 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-pytest.importorskip("mpmath", reason="needs the extra [lab]")
-
 from gestured.lab.stability.filters import FILTERS, Filter
 from gestured.lab.stability.relaxation import DECADES, error, exact
 from gestured.lab.stability.textbook import points

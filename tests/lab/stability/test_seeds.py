@@ -4,9 +4,6 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("torch", reason="needs the extra [lab]")
-pytest.importorskip("sklearn", reason="needs the extra [lab]")
-
 from gestured.lab.stability.seeds import seeds_table
 
 

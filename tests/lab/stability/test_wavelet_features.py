@@ -5,10 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("torch", reason="needs the extra [lab]")
-pytest.importorskip("mpmath", reason="needs the extra [lab]")
-pytest.importorskip("pywt", reason="needs the extra [lab]")
-
 from gestured.lab.stability import wavelet_features
 from gestured.lab.stability.wavelet_features import exact_features, features_of, wavelets_table
 from tests.lab.made import gestures

@@ -1,13 +1,8 @@
 """The ways to run a shipped model agree; and the references are what they claim to be."""
 
 import numpy as np
-import pytest
-
-pytest.importorskip("torch", reason="needs the extra [lab]")
-pytest.importorskip("onnx", reason="needs the extra [lab]")
-pytest.importorskip("sklearn", reason="needs the extra [lab]")
-
 import onnx
+import pytest
 from onnx import TensorProto
 
 from gestured.lab.adapt.weights import base_of

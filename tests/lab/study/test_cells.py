@@ -7,10 +7,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("torch")
-pytest.importorskip("pywt")
-
 from joblib import Parallel
 
 from gestured.core.errors import GesturedError

@@ -4,11 +4,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-pytest.importorskip("matplotlib", reason="needs the extra [lab]")
-pytest.importorskip("jinja2", reason="needs the extra [lab]")
-
 from gestured.lab.study.report.page import write_report
 from tests.lab.study.made_study import small_study
 

@@ -6,9 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("torch")
-pytest.importorskip("pywt")
-
 from gestured.core.errors import GesturedError
 from gestured.lab.study import cells
 from gestured.lab.study.material import Data

@@ -7,9 +7,6 @@ from xml.etree import ElementTree
 
 import pytest
 
-pytest.importorskip("torch")
-pytest.importorskip("matplotlib", reason="needs the extra [lab]")
-
 from gestured.core.errors import GesturedError
 from gestured.lab import cli
 from gestured.lab.digest import file_digest

@@ -5,9 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("torch")
-pytest.importorskip("pywt")
-
 from gestured.lab.study.bootstrap import interval
 from gestured.lab.study.material import JUDGE, SHIFT, UNCHANGED, WIDE, Data
 from gestured.lab.study.methods import METHODS

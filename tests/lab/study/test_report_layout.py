@@ -10,9 +10,6 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("matplotlib", reason="needs the extra [lab]")
-pytest.importorskip("jinja2", reason="needs the extra [lab]")
-
 from gestured.lab.study.report.page import write_report
 from tests.lab.study.made_study import empty_study, made_study
 

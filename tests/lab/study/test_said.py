@@ -1,9 +1,5 @@
 """When the model that ships says what, and how often it is wrong: answers, and what it says before them."""
 
-import pytest
-
-pytest.importorskip("torch")
-
 from gestured.lab.study.said import said
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped

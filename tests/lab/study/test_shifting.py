@@ -1,11 +1,8 @@
 """Algorithm 1: where its copies lie, and when a copy is the gesture itself."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-pytest.importorskip("torch")
 
 from gestured.lab.study.shifting import EDGES, bounding_box, copies, shifted, shifts
 from tests.lab.study.material_made import samples

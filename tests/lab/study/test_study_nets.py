@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-
-torch = pytest.importorskip("torch")
-
+import torch
 from sklearn.ensemble import HistGradientBoostingClassifier
 
 from gestured.lab.study import onnx_form, training

@@ -6,9 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("torch")
-pytest.importorskip("pywt")
-
 from gestured.lab import cli
 from gestured.lab.dataset import TRIALS
 from gestured.lab.study.methods import METHODS

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-
-pytest.importorskip("torch")
-pywt = pytest.importorskip("pywt")
+import pywt
+from scipy import stats
+from sklearn.svm import SVC
 
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.motion_history import motion_history
@@ -59,17 +59,15 @@ def test_touch_patterns_are_the_papers() -> None:
 
 
 def test_a_vector_machine_with_a_finished_kernel_answers_as_scikit_learns() -> None:
-    svm = pytest.importorskip("sklearn.svm")
     rng = np.random.default_rng(1)
     x, y = rng.normal(size=(120, 40)), rng.integers(0, 4, 120)
     x[np.arange(120), y] += 2.0
-    ours, theirs = VectorMachine(8.0, 0.01).fit(x[:80], y[:80]), svm.SVC(C=8.0, gamma=0.01).fit(x[:80], y[:80])
+    ours, theirs = VectorMachine(8.0, 0.01).fit(x[:80], y[:80]), SVC(C=8.0, gamma=0.01).fit(x[:80], y[:80])
     assert np.array_equal(ours.predict(x), theirs.predict(x))
     assert np.allclose(ours.decision_function(x), theirs.decision_function(x), atol=1e-3)
 
 
 def test_statistics_against_a_second_opinion() -> None:
-    stats = pytest.importorskip("scipy.stats")
     band = np.random.default_rng(0).normal(size=(30, 5)) ** 3
     found = band_statistics(band)
     expected = [np.abs(band).sum(0), np.linalg.norm(band, axis=0), stats.skew(band), stats.kurtosis(band), band.std(0)]
