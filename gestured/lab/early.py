@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gestured.core.measures import ACTIVE
 from gestured.lab.decide import Answers, confidence
 from gestured.lab.prefixes import floors
-from gestured.lab.samples import Samples
+from gestured.lab.samples import Samples, packed
 
 CONFIRMED = 0.97  # share of the events that the answer must confirm, in every stretch
 DOUBT = 0.1  # probability that a threshold is let through although it does not
@@ -176,8 +176,8 @@ def at_release(samples: Samples) -> Samples:
             part = window[: first + int(quiet[0]) + 1]
             window = part / max(float(part.max()), float(least[i]))
         windows.append(window.astype(np.float16))
-    ends = np.cumsum([0, *map(len, windows)]).astype(np.int64)
-    return replace(samples, frames=np.concatenate(windows), offsets=ends)
+    frames, offsets = packed(windows)
+    return replace(samples, frames=frames, offsets=offsets)
 
 
 def tap_threshold(answers: Answers, answer: NDArray[np.int64], person: NDArray[np.int64], tap: int) -> float | None:

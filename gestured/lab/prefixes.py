@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from gestured.core.measures import ACTIVE
-from gestured.lab.samples import WINDOW, Samples
+from gestured.lab.samples import OF_EACH, WINDOW, Samples, packed
 
 
 def askable(samples: Samples) -> NDArray[np.bool_]:
@@ -70,14 +70,6 @@ def prefixes(samples: Samples, chosen: NDArray[np.int64]) -> tuple[Samples, NDAr
             of.append(int(i))
             since.append(int(end) - int(samples.first[i]))
     index = np.array(of, np.int64)
-    lengths = [len(w) for w in windows]
-    return (
-        Samples(
-            np.concatenate(windows) if windows else samples.frames[:0],
-            np.concatenate([[0], np.cumsum(lengths, dtype=np.int64)]).astype(np.int64),
-            samples.labels[index], samples.kinds[index], samples.people[index], samples.strength[index],
-            samples.first[index], np.array(lengths, np.int64) - 1,
-        ),
-        index,
-        np.array(since, np.int64),
-    )  # fmt: skip
+    each = {name: getattr(samples, name)[index] for name in OF_EACH}
+    frames, offsets = packed(windows)
+    return Samples(frames, offsets, **each | {"last": np.diff(offsets) - 1}), index, np.array(since, np.int64)

@@ -48,12 +48,7 @@ class Samples:
         """The chosen samples, in that order."""
         index = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
         parts = [self.frames[self.offsets[i] : self.offsets[i + 1]] for i in index]
-        return Samples(
-            np.concatenate(parts) if parts else self.frames[:0],
-            np.concatenate([[0], np.cumsum([len(p) for p in parts], dtype=np.int64)]).astype(np.int64),
-            self.labels[index], self.kinds[index], self.people[index], self.strength[index],
-            self.first[index], self.last[index],
-        )  # fmt: skip
+        return Samples(*packed(parts), *(getattr(self, name)[index] for name in OF_EACH))
 
     def digest(self) -> str:
         """SHA-256 over everything."""
@@ -67,6 +62,15 @@ class Samples:
         ):
             total.update(np.ascontiguousarray(array).tobytes())
         return total.hexdigest()
+
+
+OF_EACH = Samples.__slots__[2:]  # the fields (G,)
+
+
+def packed(windows: Sequence[NDArray[np.float16]]) -> tuple[NDArray[np.float16], NDArray[np.int64]]:
+    """Windows (T, R, C) one after the other, (N, R, C), and where each begins and the last one ends, (G + 1,)."""
+    frames = np.concatenate(windows) if windows else np.zeros((0, WINDOW.rows, WINDOW.columns), np.float16)
+    return frames, np.cumsum([0, *map(len, windows)], dtype=np.int64)
 
 
 class Sample(NamedTuple):
@@ -93,10 +97,8 @@ def sample(segment: Segment, label: str, kind: str, person: int, window: Window 
 def collect(samples: Iterable[Sample]) -> Samples:
     """Put single samples together."""
     found = list(samples)
-    frames = [s[0] for s in found]
     return Samples(
-        np.concatenate(frames) if frames else np.zeros((0, WINDOW.rows, WINDOW.columns), np.float16),
-        np.concatenate([[0], np.cumsum([len(f) for f in frames])]).astype(np.int64),
+        *packed([s[0] for s in found]),
         np.array([s[1] for s in found], dtype="U40"),
         np.array([s[2] for s in found], dtype="U40"),
         np.array([s[3] for s in found], dtype=np.int64),
@@ -113,10 +115,5 @@ def join(parts: Sequence[Samples]) -> Samples:
     return Samples(
         np.concatenate([p.frames for p in parts]),
         np.concatenate([*offsets, starts[-1:]]).astype(np.int64),
-        np.concatenate([p.labels for p in parts]),
-        np.concatenate([p.kinds for p in parts]),
-        np.concatenate([p.people for p in parts]),
-        np.concatenate([p.strength for p in parts]),
-        np.concatenate([p.first for p in parts]),
-        np.concatenate([p.last for p in parts]),
+        *(np.concatenate([getattr(p, name) for p in parts]) for name in OF_EACH),
     )

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.lab.samples import Samples
+from gestured.lab.samples import OF_EACH, Samples
 
 THRESHOLD = 0.2  # of the gesture's peak
 EDGES = ("top", "bottom", "left", "right")
@@ -74,11 +74,6 @@ def copies(samples: Samples, threshold: float = THRESHOLD) -> Copies:
     made = Samples(
         frames.reshape(-1, *frames.shape[2:]),
         np.append(starts, edges * samples.offsets[-1]).astype(np.int64),
-        np.tile(samples.labels, edges),
-        np.tile(samples.kinds, edges),
-        np.tile(samples.people, edges),
-        np.tile(samples.strength, edges),
-        np.tile(samples.first, edges),
-        np.tile(samples.last, edges),
+        *(np.tile(getattr(samples, name), edges) for name in OF_EACH),
     )
     return Copies(made, np.tile(np.arange(count), edges), same.ravel())

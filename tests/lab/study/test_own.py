@@ -13,24 +13,12 @@ from gestured.lab.study.own import own
 from gestured.lab.study.protocols import Task
 from gestured.record.arrays import write
 from gestured.record.recordings import Recordings
-from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
+from tests.lab.adapt.recorded import cut_gestures
 
 
-def recordings(people: tuple[str, ...], labels: tuple[str, ...] = ("swipe_up", "one_tap")) -> Recordings:
-    """One simulated performance of each gesture by each person, as a collector writes them."""
-    takes = [
-        gesture_take(label, Participant(7 + k), SimulatedSensor.nominal(day=7 + k), generator(5, k, n))
-        for k in range(len(people)) for n, label in enumerate(labels)
-    ]  # fmt: skip
-    return Recordings(
-        np.concatenate([t.frames for t in takes]),
-        np.concatenate([t.times for t in takes]),
-        np.concatenate([[0], np.cumsum([len(t.frames) for t in takes])]).astype(np.int64),
-        np.array([t.label for t in takes]),
-        np.repeat(people, len(labels)),
-        onsets=np.array([np.searchsorted(t.times, t.events[0].onset_s) for t in takes]),
-        releases=np.array([np.searchsorted(t.times, t.events[0].offset_s) for t in takes]),
-    )
+def recordings(people: tuple[str, ...]) -> Recordings:
+    """A swipe and a tap of each person, as a collector writes them."""
+    return cut_gestures(people, ("swipe_up", "one_tap"))
 
 
 def test_one_name_is_one_participant_across_files(tmp_path: Path) -> None:
