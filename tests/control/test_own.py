@@ -29,9 +29,9 @@ def sensor(daemon: Daemon) -> Performer:
     return ready(daemon)
 
 
-def begun(start, daemon: Daemon, *flags: object):
+def begun(start, daemon: Daemon, *flags: object, sensor: str = "armrest"):
     """`gesturectl enrol slash`, once the daemon waits for examples."""
-    process = start("enrol", "slash", "--sensor", "armrest", *flags, "--control", daemon.ready["control"])
+    process = start("enrol", "slash", "--sensor", sensor, *flags, "--control", daemon.ready["control"])
     status = daemon.client().subscribe("status")
     while ask(daemon, "gestures")["own"]["enrolling"] is None:
         status.line()
@@ -96,10 +96,7 @@ def test_a_tape_holds_the_own_gestures_and_replays_to_the_same_events(
     start, ctl, daemon: Daemon, recorded, capsys: pytest.CaptureFixture[str]
 ) -> None:
     teacher = ready(daemon, "teacher")
-    process = start("enrol", "slash", "--sensor", "teacher", "--examples", 1, "--control", daemon.ready["control"])
-    status = daemon.client().subscribe("status")
-    while ask(daemon, "gestures")["own"]["enrolling"] is None:
-        status.line()
+    process = begun(start, daemon, "--examples", 1, sensor="teacher")
     teacher.slash()
     assert process.wait(30) == 0
 

@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,8 +11,7 @@ from gestured.client.score import Performed
 from gestured.control.cli import main
 from gestured.control.tuning import THRESHOLDS, Counts, Played, counted, for_each, proposed
 from gestured.record.arrays import write
-from gestured.record.recordings import Recordings
-from gestured.simulator import Participant, SimulatedSensor, generator, session
+from tests.lab.adapt.recorded import whole_session
 
 NAMES = ("one_tap", "swipe_left", "swipe_right")
 
@@ -68,29 +66,22 @@ def test_without_gestures_the_lowest_that_is_quiet_enough_is_proposed() -> None:
     assert proposed(rows, played, 3.0, 0.5).threshold == 0.75
 
 
-def recorded(path: Path) -> Path:
-    made = session(Participant(805), SimulatedSensor.nominal(day=5), generator(5, 5), 60.0, 0.2)
-    acts = made.events
-    write(path, Recordings(
-        frames=made.frames, times=made.times, offsets=np.array([0, len(made.times)]), labels=np.array(["session"]),
-        subjects=np.array(["07"]), event_recording=np.zeros(len(acts), np.int64),
-        event_labels=np.array([act.label for act in acts]), event_kinds=np.array([act.kind for act in acts]),
-        event_onsets=np.array([act.onset_s for act in acts]),
-        event_offsets=np.array([min(act.offset_s, float(made.times[-1])) for act in acts]),
-    ))  # fmt: skip
+@pytest.fixture
+def recorded(tmp_path: Path) -> Path:
+    path = tmp_path / "07.npz"
+    write(path, whole_session("07"))
     return path
 
 
 def test_a_labelled_session_gives_a_table_a_picture_and_settings(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = recorded(tmp_path / "07.npz")
-    assert main(["tune", str(path)]) == 0
+    assert main(["tune", str(recorded)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
     assert sum(line.lstrip().startswith("0.") for line in lines) == len(THRESHOLDS)
     assert any(line.startswith("gestures.swipe_left.threshold = 0.") for line in lines)
-    assert main(["tune", str(path), "--json"]) == 0
+    assert main(["tune", str(recorded), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     rows = found["thresholds"]
     assert [row["threshold"] for row in rows] == list(THRESHOLDS)
@@ -99,14 +90,15 @@ def test_a_labelled_session_gives_a_table_a_picture_and_settings(
     assert found["gestures"] >= 10 and rows[0]["right"] >= 0.8 * found["gestures"]
 
 
-def test_what_cannot_be_tuned_on_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_cannot_be_tuned_on_is_one_sentence(
+    recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "text.npz").write_text("no recording")
-    path = recorded(tmp_path / "07.npz")
     for arguments, reason in (
         ([tmp_path / "text.npz"], "text.npz: cannot be read as a recording"),
         ([tmp_path / "none.mcap"], "none.mcap"),
-        ([path, "--wrong-costs", "0"], "--wrong-costs 0: expected"),
-        ([path, "--model", "nobody"], "nobody: no shipped model"),
+        ([recorded, "--wrong-costs", "0"], "--wrong-costs 0: expected"),
+        ([recorded, "--model", "nobody"], "nobody: no shipped model"),
     ):
         assert main(["tune", *map(str, arguments)]) == 1
         err = capsys.readouterr().err
