@@ -4,48 +4,46 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 
 from gestured.client import program
-from gestured.control import (
-    check,
-    demo,
-    doctor,
-    export,
-    flag,
-    listen,
-    names,
-    operate,
-    own,
-    record,
-    replay,
-    shadow,
-    simulate,
-    sniff,
-    status,
-    tune,
-    view,
-    watch,
-)
 
+# Which function of which module adds which subcommands: only the module of the one that runs is imported.
 SUBCOMMANDS = (
-    *(status.add, listen.add, view.add, watch.add, doctor.add, sniff.add),
-    *(operate.add_reload, operate.add_recalibrate, shadow.add, operate.add_emit),
-    own.add,
-    *(record.add, flag.add, replay.add, export.add, tune.add),
-    *(simulate.add, check.add, names.add, demo.add),
+    ("status", "add", ("status",)),
+    ("listen", "add", ("listen",)),
+    ("view", "add", ("view",)),
+    ("watch", "add", ("watch",)),
+    ("doctor", "add", ("doctor",)),
+    ("sniff", "add", ("sniff",)),
+    ("operate", "add_reload", ("reload",)),
+    ("operate", "add_recalibrate", ("recalibrate",)),
+    ("shadow", "add", ("shadow",)),
+    ("operate", "add_emit", ("emit",)),
+    ("own", "add", ("enrol", "gestures", "forget")),
+    ("record", "add", ("record",)),
+    ("flag", "add", ("flag",)),
+    ("replay", "add", ("replay",)),
+    ("export", "add", ("export",)),
+    ("tune", "add", ("tune",)),
+    ("simulate", "add", ("simulate",)),
+    ("check", "add", ("check",)),
+    ("names", "add", ("names",)),
+    ("demo", "add", ("demo",)),
 )
 
 
-def parser() -> program.Parser:
-    """The whole command line; each subcommand adds itself and sets `run`."""
+def parser(argv: Sequence[str] = ()) -> program.Parser:
+    """The command line, as far as these arguments need it; each subcommand adds itself and sets `run`."""
     top, commands = program.program(
         "gesturectl",
         "COMMAND",
         description="The operator's client of gestured.",
         epilog="example: gesturectl listen --socket /run/gestured/events.sock",
     )
-    for add in SUBCOMMANDS:
-        add(commands)
+    asked = [row for row in SUBCOMMANDS if argv and argv[0] in row[2]]
+    for module, add, _ in asked or SUBCOMMANDS:
+        getattr(import_module(f"gestured.control.{module}"), add)(commands)
     return top
 
 
@@ -54,7 +52,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without block characters shows question marks
     try:
-        status = program.run(parser(), argv)
+        given = sys.argv[1:] if argv is None else argv
+        status = program.run(parser(given), given)
         sys.stdout.flush()
         return status
     except BrokenPipeError:  # the reader of our output has gone, as `head` does

@@ -1,0 +1,31 @@
+"""gesturectl as a whole: each subcommand is there, and one does not load what only others need."""
+
+import subprocess
+import sys
+
+import pytest
+
+from gestured.control.cli import SUBCOMMANDS, parser
+
+HEAVY = ("pythonosc", "onnxruntime", "gestured.simulator", "gestured.model", "gestured.record")
+
+
+def named(argv: list[str]) -> tuple[str, ...]:
+    """The subcommands that these arguments can reach."""
+    (group,) = (action for action in parser(argv)._subparsers._group_actions)  # type: ignore[union-attr]
+    return tuple(group.choices or ())
+
+
+def test_the_table_names_what_its_modules_add():
+    every = named([])
+    assert every == tuple(name for _, _, names in SUBCOMMANDS for name in names)
+    for _, _, names in SUBCOMMANDS:
+        assert all(named([name, "--json"]) == names for name in names)
+    assert named(["nonsense"]) == named(["--version"]) == every
+
+
+@pytest.mark.parametrize("words", [["reload"], ["status", "--json"], ["listen"], ["gestures"]])
+def test_a_command_that_asks_a_daemon_loads_no_simulator_and_no_model(words: list[str]):
+    code = "import sys; from gestured.control.cli import parser; parser(sys.argv[1:]); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True)
+    assert [name for name in done.stdout.split() if name.startswith(HEAVY)] == []
