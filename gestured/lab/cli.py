@@ -15,7 +15,6 @@ from gestured.lab.recordings.flags import add_recordings
 
 CACHE = Path(".cache/lab")
 MODELS = Path("models")
-REAL_FOLDER = Path("../shared/data")
 LAB_PACKAGES = ("torch", "sklearn", "onnx", "mpmath", "pywt", "jinja2", "matplotlib")
 # The module whose `run` each command is, imported when it is asked for: some need seconds, or what others do not.
 PROGRAMS = {
@@ -60,8 +59,8 @@ def parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--real",
             type=Path,
-            default=REAL_FOLDER,
-            help=f"folder of the real recordings; left out where it is not ({REAL_FOLDER})",
+            metavar="FOLDER",
+            help="folder of real recordings, as docs/training.md has it (default: simulated people alone)",
         )
 
     mine: dict[str, Any] = {"type": Path, "nargs": "+", "default": [], "metavar": "FILE"}
@@ -170,7 +169,7 @@ def _check(args: argparse.Namespace) -> None:
     """GesturedError for what no command can work with."""
     if "jobs" in args and args.jobs < 1:
         raise GesturedError(f"--jobs: expected 1 or more, found {args.jobs}")
-    if "real" in args and args.real != REAL_FOLDER and not args.real.is_dir():
+    if getattr(args, "real", None) is not None and not args.real.is_dir():
         raise GesturedError(f"--real: {args.real} is no folder")
 
 

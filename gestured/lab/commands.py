@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _plan(args: argparse.Namespace) -> tuple[TrainingPlan, Path | None]:
     torch.set_num_threads(args.jobs)
-    return (TrainingPlan.quick() if args.quick else TrainingPlan()), args.real if args.real.is_dir() else None
+    return (TrainingPlan.quick() if args.quick else TrainingPlan()), args.real
 
 
 def train_models(args: argparse.Namespace) -> int:

@@ -24,15 +24,14 @@ REAL_NAME = "CapFingerId, development subjects: a capacitive touchscreen, no tex
 FEWEST = 2  # participants without whom nothing can be held out
 
 
-def real(folder: Path, of_each: int | None) -> tuple[Samples, dict[str, Any]] | None:
+def real(folder: Path | None, of_each: int | None) -> tuple[Samples, dict[str, Any]] | None:
     """Gestures of the real development recordings (at most `of_each` a subject) and what they are; None without them.
 
     Only the file of cut gestures: the whole sessions hold the same touches again.
     """
-    path = folder / REAL_FILES[0]
-    if not path.exists():
+    if folder is None or not (folder / REAL_FILES[0]).exists():
         return None
-    found = read(path)
+    found = read(folder / REAL_FILES[0])
     if of_each is not None:
         gestures = np.flatnonzero(found.labels != NONE)
         first = [gestures[found.subjects[gestures] == s][:of_each] for s in np.unique(found.subjects)]

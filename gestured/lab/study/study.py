@@ -85,7 +85,7 @@ def _kept(path: Path) -> dict[str, Any]:
 
 
 def compute(
-    plan: Plan, schedule: Schedule, folder: Path, recordings: Sequence[Path], others: Path | None = None
+    plan: Plan, schedule: Schedule, folder: Path | None, recordings: Sequence[Path], others: Path | None = None
 ) -> dict[str, Any]:
     """Everything that study.json holds; `others` are recordings that judge and teach nothing."""
     start = time.monotonic()
