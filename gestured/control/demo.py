@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, nullcontext, suppress
-from dataclasses import replace
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen
 
@@ -22,7 +21,7 @@ from gestured.client.say import say, say_drawn, say_json
 from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form, Sensor
 from gestured.client.stream import Stream
-from gestured.control.play import add_arguments, frames, play_from
+from gestured.control.play import add_arguments, frames, takes
 from gestured.control.screen import Felt, Screen, in_colour
 from gestured.control.show import as_dict, block, in_words
 from gestured.core.errors import GesturedError
@@ -58,10 +57,10 @@ def run(args: argparse.Namespace) -> int:
         raise GesturedError(f"--seconds {args.seconds:g}: expected 5 to 600")
     for signalled in (signal.SIGTERM, signal.SIGHUP):  # a closed terminal must not leave the daemon behind
         signal.signal(signalled, signal.default_int_handler)
-    play = replace(play_from(args), first="circle_clockwise")
-    ((_, take),) = play.takes(args.seconds)
+    ((_, take),) = takes(args, args.seconds, first="circle_clockwise")
+    rows, columns = args.grid
     show = Show(take, args.model, args.json)
-    with Engine(args.model, play.rows, play.columns) as engine:
+    with Engine(args.model, rows, columns) as engine:
         try:
             with (
                 Control(Path(engine.ready["control"])) as control,
@@ -72,8 +71,7 @@ def run(args: argparse.Namespace) -> int:
             ):
                 show.say(
                     f"The daemon listens on {engine.listen} with the model {engine.ready['model']}.",
-                    f"A simulated sensor of {play.rows} x {play.columns} taxels sends OSC to it "
-                    f"at {play.rate_hz:g} Hz.",
+                    f"A simulated sensor of {rows} x {columns} taxels sends OSC to it at {args.rate:g} Hz.",
                     *([f"In a browser it is seen at {address}"] if address else []),
                     "For two seconds nobody touches it. Ctrl-C ends.",
                     "",

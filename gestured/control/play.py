@@ -1,8 +1,8 @@
 """What the simulated sensor plays: a person who performs gesture after gesture, and the frames of it."""
 
 import argparse
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain, cycle
 
 from gestured.client.values import number, rows_by_columns, some_of
@@ -27,39 +27,28 @@ UNTOUCHED_S = 2.0  # untouched at first: the daemon learns the baseline
 BETWEEN_S = (1.0, 2.0)  # between performances
 
 
-@dataclass(frozen=True)
-class Play:
-    """Who performs what, on which sensor. The same play gives the same frames."""
+def takes(args: argparse.Namespace, seconds: float | None, first: str | None = None) -> Iterator[tuple[float, Take]]:
+    """(start, take) one after the other, `seconds` in all or without end; times in seconds from 0.
 
-    seed: int
-    participant: int
-    rate_hz: float
-    rows: int
-    columns: int
-    kinds: Sequence[str]  # in this order, again and again; none: at random
-    non_gestures: float  # share of what is performed at random
-    speed: str | None  # None: mixed
-    first: str | None = None  # what is performed before all else, where `kinds` does not say
+    The same flags give the same frames. `first` is performed before all else, where they do not name kinds.
+    """
+    start, part = 0.0, 0
+    while seconds is None or start < seconds:
+        length = PART_S if seconds is None else min(PART_S, seconds - start)
+        yield start, _take(args, part, length, first)
+        start, part = start + length + OFF_S, part + 1
 
-    def takes(self, seconds: float | None) -> Iterator[tuple[float, Take]]:
-        """(start, take) one after the other, `seconds` in all or without end; times in seconds from 0."""
-        start, part = 0.0, 0
-        while seconds is None or start < seconds:
-            length = PART_S if seconds is None else min(PART_S, seconds - start)
-            yield start, self._take(part, length)
-            start, part = start + length + OFF_S, part + 1
 
-    def _take(self, part: int, seconds: float) -> Take:
-        rng = generator(self.seed, 0xC7, self.participant, part)
-        nominal = SimulatedSensor.nominal(day=self.participant)
-        pitch = min(nominal.extent) / min(self.rows, self.columns)
-        sensor = replace(nominal, rows=self.rows, columns=self.columns, pitch_mm=pitch, rate_hz=self.rate_hz)
-        first = [self.first] if self.first else []
-        kinds = cycle(self.kinds) if self.kinds else chain(first, at_random(rng, self.non_gestures))
-        person = Participant(self.participant)
-        return session(
-            person, sensor, rng, seconds, idle_s=BETWEEN_S, kinds=kinds, lead_s=UNTOUCHED_S, speed=self.speed
-        )
+def _take(args: argparse.Namespace, part: int, seconds: float, first: str | None) -> Take:
+    rng = generator(args.seed, 0xC7, args.participant, part)
+    rows, columns = args.grid
+    nominal = SimulatedSensor.nominal(day=args.participant)
+    pitch = min(nominal.extent) / min(rows, columns)
+    sensor = replace(nominal, rows=rows, columns=columns, pitch_mm=pitch, rate_hz=args.rate)
+    at_first = [first] if first else []
+    kinds = cycle(args.kinds) if args.kinds else chain(at_first, at_random(rng, args.non_gestures))
+    person = Participant(args.participant)
+    return session(person, sensor, rng, seconds, idle_s=BETWEEN_S, kinds=kinds, lead_s=UNTOUCHED_S, speed=args.speed)
 
 
 def frames(start: float, take: Take) -> Iterator[tuple[int, Frame]]:
@@ -70,7 +59,7 @@ def frames(start: float, take: Take) -> Iterator[tuple[int, Frame]]:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The flags of a play."""
+    """The flags of what is played."""
     parser.add_argument(
         "--participant",
         type=int,
@@ -100,9 +89,3 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="rows and columns (default: 9x9)"
     )
-
-
-def play_from(args: argparse.Namespace) -> Play:
-    """The play that the flags ask for."""
-    rows, columns = args.grid
-    return Play(args.seed, args.participant, args.rate, rows, columns, args.kinds, args.non_gestures, args.speed)

@@ -9,7 +9,7 @@ from gestured.client.program import Commands
 from gestured.client.say import say, tell
 from gestured.client.sensor import BLOBS, Form, Sensor
 from gestured.client.values import host_port, sensor_name
-from gestured.control.play import add_arguments, frames, play_from
+from gestured.control.play import add_arguments, frames, takes
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
@@ -48,16 +48,16 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Send until the time is over, or Ctrl-C. Raises GesturedError where nobody listens from the first packet on."""
-    play = play_from(args)
     form = Form(args.sensor, "ints" if args.ints else args.blob or "floats", args.plain)
     try:
         sensor = Sensor(args.to, form)
     except OSError as error:
         raise GesturedError(f"cannot send to {args.to}: {error.strerror or error}") from error
-    what = f"{play.rows} x {play.columns} taxels at {play.rate_hz:g} Hz"
+    rows, columns = args.grid
+    what = f"{rows} x {columns} taxels at {args.rate:g} Hz"
     say(f"sending {what} to {args.to} as {args.sensor}; Ctrl-C ends", to=sys.stderr)
     try:
-        for start, take in play.takes(args.seconds):
+        for start, take in takes(args, args.seconds):
             sensor.send(_telling(frames(start, take), start, take.events, sensor, args.json))
     finally:
         sensor.close()
