@@ -30,7 +30,7 @@ class Counts:
         self._metrics: str | None = None  # where they are served
 
     def add(self, name: str, label: str, count: int = 1) -> None:
-        """Count."""
+        """Count so many more under a name and a label."""
         self.values[name, label] += count
 
     def connected(self, side: str, is_there: bool, words: str) -> None:

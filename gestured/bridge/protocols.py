@@ -74,7 +74,7 @@ class FlexiTac(Protocol):
 
 
 class Csv(Protocol):
-    """Lines of numbers."""
+    """A sensor that sends a frame as a line of numbers."""
 
     _begun = False  # the first line may be the end of one
 

@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 class Serial:
-    """One sensor's line."""
+    """The line of one serial sensor: its bytes become frames, and these go to the daemon."""
 
     def __init__(self, args: argparse.Namespace, counts: Counts) -> None:
         """Raises BridgeError for what cannot be."""

@@ -64,7 +64,7 @@ class OscSlip(Protocol):
 
 
 class E256(OscSlip):
-    """Answers to /r."""
+    """The e256: it is asked by OSC for each frame, and answers to `/r` with one blob of counts."""
 
     baud = 230_400
     grid = (16, 16)

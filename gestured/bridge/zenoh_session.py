@@ -52,7 +52,7 @@ class Zenoh:
         self._hold_tokens()
 
     def close(self) -> None:
-        """Say good-bye."""
+        """Leave the network: tell it that this session ends."""
         self._closed.set()
         if self._opening.is_alive():
             self._opening.join()

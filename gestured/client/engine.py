@@ -67,7 +67,7 @@ class Engine:
 
     @property
     def pid(self) -> int:
-        """Its process."""
+        """The process number of the daemon."""
         return self._process.pid
 
     def close(self) -> None:

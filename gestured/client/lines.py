@@ -63,7 +63,7 @@ class Lines:
             return
 
     def lines(self) -> Iterator[dict[str, Any]]:
-        """Each line, parsed."""
+        """The lines of the connection, each parsed from JSON."""
         return (message for _, message in self.raw())
 
     def close(self) -> None:

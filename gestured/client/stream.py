@@ -8,8 +8,8 @@ from typing import Any
 from gestured.client.lines import Lines, Refused, Unreachable
 
 PROTOCOL = 1
-PATIENCE_S = 10.0  # a daemon greets at once
-SILENT = f"says nothing within {PATIENCE_S:g} s: it hangs, or this is not its event socket (--socket)"
+GREETING_S = 10.0  # a daemon greets at once
+SILENT = f"says nothing within {GREETING_S:g} s: it hangs, or this is not its event socket (--socket)"
 
 
 class Stream(Lines):
@@ -19,7 +19,7 @@ class Stream(Lines):
         """Connect and subscribe (None: gestures only). Raises Unreachable or Refused."""
         super().__init__(path, "--socket")
         try:
-            self.socket.settimeout(PATIENCE_S)
+            self.socket.settimeout(GREETING_S)
             try:
                 first = next(self.raw(), None)
             except TimeoutError:

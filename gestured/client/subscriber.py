@@ -15,7 +15,7 @@ from threading import Lock
 from typing import Any, Self
 
 from gestured.client.lines import Forbidden, Lines, Unreachable, Unsubscribed, parsed
-from gestured.client.stream import PATIENCE_S, SILENT, check_hello
+from gestured.client.stream import GREETING_S, SILENT, check_hello
 from gestured.core.errors import GesturedError
 
 FIRST_S, LONGEST_S = 0.1, 2.0  # from one attempt to connect to the next: doubled each time, a restart takes a second
@@ -152,7 +152,7 @@ class Subscriber:
             source.lines.socket.sendall(self._request)
         source.lines.socket.setblocking(False)
         self._selector.register(source.lines.socket, selectors.EVENT_READ, source)
-        source.due = now + PATIENCE_S  # its hello
+        source.due = now + GREETING_S  # its hello
 
     def _receive(self, source: "_Source") -> None:
         assert source.lines is not None

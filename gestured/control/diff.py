@@ -27,7 +27,7 @@ class Answer:
     confidence: float | None
 
     def words(self) -> str:
-        """For a person."""
+        """The answer as a line that a person reads."""
         clock = f"{self.onset:.3f} s"
         if self.onset >= STOPWATCH_S:
             clock = datetime.fromtimestamp(self.onset).strftime("%H:%M:%S.%f")[:-3]

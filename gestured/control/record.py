@@ -83,7 +83,7 @@ class Keeper:
         self.packets = self.events = self.lost = 0
 
     def keep(self, line: Mapping[str, Any]) -> None:
-        """One line."""
+        """Put one line of the tap onto the tape."""
         if line["type"] == "packet":
             self._t_ns = line["t_ns"] + self._epoch_ns
             packet = base64.b64decode(line["data"])

@@ -136,7 +136,7 @@ class Hearing:
                 found.append(line)
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection to the daemon."""
         self._stream.close()
 
     def _live(self) -> list[str]:

@@ -28,7 +28,7 @@ def add(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw until Ctrl-C."""
+    """Draw the sensor until Ctrl-C ends it."""
     if not sys.stdout.isatty():
         raise GesturedError("watch draws at a terminal; gesturectl listen prints events, gesturectl view has a page")
     with connect(args) as control:

@@ -103,7 +103,7 @@ class Memory:
         self.clear()
 
     def clear(self) -> None:
-        """Remember nothing."""
+        """Remember nothing of earlier contacts."""
         self.after.clear()
         self.contact = Stretch(0.0)
         self.first = self.quiet_since = None

@@ -44,7 +44,7 @@ class Habits:
         self._fell = t
 
     def rise(self) -> None:
-        """A contact began."""
+        """A contact began, whose strongest frame is yet to come."""
         self.rises += 1
         self._strongest = 0.0, None
 

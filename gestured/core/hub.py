@@ -44,7 +44,7 @@ class Hub:
 
     @property
     def scene(self) -> Scene:
-        """What decides."""
+        """The scene that decides now."""
         return self._scene
 
     @property

@@ -22,7 +22,7 @@ class Unfinished:
         self._left: float | None = None  # s, the last touched frame of the contact whose end was shown
 
     def begin(self) -> None:
-        """Another contact begins."""
+        """Another contact begins, of which nothing was shown."""
         self._passed_over = 0
 
     @property

@@ -146,7 +146,7 @@ class Decoder:
 
 
 def _frame(message: Message, route: _Route) -> Arrival:
-    """Raises ProtocolError."""
+    """The frame of a message whose address and type tags are those of `route`. Raises ProtocolError."""
     assert route.grid is not None
     rows, columns = route.grid
     size = rows * columns
@@ -173,7 +173,7 @@ def _frame(message: Message, route: _Route) -> Arrival:
 
 
 def _touches(args: tuple[Argument, ...]) -> tuple[Touch, ...]:
-    """Raises ProtocolError."""
+    """The fingers of a trajectory's arguments, three for each. Raises ProtocolError."""
     numbers: tuple[Any, ...] = args
     if not all(map(math.isfinite, numbers)):
         raise ProtocolError("not_finite", "NaN or infinity in a touch")

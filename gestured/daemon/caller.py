@@ -14,7 +14,7 @@ SO_PEERGROUPS = 59  # Linux 4.13; not in Python's socket module
 
 
 class Connection:
-    """One operator's connection."""
+    """One operator's connection to the control socket."""
 
     def __init__(self, writer: asyncio.StreamWriter) -> None:
         self._writer = writer

@@ -65,7 +65,7 @@ class Client:
 
     @property
     def backlog(self) -> int:
-        """Bytes that wait."""
+        """Bytes that wait for this client to read them."""
         return len(self._begun) + self._size
 
     def send(self, line: bytes) -> None:
@@ -127,7 +127,7 @@ class Client:
         self.go_on()
 
     def answer(self) -> None:
-        """Answer one line."""
+        """Answer the oldest line that waits for it."""
         self.turns -= 1
         try:
             self._server.subscribe(self, parse_subscription(self._asked.popleft(), self._server.gestures()))

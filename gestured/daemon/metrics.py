@@ -52,7 +52,7 @@ class Histogram:
         self.values: dict[tuple[str, ...], tuple[list[int], list[float]]] = {}
 
     def observe(self, value: float, *labels: str) -> None:
-        """Count one value."""
+        """Count one value in the bucket that it falls into."""
         if labels not in self.values:
             if len(self.values) >= self._most:
                 labels = (OTHER,) * len(labels)
@@ -104,7 +104,7 @@ class Metrics:
             self.kernel_drops, self.kernel_dropped_at = drops, time.monotonic()
 
     def event(self, event: Event) -> None:
-        """Count an event."""
+        """Count an event, and what it says of latency and confidence."""
         if isinstance(event, Gesture | Unknown):
             self.latency.observe(event.decided - event.offset)
             if event.degraded:

@@ -20,7 +20,7 @@ from gestured.daemon.request import Refusal, json_line
 from gestured.model.ladder import Ladder
 from gestured.model.own import Examiner, Own
 
-PATIENCE_S = 120.0  # an enrolment without an attempt for so long gives its place to others
+ATTEMPT_S = 120.0  # an enrolment without an attempt for so long gives its place to others
 ANSWERED_TWICE = "refractory"  # such a contact was decided, too
 
 
@@ -118,8 +118,8 @@ class OwnGestures:
             return
         if self._open[1].closed:
             self._give_up("its client has gone")
-        elif time.monotonic() - self._heard > PATIENCE_S:
-            self._give_up(f"nothing was performed for {PATIENCE_S:g} s")
+        elif time.monotonic() - self._heard > ATTEMPT_S:
+            self._give_up(f"nothing was performed for {ATTEMPT_S:g} s")
 
     async def forget(self, name: str) -> None:
         """Have a gesture no longer, nor its examples in the file. Raises Refusal or OwnFileError."""

@@ -48,7 +48,7 @@ class Shift:
             self.add(measured(segment, self._window) | {"confidence": scores.confidence})
 
     def add(self, seen: Mapping[str, float]) -> None:
-        """One gesture's quantities."""
+        """Take the quantities of one gesture."""
         for name, (low, high) in self.ranges.items():
             self._outside[name].append(not low <= seen[name] <= high)
 

@@ -84,7 +84,7 @@ class OscSink:
             self._send(self._out.message("/gestured/status", "si", (event.state, heard)).dgram)
 
     def close(self) -> None:
-        """Close the socket."""
+        """Close the socket; nothing is sent after it."""
         if self._socket is not None:
             self._socket.close()
 

@@ -89,7 +89,7 @@ class Listener:
         self.path = Path(os.fsdecode(sock.getsockname()))
 
     def close(self) -> None:
-        """Stop listening."""
+        """Stop listening; what stands at the path stays."""
         self.sock.close()
 
 

@@ -47,7 +47,7 @@ class Ahead:
     gestures: int = 0
 
     def add(self, events: Sequence[Event], acts: Iterable[Truth], minutes: float) -> None:
-        """Count one session."""
+        """Count what was said in one session."""
         self.minutes += minutes
         said = {event.id: event for event in events if isinstance(event, Provisional)}
         answers = [event for event in events if isinstance(event, Gesture | Unknown)]
@@ -139,7 +139,7 @@ def takes(which: str, count: int, seed: int) -> Iterator[Take]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """`gestured-lab early`."""
+    """Run `gestured-lab early`: print its table."""
     model = open_model(args.model)
     count = max(round(args.minutes * 60 / SESSION_S), 1)
     figures: dict[str, Any] = {"model": args.model}

@@ -35,7 +35,7 @@ def _plan(args: argparse.Namespace) -> tuple[TrainingPlan, Path | None]:
 
 
 def train_models(args: argparse.Namespace) -> int:
-    """Train, export, evaluate."""
+    """Train the models, export and evaluate them."""
     plan, real = _plan(args)
     start = time.monotonic()
     train(plan, args.out, args.cache, real, args.jobs, args.recordings)

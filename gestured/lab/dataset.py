@@ -87,7 +87,7 @@ def truths(take: Take) -> list[Truth]:
 
 
 def from_take(take: Take) -> list[Sample]:
-    """One simulated take."""
+    """The samples of one simulated take."""
     return list(matched(cuts(take.frames, take.times), truths(take)))
 
 

@@ -251,7 +251,7 @@ def logits(nets: nn.ModuleDict, samples: Samples) -> dict[str, Tensor]:
 
 
 def load_nets(path: Path) -> nn.ModuleDict:
-    """What `save_nets` wrote."""
+    """The networks that `save_nets` wrote into a file."""
     with np.load(path, allow_pickle=False) as stored:
         nets = build(dict.fromkeys(name.split(".")[0] for name in stored.files))
         nets.load_state_dict({name: torch.from_numpy(stored[name]) for name in stored.files})

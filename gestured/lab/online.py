@@ -81,7 +81,7 @@ def tallied(take: Take, zero: float, events: list[dict[str, Any]]) -> tuple[Tall
 
 
 def run(args: argparse.Namespace) -> int:
-    """`gestured-lab online`."""
+    """Run `gestured-lab online`: print its figures."""
     counts: Counter[str] = Counter()
     wrong: Counter[str] = Counter()
     waits: list[float] = []

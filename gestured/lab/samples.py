@@ -51,7 +51,7 @@ class Samples:
         return Samples(*packed(parts), *(getattr(self, name)[index] for name in OF_EACH))
 
     def digest(self) -> str:
-        """SHA-256 over everything."""
+        """The SHA-256 of all that the samples hold."""
         total = hashlib.sha256()
         for array in (
             self.frames,

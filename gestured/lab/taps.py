@@ -80,7 +80,7 @@ def figures(model: str, people: int, seed: int) -> list[dict[str, Any]]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """`gestured-lab taps`."""
+    """Run `gestured-lab taps`: print its table."""
     rows = figures(args.model, args.people, args.seed)
     if args.json:
         print(json.dumps(rows, indent=2))

@@ -157,7 +157,7 @@ def _json(text: str, key: str, kind: type) -> Any:
 
 
 def _threshold(calibration: Mapping[str, Any]) -> float:
-    """The calibration's `threshold`."""
+    """The confidence of the calibration from which an answer is published."""
     value = calibration.get("threshold", USUAL_THRESHOLD)
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
         raise ValueError(f"metadata 'calibration': threshold: expected a number from 0 to 1, found {value!r}")

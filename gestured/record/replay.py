@@ -116,7 +116,7 @@ class Mute:
         self.gestures = tuple(gestures)
 
     def classify(self, segment: Segment) -> Scores:
-        """Raises ModelError."""
+        """Give no answer: raises ModelError."""
         raise ModelError("it has no answers")
 
 
@@ -129,7 +129,7 @@ class Played:
     _learned: list[tuple[float, float]] = field(default_factory=list)  # since when it was new, and from when on known
 
     def see(self, taken: Taken) -> None:
-        """One more frame."""
+        """Remember one more frame that was used."""
         t = taken.frame.t
         self.stamps.append((taken.arrived, t))
         if taken.new:

@@ -41,7 +41,7 @@ EVENT_SCHEMA: dict[str, Any] = {
 
 @dataclass(frozen=True, slots=True)
 class Packet:
-    """A datagram."""
+    """A datagram as it was recorded."""
 
     t_ns: int  # when the daemon read it, since the epoch
     source: Address

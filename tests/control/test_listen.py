@@ -198,6 +198,6 @@ def test_a_gesture_that_the_daemon_does_not_know_is_said(start, fake):
 def test_the_wrong_one_of_two_sockets_is_said(daemon, run, monkeypatch):
     status, _, err = run("emit", "swipe_left", "--control", daemon.socket)
     assert status == 1 and f"{daemon.socket} is not the control socket" in err
-    monkeypatch.setattr("gestured.client.stream.PATIENCE_S", 0.2)
+    monkeypatch.setattr("gestured.client.stream.GREETING_S", 0.2)
     with pytest.raises(Unreachable, match="not its event socket"):
         Stream(Path(daemon.ready["control"]))

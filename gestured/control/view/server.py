@@ -73,7 +73,7 @@ class Server(ThreadingHTTPServer):
 
 
 class Handler(BaseHTTPRequestHandler):
-    """One request."""
+    """One request of a browser, and its answer."""
 
     server: Server
     timeout = ASK_S
@@ -97,7 +97,7 @@ class Handler(BaseHTTPRequestHandler):
             self._answer(HTTPStatus.NOT_FOUND, "text/plain", b"no such page\n")
 
     def do_POST(self) -> None:  # noqa: N802
-        """What changes anything."""
+        """Flag or recalibrate: the requests that change anything."""
         door, source = self.server.door, self.server.source
         may = at_home(self.headers, self.port) and door.knows(self.headers, self.port) and door.may_change(self.headers)
         try:
@@ -126,7 +126,7 @@ class Handler(BaseHTTPRequestHandler):
 
     @property
     def port(self) -> int:
-        """Ours."""
+        """The port of the page itself."""
         return self.server.address.port
 
     def log_message(self, format: str, *args: Any) -> None:

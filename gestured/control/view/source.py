@@ -39,7 +39,7 @@ class Source:
         threading.Thread(target=self._look_again_and_again, daemon=True).start()
 
     def join(self, outbox: Outbox) -> None:
-        """Somebody looks."""
+        """A browser begins to look: fill its outbox from now on."""
         if self._status:
             outbox.put("sensors", self._sensors())
         if outbox.sensor in self._latest:

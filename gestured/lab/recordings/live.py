@@ -63,7 +63,7 @@ class LiveSensor:
             raise GesturedError(f"cannot listen on {self.where}: {reason}; does a daemon listen there?") from error
 
     def close(self) -> None:
-        """Stop listening."""
+        """Stop listening to the sensor."""
         self.socket.close()
 
     @property

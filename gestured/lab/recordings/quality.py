@@ -34,7 +34,7 @@ class Captured:
         return np.array([frame.values for frame in self.frames], np.float64)
 
     def times(self) -> NDArray[np.float64]:
-        """(T,) s."""
+        """When each frame was felt, (T,) s."""
         return np.array([frame.t for frame in self.frames])
 
     @property

@@ -59,7 +59,7 @@ def all_tables(quick: bool, out: Path | None) -> Iterator[Table]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """`gestured-lab stability`."""
+    """Run `gestured-lab stability`: print and draw its tables."""
     where = f"{date.today()}, {platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
     where += f", numpy {np.__version__}"
     if not args.json:

@@ -10,7 +10,7 @@ FINITE = (float(np.finfo(np.float32).max), 1e30, 1.0, 1e-40, 1e-45, 0.0, -0.0, -
 
 
 def finger(row: float, column: float, rows: int, columns: int, width: float) -> Array:
-    """(R, C) counts."""
+    """(R, C) counts of a finger at a row and a column, as wide as `width` taxels."""
     down, right = np.ogrid[:rows, :columns]
     return np.asarray(SIGNAL * np.exp(-((down - row) ** 2 + (right - column) ** 2) / (2 * width**2)))
 

@@ -45,7 +45,7 @@ class Property:
     rounded: bool = False  # whether a constant takes away a baseline's last digits: one step of float32 at the peak
 
     def apply(self, stream: Series) -> Series:
-        """The changed stream."""
+        """The stream as this property changes it."""
         return Series(self.times(stream.times), self.frames(stream.frames))
 
     def holds(self, before: list[Segment], after: list[Segment]) -> bool:
@@ -67,7 +67,7 @@ class Property:
 
 
 def postponed(seconds: float) -> Property:
-    """All times later."""
+    """The property that all times are later by so many seconds."""
     return Property(f"{seconds:g} s later", times=lambda times: times + seconds)
 
 

@@ -135,7 +135,7 @@ def _on_threads(threads: int, run: ModelRun) -> ModelRun:
 
 
 def each(run: ModelRun) -> Way:
-    """Window by window."""
+    """The way that asks a model window by window."""
     return lambda windows: np.concatenate([run(window[None]) for window in windows])
 
 

@@ -32,7 +32,7 @@ class Schedule:
     cluster: str | None = None  # a Dask scheduler's address
 
     def path(self, task: Task, data: Data) -> Path:
-        """A cell's file."""
+        """The file in which a cell is kept."""
         return self._path(task.method, run.__module__, [data.key, asdict(task)])
 
     def once(self, name: str, module: str, key: Sequence[Any], make: Callable[[], Any]) -> Any:

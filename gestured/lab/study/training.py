@@ -48,7 +48,7 @@ class Images:
     images: NDArray[np.float32]  # (G, R, C)
 
     def batch(self, index: Indices) -> tuple[Tensor]:
-        """((B, R, C),)."""
+        """The images of one batch: a tuple of one tensor (B, R, C)."""
         return (torch.from_numpy(self.images[index]),)
 
     def order(self, index: Indices, rng: np.random.Generator) -> Indices:
@@ -61,7 +61,7 @@ Inputs = Windows | Images
 
 @dataclass(frozen=True)
 class Net:
-    """A trained network."""
+    """A network that has been trained."""
 
     module: nn.Module
 

@@ -31,7 +31,7 @@ class VectorMachine(ClassifierMixin, BaseEstimator):  # type: ignore[misc, unuse
         return np.asarray(self._machine.decision_function(self._kernel(inputs)))
 
     def predict(self, inputs: NDArray[np.floating]) -> NDArray[np.integer]:
-        """(n,) classes."""
+        """(n,) classes, the best one of each input."""
         return np.asarray(self._machine.predict(self._kernel(inputs)))
 
     def _kernel(self, inputs: NDArray[np.floating]) -> NDArray[np.float64]:
