@@ -18,13 +18,13 @@ from gestured.core.events import Gesture
 from gestured.core.found import Cut
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
+from gestured.core.grid import Grid
 from gestured.core.layouts import Layouts
 from gestured.core.osc_address import Addresses
 from gestured.core.recognizer import Recognizer
 from gestured.core.wire import Decoder
 from gestured.daemon.clients import EventServer
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.values import Grid
 from gestured.model.opening import open_model
 
 CLIENTS = 1000

@@ -1,10 +1,10 @@
 """Values on a command line, as argparse's `type` takes them: read, or refused in one sentence."""
 
-import re
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
 
 from gestured.core.address import Address
+from gestured.core.grid import Grid
 from gestured.core.osc_address import is_sensor
 
 
@@ -29,10 +29,10 @@ def bind_address(text: str) -> Address:
 
 def rows_by_columns(text: str) -> tuple[int, int]:
     """Rows and columns of a sensor."""
-    match = re.fullmatch(r"(\d{1,2})x(\d{1,2})", text)
-    if match is None or not all(2 <= int(number) <= 64 for number in match.groups()):
-        raise ArgumentTypeError(f"{text!r}: expected ROWSxCOLUMNS, each from 2 to 64, such as 9x9")
-    return int(match[1]), int(match[2])
+    try:
+        return Grid.parse(text)
+    except ValueError as error:
+        raise ArgumentTypeError(f"{text!r}: expected {error}") from None
 
 
 def sensor_name(text: str) -> str:

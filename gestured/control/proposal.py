@@ -11,10 +11,10 @@ import numpy as np
 from gestured.control.sight import Seen
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
+from gestured.core.grid import SIDES
 from gestured.core.habits import ALIKE, Habits, neighbours_alike
 from gestured.core.mounting import Mounting
 from gestured.core.osc_address import is_sensor
-from gestured.core.scene import SIDE
 
 USUAL = "/{sensor}/pressure"
 LONGEST_ADDRESS = 255  # characters of an address that is proposed
@@ -78,7 +78,7 @@ def _sensor(name: str, seen: Seen, known: Known) -> list[str]:
         found = next((shape for n in seen.taxels() if (shape := _shape(seen, n)) is not None), None)
         if found is None:
             sizes = " or ".join(map(str, seen.taxels()))
-            return [f"# {name}: {sizes} values are no grid of {SIDE[0]} to {SIDE[1]} rows and columns"]
+            return [f"# {name}: {sizes} values are no grid of {SIDES[0]} to {SIDES[1]} rows and columns"]
         grid = found
         keys.append(f'grid = "{grid[0]}x{grid[1]}"')
     habits = _habits(seen, grid, inverted)
@@ -108,7 +108,7 @@ def _shape(seen: Seen, taxels: int) -> Grid | None:
 
 def _shapes(taxels: int) -> Iterator[Grid]:
     """Grids of so many taxels, the squarest first."""
-    sides = range(SIDE[0], SIDE[1] + 1)
+    sides = range(SIDES[0], SIDES[1] + 1)
     shapes = [(rows, taxels // rows) for rows in sides if taxels % rows == 0 and taxels // rows in sides]
     yield from sorted(shapes, key=lambda shape: (abs(shape[0] - shape[1]), -shape[0]))
 

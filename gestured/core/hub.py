@@ -152,11 +152,6 @@ class Hub:
         numbers = self._numbers | {name: feed.numbers for name, feed in self._feeds.items()}
         return {name: sequence for name, (sequence, _) in numbers.items()}
 
-    def states(self, now: float) -> dict[str, str]:
-        """The state of each sensor, heard or in the scene, at `now`; see `Reading`. Any thread may ask."""
-        silent = dict.fromkeys(self._scene.sensors, "no_data")
-        return silent | {name: feed.state(now) for name, feed in tuple(self._feeds.items())}
-
     def readings(self, now: float) -> dict[str, Reading]:
         """What is known of each sensor, heard or in the scene, at `now`. Any thread may ask."""
         silent = {name: Reading("no_data", self._scene.grid_of(name)) for name in self._scene.sensors}

@@ -22,6 +22,7 @@ def event_type(event: Event) -> str:
     return type(event).__name__.lower()
 
 
+LONGEST = 60  # characters of what a peer sent, in an answer to it
 EVENT_TYPES = tuple(cls.__name__.lower() for cls in get_args(Event))
 _STREAM_TIMES = frozenset(("onset", "offset", "decided"))
 
@@ -70,6 +71,12 @@ def lost_json(count: int) -> bytes:
 def error_json(reason: str) -> bytes:
     """Tells a client what was wrong with its request."""
     return _line({"type": "error", "reason": reason})
+
+
+def quoted(value: object) -> str:
+    """How an answer names what a peer sent: as JSON, cut where it is long."""
+    text = json.dumps(value)
+    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 
 def _line(value: dict[str, Any]) -> bytes:

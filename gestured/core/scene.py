@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from gestured.core.grid import SIDES
 from gestured.core.mounting import Mounting
 from gestured.core.osc_address import Addresses
 from gestured.core.timing import Timing
 
 ONE_TAP, DOUBLE_TAP = "one_tap", "double_tap"
 TAP_GAP_S = (0.2, 0.6)  # s: shorter no hand taps twice through 15 Hz, longer no two taps belong together
-SIDE = (2, 64)  # taxels of a grid's side, least and most
 
 Clock = Literal["arrival", "sensor"]
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
@@ -56,8 +56,8 @@ class Scene:
             raise ValueError(f"tap_gap_s: expected {TAP_GAP_S[0]:g} to {TAP_GAP_S[1]:g} s, found {self.tap_gap_s!r}")
         for name in ("", *self.sensors):
             rows, columns = self.grid_of(name)
-            if not (SIDE[0] <= rows <= SIDE[1] and SIDE[0] <= columns <= SIDE[1]):
-                raise ValueError(f"grid: expected sides of {SIDE[0]} to {SIDE[1]} taxels, found {rows} x {columns}")
+            if not (SIDES[0] <= rows <= SIDES[1] and SIDES[0] <= columns <= SIDES[1]):
+                raise ValueError(f"grid: expected sides of {SIDES[0]} to {SIDES[1]} taxels, found {rows} x {columns}")
             if self.clock_of(name) not in ("arrival", "sensor"):
                 raise ValueError(f"clock: expected arrival or sensor, found {self.clock_of(name)!r}")
 

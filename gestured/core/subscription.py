@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from gestured.core.errors import ProtocolError
 from gestured.core.events import Event, Gesture, Provisional, Status
-from gestured.core.messages import EVENT_TYPES, event_type
+from gestured.core.messages import EVENT_TYPES, event_type, quoted
 from gestured.core.osc_address import is_sensor
 
 MAX_LINE = 4096  # bytes of a client's request
@@ -53,24 +53,19 @@ def parse_subscription(line: bytes, gestures: Collection[str]) -> Subscription:
     given: dict[str, frozenset[str]] = {}
     for key, value in wanted.items():
         if key not in ("types", "sensors", "gestures"):
-            raise _refused(f"subscribe: unknown key {_short(key)}, expected types, sensors or gestures")
+            raise _refused(f"subscribe: unknown key {quoted(key)}, expected types, sensors or gestures")
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             raise _refused(f"subscribe.{key}: expected a list of strings")
         for item in value:
             if key == "types" and item not in EVENT_TYPES:
-                raise _refused(f"subscribe.types: unknown {_short(item)}, expected any of {', '.join(EVENT_TYPES)}")
+                raise _refused(f"subscribe.types: unknown {quoted(item)}, expected any of {', '.join(EVENT_TYPES)}")
             if key == "gestures" and item not in gestures:
-                raise _refused(f"subscribe.gestures: unknown {_short(item)}, expected any of {', '.join(gestures)}")
+                raise _refused(f"subscribe.gestures: unknown {quoted(item)}, expected any of {', '.join(gestures)}")
             if key == "sensors" and not is_sensor(item):
-                raise _refused(f"subscribe.sensors: {_short(item)} cannot be a sensor's name")
+                raise _refused(f"subscribe.sensors: {quoted(item)} cannot be a sensor's name")
         given[key] = frozenset(value)
     return Subscription(**given)
 
 
 def _refused(text: str) -> ProtocolError:
     return ProtocolError("subscription", text)
-
-
-def _short(text: str) -> str:
-    text = json.dumps(text)
-    return text if len(text) <= 60 else text[:57] + "..."

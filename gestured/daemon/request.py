@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gestured.core.errors import GesturedError
+from gestured.core.messages import quoted
 
 MAX_REQUEST_BYTES = 4096  # bytes of a request
 
@@ -60,21 +61,16 @@ def parse_request(line: bytes, verbs: Mapping[str, Verb]) -> tuple[str, dict[str
         raise Refusal('verb: expected one JSON object with a "verb", such as {"verb":"status"}')
     name = request.pop("verb")
     if name not in verbs:
-        raise Refusal(f"verb: unknown {_short(name)}, expected one of {', '.join(verbs)}")
+        raise Refusal(f"verb: unknown {quoted(name)}, expected one of {', '.join(verbs)}")
     known = verbs[name].parameters
     for key, value in request.items():
         if key not in known:
-            raise Refusal(f"{name}: unknown key {_short(key)}, expected {', '.join(known) or 'no key'}")
+            raise Refusal(f"{name}: unknown key {quoted(key)}, expected {', '.join(known) or 'no key'}")
         parameter = known[key]
         wrong = isinstance(value, bool) and parameter.kind is not bool
         if wrong or not isinstance(value, parameter.kind) or not parameter.check(value):
-            raise Refusal(f"{name}.{key}: expected {parameter.words}, found {_short(value)}")
+            raise Refusal(f"{name}.{key}: expected {parameter.words}, found {quoted(value)}")
     for key, parameter in known.items():
         if parameter.required and key not in request:
             raise Refusal(f"{name}.{key}: is missing, expected {parameter.words}")
     return name, request
-
-
-def _short(value: object) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from gestured import __version__
 from gestured.core.address import Address
+from gestured.core.grid import Grid
 from gestured.core.own import Examples, to_dict
 from gestured.core.reading import Reading
 from gestured.core.view import View
 from gestured.daemon.metrics import Counter, Metrics
 from gestured.daemon.snapshot import Snapshot
-from gestured.daemon.values import Grid
 
 
 def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:

@@ -2,25 +2,15 @@
 
 import ipaddress
 import os
-import re
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 from pydantic import BeforeValidator
 
 from gestured.core.address import Address
+from gestured.core.grid import Grid
 
 SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
-
-
-class Grid(NamedTuple):
-    """Rows and columns of a sensor's frames as they are sent, before rotation."""
-
-    rows: int
-    columns: int
-
-    def __str__(self) -> str:
-        return f"{self.rows}x{self.columns}"
 
 
 def _address(value: object) -> Address:
@@ -40,10 +30,7 @@ def _destination(value: object) -> Address:
 
 
 def _grid(value: object) -> Grid:
-    match = re.fullmatch(r"(\d{1,3})x(\d{1,3})", str(value))
-    if not isinstance(value, str) or match is None or not all(2 <= int(n) <= 64 for n in match.groups()):
-        raise ValueError("ROWSxCOLUMNS, each from 2 to 64, such as 9x9 or 27x15")
-    return Grid(int(match[1]), int(match[2]))
+    return Grid.parse(value if isinstance(value, str) else "")
 
 
 def _socket(value: object) -> Path:

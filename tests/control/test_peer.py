@@ -38,7 +38,8 @@ print(asked.decode() or "nothing", flush=True)
 
 CLIENT = """
 import os, sys
-from gestured.control.cli import main
+from gestured.control.cli import main, parser
+parser().format_help()  # loads everything: the other account may not be allowed to read where Python is
 os.setgroups([]); os.setgid(int(sys.argv[1])); os.setuid(int(sys.argv[1]))
 sys.exit(main(sys.argv[2:]))
 """

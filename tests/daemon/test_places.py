@@ -56,7 +56,7 @@ def test_who_is_silent_for_long_loses_the_place_and_goes_on_counting_on_return(r
         room.swipe(f"squatter{n}")
     room.wait(FORGET_S / 2)
     room.swipe("late")
-    assert "late" not in room.hub.states(room.now) and room.dropped("too_many_sensors") > 0
+    assert "late" not in room.hub.readings(room.now) and room.dropped("too_many_sensors") > 0
     room.wait(FORGET_S)
     for n in range(4):
         room.swipe(f"new{n}")
@@ -74,7 +74,7 @@ def test_a_sensor_that_sends_keeps_its_place(room: Room) -> None:
         room.wait(FORGET_S * 0.4)
         room.send("s1", Hand().idle(0.2))
     room.swipe("new")
-    assert {"s1", "new"} <= set(room.hub.states(room.now))
+    assert {"s1", "new"} <= set(room.hub.readings(room.now))
 
 
 def test_a_name_whose_sender_goes_on_is_not_given_to_another_port(room: Room) -> None:
