@@ -1,7 +1,8 @@
 """Everything of a configuration that decides what is recognised: one frozen value.
 
 The daemon makes it from its settings, a replay from a tape. Two hubs with equal scenes, the same classifier and the
-same packets give the same events.
+same packets at the same times give the same events, as long as nobody changes, restarts or tests one of them, and both
+had room for every packet.
 """
 
 import ipaddress

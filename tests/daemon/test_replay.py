@@ -1,8 +1,12 @@
 """The daemon over UDP, at any speed, says what the recognizer says in the process: event for event."""
 
+import dataclasses
+import json
 import random
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -14,7 +18,14 @@ from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.messages import event_type
 from gestured.core.recognizer import Recognizer
+from gestured.daemon import status
+from gestured.daemon.asked import scene_of
+from gestured.daemon.merge import load_settings
+from gestured.daemon.snapshot import Models, Snapshot
+from gestured.daemon.watch import Watch
+from gestured.model.ladder import ladder_for
 from gestured.model.opening import open_model
+from gestured.record.replay import maker
 from tests.daemon import harness
 from tests.daemon.harness import Daemon, Hand, Sensor
 
@@ -95,3 +106,23 @@ def same(online: list[harness.Line], offline: list[Event]) -> None:
         for key in ("onset", "offset", "decided"):
             assert ours.get(key, began) - began == pytest.approx(getattr(theirs, key, 0.0), abs=1e-3)
         assert ours.get("scores", {}) == pytest.approx(getattr(theirs, "scores", {}), abs=1e-5)
+
+
+def test_a_tape_knows_everything_that_decides(model: Path, tmp_path: Path) -> None:
+    file = tmp_path / "gestured.toml"
+    file.write_text(
+        'grid = "7x8"\nclock = "sensor"\nstale_s = 2.5\ntap_gap_s = 0.3\nprovisional_taps = false\nmax_sensors = 7\n'
+        'allow = ["127.0.0.0/8", "fd00::/8"]\naddresses.pressure = "/skin/{sensor}"\n'
+        'gestures.use = ["swipe_left", "one_tap"]\ngestures.one_tap = { threshold = 0.75, refractory_s = 1.5 }\n'
+        'sensors.arm = { grid = "5x6", rotate = 90, mirror = true, invert = true, clock = "arrival" }\n'
+    )
+    ladder = ladder_for(model)
+    usual, odd = (load_settings({"model": str(model), **given}, {})[0] for given in ({}, {"config": str(file)}))
+    scene = scene_of(odd, ladder)
+    models = Models.of(ladder, Watch(ladder).shift, failed=False)
+    daemon = SimpleNamespace(models=models, instance="", gestures=scene.gestures, settings=odd)
+    told = status.scene(cast(Snapshot, daemon), 0, {})
+    read, other = maker(json.loads(json.dumps(told))).scene, scene_of(usual, ladder)
+    kept = {"touches", "frames"}  # what is told beside the answers decides nothing
+    for name in {field.name for field in dataclasses.fields(scene)} - kept:
+        assert getattr(read, name) == getattr(scene, name) != getattr(other, name), name
