@@ -44,7 +44,7 @@ def add_filters(parser: argparse.ArgumentParser) -> None:
 
 def add_metrics(parser: argparse.ArgumentParser) -> None:
     """Add where Prometheus may ask."""
-    text = "HTTP address of /metrics; port 0 is any free one (default: off)"
+    text = "HTTP address of /metrics; port 0 takes any free port (default: off)"
     parser.add_argument("--metrics", type=bind_address, metavar="HOST:PORT", help=text)
 
 

@@ -13,7 +13,7 @@ from gestured.client.control import Control
 def add_sockets(parser: argparse.ArgumentParser) -> None:
     """Add `--control` and `--socket` to a subcommand: either is enough to find the daemon."""
     for flag, what in (("--control", "control"), ("--socket", "event")):
-        text = f"the daemon's {what} socket; naming either socket is enough (default: where the daemon puts it)"
+        text = f"the daemon's {what} socket; one of the two is enough (default: of your session, else the service)"
         parser.add_argument(flag, type=Path, metavar="PATH", help=text)
 
 

@@ -31,7 +31,7 @@ def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "doctor",
-        help="what is wrong, and what to do about it",
+        help="say what is wrong, and what to do about it",
         description="Look at versions, clock, kernel buffer, sockets and permissions, and at the daemon, its model\n"
         "and its sensors. Each finding comes with its remedy. Exit status 1 where something is bad.",
         epilog="example:\n  gesturectl doctor",

@@ -24,7 +24,7 @@ def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "export",
-        help="a recording as .npz, or for ROS 2",
+        help="write a recording as .npz, or for ROS 2",
         description="Write the frames of a recording as .npz, one session a sensor, with the gestures that the\n"
         "daemon recognised as its events. Sensors of one file have one grid. With --ros2 as MCAP instead,\n"
         "which rosbag2 plays and viewers of ROS 2 draw: sensor_msgs/Image and std_msgs/String.",

@@ -22,7 +22,7 @@ def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "flag",
-        help="keep the last 30 seconds: that was wrong",
+        help="keep the last 30 seconds after a wrong gesture",
         description="Keep what the daemon's flight recorder holds, the packets of the last 30 seconds with the\n"
         "events and the model's sha256, as a recording. The daemon must run with --flight-recorder.",
         epilog='examples:\n  gesturectl flag\n  gesturectl flag wrong.mcap --note "a tap, taken for a swipe"',

@@ -20,7 +20,7 @@ def add(commands: Commands) -> None:
         description="Print names, one a line, for completions and scripts: the running daemon's, where there is one.",
         epilog="example:\n  gesturectl names sensors",
     )
-    parser.add_argument("what", choices=("gestures", "types", "sensors"), help="of what")
+    parser.add_argument("what", choices=("gestures", "types", "sensors"), help="what to list")
     add_sockets(parser)
     parser.set_defaults(run=run)
 

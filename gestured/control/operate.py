@@ -54,7 +54,7 @@ def add_emit(commands: Commands) -> None:
         epilog="example:\n  gesturectl emit swipe_left --sensor armrest",
     )
     parser.add_argument("gesture", metavar="GESTURE", help="one of the gestures in use")
-    parser.add_argument("--sensor", metavar="NAME", help="whose event it is to be (default: test)")
+    parser.add_argument("--sensor", metavar="NAME", help="the sensor named in the event (default: test)")
     asks(
         parser,
         "emit",

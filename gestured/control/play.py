@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="who performs (default: 900; the models learned from 0 to 33)",
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="another order of things (default: 0)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="another sequence of gestures (default: 0)")
     parser.add_argument(
         "--kinds",
         type=some_of(GESTURES + NON_GESTURES + SEQUENCES),
@@ -80,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=number(0.0, 1.0),
         default=0.2,
         metavar="SHARE",
-        help="share of what is no gesture (default: 0.2)",
+        help="share of performances that are no gesture (default: 0.2)",
     )
     parser.add_argument("--speed", choices=tuple(SPEEDS), help="how fast the person moves (default: mixed)")
     parser.add_argument(

@@ -16,7 +16,7 @@ def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "shadow",
-        help="try a model beside the active one",
+        help="run another model beside the active one",
         description="Have the daemon run a candidate model on the same segments as the active one. It publishes\n"
         "nothing; without MODEL, how far the two agree is printed. A restart ends it.",
         epilog="examples:\n  gesturectl shadow candidate.onnx\n  gesturectl shadow\n  gesturectl shadow --stop",

@@ -24,7 +24,7 @@ def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "simulate",
-        help="be a sensor that somebody touches",
+        help="simulate a sensor that somebody touches",
         description=DESCRIPTION,
         epilog="examples:\n  gesturectl simulate --to 127.0.0.1:9000 --sensor armrest\n"
         "  gesturectl simulate --kinds swipe_left,double_tap --seconds 30 --blob",

@@ -35,7 +35,8 @@ def add(commands: Commands) -> None:
         epilog="examples:\n  gesturectl sniff --seconds 3\n  gesturectl sniff --listen 0.0.0.0:9000",
     )
     parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help="how long (default: 5)")
-    parser.add_argument("--listen", type=host_port, metavar="HOST:PORT", help="a UDP address that nobody has")
+    text = "listen at this UDP address itself; no daemon may have it"
+    parser.add_argument("--listen", type=host_port, metavar="HOST:PORT", help=text)
     add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print what was seen as JSON")
     parser.set_defaults(run=run)

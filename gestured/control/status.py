@@ -31,13 +31,13 @@ def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "status",
-        help="how the daemon is, on one screen",
+        help="show the state of the daemon and its sensors",
         description="Show sensors, rates, health, model and the last answers of a running daemon.\n"
         "Exit status 1 if it is not ready.",
         epilog="examples:\n  gesturectl status --watch\n  gesturectl status --all\n  gesturectl status --json",
     )
-    parser.add_argument("--watch", action="store_true", help="again every second, until Ctrl-C")
-    text = "each daemon that is found on this machine, a line each; exit status 1 if one is not ready"
+    parser.add_argument("--watch", action="store_true", help="repeat every second, until Ctrl-C")
+    text = "show each daemon on this machine, a line each; exit status 1 if one is not ready"
     parser.add_argument("--all", action="store_true", help=text)
     add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print all that is known as JSON, one line each time")

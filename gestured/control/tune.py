@@ -27,7 +27,7 @@ def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "tune",
-        help="which threshold suits recordings of your own",
+        help="print what each threshold costs on your recordings",
         description="Play recordings through the daemon's own code, and print for every threshold which share of the\n"
         "gestures is missed and wrong, and how many events an hour nobody meant. An .npz says what was\n"
         'performed; a tape of gesturectl record counts as "other things": whatever is published in it is\n'
@@ -36,9 +36,9 @@ def add(commands: Commands) -> None:
         "  gesturectl tune recordings/07.npz evening.mcap --model my.onnx",
     )
     parser.add_argument("recordings", type=Path, nargs="+", metavar="FILE", help="an .npz with labels, or a tape")
-    parser.add_argument("--model", default="cnn_lstm", metavar="MODEL", help="a shipped model or a file (cnn_lstm)")
+    parser.add_argument("--model", default="cnn_lstm", metavar="MODEL", help="shipped, or a file (default: cnn_lstm)")
     parser.add_argument("--wrong-costs", type=float, default=3.0, metavar="X",
-                        help="a wrong or a false event is as bad as X gestures that are missed (3)")  # fmt: skip
+                        help="a wrong or a false event is as bad as X missed gestures (default: 3)")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     parser.set_defaults(run=run)
 

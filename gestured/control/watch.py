@@ -17,7 +17,7 @@ def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "watch",
-        help="a sensor at the terminal, the finger as it moves",
+        help="show a sensor at the terminal, live",
         description="Draw a sensor of the running daemon as it is felt, with the direction of the finger,\n"
         "phase, activity and answers, provisional ones too, until Ctrl-C. 80 x 24 characters are enough.",
         epilog="example:\n  gesturectl watch armrest",

@@ -21,7 +21,7 @@ def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "view",
-        help="a live picture in a browser",
+        help="show a sensor in a browser, live",
         description="Serve one page on this machine that shows the matrix as it is felt, the activity and its\n"
         "thresholds, and every answer with its scores. Prints the page's address: it works once, for the\n"
         "browser that opens it. Nothing is opened by itself.",
@@ -30,7 +30,7 @@ def add(commands: Commands) -> None:
     text = f"where the page is served, a loopback address (default: {DEFAULT}; port 0: any)"
     parser.add_argument("--listen", type=bind_address, default=DEFAULT, metavar="HOST:PORT", help=text)
     parser.add_argument(
-        "--folder", type=Path, default=Path(), metavar="FOLDER", help="for what is flagged (default: .)"
+        "--folder", type=Path, default=Path(), metavar="FOLDER", help="folder for flagged recordings (default: .)"
     )
     add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print the address as JSON")
