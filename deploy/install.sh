@@ -22,6 +22,11 @@ put() {  # put MODE FILE PATH: programs and pages are where PREFIX says
     echo "$3" >>"$work/installed"
 }
 
+page() {  # page FILE: a document, whose neighbours all stand in one folder
+    sed 's,](\.\./,](,g; s,](docs/,](,g; s,](deploy/,](,g' "$1" >"$work/page"
+    put 644 "$work/page" "$doc/$(basename "$1")"
+}
+
 keep() {  # keep FILE PATH: an operator's file stays as it is, here and by `make uninstall`
     [ -e "$root$2" ] || { mkdir -p "$root$(dirname "$2")"; cp "$1" "$root$2"; }
 }
@@ -66,8 +71,11 @@ put 644 systemd/gestured.tmpfiles.conf "$prefix/lib/tmpfiles.d/gestured.conf"
     put 644 "$work/share/$file" "$share/${file#./}"
 done
 for file in systemd/osc-output.conf deploy/gestured.toml deploy/prometheus/gestured.rules.yml \
-    deploy/prometheus/prometheus.yml deploy/grafana/dashboards/gestured.json docs/events.schema.json docs/*.md LICENSE NOTICE; do
+    deploy/prometheus/prometheus.yml deploy/grafana/dashboards/gestured.json docs/*.json docs/*.svg LICENSE NOTICE; do
     put 644 "$file" "$doc/$(basename "$file")"
+done
+for file in *.md docs/*.md; do
+    page "$file"
 done
 keep deploy/gestured.toml /etc/gestured/gestured.toml
 keep systemd/gestured.default /etc/default/gestured

@@ -14,7 +14,7 @@ from gestured.client.holder import bind_failure
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
-RECEIVE_BYTES = 4 << 20  # the default holds 166 frames of 9 x 9 floats, this 6,500
+RECEIVE_BYTES = 4 << 20  # twenty times the usual default: what a sensor sends while the loop stands still
 BACKLOG = 1024  # a thousand clients may come back at once after a restart
 SO_RCVBUFFORCE = 33  # Linux; these three are not in Python's socket module
 SO_TIMESTAMPNS = 35

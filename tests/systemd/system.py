@@ -5,6 +5,7 @@ One test, because each step stands on the one before; it prints what it measured
 
 import json
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -111,6 +112,17 @@ def as_user(box: Container, *command: str, groups: str) -> "subprocess.Completed
     """Run a command inside as somebody who is nobody."""
     group = ("--clear-groups",) if not groups else (f"--groups={groups}",)
     return box.run("setpriv", "--reuid=4000", "--regid=4000", *group, *command, check=False)
+
+
+def test_installed_documents_find_each_other(box: Container, installed: Path):
+    folder = installed.parent / "usr" / "share" / "doc" / "gestured"  # the container has taken usr out of the root
+    links = {
+        (page.name, target)
+        for page in folder.glob("*.md")
+        for target in re.findall(r"\]\(([^)#\s]+)", page.read_text())
+        if "://" not in target
+    }
+    assert len(links) > 100 and [(page, target) for page, target in links if not (folder / target).exists()] == []
 
 
 def test_members_of_the_group_may_and_others_may_not(box: Container):
