@@ -50,8 +50,10 @@ def parser() -> argparse.ArgumentParser:
         return command
 
     def add_work(command: argparse.ArgumentParser) -> None:
-        command.add_argument("--cache", type=Path, default=CACHE, help=f"where finished steps are kept ({CACHE})")
-        command.add_argument("--jobs", type=int, default=2, help="processes and threads (2)")
+        command.add_argument(
+            "--cache", type=Path, default=CACHE, help=f"where finished steps are kept (default: {CACHE})"
+        )
+        command.add_argument("--jobs", type=int, default=2, help="processes and threads (default: 2)")
         command.add_argument("--quick", action="store_true", help="a small run to try it; its models are worth nothing")
 
     def add_data(command: argparse.ArgumentParser) -> None:
@@ -64,51 +66,60 @@ def parser() -> argparse.ArgumentParser:
         )
 
     mine: dict[str, Any] = {"type": Path, "nargs": "+", "default": [], "metavar": "FILE"}
-    train = add("train", "make the three models again from nothing; goes on where it was interrupted",
+    train = add("train", "train the three models from nothing; goes on where it was interrupted",
                 "gestured-lab train --out models --jobs 2")  # fmt: skip
-    train.add_argument("--out", type=Path, default=MODELS, help=f"folder for the models ({MODELS})")
+    train.add_argument("--out", type=Path, default=MODELS, help=f"folder for the models (default: {MODELS})")
     train.add_argument("--recordings", **mine, help="recordings of your own to learn from, too")
     add_data(train)
-    adapt = add("adapt", "go on from a shipped model with recordings of your own, and say what that is worth; writes "
-                "nothing where it is no better", "gestured-lab adapt recordings/*.npz --out my.onnx")  # fmt: skip
+    adapt = add("adapt", "train a shipped model further with recordings of your own, and print what that is worth; "
+                "writes nothing, with exit status 1, unless it is better",
+                "gestured-lab adapt recordings/*.npz --out my.onnx")  # fmt: skip
     adapt.add_argument("recordings", type=Path, nargs="+", metavar="FILE", help="recordings of your own (.npz)")
     adapt.add_argument("--out", type=Path, required=True, metavar="MODEL", help="a new file for the model (*.onnx)")
-    adapt.add_argument("--base", default="cnn_lstm", metavar="MODEL", help="cnn_lstm, lstm, or a file (cnn_lstm)")
-    adapt.add_argument("--as-none", action="append", default=[], metavar="NAME",
-                       help="take a name of your own for no gesture; else it is left out")  # fmt: skip
-    adapt.add_argument("--force", action="store_true", help="write the model also where it is no better")
-    adapt.add_argument("--cache", type=Path, metavar="DIR", help="for simulated takes (gestured, in your cache folder)")
     adapt.add_argument(
-        "--steps", type=int, default=200, metavar="N", help="of learning, for each group of people (200)"
+        "--base", default="cnn_lstm", metavar="MODEL", help="cnn_lstm, lstm, or a file (default: cnn_lstm)"
     )
-    evaluate = add("evaluate", "print what the models are worth on people never seen; writes cards and manifest",
+    adapt.add_argument("--as-none", action="append", default=[], metavar="NAME",
+                       help="take recordings with this name of your own as non-gestures "
+                            "(default: leave them out)")  # fmt: skip
+    adapt.add_argument("--force", action="store_true", help="write the model also where it is no better")
+    adapt.add_argument(
+        "--cache", type=Path, metavar="DIR", help="for simulated takes (default: gestured, in your cache folder)"
+    )
+    adapt.add_argument(
+        "--steps", type=int, default=200, metavar="N", help="training steps for each held-out group (default: 200)"
+    )
+    evaluate = add("evaluate", "print the accuracy of models on people that they have not learned from; "
+                   "writes cards and manifest",
                    "gestured-lab evaluate --models models")  # fmt: skip
-    evaluate.add_argument("--models", type=Path, default=MODELS, help=f"folder of the models ({MODELS})")
-    evaluate.add_argument("--networks", action="store_true", help="also compare each network alone and with a second")
+    evaluate.add_argument("--models", type=Path, default=MODELS, help=f"folder of the models (default: {MODELS})")
+    evaluate.add_argument(
+        "--networks", action="store_true", help="also compare each network alone and with its second opinion"
+    )
     evaluate.add_argument("--field", action="store_true", help="also compare rules for deciding early")
     evaluate.add_argument("--whole", action="store_true", help="also train networks that lack a group of kinds of "
                           "non-gestures (as long as training takes), and say how many they reject")  # fmt: skip
     evaluate.add_argument("--curve", action="store_true", help="also print right, wrong and accepted by threshold")
-    evaluate.add_argument("--readme", type=Path, help="a README whose table of figures is renewed")
-    evaluate.add_argument("--recordings", **mine, help="those that the models were trained with")
+    evaluate.add_argument("--readme", type=Path, help="a document whose tables of figures are written anew")
+    evaluate.add_argument("--recordings", **mine, help="the recordings with which the models were trained")
     add_data(evaluate)
-    online = add("online", "send continuous simulated sessions to a running daemon over UDP and score its events",
+    online = add("online", "start a daemon, send it continuous simulated sessions over UDP, and score its events",
                  "gestured-lab online --model cnn_lstm --minutes 10")  # fmt: skip
-    online.add_argument("--model", default="cnn_lstm", help="model of the daemon that is started (cnn_lstm)")
-    online.add_argument("--minutes", type=float, default=20, help="minutes of sessions (20)")
-    online.add_argument("--idle-minutes", type=float, default=5, help="minutes of an untouched sensor (5)")
-    online.add_argument("--speed", type=float, default=100, help="times real time (100)")
-    online.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (900)")
+    online.add_argument("--model", default="cnn_lstm", help="model of the daemon that is started (default: cnn_lstm)")
+    online.add_argument("--minutes", type=float, default=20, help="minutes of sessions (default: 20)")
+    online.add_argument("--idle-minutes", type=float, default=5, help="minutes of an untouched sensor (default: 5)")
+    online.add_argument("--speed", type=float, default=100, help="times real time (default: 100)")
+    online.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (default: 900)")
     taps = add("taps", "print what each wait for a second tap costs in double taps and saves in time, simulated",
                "gestured-lab taps --people 20")  # fmt: skip
-    taps.add_argument("--model", default="cnn_lstm", help="a path, or a shipped model's name (cnn_lstm)")
-    taps.add_argument("--people", type=int, default=20, help="participants, two minutes of taps of each (20)")
-    taps.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (900)")
-    early = add("early", "play simulated sessions and say how early and how rightly a model speaks",
+    taps.add_argument("--model", default="cnn_lstm", help="a path, or a shipped model's name (default: cnn_lstm)")
+    taps.add_argument("--people", type=int, default=20, help="participants, two minutes of taps of each (default: 20)")
+    taps.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (default: 900)")
+    early = add("early", "play simulated sessions, and print how early and how rightly a model names gestures",
                 "gestured-lab early --model cnn_lstm --minutes 20")  # fmt: skip
-    early.add_argument("--model", default="cnn_lstm", help="the model that is asked (cnn_lstm)")
-    early.add_argument("--minutes", type=float, default=20, help="minutes of sessions of each kind (20)")
-    early.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (900)")
+    early.add_argument("--model", default="cnn_lstm", help="the model that is asked (default: cnn_lstm)")
+    early.add_argument("--minutes", type=float, default=20, help="minutes of sessions of each kind (default: 20)")
+    early.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (default: 900)")
     stability = add("stability", "measure filters, extreme inputs, models and symmetries of the whole path",
                     "gestured-lab stability --quick")  # fmt: skip
     stability.add_argument("--quick", action="store_true", help="some seconds instead of some minutes")
@@ -116,8 +127,8 @@ def parser() -> argparse.ArgumentParser:
     study = add("study", "compare every method of the paper, and some beyond it, under several protocols; "
                 "writes one HTML page, study.json and CSV files; goes on where it was interrupted",
                 "gestured-lab study --out report/ --jobs 2")  # fmt: skip
-    study.add_argument("--out", type=Path, default=Path("report"), help="folder for the report (report)")
-    study.add_argument("--seeds", type=int, default=3, help="seeds of each figure of the main tables (3)")
+    study.add_argument("--out", type=Path, default=Path("report"), help="folder for the report (default: report)")
+    study.add_argument("--seeds", type=int, default=3, help="seeds of each figure of the main tables (default: 3)")
     study.add_argument("--draw", type=Path, metavar="FILE", help="compute nothing: draw the picture of error against "
                        "run time again, from the study.json or operating-points.json of an earlier run")  # fmt: skip
     study.add_argument("--readme", type=Path, metavar="FILE", help="with --draw: a README whose table below the "
@@ -126,9 +137,11 @@ def parser() -> argparse.ArgumentParser:
                        "another generator's (python -m tests.foreign.recordings) or another sensor's")  # fmt: skip
     study.add_argument("--recordings", **mine, help="recordings of your own")
     study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")
-    study.add_argument("--seed", type=int, default=0, help="of splits and training: same seed, same numbers (0)")
+    study.add_argument(
+        "--seed", type=int, default=0, help="of splits and training: same seed, same numbers (default: 0)"
+    )
     add_data(study)
-    own = add("own", "learn what a model needs for gestures of its user's own, and write it into its file; "
+    own = add("own", "learn what a model needs for gestures of your own, and write it into its file; "
               "prints what enrolment is worth", "gestured-lab own models/cnn_lstm.onnx")  # fmt: skip
     own.add_argument("models", type=Path, nargs="+", metavar="MODEL", help="an .onnx file that has an embedding")
     own.add_argument("--compare", action="store_true", help="also judge dynamic time warping")
