@@ -31,7 +31,8 @@ DRAIN_S = 0.25  # for serving what still waits when the daemon ends
 PAUSE_S = 0.001  # between reads of packets that come thick: to be woken for each is a large part of its price
 FEW = 8  # packets found by a read, up to which it is followed by a pause
 FULL_S = 0.25  # for which a stall explains that the kernel drops packets; if it lasts longer, it is a flood
-EARLY_S = 0.001  # by which we are woken before something is due: the loop's timers know milliseconds
+EARLY_S = 0.001  # by which we are woken before something is due: the loop's timers know milliseconds alone
+SPARSE_S = 0.02  # between packets, from which on there is time to wait for a moment more exactly than that
 STEP_S = 0.05  # by which the wall clock may move against ours; after a larger step the kernel's times say nothing
 
 TIMESTAMP = struct.Struct("@qq")  # s and ns since the epoch, by the wall clock
@@ -62,6 +63,7 @@ class Receiver:
         self._behind_s = 0.0  # for so long the oldest packet waits that was read and not yet served
         self._looked = 0.0  # s, when we last looked whether something waits
         self._found = 0  # packets, then
+        self._sparse = False  # whether the last ones came after a pause
         self._pause: asyncio.TimerHandle | None = None
         self._again: asyncio.Handle | None = None
         self._due = math.inf  # s, when time alone will decide something
@@ -81,8 +83,8 @@ class Receiver:
 
     def _wake(self) -> None:
         now = self._clock()
-        thick = now - self._looked < PAUSE_S
-        self._looked = now
+        pause_s = now - self._looked
+        thick, self._sparse, self._looked = pause_s < PAUSE_S, pause_s >= SPARSE_S, now
         self.read()
         if thick and self._found <= FEW:
             self._loop.remove_reader(self._sock)
@@ -219,10 +221,11 @@ class Receiver:
                 self._alarm.cancel()
                 self._alarm = None
             if self._due < math.inf:
-                self._alarm = self._loop.call_later(max(self._due - EARLY_S - self._clock(), 0.0), self._wait)
+                woken = self._due - EARLY_S if self._sparse else self._due + EARLY_S
+                self._alarm = self._loop.call_later(max(woken - self._clock(), 0.0), self._wait)
 
     def _wait(self) -> None:
-        """The last millisecond is waited for turn by turn; meanwhile the loop serves everybody else."""
+        """Something is due, or is in a millisecond, for which we wait turn by turn: the loop serves everybody else."""
         if self._clock() < self._due:
             self._alarm = self._loop.call_soon(self._wait)
         else:
