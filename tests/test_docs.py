@@ -139,7 +139,7 @@ def test_the_first_screen_quotes_the_tables():
     for begins in ("`cnn_lstm.onnx`, simulated, nominal", "`cnn_lstm.onnx`, real, taps and swipes"):
         _, count, _, right, wrong, *_ = (cell.partition(" (")[0] for cell in cells(readme, begins))  # no intervals
         assert all(figure in screen for figure in (f"{right}", f"{wrong}", f" {count} ")), (begins, count, right, wrong)
-    for begins in ("last frame sent to event received (p50)", "start to ready"):
+    for begins in ("answer decided to event received (p50)", "start to ready"):
         assert cells(performance, begins)[1] in screen, begins
     assert f"{float(cells(performance, 'resident memory, one sensor')[1].split()[0]):.0f} MiB" in screen
     (false,) = re.findall(r"(\d\.\d+) false events a minute", readme)
