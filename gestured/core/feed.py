@@ -96,7 +96,7 @@ class Feed:
     @property
     def due(self) -> float:
         """When `wait` will find something unless a frame comes before; infinite where nothing waits."""
-        due = self._recognizer.due
+        due = None if self._open is None else self._recognizer.due  # nothing waits where there is no contact
         return math.inf if due is None else self._stamper.when(due)
 
     def wait(self, now: float, facts: list[Fact]) -> None:

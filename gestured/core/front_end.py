@@ -187,17 +187,18 @@ class FrontEnd:
 
     def _pass(self, t: float) -> list[Found]:
         """Time passes until a frame at `t` s: what that alone decides. A frame cannot join what is over."""
-        step = self._pace.step(t)
+        found: list[Found] = []
+        segmenter, step = self._segmenter, self._pace.step(t)
         if step > self.timing.stale_s:
-            found = self.flush(t)
+            found += self.flush(t)
         else:
-            found = self.wait(t)
-            if self._segmenter.phase.touched:
-                found += self._done(self._segmenter.flush(t, self._pace.sure), t)
+            if segmenter.phase.touched:
+                found += self.wait(t)
+                found += self._done(segmenter.flush(t, self._pace.sure), t)
             self._pace.learn(step)
         self._pace.last = t
-        if not self._segmenter.phase.touched:
-            self._segmenter.after.fade(t)
+        if not segmenter.phase.touched:
+            segmenter.after.fade(t)
         return found
 
     def _shift(self, look: Look) -> list[Contact]:
