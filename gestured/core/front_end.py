@@ -145,7 +145,7 @@ class FrontEnd:
     def due(self) -> float | None:
         """When `wait` will find something unless a frame comes before, in s. None where there is nothing to wait for.
 
-        Nothing is waited for beyond a frame that is overdue: it may tell otherwise.
+        Where a frame is overdue before that moment, nothing is decided without it: it may show the finger again.
         """
         off = self._unfinished.due if self.previews else None
         due = self._segmenter.over if off is None else off  # that a finger is off shows before a contact is over
@@ -154,11 +154,11 @@ class FrontEnd:
     def wait(self, t: float) -> list[Found]:
         """No frame has come until `t` s: a finger may be off, a contact may be over. A later frame finds the same."""
         found: list[Found] = []
-        if self.previews and (due := self.due) is not None and due == self._unfinished.due and due <= t:
-            found += self._unfinished.wait(self.segments, due)
-        if (due := self.due) is not None and due <= t:
-            sure = self._pace.sure
-            found += self._done(self._segmenter.flush(min(t, sure), sure), t)
+        until = min(t, self._pace.sure)
+        if self.previews and (off := self._unfinished.due) is not None and off <= until:
+            found += self._unfinished.wait(self.segments, off)
+        if (over := self._segmenter.over) is not None and over <= until:
+            found += self._done(self._segmenter.flush(until, until), t)
         return found
 
     def give_up(self, t: float) -> list[Contact]:
