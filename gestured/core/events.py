@@ -27,7 +27,7 @@ class Provisional:
     gesture: str
     confidence: float  # 0..1
     onset: float  # s
-    decided: float  # s, the frame that made it sure enough
+    decided: float  # s, when the model was sure enough
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Gesture:
     sequence: int  # counts a sensor's gestures from 1 without gaps
     onset: float  # s, first touched frame
     offset: float  # s, last touched frame
-    decided: float  # s, the frame (or flush) that decided it
+    decided: float  # s, when it was decided: the end of the wait after the last touched frame, or later
     frames: int  # touched frames, first to last
     lost: int
     model: str

@@ -34,12 +34,12 @@ class Hub:
         """`classifier` must know the scene's gestures (ValueError)."""
         self._feeds: dict[str, Feed] = {}
         self._numbers: dict[str, tuple[int, int]] = {}  # sequence and id that sensors which are not there have used
-        self._missed = 0  # times that this machine had no room for a packet,
-        self._told: dict[str, int] = {}  # and how many of them a sensor knows of
+        self._missed = 0  # times that this machine had no room for a packet
+        self._told: dict[str, int] = {}  # of each sensor: how many of these times its feed was told of
         self._owners: frozenset[Source] = frozenset()
-        self._asked: frozenset[str] | None = frozenset()  # sensors that are foreseen; None is all
-        self._waits: dict[str, Feed] = {}  # those in which a contact may be over before the next frame
-        self._due = math.inf  # s, when the first of them may
+        self._asked: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
+        self._waits: dict[str, Feed] = {}  # sensors in which a contact may be over before the next frame
+        self._due = math.inf  # s, when the first contact of all sensors may be over
         self._set(scene, classifier)
 
     @property

@@ -100,7 +100,7 @@ class Taxels:
         self.stuck = Stuck(rows * columns)
         self.frozen = Frozen(rows * columns)
         self.bad: Mask = np.zeros(rows * columns, dtype=bool)  # replaced, never changed in place
-        self.count = 0  # of the bad ones
+        self.count = 0  # how many taxels are bad
 
     def review(self, sigma: Array, noise: float) -> None:
         """Say which are bad, by each taxel's noise (N,) and the sensor's. Were it all of them, none would be left."""
