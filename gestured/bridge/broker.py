@@ -12,7 +12,7 @@ from gestured.core.address import Address
 
 PLAIN_PORT, TLS_PORT = 1883, 8883  # registered with IANA
 EXPIRY_S = 1  # how long a broker keeps an event for a subscriber: as OLD_S says, which MQTT counts in whole seconds
-BROKER_S = 5.0  # for any answer of the broker
+BROKER_S = 5.0  # s that the broker may take for any answer
 LAST_S = 1.0  # for its answer to our good-bye; without it, it publishes our last will
 KEEPALIVE_S = 5  # a broker that vanished without a word is noticed, and ours declared dead, after one and a half
 MOST_INCOMING = 1000  # messages that wait to be looked at; more are dropped

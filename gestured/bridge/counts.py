@@ -27,7 +27,7 @@ class Counts:
         self.values: Counter[tuple[str, str]] = Counter()
         self._words: dict[str, str] = {}  # side -> how it is, for systemd's status line
         self._ready = False
-        self._metrics: str | None = None  # where they are served
+        self._metrics: str | None = None  # HOST:PORT of /metrics, where they are served
 
     def add(self, name: str, label: str, count: int = 1) -> None:
         """Count so many more under a name and a label."""

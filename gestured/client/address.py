@@ -38,7 +38,7 @@ def find_socket(environ: Mapping[str, str]) -> Path:
 
 
 def find_control(environ: Mapping[str, str]) -> Path:
-    """Where it keeps its control socket."""
+    """The control socket that is meant where none is named, by the rules of `find_socket`."""
     if path := setting(environ, "control"):
         return Path(path)
     return control_beside(find_socket(environ))

@@ -13,7 +13,7 @@ Words = Callable[[dict[str, Any]], str]  # an answer of the daemon's for a perso
 
 
 def add_reload(commands: Commands) -> None:
-    """Another model or other settings, without losing a gesture."""
+    """Add `reload`: the daemon takes another model or other settings, and loses no gesture."""
     parser = commands.add_parser(
         "reload",
         help="read model and configuration again",
@@ -26,7 +26,7 @@ def add_reload(commands: Commands) -> None:
 
 
 def add_recalibrate(commands: Commands) -> None:
-    """The idle sensor is learned anew."""
+    """Add `recalibrate`: the daemon learns what a sensor shows that nobody touches."""
     parser = commands.add_parser(
         "recalibrate",
         help="learn the idle sensor anew",
@@ -44,7 +44,7 @@ def add_recalibrate(commands: Commands) -> None:
 
 
 def add_emit(commands: Commands) -> None:
-    """A made-up gesture goes through every output."""
+    """Add `emit`: the daemon sends a made-up gesture through every output."""
     parser = commands.add_parser(
         "emit",
         help="publish a marked test event",

@@ -18,9 +18,9 @@ from gestured.model.own import Own
 from gestured.model.rung import Rung
 from gestured.model.shipped import LADDER, shipped, shipped_name
 
-SLOW_S = 0.05  # that a run may take: it delays an answer, and usually takes some milliseconds
-SLOW_RUNS = 3  # in a row, after which a rung is put aside: a single one may be the fault of what else the machine does
-RETRY_S = 30.0  # for which a rung is put aside: to try it again may cost an answer as much time as it took before
+SLOW_S = 0.05  # s; a run that takes longer counts as slow. It delays an answer, and usually takes some milliseconds
+SLOW_RUNS = 3  # slow runs in a row put a rung aside; a single one may be the fault of another program
+RETRY_S = 30.0  # s that a rung is put aside for; to try it again may delay an answer as much as before
 
 
 class Ladder:

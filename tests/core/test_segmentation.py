@@ -32,7 +32,7 @@ def deeds(stream: Stream, wait: bool = True, sure_s: float = 0.0) -> list[Deed]:
 
 
 def play(stream: Stream, wait: bool = True) -> list[Action]:
-    """What it does."""
+    """The actions alone that a segmenter says of a stream."""
     return [deed.action for deed in deeds(stream, wait)]
 
 

@@ -38,13 +38,13 @@ class Settled:
     """Networks that went on, their decision and their threshold, and what they are worth on own recordings."""
 
     judged: Judged
-    least: float  # its threshold
+    least: float  # the confidence from which an answer is published
     before: Shares
     after: Shares
-    way: float  # of the way to the new weights
+    way: float  # share of the way from the old weights to the new ones, one of `WAYS`
     groups: Groups
-    answers: Answers  # of the new model, to those held out
-    apart: Sequence[tuple[Judged, Samples]]  # the networks that left out a group, and that group
+    answers: Answers  # what the new model says of the people who were held out
+    apart: Sequence[tuple[Judged, Samples]]  # for each group of people: networks without it, and its samples
 
 
 @dataclass(frozen=True)

@@ -30,9 +30,9 @@ class Course:
 
     steps: int = 200  # some 15 seconds on one core
     rates: tuple[float, float] = (6e-4, 4.5e-4)  # of the network and of its second opinion; they fall to 0
-    own_share: float = 0.4  # of a batch, at most
+    own_share: float = 0.4  # share of a batch that own samples may have
     repeats: float = 40.0  # times that each own sample is shown, at most: few samples are few steps' worth
-    fit: FitConfig = FitConfig()  # what is as in training
+    fit: FitConfig = FitConfig()  # settings of a step that are those of training
 
 
 def classes_of(samples: Samples) -> NDArray[np.int64]:
