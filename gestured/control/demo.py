@@ -39,7 +39,7 @@ def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "demo",
-        help="see it recognise simulated gestures",
+        help="start a daemon, and watch it recognise simulated gestures",
         description="Start a daemon with a shipped model and a simulated sensor that sends to it\n"
         "over UDP, and show what was performed beside what was recognised.",
         epilog="examples:\n  gesturectl demo --seconds 20 --speed fast\n  gesturectl demo --json --kinds double_tap",

@@ -16,7 +16,7 @@ def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "names",
-        help="names of gestures, types of events, or sensors, one a line",
+        help="print names of gestures, types of events, or sensors, one a line",
         description="Print names, one a line, for completions and scripts: the running daemon's, where there is one.",
         epilog="example:\n  gesturectl names sensors",
     )
