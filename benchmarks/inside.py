@@ -18,11 +18,10 @@ from gestured.core.events import Gesture
 from gestured.core.found import Cut
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
-from gestured.core.grid import Grid
-from gestured.core.layouts import Layouts
-from gestured.core.osc_address import Addresses
+from gestured.core.mounting import Grid
+from gestured.core.osc import Layouts
 from gestured.core.recognizer import Recognizer
-from gestured.core.wire import Decoder
+from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.clients import EventServer
 from gestured.daemon.metrics import Metrics
 from gestured.model.opening import open_model

@@ -17,9 +17,8 @@ from gestured.client.osc_out import dated
 from gestured.client.sensor import Form
 from gestured.client.stream import Stream
 from gestured.core.frames import Frame, Touch
-from gestured.core.grid import Grid
-from gestured.core.osc_address import Addresses
-from gestured.core.wire import Decoder
+from gestured.core.mounting import Grid
+from gestured.core.wire import Addresses, Decoder
 from gestured.lab.made_of import made_of
 from gestured.model.shipped import shipped
 from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take

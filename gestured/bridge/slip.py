@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from gestured.bridge.readings import FEWEST, LINE_BYTES, Protocol, Reading, reading_of
 from gestured.core.errors import ProtocolError
-from gestured.core.osc import decode
-from gestured.core.osc_message import Message
+from gestured.core.osc import Message, decode
 
 SLIP_END = b"\xc0"
 # Bytes a taxel -> what they are.

@@ -4,8 +4,8 @@ from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
 
 from gestured.core.address import Address
-from gestured.core.grid import Grid
-from gestured.core.osc_address import is_sensor
+from gestured.core.mounting import Grid
+from gestured.core.wire import is_sensor
 
 
 def host_port(text: str) -> Address:

@@ -11,10 +11,9 @@ import numpy as np
 from gestured.control.sight import Seen
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
-from gestured.core.grid import SIDES
 from gestured.core.habits import ALIKE, Habits, neighbours_alike
-from gestured.core.mounting import Mounting
-from gestured.core.osc_address import is_sensor
+from gestured.core.mounting import SIDES, Mounting
+from gestured.core.wire import is_sensor
 
 USUAL = "/{sensor}/pressure"
 LONGEST_ADDRESS = 255  # characters of an address that is proposed

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gestured.core import osc
 from gestured.core.errors import ProtocolError
-from gestured.core.osc_message import Message
+from gestured.core.osc import Message
 
 MOST_ADDRESSES = 256  # addresses; what comes after that is counted together
 LEAST_TAXELS = 4  # 2 x 2

@@ -11,8 +11,7 @@ from gestured.core.frames import Frame
 from gestured.core.habits import Habits
 from gestured.core.mounting import Mounting
 from gestured.core.pace import Pace
-from gestured.core.phases import Action
-from gestured.core.segmentation import Deed, Segmenter
+from gestured.core.segmenter import Action, Deed, Segmenter
 from gestured.core.timing import Timing
 from gestured.core.unfinished import Unfinished
 

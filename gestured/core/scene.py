@@ -10,10 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from gestured.core.grid import SIDES
-from gestured.core.mounting import Mounting
-from gestured.core.osc_address import Addresses
+from gestured.core.mounting import SIDES, Mounting
 from gestured.core.timing import Timing
+from gestured.core.wire import Addresses
 
 ONE_TAP, DOUBLE_TAP = "one_tap", "double_tap"
 TAP_GAP_S = (0.2, 0.6)  # s: shorter no hand taps twice through 15 Hz, longer no two taps belong together

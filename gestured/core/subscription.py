@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from gestured.core.errors import ProtocolError
 from gestured.core.events import Event, Gesture, Provisional, Status
 from gestured.core.messages import EVENT_TYPES, event_type, quoted
-from gestured.core.osc_address import is_sensor
+from gestured.core.wire import is_sensor
 
 MAX_LINE = 4096  # bytes of a client's request
 

@@ -4,7 +4,7 @@ from gestured.core.cutter import Cutter
 from gestured.core.found import Draft, Preview
 from gestured.core.frames import Segment
 from gestured.core.pace import Pace
-from gestured.core.segmentation import Segmenter
+from gestured.core.segmenter import Segmenter
 from gestured.core.timing import Timing
 
 PREVIEW_S = 0.0666  # from one preview to the next: 15 a second, a little less than 1/15 because times are rounded

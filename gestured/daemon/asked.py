@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from gestured.core.errors import ModelError
 from gestured.core.mounting import Mounting
-from gestured.core.osc_address import Addresses
 from gestured.core.own import is_name
 from gestured.core.scene import Scene, Setup
+from gestured.core.wire import Addresses
 from gestured.daemon import own_file
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics

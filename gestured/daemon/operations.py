@@ -8,8 +8,8 @@ from itertools import chain
 
 from gestured.core.events import Gesture, Onset, Provisional, Release
 from gestured.core.hub import Hub
-from gestured.core.osc_address import is_sensor
 from gestured.core.reading import Reading
+from gestured.core.wire import is_sensor
 from gestured.daemon.caller import Connection
 from gestured.daemon.desk import Desk
 from gestured.daemon.own import OwnGestures

@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gestured.core.address import Address
-from gestured.core.osc_address import Addresses
 from gestured.core.scene import TAP_GAP_S
 from gestured.core.timing import Timing
+from gestured.core.wire import Addresses
 from gestured.daemon.values import (
     AddressField,
     DestinationField,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gestured import __version__
 from gestured.core.address import Address
-from gestured.core.grid import Grid
+from gestured.core.mounting import Grid
 from gestured.core.own import Examples, to_dict
 from gestured.core.reading import Reading
 from gestured.core.view import View

@@ -15,10 +15,10 @@ from gestured.core.facts import events_of
 from gestured.core.feed import front_end_of
 from gestured.core.frames import Frame, Touch
 from gestured.core.mounting import Mounting
-from gestured.core.osc_address import is_sensor
 from gestured.core.recognizer import Recognizer
 from gestured.core.scene import Scene, Setup
 from gestured.core.timing import Timing
+from gestured.core.wire import is_sensor
 from gestured.model.ladder import gestures_in_use, ladder_for
 
 

@@ -16,10 +16,10 @@ from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault,
 from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
 from gestured.core.mounting import Mounting
-from gestured.core.osc_address import Addresses
 from gestured.core.own import Examples, from_dict
 from gestured.core.scene import Scene, Setup
 from gestured.core.timing import Timing
+from gestured.core.wire import Addresses
 from gestured.record.tape import Tape
 from gestured.record.tape_reader import read
 

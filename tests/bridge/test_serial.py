@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gestured.core.osc_address import Addresses
-from gestured.core.wire import Decoder
+from gestured.core.wire import Addresses, Decoder
 from tests.bridge.conftest import Process, page, wait
 from tests.bridge.test_protocols import written
 from tests.daemon.harness import DEADLINE_S, Hand, Sensor, blob, floats

@@ -19,7 +19,7 @@ from gestured.client.say import MOST, shown
 from gestured.control.proposal import propose
 from gestured.control.sight import Sight
 from gestured.core.errors import RecordingError
-from gestured.core.osc_address import Addresses, is_sensor
+from gestured.core.wire import Addresses, is_sensor
 from gestured.record import arrays as recording
 from gestured.record import tape_reader, tape_writer
 from tests.control.conftest import ROOT, gestures

@@ -11,8 +11,7 @@ import pytest
 from gestured.control.proposal import Known, propose
 from gestured.control.sight import Sight
 from gestured.control.sniff import lines
-from gestured.core.osc_address import Addresses
-from gestured.core.wire import Decoder
+from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.merge import load_settings
 from tests import encoding
 from tests.daemon.harness import Hand, blob, counted, floats, ints

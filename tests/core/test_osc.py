@@ -16,8 +16,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 from gestured.core import osc
 from gestured.core.errors import ProtocolError
-from gestured.core.layouts import Layouts
-from gestured.core.osc_message import Message
+from gestured.core.osc import Layouts, Message
 from tests import encoding
 
 REASONS = {"not_osc", "address", "types", "truncated", "trailing", "bundle", "oversized"}

@@ -9,7 +9,7 @@ from gestured.core.contact import Memory
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.mounting import Mounting
-from gestured.core.phases import CONTACT, GAP, IDLE, RELEASING, SPENT, Signal
+from gestured.core.segmenter import CONTACT, GAP, IDLE, RELEASING, SPENT, Signal
 from gestured.core.timing import Timing
 from gestured.core.view import view_of
 from tests.core.test_habits import RATE_HZ, session

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from gestured.core import wire
 from gestured.core.frames import Touch
-from gestured.core.osc_address import Addresses, is_sensor
-from gestured.core.wire import Arrival, Decoder
+from gestured.core.wire import Addresses, Arrival, Decoder, is_sensor
 from tests import encoding
 
 GRID = (3, 4)

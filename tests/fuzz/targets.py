@@ -14,10 +14,9 @@ import numpy as np
 
 from gestured.core.errors import ModelError, ProtocolError
 from gestured.core.frames import Segment
-from gestured.core.osc_address import Addresses
 from gestured.core.stamping import Stamper
 from gestured.core.subscription import parse_subscription
-from gestured.core.wire import Arrival, Decoder
+from gestured.core.wire import Addresses, Arrival, Decoder
 from gestured.daemon.client import Client, Server
 from gestured.model.model import Model
 from tests.bounds import little_memory

@@ -38,7 +38,7 @@ def test_comments_docstrings_and_line_breaks_are_no_code(copy: Path) -> None:
     ("module", "room"),
     [
         ("gestured.lab.dataset", "lab/dataset.py"),  # its own code
-        ("gestured.lab.dataset", "core/segmentation.py"),  # what it imports imports it
+        ("gestured.lab.dataset", "core/segmenter.py"),  # what it imports imports it
         ("gestured.lab.dataset", "simulator/people.py"),  # through a package
         ("gestured.lab.study.sessions", "daemon/service.py"),  # a program that it starts
         ("gestured.lab.study.report.page", "lab/study/report/reading.py"),  # imported by the name that its folder has

@@ -7,9 +7,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.core import segmentation
-from gestured.core.phases import CONTACT, GAP, IDLE, RELEASING, SPENT, TRANSITIONS, Action, Phase, Row, Signal
-from gestured.core.segmentation import Deed, Segmenter
+from gestured.core import segmenter as core_segmenter
+from gestured.core.segmenter import (
+    CONTACT,
+    GAP,
+    IDLE,
+    RELEASING,
+    SPENT,
+    TRANSITIONS,
+    Action,
+    Deed,
+    Phase,
+    Row,
+    Segmenter,
+    Signal,
+)
 
 PHASES = {phase.name: phase for phase in (IDLE, CONTACT, RELEASING, GAP, SPENT)}
 PAGE = Path(__file__).parents[2] / "ARCHITECTURE.md"
@@ -81,7 +93,7 @@ def test_no_row_is_there_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
             seen.add(key)
             return TRANSITIONS[key]
 
-    monkeypatch.setattr(segmentation, "TRANSITIONS", Watched(TRANSITIONS))
+    monkeypatch.setattr(core_segmenter, "TRANSITIONS", Watched(TRANSITIONS))
 
     def frames(count: int, activity: float, step: float = 1 / 15) -> Stream:
         return [(step, activity, (4.0, 4.0))] * count
