@@ -6,9 +6,10 @@ had room for every packet.
 """
 
 import ipaddress
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from gestured.core.mounting import SIDES, Mounting
 from gestured.core.timing import Timing
@@ -16,6 +17,8 @@ from gestured.core.wire import Addresses
 
 ONE_TAP, DOUBLE_TAP = "one_tap", "double_tap"
 TAP_GAP_S = (0.2, 0.6)  # s: shorter no hand taps twice through 15 Hz, longer no two taps belong together
+STALE_S = (0.2, 60.0)  # s: shorter than a pause of a slow sensor, longer than anybody waits
+MOST_SENSORS = 4096
 
 Clock = Literal["arrival", "sensor"]
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
@@ -52,14 +55,44 @@ class Scene:
     def __post_init__(self) -> None:
         if not self.gestures:
             raise ValueError("gestures: expected at least one, found none")
-        if not TAP_GAP_S[0] <= self.tap_gap_s <= TAP_GAP_S[1]:
-            raise ValueError(f"tap_gap_s: expected {TAP_GAP_S[0]:g} to {TAP_GAP_S[1]:g} s, found {self.tap_gap_s!r}")
+        for key, (least, most) in (("tap_gap_s", TAP_GAP_S), ("stale_s", STALE_S)):
+            if not least <= getattr(self, key) <= most:
+                raise ValueError(f"{key}: expected {least:g} to {most:g} s, found {getattr(self, key)!r}")
+        if not 0 < self.max_sensors <= MOST_SENSORS or len(self.sensors) > MOST_SENSORS:
+            raise ValueError(
+                f"sensors: expected at most {MOST_SENSORS}, found {self.max_sensors}, {len(self.sensors)} named"
+            )
+        for value in (*self.thresholds.values(), *self.refractory.values()):
+            if not math.isfinite(value):
+                raise ValueError(f"gestures: expected thresholds and seconds that are finite, found {value!r}")
         for name in ("", *self.sensors):
             rows, columns = self.grid_of(name)
             if not (SIDES[0] <= rows <= SIDES[1] and SIDES[0] <= columns <= SIDES[1]):
                 raise ValueError(f"grid: expected sides of {SIDES[0]} to {SIDES[1]} taxels, found {rows} x {columns}")
             if self.clock_of(name) not in ("arrival", "sensor"):
                 raise ValueError(f"clock: expected arrival or sensor, found {self.clock_of(name)!r}")
+
+    @classmethod
+    def from_dict(cls, told: Mapping[str, Any], gestures: tuple[str, ...], grid: tuple[int, int]) -> "Scene":
+        """The scene of a daemon whose settings are `told`, as values or as JSON holds them; others are passed over.
+
+        `gestures` are those in use, `grid` holds where the settings name none. What is missing has its default.
+        Raises ValueError, KeyError, TypeError, AttributeError or OverflowError for what no daemon's settings can be.
+        """
+        parts = told.get("per_gesture", {}).items()
+        plain: tuple[tuple[str, type], ...] = (
+            ("clock", str), ("stale_s", float), ("tap_gap_s", float), ("provisional_taps", bool), ("max_sensors", int),
+        )  # fmt: skip
+        return cls(
+            gestures=gestures,
+            grid=_grid(told.get("grid") or grid),
+            sensors={name: _setup(own) for name, own in told.get("sensors", {}).items()},
+            addresses=Addresses(**told.get("addresses", {})),
+            allow=tuple(ipaddress.ip_network(str(network)) for network in told.get("allow", ())),
+            thresholds={name: float(own["threshold"]) for name, own in parts if own["threshold"] is not None},
+            refractory={name: float(own["refractory_s"]) for name, own in parts},
+            **{key: kind(told[key]) for key, kind in plain if key in told},
+        )
 
     def setup(self, sensor: str) -> Setup:
         """What is set for a sensor."""
@@ -90,3 +123,14 @@ class Scene:
         address = ipaddress.ip_address(host)
         mapped = getattr(address, "ipv4_mapped", None)
         return any((mapped or address) in network for network in self.allow)
+
+
+def _grid(value: Any) -> tuple[int, int]:
+    rows, columns = value
+    return int(rows), int(columns)
+
+
+def _setup(own: Mapping[str, Any]) -> Setup:
+    grid = own.get("grid")
+    mounting = Mounting(own.get("rotate", 0), own.get("mirror", False), own.get("invert", False))
+    return Setup(grid and _grid(grid), mounting, own.get("clock"))

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gestured.core.address import Address
-from gestured.core.scene import TAP_GAP_S
+from gestured.core.scene import MOST_SENSORS, STALE_S, TAP_GAP_S
 from gestured.core.timing import Timing
 from gestured.core.wire import Addresses
 from gestured.daemon.values import (
@@ -109,7 +109,7 @@ class Settings(Part):
         description="where a frame's time comes from: its arrival, or the increments of the sensor's time tags",
     )
     stale_s: float = Field(
-        default=1.0, ge=0.2, le=60, description="seconds of silence after which a sensor counts as gone"
+        default=1.0, ge=STALE_S[0], le=STALE_S[1], description="seconds of silence after which a sensor counts as gone"
     )
     tap_gap_s: float = Field(
         default=Timing().tap_gap_s,
@@ -125,7 +125,10 @@ class Settings(Part):
         default=False, description="whether provisional events and their revocations are also sent to `publish`"
     )
     max_sensors: int = Field(
-        default=64, ge=1, le=4096, description="how many sensors at a time; further ones are dropped and counted"
+        default=64,
+        ge=1,
+        le=MOST_SENSORS,
+        description="how many sensors at a time; further ones are dropped and counted",
     )
     allow: Annotated[tuple[NetworkField, ...], Listed] = Field(
         default=(), description="addresses or networks that may send frames; any unless set"

@@ -1,7 +1,6 @@
 """A tape through the hub that the daemon uses: the same packets at the same times give the same events."""
 
 import dataclasses
-import ipaddress
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,18 +14,10 @@ from gestured.core.events import Event, Onset
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
 from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
-from gestured.core.mounting import Mounting
 from gestured.core.own import Examples, from_dict
-from gestured.core.scene import Scene, Setup
-from gestured.core.timing import Timing
-from gestured.core.wire import Addresses
+from gestured.core.scene import Scene
 from gestured.record.tape import Tape
 from gestured.record.tape_reader import read
-
-SENSORS = 4096  # the most that a daemon's settings allow
-MAX_SENSORS = 64  # a daemon's default, for a tape that does not say
-TAP_GAP_S = Timing().tap_gap_s  # a daemon's default, for a tape that does not say
-STALE_S = 60  # the longest that a daemon's settings allow
 
 
 @dataclass(frozen=True)
@@ -54,53 +45,15 @@ def maker(told: Mapping[str, Any]) -> Maker:
     if not isinstance(settings, dict):
         raise RecordingError("scene: expected settings, as the daemon writes them")
     try:
-        sensors: Mapping[str, Any] = dict(settings["sensors"])
-        parts: Mapping[str, Any] = dict(settings["per_gesture"])
-        thresholds = {n: _finite(p["threshold"]) for n, p in parts.items() if p["threshold"] is not None}
-        most, stale_s = int(settings.get("max_sensors", MAX_SENSORS)), _finite(settings["stale_s"])
-        if len(sensors) > SENSORS or not 0 < most <= SENSORS:
-            raise ValueError(f"{len(sensors)} sensors of {most}, expected at most {SENSORS}")
-        if not 0 < stale_s <= STALE_S:
-            raise ValueError(f"stale_s: expected up to {STALE_S} s")
         model = told["model"]
-        scene = Scene(
-            gestures=tuple(_text(name) for name in told["gestures"]),
-            grid=_grid(settings["grid"] or (model["rows"], model["columns"])),
-            sensors={name: _setup(own) for name, own in sensors.items()},
-            addresses=Addresses(settings["addresses"]["pressure"], settings["addresses"]["trajectory"]),
-            clock=settings["clock"],
-            stale_s=stale_s,
-            tap_gap_s=_finite(settings.get("tap_gap_s", TAP_GAP_S)),
-            provisional_taps=bool(settings.get("provisional_taps", True)),
-            max_sensors=most,
-            allow=tuple(ipaddress.ip_network(_text(network)) for network in settings.get("allow", ())),
-            thresholds=thresholds,
-            refractory={n: _finite(p["refractory_s"]) for n, p in parts.items()},
-        )
+        gestures = tuple(_text(name) for name in told["gestures"])
+        scene = Scene.from_dict(settings, gestures, (model["rows"], model["columns"]))
         models = [_text(name) for name in (settings["model"], *settings["fallback"])]
         return Maker(scene, models, str(model.get("sha256")), from_dict(told.get("own", {})))
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise RecordingError(
             f"scene: expected gestures and settings as the daemon writes them: {repr(error)[:200]}"
         ) from None
-
-
-def _setup(own: Mapping[str, Any]) -> Setup:
-    grid = own.get("grid")
-    mounting = Mounting(own.get("rotate", 0), own.get("mirror", False), own.get("invert", False))
-    return Setup(grid and _grid(grid), mounting, own.get("clock"))
-
-
-def _grid(value: Any) -> tuple[int, int]:
-    rows, columns = value
-    return int(rows), int(columns)
-
-
-def _finite(value: Any) -> float:
-    number = float(value)
-    if not math.isfinite(number):
-        raise ValueError(f"expected a number, found {number}")
-    return number
 
 
 def _text(value: object) -> str:
