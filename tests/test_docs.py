@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -74,8 +75,8 @@ def test_the_subscriber_in_the_readme_prints_gestures(tmp_path: Path):
         listener.bind(str(path))
         listener.listen()
         listener.settimeout(30)
-        code = code.replace("/tmp/gestured.sock", str(path))
-        with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as subscriber:
+        command, environment = [sys.executable, "-c", code], os.environ | {"GESTURED_SOCKET": str(path)}
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as subscriber:
             client, _ = listener.accept()
             request = json.loads(client.makefile().readline())
             assert request == {"subscribe": {"types": ["gesture"]}}
@@ -102,19 +103,25 @@ def test_the_sensor_in_the_readme_sends_a_frame():
 
 @pytest.mark.e2e
 def test_the_first_steps_in_the_readme_lead_to_a_gesture(tmp_path: Path):
-    """The daemon, the simulated sensor and the listener as the README starts them, but for the addresses."""
+    """The daemon, the simulated sensor and the listener as the README starts them, but for the addresses.
+
+    The socket's path stands once in the README, in a line that each terminal begins with.
+    """
     if not shipped()["cnn_lstm"].exists():
         pytest.skip(f"{shipped()['cnn_lstm']} is not there")
     lines = [line for line in "".join(blocks("sh")).splitlines() if line.startswith("gesture")]
     daemon_line, simulate_line, listen_line = lines[0], lines[1], lines[2]
-    path = str(tmp_path / "events.sock")
+    (exported,) = re.findall(r"^export (\w+)=(?:\S+)$", "".join(blocks("sh")), re.MULTILINE)
+    environment = os.environ | {exported: str(tmp_path / "events.sock")}
     running = []
 
     def begin(line: str, *more: str) -> "subprocess.Popen[str]":
-        program, *arguments = shlex.split(line.replace("/tmp/gestured.sock", path))
+        program, *arguments = shlex.split(line)
         module = {"gestured": "gestured.daemon", "gesturectl": "gestured.control"}[program]
         command = [sys.executable, "-m", module, *arguments, *more]
-        process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        process = subprocess.Popen(
+            command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
         running.append(process)
         return process
 

@@ -2,19 +2,29 @@
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
-SYSTEM = Path("/run/gestured/events.sock")  # of the installed service
-SHARED = Path("/tmp")  # where a daemon without a session keeps its folder; anybody can make it first
+from gestured.core.errors import SettingsError
+
+SYSTEM = Path("/run/gestured/events.sock")  # of the installed service, and of root
 
 
 def default_socket(environ: Mapping[str, str]) -> Path:
-    """The event socket of a daemon that is told none: where systemd or the session keeps such things."""
+    """The event socket of a daemon that is told none: where systemd, the session or root keeps such things.
+
+    Raises SettingsError where there is no such folder.
+    """
     if directory := environ.get("RUNTIME_DIRECTORY"):
         return Path(directory.split(":")[0]) / "events.sock"
     if directory := environ.get("XDG_RUNTIME_DIR"):
         return Path(directory) / "gestured" / "events.sock"
-    return SHARED / f"gestured-{os.getuid()}" / "events.sock"
+    if os.geteuid() == 0:
+        return SYSTEM
+    raise SettingsError(
+        "socket: there is no default here, since neither RUNTIME_DIRECTORY nor XDG_RUNTIME_DIR is set; "
+        "name a path with --socket, or in GESTURED_SOCKET for the daemon and its clients alike"
+    )
 
 
 def control_beside(socket: Path) -> Path:
@@ -26,15 +36,15 @@ def find_socket(environ: Mapping[str, str]) -> Path:
     """The event socket that is meant where none is named, the first of these.
 
     What the environment says, as the daemon reads it; that of a daemon in the session; the installed service's; the one
-    where a daemon without a session would keep it. Who serves it, `client.peer` looks at.
+    that a daemon would make. Who serves it, `client.peer` looks at. Raises SettingsError where none can be meant.
     """
     if path := setting(environ, "socket"):
         return Path(path)
-    own = default_socket(environ)
     # Unlike Path.exists, os.path.exists raises no error where we may not look.
-    if environ.get("RUNTIME_DIRECTORY") or (environ.get("XDG_RUNTIME_DIR") and os.path.exists(own)):
-        return own
-    return SYSTEM if SYSTEM.parent.is_dir() else own
+    installed = SYSTEM.parent.is_dir() and not environ.get("RUNTIME_DIRECTORY")
+    if installed and not (environ.get("XDG_RUNTIME_DIR") and os.path.exists(default_socket(environ))):
+        return SYSTEM
+    return default_socket(environ)
 
 
 def find_control(environ: Mapping[str, str]) -> Path:
@@ -49,7 +59,10 @@ def find_all_controls(environ: Mapping[str, str]) -> list[Path]:
     session = environ.get("XDG_RUNTIME_DIR")
     folders = [SYSTEM.parent.parent, *([Path(session)] if session else [])]
     found = {path for folder in folders for path in folder.glob(f"{SYSTEM.parent.name}*/{SYSTEM.stem}.ctl")}
-    return sorted({find_control(environ), *found} if os.path.exists(find_control(environ)) else found)
+    with suppress(SettingsError):  # none is meant
+        if os.path.exists(meant := find_control(environ)):
+            found.add(meant)
+    return sorted(found)
 
 
 def setting(environ: Mapping[str, str], key: str) -> str | None:

@@ -1,7 +1,7 @@
 """Who serves a Unix socket, and whether a client believes him.
 
-A client shows what a daemon says, and opens files that it names. So it asks nothing of a stranger: anybody can make the
-default folder below /tmp before its owner does.
+A client shows what a daemon says, and opens files that it names. So it asks nothing of a stranger: a path says where a
+daemon should be, not who is there.
 """
 
 import os

@@ -39,7 +39,7 @@ def parser(argv: Sequence[str] = ()) -> program.Parser:
         "gesturectl",
         "COMMAND",
         description="The operator's client of gestured.",
-        epilog="example: gesturectl listen --socket /run/gestured/events.sock",
+        epilog="example: gesturectl listen --gesture swipe_left",
     )
     asked = [row for row in SUBCOMMANDS if argv and argv[0] in row[2]]
     for module, add, _ in asked or SUBCOMMANDS:

@@ -146,9 +146,12 @@ class Show:
             programs = program.parent if program.name == "gesturectl" else Path()
             say(
                 "",
-                "Next, a daemon of your own, and in a second terminal a sensor that somebody touches:",
+                "Next, a daemon of your own, a sensor that somebody touches, and a listener, each in a terminal",
+                "that begins with this line:",
+                "  export GESTURED_SOCKET=/tmp/gestured.sock",
                 f"  {programs / 'gestured'} --model {self.model}",
                 f"  {programs / 'gesturectl'} simulate --sensor armrest",
+                f"  {programs / 'gesturectl'} listen",
             )
 
     def _draw(self, control: Control) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gestured.client.address import control_beside, default_socket
+from gestured.core.errors import GesturedError
 from gestured.daemon.log import log
 from gestured.daemon.settings import Settings
 from gestured.daemon.sockets import (
@@ -60,7 +61,7 @@ class Bound:
 
 
 def bind_all(settings: Settings) -> Bound:
-    """Take what systemd passed and bind the rest. All or nothing; raises AddressError."""
+    """Take what systemd passed and bind the rest. All or nothing; raises AddressError or SettingsError."""
     given = _by_name(_passed())
     opened: list[socket.socket | Listener] = list(given.values())
     try:
@@ -87,7 +88,7 @@ def bind_all(settings: Settings) -> Bound:
             if beside == path:
                 raise AddressError(f"control: {path} is the event socket, choose another path with --control")
             control = UnixListener(beside, "control")
-    except AddressError:
+    except GesturedError:
         for sock in opened:
             sock.close()
         raise

@@ -86,7 +86,7 @@ class Settings(Part):
     socket: SocketField | None = Field(
         default=None,
         description="Unix socket of the event stream; by default $RUNTIME_DIRECTORY/events.sock, "
-        "else $XDG_RUNTIME_DIR/gestured/events.sock, else /tmp/gestured-UID/events.sock",
+        "else $XDG_RUNTIME_DIR/gestured/events.sock, for root /run/gestured/events.sock",
     )
     control: SocketField | None = Field(
         default=None,

@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from gestured.client.address import SHARED
 from gestured.client.holder import bind_failure
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
@@ -173,13 +172,9 @@ class UnixListener(Listener):
 
 def make_default_directory(directory: Path) -> None:
     """Make the folder of the default socket, for its owner alone. Raises AddressError."""
-    shared = directory.parent == SHARED  # anybody could have made it, or a link, before us
     try:
         directory.mkdir(0o700, parents=True, exist_ok=True)
-        found = directory.lstat() if shared else directory.stat()
     except OSError as error:
         raise AddressError(
             f"socket: cannot make {directory}: {error.strerror}; choose another with --socket"
         ) from error
-    if not stat.S_ISDIR(found.st_mode) or (shared and found.st_uid != os.getuid()):
-        raise AddressError(f"socket: {directory} is not a folder of ours; choose another with --socket")

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from gestured.client import address
+from gestured.core.errors import SettingsError
 
 
 @pytest.fixture
@@ -34,13 +35,15 @@ def test_what_the_environment_says_comes_first(tmp_path: Path, system: Path):
     assert address.find_socket({"RUNTIME_DIRECTORY": "/c:/d"}) == Path("/c/events.sock")
 
 
-def test_the_installed_service_comes_before_any_folder_in_tmp(
-    tmp_path: Path, system: Path, monkeypatch: pytest.MonkeyPatch
+def test_without_a_session_root_has_the_services_folder_and_others_are_asked_for_a_path(
+    system: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(address, "SHARED", tmp_path)
-    anybodys = tmp_path / f"gestured-{os.getuid()}" / "events.sock"
-    anybodys.parent.mkdir()
-    anybodys.touch()
-    assert address.find_socket({}) == anybodys
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    assert address.default_socket({}) == address.find_socket({}) == system
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    for asked in (address.default_socket, address.find_socket, address.find_control):
+        with pytest.raises(SettingsError, match=r"XDG_RUNTIME_DIR .* --socket"):
+            asked({})
+    assert address.find_all_controls({}) == []
     system.parent.mkdir()
     assert address.find_socket({}) == system

@@ -62,6 +62,8 @@ def test_without_a_terminal_no_escape_codes_and_without_block_characters_words(r
     assert (status, err) == (0, "")
     assert "\x1b" not in out
     assert "performed   swipe_up" in out and "Summary" in out
+    (exported,) = [line for line in out.splitlines() if "export " in line]
+    assert exported.strip() in Path(gestured.__file__, "../../README.md").resolve().read_text().splitlines()
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -23,7 +24,7 @@ from tests.sockets import free_address
 
 WRAPPER = '#!/bin/sh\nPYTHONPATH={root} exec {python} -m gestured.{package} "$@"\n'
 # A phrase that only this example has, and so its name.
-SHELL = ("--types gesture,unknown --count 2", "--json --count 1 | while", "show the next track")
+ENDING, *LOOPS = SHELL = ("--types gesture,unknown --count 2", "--json --reconnect | while", "show the next track")
 PHRASES = {
     *SHELL,
     "across its restarts",
@@ -123,14 +124,27 @@ def compiled(place: Place, phrase: str) -> str:
     return str(program)
 
 
-@pytest.mark.parametrize("phrase", SHELL)
-def test_shell(place: Place, phrase: str):
-    environment = {"PATH": f"{place.folder}:/usr/bin:/bin"}
-    command = ["bash", "-euo", "pipefail", "-c", place.here(example(phrase).text)]
-    with place.gestures():
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment)
-    assert done.returncode == 0, done.stderr
-    assert ("the next track" if "track" in example(phrase).text else "swipe_left") in done.stdout
+def shell(place: Place, phrase: str) -> "subprocess.Popen[str]":
+    """An example in a shell whose environment names this daemon's socket, as a leader of its processes."""
+    environment = {"PATH": f"{place.folder}:/usr/bin:/bin", "GESTURED_SOCKET": str(place.daemon.socket)}
+    command = ["bash", "-euo", "pipefail", "-c", example(phrase).text]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment, start_new_session=True)
+
+
+def test_shell(place: Place):
+    with place.gestures(), shell(place, ENDING) as process:
+        assert "swipe_left" in process.communicate(timeout=60)[0]
+    assert process.returncode == 0
+
+
+@pytest.mark.parametrize("phrase", LOOPS)
+def test_a_loop_in_a_shell_goes_on(place: Place, phrase: str):
+    with place.gestures(), shell(place, phrase) as process:
+        assert process.stdout is not None
+        try:
+            assert all("the next track" in process.stdout.readline() for _ in range(4))
+        finally:
+            os.killpg(process.pid, signal.SIGKILL)
 
 
 def test_python_subscriber(place: Place):
