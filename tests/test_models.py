@@ -352,6 +352,55 @@ def test_altered_bytes_open_or_are_refused(good_bytes: bytes, changes: list[tupl
     assert scores.values.sum() == pytest.approx(1.0, abs=1e-3)
 
 
+# --- damage that a self-test does not see ---
+
+
+@pytest.fixture(scope="module")
+def exported(good_bytes: bytes) -> bytes:
+    """As the laboratory writes it."""
+    return model_file.sealed(good_bytes)
+
+
+@given(
+    places=st.lists(st.floats(0, 1, exclude_max=True), min_size=1, max_size=4, unique=True),
+    near_the_end=st.booleans(),
+    flip=st.integers(1, 255),
+)
+def test_no_damage_to_an_exported_model_goes_unnoticed(
+    exported: bytes, places: list[float], near_the_end: bool, flip: int
+) -> None:
+    """Neither in the graph and the metadata nor in the digest itself, with its name."""
+    first = len(exported) - 80 if near_the_end else 0
+    data = bytearray(exported)
+    for place in {first + int(share * (len(exported) - first)) for share in places}:
+        data[place] ^= flip
+    with pytest.raises(ValueError, match="damaged"):
+        Model(bytes(data), "")
+
+
+def test_a_user_is_told_of_damage_and_of_a_file_without_a_digest(tmp_path: Path, exported: bytes) -> None:
+    path = tmp_path / "mine.onnx"
+    path.write_bytes(exported)
+    assert check(path)["digest"]
+    assert not check(build(tmp_path / "older.onnx"))["digest"]
+    for copy in range(24):
+        data = bytearray(exported)
+        for place in np.random.default_rng(copy).integers(0, len(data), 4):
+            data[place] ^= 1 + copy
+        path.write_bytes(data)
+        with pytest.raises(ModelError, match="damaged"):
+            check(path)
+
+
+def test_what_another_program_changed_after_the_export_is_refused(tmp_path: Path, exported: bytes) -> None:
+    import onnx
+
+    proto = onnx.load_model_from_string(exported)
+    proto.metadata_props.add(key="note", value="mine")
+    (tmp_path / "m.onnx").write_bytes(proto.SerializeToString())
+    assert "'digest'" in refusal(tmp_path / "m.onnx")
+
+
 # --- shipped models ---
 
 

@@ -37,6 +37,8 @@ def run(args: argparse.Namespace) -> int:
         return 0
     for key, value in report.items():
         say(f"{key:<14} {_words(value)}")
+    if not (report["digest"] or report["shipped"]):
+        say("no digest: whether it is damaged cannot be told; gestured-lab writes one into each file that it exports")
     say("usable")
     return 0
 

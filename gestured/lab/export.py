@@ -24,7 +24,7 @@ from gestured.core.errors import ModelError
 from gestured.core.window import Window
 from gestured.lab.forest_graph import OPSET, around_thresholds, forest_graph, forest_outputs
 from gestured.lab.recordings import origin
-from gestured.model.file import SelfTest
+from gestured.model.file import SelfTest, sealed
 from gestured.model.model import Model
 from gestured.record.files import PUBLIC, atomic_write
 
@@ -147,7 +147,7 @@ def _finish(
     helper.set_model_props(proto, metadata | {"self_test": SelfTest(example, scores, unknown).to_json()})
     try:
         onnx.checker.check_model(proto, full_check=True)
-        data = proto.SerializeToString(deterministic=True)
+        data = sealed(proto.SerializeToString(deterministic=True))
         _compare(Model(data, path.stem), truth, inputs)
     except (ValueError, onnx.checker.ValidationError, onnx.shape_inference.InferenceError) as error:
         raise ModelError(f"{path}: not written: {error}") from error

@@ -9,6 +9,7 @@ Functions here raise ValueError with the reason; `model.open_model` adds the fil
 
 import base64
 import binascii
+import hashlib
 import json
 import math
 import os
@@ -29,6 +30,8 @@ MAX_MESSAGE_DEPTH = 16  # messages inside messages
 MAX_PROPERTIES = 64  # entries of metadata; a shipped model has a dozen
 MAX_TEXT = 2 << 20  # bytes of one entry of metadata; the largest is the self-test, some kilobytes
 MAX_METADATA = 4 << 20  # bytes of all entries of metadata together
+# What stands in a file before the 64 characters of its digest: the head of a protobuf entry of `metadata_props`.
+DIGEST = b"\x72\x4a\x0a\x06digest\x12\x40"
 MAX_SELF_TEST = 400_000  # numbers of a self-test's input; more do not fit into MAX_TEXT
 MOST_VALUES = 1 << 63  # values of a tensor, as far as they are counted: what claims more claims too much anyway
 
@@ -85,6 +88,23 @@ def read_bytes(path: Path) -> bytes:
     if len(data) > MAX_MODEL_BYTES:
         raise ValueError(f"grew while it was read, expected at most {MAX_MODEL_BYTES} bytes")
     return data
+
+
+def sealed(data: bytes) -> bytes:
+    """An exported model with its digest at its end: an entry `digest` of its metadata, the sha256 of all before it."""
+    return data + DIGEST + hashlib.sha256(data).hexdigest().encode()
+
+
+def has_digest(data: bytes) -> bool:
+    """Whether a model's file ends in its digest; ValueError where that is not the digest of what comes before."""
+    end = len(data) - len(DIGEST) - 2 * hashlib.sha256().digest_size
+    found = data[max(end, 0) : max(end, 0) + len(DIGEST)]
+    # A digest whose own name is damaged is still one; the end of any other entry has hardly a byte in common with it.
+    if sum(one != other for one, other in zip(found, DIGEST, strict=False)) > len(DIGEST) // 2:
+        return False
+    if data != sealed(data[:end]):
+        raise ValueError("is damaged, or was changed after its export: its digest is that of another content")
+    return True
 
 
 def inspect(data: bytes) -> dict[str, str]:

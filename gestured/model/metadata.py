@@ -44,8 +44,13 @@ class Metadata:
     own: Space | None  # where gestures of the user's own are compared; None for a model that cannot
 
     @classmethod
-    def parse(cls, properties: Mapping[str, str]) -> "Metadata":
-        """Holds every key against the contract; ValueError names the key and what was expected."""
+    def parse(cls, properties: Mapping[str, str], *, sealed: bool = False) -> "Metadata":
+        """Holds every key against the contract; ValueError names the key and what was expected.
+
+        A file that is `sealed` ends in its digest, which is right.
+        """
+        if "digest" in properties and not sealed:
+            raise ValueError("metadata 'digest': expected at the file's end; another program has written the file anew")
         required = ("gestures", "kind", "version", "rows", "columns", "rate_hz", "window", "calibration")
         missing = [k for k in (*required, "self_test", "training_data", "quantiles") if k not in properties]
         if missing:

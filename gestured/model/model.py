@@ -14,7 +14,7 @@ from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Segment
-from gestured.model.file import inspect
+from gestured.model.file import has_digest, inspect
 from gestured.model.metadata import Metadata
 from gestured.model.session import Session
 
@@ -34,7 +34,8 @@ class Model:
         self.name = name
         self.size = len(data)
         self.sha256 = hashlib.sha256(data).hexdigest()
-        self.metadata = Metadata.parse(inspect(data))
+        self.sealed = has_digest(data)  # where it is not, nothing but the self-test finds damage
+        self.metadata = Metadata.parse(inspect(data), sealed=self.sealed)
         self.gestures = self.metadata.gestures
         self.rows = self.metadata.rows
         self.columns = self.metadata.columns
@@ -107,6 +108,7 @@ class Model:
             "version": known.version,
             "size": self.size,
             "sha256": self.sha256,
+            "digest": self.sealed,
             "input": self._input,
             "gestures": list(self.gestures),
             "window": asdict(known.window),

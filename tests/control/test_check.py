@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from gestured.model import file
 from gestured.model.shipped import shipped
 
 
@@ -44,3 +45,12 @@ def test_an_altered_shipped_file_is_refused(run, tmp_path):
     (tmp_path / "cut.onnx").write_bytes(data)
     status, _, err = run("check", tmp_path / "cut.onnx")
     assert status == 3 and "cut.onnx" in err
+
+
+def test_a_file_without_a_digest_is_told_so(run, model, tmp_path):
+    status, out, _ = run("check", model)
+    assert status == 0 and "no digest" in out
+    sealed = tmp_path / "mine.onnx"
+    sealed.write_bytes(file.sealed(model.read_bytes()))
+    status, out, _ = run("check", sealed)
+    assert status == 0 and "no digest" not in out

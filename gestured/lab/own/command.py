@@ -15,7 +15,7 @@ from gestured.lab.own.learn import Figures, Seen, figures, learn, played_through
 from gestured.lab.own.play import played
 from gestured.lab.own.signs import JUDGED
 from gestured.lab.own.warping import recalls
-from gestured.model.file import read_bytes
+from gestured.model.file import read_bytes, sealed
 from gestured.model.model import Model
 from gestured.record.files import PUBLIC, atomic_write
 
@@ -55,9 +55,9 @@ def teach(path: Path, cache: Path, people: int, jobs: int) -> Space:
     space = learn(Seen.by(_embedding(path), played(cache, people, jobs)))
     figures_of = {model.stem: measured(model) for model in path.parent.glob("*.onnx")}  # the graph stays the same
     proto = onnx.load(path)
-    kept = {one.key: one.value for one in proto.metadata_props} | {"own": space.to_json()}
+    kept = {one.key: one.value for one in proto.metadata_props if one.key != "digest"} | {"own": space.to_json()}
     onnx.helper.set_model_props(proto, kept)
-    data = proto.SerializeToString(deterministic=True)
+    data = sealed(proto.SerializeToString(deterministic=True))
     try:
         Model(data, path.stem)
     except ValueError as error:
