@@ -96,6 +96,8 @@ def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
         return f"{head}cancelled: {event['reason']}{tail}"
     if kind == "lost":
         return f"{head}{event['count']} events lost: this reader was too slow"
+    if kind == "release":
+        return f"{head}release (the finger left at this time)"
     return f"{head}{kind}"
 
 

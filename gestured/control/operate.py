@@ -19,10 +19,17 @@ def add_reload(commands: Commands) -> None:
         help="read model and configuration again",
         description="Have the daemon read its configuration and its model again. Both are checked, the model\n"
         "with its self-test, before anything changes; where something is wrong, the old ones stay\n"
-        "and the exit status is 1.",
+        "and the exit status is 1. Settings that only a restart can change are named.",
         epilog="example:\n  gesturectl reload",
     )
-    asks(parser, "reload", lambda answer: f"reloaded; {answer['model']} answers")
+    asks(parser, "reload", _reloaded)
+
+
+def _reloaded(answer: dict[str, Any]) -> str:
+    """What a reload has done, and what it could not."""
+    waiting = ", ".join(answer.get("awaiting_restart", ()))  # a daemon of before does not say
+    rest = f"; not yet in use, since only a restart changes it: {waiting}" if waiting else ""
+    return f"reloaded; {answer['model']} answers{rest}"
 
 
 def add_recalibrate(commands: Commands) -> None:

@@ -84,7 +84,8 @@ class Operations:
         reason = await self.reload_all()
         if reason is not None:
             raise Refusal(f"{reason}; nothing has changed")
-        return {"model": self.snapshot().models.active}
+        snapshot = self.snapshot()
+        return {"model": snapshot.models.active, "awaiting_restart": snapshot.awaiting_restart}
 
     async def recalibrate(self, connection: Connection, sensor: str | None = None) -> Reply:
         """Learn the idle sensor anew: one, or all. Refused while one of them is touched: a hand is no baseline."""

@@ -45,6 +45,7 @@ class Service:
         """Serves from now on. `load` reads the configuration again, for a reload."""
         settings, ladder = asked.settings, asked.ladder
         self._settings, self._ladder, self._bound = settings, ladder, bound
+        self._started_with = settings
         self._instance, self._started, self._stopping = secrets.token_hex(8), time.time(), False
         self._begun = time.monotonic()
         self._reloading: asyncio.Task[str | None] | None = None  # a task that nobody holds may be collected
@@ -108,7 +109,12 @@ class Service:
             flight_held_bytes=self._taps.held_bytes,
             addresses=self._bound.addresses(),
             settings=self._settings,
+            awaiting_restart=self._awaiting_restart(),
         )
+
+    def _awaiting_restart(self) -> list[str]:
+        """Settings that a reload has read, but that a restart alone can put to use."""
+        return [key for key in AT_A_RESTART if getattr(self._settings, key) != getattr(self._started_with, key)]
 
     def _state(self) -> dict[str, Any]:
         """Everything that an operator may see of the daemon now."""
@@ -207,11 +213,10 @@ class Service:
     def _swap(self, asked: Asked) -> None:
         """Go on with what a reload has opened."""
         settings, ladder = asked.settings, asked.ladder
-        for key in AT_A_RESTART:
-            if getattr(settings, key) != getattr(self._settings, key):
-                log.warning("this setting changes at a restart only", key=key)
         logging.configure(settings.log_level)
         self._settings, self._ladder = settings, ladder
+        for key in self._awaiting_restart():
+            log.warning("this setting changes at a restart only", key=key)
         self._watch.follow(ladder)
         before = self._gestures()
         self._own.follow(ladder, asked.own)

@@ -67,6 +67,7 @@ class Snapshot:
     flight_held_bytes: int
     addresses: Mapping[str, str | None]  # where it can be reached
     settings: Settings
+    awaiting_restart: list[str]  # keys of settings that a reload has read, and only a restart puts to use
 
     @property
     def every_gesture(self) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from tests import encoding
 from tests.control.conftest import asked
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Hand, Sensor, floats
+from tests.sockets import FakeDaemon
 
 
 def test_status_shows_sensors_model_and_answers(ctl, daemon: Daemon) -> None:
@@ -98,6 +99,13 @@ def test_recalibrate_and_reload(ctl, daemon: Daemon) -> None:
     status, _, err = ctl("reload")
     path.write_bytes(good)
     assert status == 1 and str(path) in err and "nothing has changed" in err
+
+
+def test_reload_names_what_only_a_restart_changes(start, fake: FakeDaemon) -> None:
+    process = start("reload", "--control", fake.path)
+    fake.accept({"ok": True, "model": "tiny", "awaiting_restart": ["listen", "metrics"]})
+    out, _ = process.communicate(timeout=30)
+    assert process.returncode == 0 and re.search(rb"tiny answers; .*restart.*: listen, metrics\n$", out)
 
 
 def test_a_shadow_is_named_by_a_path_that_is_the_clients(ctl, run, start, daemon: Daemon, tmp_path: Path) -> None:

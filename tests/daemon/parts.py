@@ -27,6 +27,7 @@ SNAPSHOT = Snapshot(
     models=Models("m", "m", 0, False, 0, "m.onnx", "1", "", (9, 9), False, 0, {}, ()), gestures=("one_tap",),
     own={"gestures": {}}, sensors={"arm": Reading("ok", (9, 9))}, recent=(), shadow=None, clients=0, backlog_bytes=0,
     kernel_drops=0, taps=0, flight_limit_bytes=0, flight_held_bytes=0, addresses={}, settings=Settings(),
+    awaiting_restart=[],
 )  # fmt: skip
 
 

@@ -188,6 +188,21 @@ def test_reload_says_what_was_wrong_and_keeps_the_old(start, model: Path, tmp_pa
         assert status["model"]["version"] == "2" and status["reloads"] == {"refused": 1, "done": 1}
 
 
+def test_a_reload_names_what_only_a_restart_changes_until_it_is_as_before(start, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text("")
+    daemon = start("--config", config)
+    with Control(Path(daemon.ready["control"])) as control:
+        for text, named in (
+            ("tap_gap_s = 0.3", []),
+            ("flight_recorder = 4", ["flight_recorder"]),
+            ("flight_recorder = 4\ntap_gap_s = 0.4", ["flight_recorder"]),
+            ("tap_gap_s = 0.4", []),
+        ):
+            config.write_text(text)
+            assert control.ask("reload")["awaiting_restart"] == named
+
+
 def test_a_shadow_sees_the_same_and_publishes_nothing(start, model: Path, tmp_path: Path) -> None:
     swapped = list(tiny_model.GESTURES)
     other = tiny_model.make(tmp_path / "candidate.onnx", version="9")
