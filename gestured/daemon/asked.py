@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from gestured.core.errors import ModelError
 from gestured.core.own import is_name
 from gestured.core.scene import Scene
-from gestured.daemon import own_file
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.own_file import OwnFile
 from gestured.daemon.settings import Settings
 from gestured.daemon.sinks import Output, outputs
+from gestured.model import own_file
 from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, require_gestures
+from gestured.model.own_file import OwnFile
 
 SLIP = 0.8  # of difflib's ratio: a name so near to one of the model's gestures was meant to be that
 

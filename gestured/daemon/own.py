@@ -12,13 +12,13 @@ from gestured.core.events import Cancelled
 from gestured.core.facts import Decided, Fact
 from gestured.core.own import MOST, Examples, is_name
 from gestured.core.prototypes import EXAMPLES
-from gestured.daemon import own_file
 from gestured.daemon.caller import Connection
 from gestured.daemon.log import log
-from gestured.daemon.own_file import OwnFile
 from gestured.daemon.request import Refusal, json_line
+from gestured.model import own_file
 from gestured.model.ladder import Ladder
 from gestured.model.own import Examiner, Own
+from gestured.model.own_file import OwnFile
 
 ATTEMPT_S = 120.0  # an enrolment without an attempt for so long gives its place to others
 ANSWERED_TWICE = "refractory"  # such a contact was decided, too

@@ -12,8 +12,8 @@ import pytest
 from gestured.client.control import Control
 from gestured.client.lines import Refused
 from gestured.core.own import Example
-from gestured.daemon import own_file
 from gestured.daemon.own import OwnGestures
+from gestured.model import own_file
 from gestured.model.ladder import ladder_for
 from tests.daemon import tiny_model
 from tests.daemon.harness import Client, Daemon, Frame, Hand, Sensor, lines_of
