@@ -10,7 +10,14 @@ import pytest
 
 import gestured
 from gestured.core.events import Onset
-from gestured.core.frames import Touch
+from gestured.core.found import Cut
+from gestured.core.frames import Frame, Touch
+from gestured.core.front_end import FrontEnd
+from gestured.core.own import Example
+from gestured.model import own_file
+from gestured.model.model import Model
+from gestured.model.opening import open_model
+from tests.daemon import tiny_model
 from tests.daemon.harness import Hand
 from tests.small_model import build
 
@@ -59,6 +66,13 @@ def test_another_name_is_an_error_as_of_any_module():
         ({"grid": (9, 9.5)}, r"found \(9, 9\.5\)"),
         ({"grid": "9x9"}, "found '9x9'"),
         ({"rotate": 45}, "found 45"),
+        ({"mirror": "no"}, "mirror: expected true or false, found 'no'"),
+        ({"invert": float("nan")}, "invert: expected true or false, found nan"),
+        ({"thresholds": {"wave": 0.5}}, "'wave' is no gesture of cnn_lstm, expected any of .*one_tap"),
+        ({"thresholds": {"one_tap": 5}}, "thresholds: one_tap: expected 0 to 1, found 5"),
+        ({"thresholds": {"one_tap": "0.5"}}, "thresholds: one_tap: expected 0 to 1, found '0.5'"),
+        ({"thresholds": 0.5}, "thresholds: expected a confidence for each name, .*found 0.5"),
+        ({"own_gestures": "none.json"}, r"none\.json: cannot be read: No such file"),
     ],
 )
 def test_a_mistake_in_opening_is_one_sentence(shelf: Path, wrong: dict[str, Any], words: str):
@@ -142,6 +156,77 @@ def test_reset_ends_the_contact_that_is_open(recognizer: Any):
 def test_gestures_are_the_models_in_its_order(shelf: Path):
     known = gestured.open("cnn_lstm").gestures
     assert gestured.open("cnn_lstm", gestures=list(reversed(known[:2]))).gestures == known[:2]
+
+
+def test_a_model_that_cannot_be_used_is_an_error_and_no_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture):
+    (tmp_path / "mine.onnx").write_bytes(b"damaged")
+    with pytest.raises(gestured.GesturedError, match=r"mine\.onnx"):
+        gestured.open(tmp_path / "mine.onnx")
+    assert caplog.messages == []
+
+
+def test_recognisers_share_a_model_as_long_as_its_file_is_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    opened: list[str] = []
+    monkeypatch.setattr("gestured.model.opening.Model", lambda data, name: opened.append(name) or Model(data, name))
+    path = build(tmp_path / "mine.onnx")
+    kept = [gestured.open(path) for _ in range(3)]
+    assert opened == ["mine"]
+    build(path, version="4", gestures='["one_tap", "swipe_down"]')
+    kept.append(gestured.open(path))
+    assert opened == ["mine"] * 2 and kept[-1].gestures != kept[0].gestures
+
+
+def stroke(recognizer: Any, frames: list[Any], before: int = 30) -> list[Any]:
+    """What comes of frames between idle seconds, in the sensor's counts."""
+    hand = Hand()
+    frames = [*hand.idle(before / 15), *frames, *hand.idle(1.0)]
+    return [event for n, frame in enumerate(frames) for event in recognizer.push(n / 15, frame)]
+
+
+def test_counts_that_fall_under_pressure_are_turned_round(model: Path):
+    plain, inverted = gestured.open(model), gestured.open(model, invert=True)
+    frames = [*Hand().idle(2.0), *Hand().swipe("left"), *Hand().idle(1.0)]
+    expected = [event for n, frame in enumerate(frames) for event in plain.push(n / 15, np.asarray(frame, float))]
+    found = [event for n, frame in enumerate(frames) for event in inverted.push(n / 15, 5000.0 - np.asarray(frame))]
+    assert [event.gesture for event in expected if isinstance(event, gestured.Gesture)] == ["swipe_left"]
+    assert [type(event) for event in found] == [type(event) for event in expected]
+    assert found[1].gesture == "swipe_left" and not stroke(gestured.open(model, invert=True), Hand().swipe("left"))
+
+
+def test_a_threshold_is_the_confidence_from_which_an_answer_is_given(model: Path):
+    (answer,) = [e for e in stroke(gestured.open(model), Hand().swipe("left")) if isinstance(e, gestured.Gesture)]
+    strict = gestured.open(model, thresholds={"swipe_left": 1.0, "one_tap": 0.0})
+    (unknown,) = [e for e in stroke(strict, Hand().swipe("left")) if isinstance(e, gestured.Unknown)]
+    assert answer.confidence == unknown.confidence < 1 and unknown.reason == "confidence"
+
+
+def test_own_gestures_are_recognised_from_their_file(tmp_path: Path, model: Path):
+    """A file as a daemon writes it: enrolled there, recognised here."""
+    slash = [Hand().frame(1.0 + k, 1.0 + k) for k in range(7)]
+    able = tiny_model.make(tmp_path / "able.onnx", own=tiny_model.own())
+    front_end = FrontEnd("sensor", 9, 9)
+    frames = [*Hand().idle(2.0), *slash, *Hand().idle(1.0)]
+    found = [one for n, values in enumerate(frames) for one in front_end.push(Frame(n / 15, np.asarray(values)))]
+    (segment,) = [one.segment for one in found if isinstance(one, Cut)]
+    example = Example.of(segment, open_model(able).metadata.window)
+    assert example is not None
+    own_file.write(tmp_path / "own.json", {"slash": (example, example)}, "")
+    recognizer = gestured.open(able, own_gestures=tmp_path / "own.json", thresholds={"slash": 0.5})
+    assert recognizer.gestures[-1] == "slash"
+    (answer,) = [event for event in stroke(recognizer, slash) if isinstance(event, gestured.Gesture)]
+    assert (answer.gesture, answer.own) == ("slash", True)
+    with pytest.raises(gestured.GesturedError, match="tiny has no embedding"):
+        gestured.open(model, own_gestures=tmp_path / "own.json")
+    (tmp_path / "own.json").write_text("{}")
+    with pytest.raises(gestured.GesturedError, match=r"own\.json: is no file of own gestures"):
+        gestured.open(able, own_gestures=tmp_path / "own.json")
+
+
+@pytest.mark.parametrize("lost", [float("nan"), -1, 0.5, "1", None])
+def test_frames_that_went_missing_are_counted_in_whole_numbers(recognizer: Any, lost: Any):
+    with pytest.raises(ValueError, match=rf"lost: expected a count of frames, found {lost!r}"):
+        recognizer.push(1.0, np.zeros((9, 9)), lost=lost)
+    assert recognizer.push(1.0, np.zeros((9, 9)), lost=np.int64(1)) == []
 
 
 def test_a_fallback_that_answers_is_a_warning(shelf: Path, caplog: pytest.LogCaptureFixture):

@@ -210,7 +210,7 @@ def test_a_fallback_that_was_replaced_is_not_opened_before_a_reload(shelf: Path,
     ladder.rungs[0].model = Fake("one", Clock(), error=ModelError("broken"))
     build(other, version="another")
     said: list[str] = []
-    ladder._report = said.append
+    ladder.report = said.append
     with pytest.raises(ModelError):
         ladder.classify(segment())
     assert "other.onnx: is not the file that was tried" in said[-1]

@@ -41,6 +41,9 @@ class Mounting:
     def __post_init__(self) -> None:
         if self.rotate not in (0, 90, 180, 270):
             raise ValueError(f"rotate: expected 0, 90, 180 or 270, found {self.rotate!r}")
+        for name, value in (("mirror", self.mirror), ("invert", self.invert)):
+            if value not in (True, False):
+                raise ValueError(f"{name}: expected true or false, found {value!r}")
 
     def shape(self, rows: int, columns: int) -> tuple[int, int]:
         """The grid (R, C) after mounting."""

@@ -40,21 +40,13 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
 
     With `insist` a fallback is not good enough: what runs already is better than that.
     """
-    early: list[str] = []
-    opened = False  # until then a failure may end the start, and the error says it all
-
-    def report(sentence: str) -> None:
-        if opened:
-            log.warning("model", what=sentence)
-        else:
-            early.append(sentence)
-
-    ladder = ladder_for(settings.model, settings.fallback or None, report=report)
+    early: list[str] = []  # a failure may still be the answer to a reload, and the error says it all
+    ladder = ladder_for(settings.model, settings.fallback or None, report=early.append)
     if insist and ladder.degraded:
         raise ModelError("; ".join(early))
-    opened = True
+    ladder.report = lambda sentence: log.warning("model", what=sentence)
     for sentence in early:
-        report(sentence)
+        ladder.report(sentence)
     gestures_in_use(ladder, settings.gestures)
     require_gestures(ladder, (name for name in settings.per_gesture if not _may_be_own(name, settings, ladder)))
     return ladder

@@ -1,9 +1,11 @@
 """The recogniser of one sensor in a process of one's own: what `gestured.open` gives."""
 
+import errno
 import logging
 import math
 import operator
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +21,10 @@ from gestured.core.recognizer import Recognizer
 from gestured.core.scene import Scene, Setup
 from gestured.core.timing import Timing
 from gestured.core.wire import is_sensor
-from gestured.model.ladder import gestures_in_use, ladder_for
+from gestured.model import own_file
+from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, require_gestures
+from gestured.model.own import Own
+from gestured.model.own_file import OwnFileError
 
 
 class Embedded:
@@ -40,7 +45,7 @@ class Embedded:
 
         `touches` are the finger positions that the sensor knows, `lost` how many frames went missing just before.
         A frame with a value that is not finite is passed over, as if it had been lost. Raises ValueError for a time
-        that is not after the last frame's, and for what is no frame of this sensor's grid.
+        that is not after the last frame's, for what is no frame of this sensor's grid, and for no count.
         """
         if not self._last < t < math.inf:
             after = f"a time after the last frame's, {self._last} s" if self._last > -math.inf else "seconds"
@@ -48,6 +53,8 @@ class Embedded:
         frame = _counts(values)
         if frame.shape != self._shape:
             raise ValueError(f"values: expected the grid {self._shape} of this sensor, found the shape {frame.shape}")
+        if not hasattr(lost, "__index__") or lost < 0:
+            raise ValueError(f"lost: expected a count of frames, found {lost!r}")
         self._last = t
         return events_of(self._recognizer.push(Frame(t, frame, tuple(touches), lost)))
 
@@ -89,36 +96,75 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     grid: tuple[int, int] | None = None,
     rotate: int = 0,
     mirror: bool = False,
+    invert: bool = False,
     gestures: Sequence[str] | None = None,
+    thresholds: Mapping[str, float] | None = None,
+    own_gestures: str | Path | None = None,
     tap_gap_s: float = Timing().tap_gap_s,
     provisional: bool = False,
 ) -> Embedded:
     """The recogniser of one sensor with a model: the name of one that ships, or the path of an .onnx file.
 
     `sensor` is the name in its events; `grid` its rows and columns as it sends them, the model's unless told; `rotate`
-    (degrees clockwise: 0, 90, 180, 270) and `mirror` say how it is mounted; `gestures` are those to use, all unless
-    told; `tap_gap_s` is how long a tap waits for a second one, 0.2 to 0.6 s. With `provisional` a contact's most
-    probable gesture is said before it is over, where the model was made for that.
+    (degrees clockwise: 0, 90, 180, 270) and `mirror` say how it is mounted, `invert` that its counts fall under
+    pressure; `gestures` are those to use, all unless told; `thresholds` the confidences, 0 to 1, from which a gesture
+    is one, the model's own unless told; `own_gestures` is a daemon's file of gestures that were enrolled; `tap_gap_s`
+    is how long a tap waits for a second one, 0.2 to 0.6 s. With `provisional` a contact's most probable gesture is
+    said before it is over, where the model was made for that.
 
-    Below a shipped model stand its fallbacks, as in the daemon: that one answers is logged as a warning of the logger
-    `gestured`. Raises ModelError for a model that cannot be used, SettingsError for another mistake.
+    Recognisers of one model share it. Below a shipped model stand its fallbacks, as in the daemon: that one answers is
+    logged as a warning of the logger `gestured`. Raises ModelError for a model that cannot be used, SettingsError or
+    OwnFileError for another mistake.
     """
     if not is_sensor(sensor):
         raise SettingsError(f"sensor: expected 1 to 64 of A-Z, a-z, 0-9, _ and -, found {sensor!r}")
     ladder = ladder_for(model, report=logging.getLogger("gestured").warning)
     used = gestures_in_use(ladder, gestures)
+    if own_gestures is not None:
+        ladder.own = _own(ladder, Path(own_gestures))
     try:
         rows, columns = map(operator.index, (ladder.rows, ladder.columns) if grid is None else grid)
     except (TypeError, ValueError):
         raise SettingsError(f"grid: expected rows and columns, such as (9, 9), found {grid!r}") from None
     try:
-        mounted = {sensor: Setup(mounting=Mounting(rotate, mirror))}
-        scene = Scene(gestures=used, grid=(rows, columns), sensors=mounted, tap_gap_s=tap_gap_s)
+        scene = Scene(
+            gestures=used,
+            grid=(rows, columns),
+            sensors={sensor: Setup(mounting=Mounting(rotate, mirror, invert))},
+            tap_gap_s=tap_gap_s,
+            thresholds=_thresholds(ladder, {} if thresholds is None else thresholds),
+        )
     except (TypeError, ValueError) as error:
         raise SettingsError(str(error)) from None
     front_end = front_end_of(sensor, scene)
     front_end.previews = provisional
-    return Embedded(Recognizer(front_end, ladder, gestures=used), used)
+    recognizer = Recognizer(front_end, ladder, gestures=used, thresholds=scene.thresholds)
+    return Embedded(recognizer, (*used, *ladder.own.gestures))
+
+
+def _own(ladder: Ladder, path: Path) -> Own:
+    """The gestures of a file, for a model that can compare them."""
+    if not path.exists():
+        raise OwnFileError(f"{path}: cannot be read: {os.strerror(errno.ENOENT)}")
+    found = own_file.load(path)
+    if found.fault is not None:
+        raise OwnFileError(found.fault)
+    if ladder.model.space is None and not ladder.degraded:
+        raise SettingsError(f"own_gestures: {ladder.name} has no embedding, expected a model that was made for them")
+    return Own(found.gestures)
+
+
+def _thresholds(ladder: Ladder, told: Mapping[str, float]) -> Mapping[str, float]:
+    """Confidences by name, of the model's gestures and the user's own."""
+    if not isinstance(told, Mapping):
+        raise SettingsError(
+            f"thresholds: expected a confidence for each name, such as {{'one_tap': 0.8}}, found {told!r}"
+        )
+    require_gestures(ladder, (name for name in told if name not in ladder.own.gestures))
+    for name, least in told.items():
+        if not isinstance(least, int | float) or not 0 <= least <= 1:
+            raise SettingsError(f"thresholds: {name}: expected 0 to 1, found {least!r}")
+    return told
 
 
 def _counts(values: ArrayLike) -> np.ndarray[tuple[int, ...], np.dtype[np.generic]]:

@@ -48,7 +48,7 @@ class Ladder:
             raise ModelError("a ladder needs at least one model")
         self.rungs = tuple(Rung(source) for source in rungs)
         self._slow_s, self._clock = slow_s, clock
-        self._report = report or (lambda sentence: None)
+        self.report = report or (lambda sentence: None)
         self.failures = 0  # how often a rung was put aside
         self._faint = 0  # previews in a row that failed, or took too long
         self._previews_from = -math.inf  # s of `clock`
@@ -109,7 +109,7 @@ class Ladder:
                 continue
             self._timed(rung, took)
             if rung is not self._active:
-                self._report(f"{rung.name} answers now")
+                self.report(f"{rung.name} answers now")
                 self._active = rung
             own = self.own.match(model, segment) if self.own.gestures else None
             return replace(scores, degraded=scores.degraded or self.degraded, took_s=took, own=own)
@@ -140,14 +140,17 @@ class Ladder:
         return scores
 
     def _first_open(self) -> tuple[Rung, Model]:
-        reasons = []
+        failed: list[tuple[Rung, str]] = []
         for rung in self.rungs:
             try:
-                return rung, rung.open_first()
+                opened = rung.open_first()
             except ModelError as error:
-                reasons.append(str(error))
-                self._put_aside(rung, str(error))
-        raise ModelError("; ".join(reasons))
+                failed.append((rung, str(error)))
+                continue
+            for other, reason in failed:  # where no rung can be opened, the error below says all that there is to say
+                self._put_aside(other, reason)
+            return rung, opened
+        raise ModelError("; ".join(reason for _, reason in failed))
 
     def _check_gestures(self, rung: Rung) -> None:
         """A fallback that cannot be read now may come back; one that knows other gestures is a mistake."""
@@ -158,7 +161,7 @@ class Ladder:
                 if rung.gone:
                     self._put_aside(rung, str(error))
                 else:
-                    self._report(f"{rung.name} could not be used: {error}")
+                    self.report(f"{rung.name} could not be used: {error}")
             return
         if gestures != self.gestures:
             raise ModelError(
@@ -171,7 +174,7 @@ class Ladder:
         rung.aside_until = math.inf if rung.gone else self._clock() + RETRY_S
         self.failures += 1
         until = "until a reload" if rung.gone else f"for {RETRY_S:g} s"
-        self._report(f"{rung.name} is put aside {until}: {reason}")
+        self.report(f"{rung.name} is put aside {until}: {reason}")
 
     def _timed(self, rung: Rung, took: float) -> None:
         rung.slow = rung.slow + 1 if took > self._slow_s else 0

@@ -8,6 +8,7 @@ was expected.
 import hashlib
 from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary
 
 from gestured.model.file import inspect
 from gestured.model.metadata import Metadata
@@ -15,20 +16,27 @@ from gestured.model.model import Model
 from gestured.model.process import ModelProcess, try_out
 from gestured.model.shipped import naming, read
 
+# Models of this process by sha256 and name: they have no state, so that any number of ladders may hold one.
+_opened: WeakValueDictionary[tuple[str, str], Model] = WeakValueDictionary()
+
 
 def open_model(source: str | Path, tried: str | None = None) -> Model:
     """Open and verify a model: a path, or the bare name of a shipped one. Raises ModelError.
 
     What does not ship is tried in a process of its own first, which takes about half a second, at most some seconds;
-    not where its sha256 is that of a file that was `tried` before.
+    not where its sha256 is that of a file that was `tried` before. One that is open already is shared.
     """
     path, name, data = read(source)
+    sha256 = hashlib.sha256(data).hexdigest()
     with naming(path):
-        if name is None and tried is None:
-            try_out(data)
-        elif name is None and hashlib.sha256(data).hexdigest() != tried:
+        if name is None and tried is not None and tried != sha256:
             raise ValueError("is not the file that was tried any more; a reload takes the new one")
-        return Model(data, path.stem)
+        model = _opened.get((sha256, path.stem))
+        if model is None:
+            if name is None and tried is None:
+                try_out(data)
+            model = _opened[sha256, path.stem] = Model(data, path.stem)
+        return model
 
 
 def look_at(source: str | Path) -> tuple[tuple[str, ...], str]:
@@ -37,11 +45,13 @@ def look_at(source: str | Path) -> tuple[tuple[str, ...], str]:
     Raises ModelError.
     """
     path, name, data = read(source)
+    sha256 = hashlib.sha256(data).hexdigest()
     with naming(path):
+        if (model := _opened.get((sha256, path.stem))) is not None:
+            return model.gestures, sha256
         if name is None:
-            report = try_out(data)
-            return tuple(report["gestures"]), report["sha256"]
-        return Metadata.parse(inspect(data)).gestures, hashlib.sha256(data).hexdigest()
+            return tuple(try_out(data)["gestures"]), sha256
+        return Metadata.parse(inspect(data)).gestures, sha256
 
 
 def open_apart(source: str | Path) -> ModelProcess:
