@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.noise import NOISE_TAU_S
+from gestured.core.idle import NOISE_TAU_S
 from gestured.core.quantiles import median
 
 Array = NDArray[np.float64]

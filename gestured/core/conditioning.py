@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.activity import Activity, hardly_ever
-from gestured.core.baseline import Baseline
 from gestured.core.contact import AfterEffect
-from gestured.core.noise import Noise
+from gestured.core.idle import Baseline, Noise
 from gestured.core.taxels import Inspection, Taxels
 
 Array = NDArray[np.float64]

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.noise import quantum, restlessness
-from gestured.core.quantiles import median
+from gestured.core.quantiles import median, quantile
 
 Array = NDArray[np.float64]
 
@@ -25,6 +24,15 @@ MOVED_ONE_IN = 20  # of a large sensor one taxel in so many may move: bad ones m
 CONSTANT_ONE_IN = 4  # where more than one taxel in so many stands still, standing still is the sensor's way
 SPIKE = 1000.0  # a frame so many times further off than frames usually jump is a fault of the readout, not idle
 SPIKES_ONE_IN = 8  # frames; where more than one in so many is that far off, they are no single frames
+JUMP_PER_SIGMA = 1.128  # of normal noise, the mean absolute difference of successive values: 2 / sqrt(pi)
+SIGMA_PER_DEVIATION = 1.2533  # of normal noise, its sigma by its mean absolute deviation: sqrt(pi / 2)
+TREMBLE = 0.35  # of a step: with that much noise a finger's tremble shows in the last digit
+CLIPPED_SHARE = 0.25  # of the taxels: where so many lie at the lowest value twice, the sensor cuts off its noise
+CLIPPED_QUANTILE = 0.75  # of the taxels' noise, where it is cut off: most taxels seem quieter than they are
+PRIOR_FRAMES = 16  # frames that the noise of all taxels weighs: a second of frames knows a taxel's own noise badly
+LEAST_STEP = 1e-35  # counts; its reciprocal must stay a number
+WHOLE = 2.0**52  # counts: from here on every float64 is a whole number, which says nothing
+RESOLUTION = 1e-6  # of the largest count: less than float32 resolves is no step of a sensor
 
 
 class Learned(NamedTuple):
@@ -106,3 +114,43 @@ def _without_spikes(stack: Array) -> Array:
     good = np.abs(stack - median(stack)).max(axis=1) <= SPIKE * max(usual, quantum(stack, jumps))
     spikes = len(stack) - np.count_nonzero(good)
     return stack if not spikes or spikes > max(1, len(stack) // SPIKES_ONE_IN) else stack[good]
+
+
+class Restlessness(NamedTuple):
+    """What (n, N) counts of a sensor that may be idle say of its noise."""
+
+    floor: float  # counts, one standard deviation of the usual taxel, or one step where that is more
+    step: float  # counts, one quantisation step
+    spread: Array  # (N,) counts, one standard deviation of each taxel about its median
+    tells_constants: bool  # whether a taxel that stood still stands out: noise shows, and is not cut off
+    fine: bool  # whether a finger's tremble shows in the last digit
+
+    def sigma(self, frames: int) -> Array:
+        """(N,) counts: each taxel's standard deviation as `frames` tell it, leaning on all taxels together."""
+        pooled = (frames * self.spread**2 + PRIOR_FRAMES * self.floor**2) / (frames + PRIOR_FRAMES)
+        return np.maximum(np.sqrt(pooled), self.floor / 2)
+
+
+def restlessness(stack: Array, baseline: Array, jumps: Array) -> Restlessness:
+    """What (n, N) counts say, with their medians (N,) and their successive absolute differences (n - 1, N).
+
+    Differences see noise and not slow movement; means of absolute values, since one outlier must not rule.
+    """
+    rough = jumps.mean(axis=0) / JUMP_PER_SIGMA
+    clipped = np.count_nonzero((stack == stack.min()).sum(axis=0) >= 2) >= CLIPPED_SHARE * rough.size
+    pooled = quantile(rough[rough > 0], CLIPPED_QUANTILE if clipped else 0.5) if rough.any() else 0.0
+    step = quantum(stack, jumps)
+    spread = np.abs(stack - baseline).mean(axis=0) * SIGMA_PER_DEVIATION
+    return Restlessness(max(pooled, step), step, spread, not (clipped or pooled < step), pooled >= TREMBLE * step)
+
+
+def quantum(stack: Array, jumps: Array) -> float:
+    """One quantisation step in counts of a sensor that has shown (n, N) counts, and these changes; never 0.
+
+    Whole numbers count in ones; otherwise the smallest change that was seen is taken.
+    """
+    if np.array_equal(stack, np.rint(stack)) and np.abs(stack).max() < WHOLE:
+        return 1.0
+    seen = jumps[jumps > 0]
+    top = float(median(np.abs(stack).max(axis=1)))  # of most frames: one spike must not rule
+    return max(float(seen.min()) if seen.size else 0.0, top * RESOLUTION, LEAST_STEP)

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.activity import Activity
-from gestured.core.baseline import BASELINE_TAU_S, RECOVERY_TAU_S, Baseline
 from gestured.core.contact import AFTER_S, RECOVERY_S, AfterEffect
-from gestured.core.noise import NOISE_TAU_S, REVIEW_S, SIGMA_PER_DEVIATION, UNSEEN_S, Noise
+from gestured.core.idle import BASELINE_TAU_S, NOISE_TAU_S, RECOVERY_TAU_S, REVIEW_S, UNSEEN_S, Baseline, Noise
+from gestured.core.settling import SIGMA_PER_DEVIATION
 from gestured.simulator.textile import REMANENCE_S, relax
 
 Array = NDArray[Any]
@@ -96,9 +96,9 @@ def _remanence(times: Array, inputs: Array) -> Array:
 
 
 FILTERS = (
-    Filter("baseline (core/baseline)", BASELINE_TAU_S, _baseline(False), 0.0),
-    Filter("baseline after a contact (core/baseline)", RECOVERY_TAU_S, _baseline(True), 0.0),
-    Filter("noise (core/noise)", NOISE_TAU_S, _noise, 0.5, REVIEW_S, UNSEEN_S),
+    Filter("baseline (core/idle)", BASELINE_TAU_S, _baseline(False), 0.0),
+    Filter("baseline after a contact (core/idle)", RECOVERY_TAU_S, _baseline(True), 0.0),
+    Filter("noise (core/idle)", NOISE_TAU_S, _noise, 0.5, REVIEW_S, UNSEEN_S),
     Filter("idle activity (core/activity)", NOISE_TAU_S, _usual, 0.0, dtypes=(np.float64,)),
     Filter(
         "after-effect of a contact (core/contact)",

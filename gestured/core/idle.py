@@ -1,69 +1,76 @@
-"""How much an idle sensor moves: each taxel's noise, and the step in which the sensor counts."""
+"""What the idle sensor shows, how much it moves, and in which step it counts.
+
+Learned from a second in which nothing moved, then followed while it is idle.
+"""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.quantiles import median, quantile
+from gestured.core.quantiles import median
+from gestured.core.settling import LEAST_STEP, RESOLUTION, SIGMA_PER_DEVIATION, Learned, Settling
 
 Array = NDArray[np.float64]
 
+BASELINE_TAU_S = 2.0  # time constant of the idle sensor: drift of hours and warmth of minutes are followed
+RECOVERY_TAU_S = 0.4  # time constant just after a contact: textile comes back slowly, and that is no touch
 NOISE_TAU_S = 30.0  # the time constant with which noise is followed: it changes slowly
 REVIEW_S = 0.5  # the pause between two looks at the noise; they would cost too much at each frame
 UNSEEN_S = 4.0  # the most that one look counts of the time under a contact or in silence
 OUTLIER = 4.0  # times its noise: a taxel that is further off counts as this far, since one outlier must not rule
-JUMP_PER_SIGMA = 1.128  # of normal noise, the mean absolute difference of successive values: 2 / sqrt(pi)
-SIGMA_PER_DEVIATION = 1.2533  # of normal noise, its sigma by its mean absolute deviation: sqrt(pi / 2)
 LIVELY_FRAMES = 10  # from so many one can tell that a sensor never sends the same frame twice in a row
-TREMBLE = 0.35  # of a step: with that much noise a finger's tremble shows in the last digit
-CLIPPED_SHARE = 0.25  # of the taxels: where so many lie at the lowest value twice, the sensor cuts off its noise
-CLIPPED_QUANTILE = 0.75  # of the taxels' noise, where it is cut off: most taxels seem quieter than they are
-PRIOR_FRAMES = 16  # frames that the noise of all taxels weighs: a second of frames knows a taxel's own noise badly
-LEAST_STEP = 1e-35  # counts; its reciprocal must stay a number
-WHOLE = 2.0**52  # counts: from here on every float64 is a whole number, which says nothing
-RESOLUTION = 1e-6  # of the largest count: less than float32 resolves is no step of a sensor
 
 
-class Restlessness(NamedTuple):
-    """What (n, N) counts of a sensor that may be idle say of its noise."""
+class Baseline:
+    """The counts of one idle sensor. It stands still under a contact: a tracker that went on would erase the hand."""
 
-    floor: float  # counts, one standard deviation of the usual taxel, or one step where that is more
-    step: float  # counts, one quantisation step
-    spread: Array  # (N,) counts, one standard deviation of each taxel about its median
-    tells_constants: bool  # whether a taxel that stood still stands out: noise shows, and is not cut off
-    fine: bool  # whether a finger's tremble shows in the last digit
+    def __init__(self, taxels: int) -> None:
+        self.counts: Array = np.zeros(taxels)  # replaced, never changed in place
+        self.known = False
+        self.provisional = False  # it is doubtful, and the next stable second replaces it
+        self._settling = Settling()
+        self._followed: float | None = None  # s, the last idle frame; None after a contact or a silence
 
-    def sigma(self, frames: int) -> Array:
-        """(N,) counts: each taxel's standard deviation as `frames` tell it, leaning on all taxels together."""
-        pooled = (frames * self.spread**2 + PRIOR_FRAMES * self.floor**2) / (frames + PRIOR_FRAMES)
-        return np.maximum(np.sqrt(pooled), self.floor / 2)
+    def settle(self, t: float, raw: Array) -> Learned | None:
+        """Offer (N,) counts that may be idle; what was learned, if a stable second ends here."""
+        learned = self._settling.push(t, raw, patience=not self.known)
+        if learned is not None:
+            self.counts = learned.baseline
+            self.known, self.provisional = True, not learned.stable
+            self._followed = t
+        return learned
 
+    def unsettle(self) -> None:
+        """Forget the frames that `settle` was offered: there is no need, or the sensor is touched."""
+        self._settling.clear()
 
-def restlessness(stack: Array, baseline: Array, jumps: Array) -> Restlessness:
-    """What (n, N) counts say, with their medians (N,) and their successive absolute differences (n - 1, N).
+    def idle_since(self, t: float) -> float | None:
+        """When the idle frame before that at `t` s was, in s; None where a contact or a silence lies between."""
+        since, self._followed = self._followed, t
+        return since
 
-    Differences see noise and not slow movement; means of absolute values, since one outlier must not rule.
-    """
-    rough = jumps.mean(axis=0) / JUMP_PER_SIGMA
-    clipped = np.count_nonzero((stack == stack.min()).sum(axis=0) >= 2) >= CLIPPED_SHARE * rough.size
-    pooled = quantile(rough[rough > 0], CLIPPED_QUANTILE if clipped else 0.5) if rough.any() else 0.0
-    step = quantum(stack, jumps)
-    spread = np.abs(stack - baseline).mean(axis=0) * SIGMA_PER_DEVIATION
-    return Restlessness(max(pooled, step), step, spread, not (clipped or pooled < step), pooled >= TREMBLE * step)
+    def follow(self, t: float, since: float, above: Array, *, recovering: bool) -> None:
+        """Follow the sensor, idle from `since` until `t` s and then (N,) counts `above` this; the step is exact."""
+        tau = RECOVERY_TAU_S if recovering else BASELINE_TAU_S
+        self.counts = self.counts + above * -math.expm1((since - t) / tau)
 
+    def hold(self) -> None:
+        """The sensor is touched: what passes now is not followed."""
+        self._followed = None
+        self._settling.clear()
 
-def quantum(stack: Array, jumps: Array) -> float:
-    """One quantisation step in counts of a sensor that has shown (n, N) counts, and these changes; never 0.
+    def doubt(self) -> None:
+        """After a silence: go on, but replace it by the next stable second."""
+        self.provisional = True
+        self._followed = None
 
-    Whole numbers count in ones; otherwise the smallest change that was seen is taken.
-    """
-    if np.array_equal(stack, np.rint(stack)) and np.abs(stack).max() < WHOLE:
-        return 1.0
-    seen = jumps[jumps > 0]
-    top = float(median(np.abs(stack).max(axis=1)))  # of most frames: one spike must not rule
-    return max(float(seen.min()) if seen.size else 0.0, top * RESOLUTION, LEAST_STEP)
+    def forget(self, *, keep: bool) -> None:
+        """The next stable second is a new baseline. `keep`: what `settle` was offered counts for it."""
+        self.known = self.provisional = False
+        self._followed = None
+        if not keep:
+            self._settling.clear()
 
 
 class Noise:
