@@ -120,6 +120,7 @@ def _habits(seen: Seen, grid: Grid, inverted: bool) -> Habits:
         last = max(t, last + STEP_S)
         front_end.push(Frame(last, frame))
     front_end.flush(last + 1.0)
+    front_end.habits.paused(last + 1.0)
     return front_end.habits
 
 

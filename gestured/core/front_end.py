@@ -114,8 +114,8 @@ class FrontEnd:
             return found
         look = conditioner.look(t, raw, segmenter.after)
         self.latest = frame, look
-        if look.burst and conditioner.fallen(look) >= segmenter.on:
-            self.habits.fall(t)
+        if look.burst and (fallen := conditioner.fallen(look)) >= segmenter.on:
+            self.habits.fall(t, frame.values, fallen)
         if look.shifted:
             return found + self._shift(look)
         self._below_since = None
@@ -136,7 +136,7 @@ class FrontEnd:
         if segmenter.phase.touched:
             conditioner.settle(t, raw)  # what stays on the sensor becomes part of its baseline
         else:
-            self.habits.idle(frame.values)
+            self.habits.idle(t, frame.values)
             conditioner.idle(look, recovering=segmenter.after.recovering(t))
         return found
 

@@ -25,6 +25,7 @@ class Habits:
         self.falls = self.rises = 0  # contacts in which counts fell below the baseline, and in which they rose
         self.exchanges = self.fits = 0  # contacts that look like one finger with R and C exchanged, and as they are
         self._fell = -np.inf  # s, the last frame that lay below the baseline
+        self._falling = False  # whether a contact in which counts fell is not over
         self._idle: Counts | None = None  # (R, C) the last frame without a contact
         self._strongest: tuple[float, Counts | None] = 0.0, None  # the contact's strongest frame: activity, and (R, C)
 
@@ -38,19 +39,32 @@ class Habits:
         """Whether rows and columns are exchanged."""
         return self.exchanges >= ENOUGH and self.exchanges >= MOSTLY * self.fits
 
-    def fall(self, t: float) -> None:
-        """A frame at `t` s lies as far below the baseline as a touched one lies above it."""
-        self.falls += t - self._fell > PAUSE_S
-        self._fell = t
+    def fall(self, t: float, values: Counts, activity: float) -> None:
+        """A frame (R, C), as it was sent at `t` s, lies as far below the baseline as a touched one lies above it."""
+        if self.paused(t):
+            self.falls += 1
+            self._strongest = 0.0, None
+        self._fell, self._falling = t, True
+        self.pressed(values, activity)
 
     def rise(self) -> None:
         """A contact began, whose strongest frame is yet to come."""
         self.rises += 1
-        self._strongest = 0.0, None
+        self._strongest, self._falling = (0.0, None), False
 
-    def idle(self, values: Counts) -> None:
-        """A frame (R, C) without a contact, as it was sent."""
-        self._idle = values
+    def idle(self, t: float, values: Counts) -> None:
+        """A frame (R, C) without a contact, as it was sent at `t` s."""
+        if self.paused(t):
+            self._idle = values
+
+    def paused(self, t: float) -> bool:
+        """Whether no contact in which counts fell goes on at `t` s; one that is over is compared."""
+        if t - self._fell <= PAUSE_S:
+            return False
+        if self._falling:
+            self._falling = False
+            self.touched()
+        return True
 
     def pressed(self, values: Counts, activity: float) -> None:
         """A frame (R, C) of a contact, as it was sent."""

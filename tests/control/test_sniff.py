@@ -69,6 +69,14 @@ def test_a_grid_is_proposed_whether_or_not_somebody_touched_it(tmp_path) -> None
     assert words.startswith("# ") and "83" in words and "no grid" in words
 
 
+def test_both_mistakes_are_mended_at_once(tmp_path) -> None:
+    """Rows and columns are exchanged, and counts fall."""
+    frames = (frame.reshape(12, 6) for frame in touched(6, 12, -1.0))
+    sight = seen(floats("/arm/pressure", frame, n) for n, frame in enumerate(frames))
+    known = Known(grid=(12, 6), told=True)
+    assert valid(propose(sight.rows(), known), tmp_path) == {"arm": ((6, 12), True)}
+
+
 def test_nothing_is_proposed_where_the_daemon_is_set_to_what_arrives() -> None:
     sight = seen(floats("/x/arm/y", frame, n) for n, frame in enumerate(touched(27, 15)))
     assert propose(sight.rows())

@@ -58,6 +58,14 @@ def test_exchanged_rows_and_columns_are_noticed(rows: int, columns: int, mountin
     assert wrong.habits.exchanged
 
 
+@pytest.mark.parametrize(("rows", "columns"), [(6, 12), (12, 6)])
+def test_rows_and_columns_that_are_exchanged_are_noticed_where_counts_fall_as_well(rows: int, columns: int) -> None:
+    frames = session(rows, columns, -1.0, contacts=5)
+    right, wrong = (played(each).habits for each in (frames, frames.reshape(-1, columns, rows)))
+    assert right.inverted and not right.exchanged
+    assert wrong.inverted and wrong.exchanged
+
+
 def test_what_was_noticed_is_forgotten_when_the_sensor_is_learned_anew() -> None:
     falling = played(session(9, 9, -1.0))
     falling.reset()
