@@ -108,7 +108,7 @@ class ControlServer:
             verb = self._verbs[name]
             if verb.changes:
                 user = {"verb": name, "uid": who.uid, "pid": who.pid}
-                self._journal.info("control", f"{name} by {who.uid}", **user, **parameters)
+                self._journal.info("control request", f"{name}, of uid {who.uid}", **user, **parameters)
         async with self._turn(self._slow if verb.slow else self._quick):
             if connection.closed or self._ended:  # while it waited for its turn
                 return

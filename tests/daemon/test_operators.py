@@ -185,7 +185,7 @@ def test_one_tap_a_connection_and_what_is_repeated_is_logged_at_a_bounded_rate(s
                 operator.ask("tap")
         assert operator.ask("status")["taps"] == 1
     daemon.stop()
-    said = [line for line in lines_of(daemon.stderr()) if line["event"] == "control"]
+    said = [line for line in lines_of(daemon.stderr()) if line["event"] == "control request"]
     assert len(said) == control.LOGGED and {line["verb"] for line in said} == {"tap"}
 
 
