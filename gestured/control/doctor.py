@@ -2,6 +2,7 @@
 
 import argparse
 import platform
+import shlex
 import socket
 import stat
 import subprocess
@@ -18,13 +19,19 @@ from gestured.client.peer import Stranger
 from gestured.client.program import Commands
 from gestured.client.say import say, say_json
 from gestured.control.address import add_sockets, control_path
-from gestured.control.findings import BUFFER_BYTES, Finding, examine_status, model_finding
+from gestured.control.findings import BUFFER_BYTES, Finding, dropping, examine_status, model_finding
+from gestured.control.proposal import propose
+from gestured.control.sight import Sight
+from gestured.control.sniff import overhear
 from gestured.core.address import Address
 
 YEAR_S = 365 * 86_400
 RELEASED = 1_750_000_000  # s since the epoch; a clock before that is wrong
 BRIDGES = ("gestured-bridge@*", "gestured-serial@*")  # units of systemd
 SYSTEMD_S = 5.0  # for its answer, which takes milliseconds
+LOOK_S = 1.5  # how long packets are looked at where the daemon drops some: 22 frames of a usual sensor
+UNIX_SOCKETS = Path("/proc/net/unix")
+LISTENS = "00010000"  # the flag of a listening socket there
 
 
 def add(commands: Commands) -> None:
@@ -49,8 +56,8 @@ def run(args: argparse.Namespace) -> int:
         if args.json:
             say_json(asdict(finding))
         else:
-            remedy = [f"        -> {finding.remedy}"] if finding.remedy else []
-            say(f"{finding.level:<5}   {finding.what}", *remedy)
+            remedy = enumerate(finding.remedy.splitlines())
+            say(f"{finding.level:<5}   {finding.what}", *(f"{'   ' if n else '-> ':>11}{line}" for n, line in remedy))
     return 1 if bad else 0
 
 
@@ -63,10 +70,15 @@ def examine(path: Path) -> Iterator[Finding]:
     try:
         with Control(path) as control:
             status = control.ask("status")
+            proposed = _proposed(control) if dropping(status) else []
     except Forbidden as error:
         yield Finding("bad", str(error), JOIN)
         return
     except (Unreachable, Refused, Stranger) as error:
+        others = running(UNIX_SOCKETS)
+        if others and path not in others:
+            yield _elsewhere(path, others)
+            return
         remedy = "does it run? systemctl status gestured; its last words: journalctl --unit gestured --lines 20"
         if isinstance(error, Stranger):
             remedy = f"ls -ld {path.parent} shows whose folder it is"
@@ -75,7 +87,35 @@ def examine(path: Path) -> Iterator[Finding]:
         yield model_finding("cnn_lstm", None)
         return
     yield _permissions(path)
-    yield from examine_status(status)
+    yield from examine_status(status, proposed)
+
+
+def running(table: Path) -> list[Path]:
+    """The control sockets of all daemons of this machine, by the kernel's table of Unix sockets."""
+    try:
+        rows = [row.split(maxsplit=7) for row in table.read_text("utf-8", "replace").splitlines()]
+    except OSError:
+        return []
+    listening = {Path(row[7]) for row in rows if len(row) == 8 and row[3] == LISTENS}
+    return sorted(path for path in listening if path.suffix == ".ctl" and path.with_suffix(".sock") in listening)
+
+
+def _elsewhere(path: Path, others: list[Path]) -> Finding:
+    """A daemon runs, but not where it was looked for."""
+    sockets = [shlex.quote(str(other.with_suffix(".sock"))) for other in others]
+    remedy = f"export GESTURED_SOCKET={sockets[0]} names it to all commands, --socket {sockets[0]} to one"
+    return Finding("bad", f"no daemon on {path}, but one whose event socket is {', '.join(sockets)}", remedy)
+
+
+def _proposed(control: Control) -> list[str]:
+    """What to set for what arrives now; nothing where all that arrives fits."""
+    sight = Sight()
+    try:
+        known = overhear(control, LOOK_S, sight)
+    except (Unreachable, Refused):
+        return []  # it has ended meanwhile, or cannot show its packets
+    lines = propose(sight.rows(), known)
+    return lines if lines and lines[0].startswith(("[", "#")) else []
 
 
 def _versions() -> Finding:

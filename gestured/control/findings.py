@@ -1,7 +1,7 @@
 """What the doctor finds in a daemon's status: of itself, its model, its input, its sensors and its output."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,7 +27,7 @@ class Finding:
 
 DROPS = {  # why, and what to do
     "address": "came to an address that no sensor has: gesturectl sniff proposes [addresses]",
-    "size": 'had another number of taxels than the grid: [sensors.NAME] grid = "ROWSxCOLUMNS" (gesturectl sniff)',
+    "size": "had another number of taxels than the grid: gesturectl sniff proposes one",
     "types": "held neither numbers nor one blob: wire.md says what a frame is, gesturectl sniff what arrives",
     "not_allowed": "came from a source that is not under allow",
     "second_source": "came from a second sender for one sensor's name (gesturectl sniff): give each its own name",
@@ -38,10 +38,21 @@ DROPS = {  # why, and what to do
 }
 
 
-def examine_status(status: dict[str, Any]) -> Iterator[Finding]:
-    """What the daemon's answer to `status` shows."""
-    for look in (_daemon, _ports, _active_model, _input, _sensors, _shift, _output):
+def examine_status(status: dict[str, Any], proposed: Sequence[str] = ()) -> Iterator[Finding]:
+    """What the daemon's answer to `status` shows; `proposed` is what to set for what arrives, where it does not fit."""
+    for look in (_daemon, _ports, _active_model):
         yield from look(status)
+    if proposed:
+        what = "what arrives does not fit the settings, and is dropped"
+        yield Finding("bad", what, "\n".join(["set in the configuration file, then gesturectl reload:", *proposed]))
+    for look in (_input, _sensors, _shift, _output):
+        yield from look(status)
+
+
+def dropping(status: dict[str, Any]) -> bool:
+    """Whether the daemon has dropped something within RECENT_S."""
+    ages = _ages(status, "dropped")
+    return any(ages.get(reason, math.inf) <= RECENT_S for reason in status["input"]["dropped"])
 
 
 def model_finding(name: str, sha256: str | None) -> Finding:
@@ -119,7 +130,10 @@ def _dated(what: str, seconds: float | None, remedy: str) -> Finding:
 
 def _sensors(status: dict[str, Any]) -> Iterator[Finding]:
     if not status["sensors"]:
-        yield Finding("bad", "no sensor was heard", "gesturectl sniff shows whether anything arrives")
+        if dropping(status):
+            yield Finding("bad", "no sensor was heard, since all that arrives is dropped", "mend what is said above")
+        else:
+            yield Finding("bad", "no sensor was heard", "gesturectl sniff shows whether anything arrives")
     for name, sensor in status["sensors"].items():
         for found in _sensor(name, sensor):
             yield Finding(found.level, f"sensor {name}: {found.what}", found.remedy)

@@ -53,9 +53,8 @@ def run(args: argparse.Namespace) -> int:
                 sight.packet(t, source, packet)
         else:
             with connect(args) as control:
-                known = Known.of(control.ask("tap"))
-                for t, source, packet in _tap(control, args.seconds):
-                    sight.packet(t, source, packet)
+                finish_on_signals(control)
+                known = overhear(control, args.seconds, sight)
     except KeyboardInterrupt:
         pass
     rows = sight.rows()
@@ -67,6 +66,18 @@ def run(args: argparse.Namespace) -> int:
     summary = {"packets": sight.packets, "messages": found, "errors": sight.errors, "proposed": proposed}
     tell(args.json, summary, *lines(sight, proposed))
     return 0 if proposed else 1
+
+
+def overhear(control: Control, seconds: float, sight: Sight) -> Known:
+    """Have `sight` see for so long what reaches the daemon; what is set there. Raises Unreachable, Refused."""
+    known = Known.of(control.ask("tap"))
+    finish_after(control, seconds)
+    for line in control.lines():
+        if line["type"] == "packet":
+            sight.packet(line["t_ns"] / 1e9, str(Address(*line["source"])), base64.b64decode(line["data"]))
+    if not control.finished:
+        raise Unreachable("the daemon closed the connection")
+    return known
 
 
 def lines(sight: Sight, proposed: list[str]) -> Iterator[str]:
@@ -103,16 +114,6 @@ def _remarks(seen: Seen) -> Iterator[str]:
     if split_address(seen.address) is None and not seen.address.endswith(TRAJECTORY):
         unsafe = f"is not proposed: expected parts of A-Z a-z 0-9 _ - . and at most {LONGEST_ADDRESS} characters"
         yield f"  {address} {unsafe}"
-
-
-def _tap(control: Control, seconds: float) -> Iterator[tuple[float, str, bytes]]:
-    finish_on_signals(control)
-    finish_after(control, seconds)
-    for line in control.lines():
-        if line["type"] == "packet":
-            yield line["t_ns"] / 1e9, str(Address(*line["source"])), base64.b64decode(line["data"])
-    if not control.finished:
-        raise Unreachable("the daemon closed the connection")
 
 
 def _listen(address: Address, seconds: float) -> Iterator[tuple[float, str, bytes]]:
