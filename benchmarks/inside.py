@@ -15,12 +15,12 @@ from benchmarks.traffic import touched
 from gestured.client.sensor import Form
 from gestured.core import messages, osc
 from gestured.core.events import Gesture
-from gestured.core.found import Cut
 from gestured.core.frames import Frame
-from gestured.core.front_end import FrontEnd
+from gestured.core.front_end import Cut, FrontEnd
 from gestured.core.mounting import Grid
 from gestured.core.osc import Layouts
-from gestured.core.recognizer import Recognizer
+from gestured.core.scene import Scene
+from gestured.core.sensor import Sensor
 from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.clients import EventServer
 from gestured.daemon.metrics import Metrics
@@ -67,14 +67,14 @@ def _decode(figure: str, ours: Callable[[], object], theirs: Callable[[], object
 def recognise(model: str) -> Row:
     """Prepare, infer and decide, against onnxruntime's bare `run` on the same window."""
     take = touched(1, 60.0)
-    front = FrontEnd("bench", 9, 9)
+    front = FrontEnd(9, 9)
     cuts = [c for t, f in zip(take.sensor_times, take.frames, strict=True) for c in front.push(Frame(float(t), f))]
     segments = [c for c in cuts if isinstance(c, Cut)]
     opened = open_model(model)
     windows = [opened.metadata.window.apply(c.segment)[np.newaxis] for c in segments]
     session: Any = opened._session._session
     name = session.get_inputs()[0].name
-    recognizer = Recognizer(FrontEnd("bench", 9, 9), opened)
+    recognizer = Sensor("bench", Scene(opened.gestures, (9, 9)), opened)
 
     def whole() -> None:
         for segment in segments:

@@ -8,8 +8,8 @@ from benchmarks.timing import Row
 from benchmarks.traffic import touched
 from gestured.core.events import Gesture, Unknown
 from gestured.core.frames import Frame
-from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Recognizer
+from gestured.core.scene import Scene
+from gestured.core.sensor import Sensor
 from gestured.lab.online import play
 from gestured.model.model import Model
 from gestured.model.opening import open_model
@@ -43,7 +43,7 @@ def replay(model: str) -> Row:
 
 def _answers(take: Take, model: Model) -> list[str | None]:
     """The gesture of each segment, None for unknown."""
-    recognizer = Recognizer(FrontEnd("bench", *take.frames.shape[1:]), model)
+    recognizer = Sensor("bench", Scene(model.gestures, take.frames.shape[1:]), model)
     frames = zip(take.sensor_times, take.frames, strict=True)
     events = [event for t, values in frames for event in recognizer.push(Frame(float(t), values))]
     events += recognizer.flush(float(take.sensor_times[-1]) + 2)

@@ -11,8 +11,9 @@ if TYPE_CHECKING:
     from gestured.core.events import Cancelled, Gesture, Onset, Provisional, Release, Status, Unknown
     from gestured.core.frames import Frame, Touch
     from gestured.core.hub import Hub
-    from gestured.core.recognizer import Recognizer
     from gestured.core.scene import Scene
+    from gestured.core.sensor import Sensor
+    from gestured.core.sensor import Sensor as Recognizer
     from gestured.model.embedded import open
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "Recognizer",
     "Release",
     "Scene",
+    "Sensor",
     "Status",
     "Subscriber",
     "Touch",
@@ -39,8 +41,8 @@ _HOMES = {
     "core.events": ("Cancelled", "Gesture", "Onset", "Provisional", "Release", "Status", "Unknown"),
     "core.frames": ("Frame", "Touch"),
     "core.hub": ("Hub",),
-    "core.recognizer": ("Recognizer",),
     "core.scene": ("Scene",),
+    "core.sensor": ("Recognizer", "Sensor"),
     "model.embedded": ("open",),
 }
 

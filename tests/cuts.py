@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Recognizer
+from gestured.core.scene import Scene
+from gestured.core.sensor import Sensor
 from gestured.lab.dataset import Truth, truths
 from gestured.model.opening import open_model
 from gestured.simulator import Participant, SimulatedSensor, any_sensor, generator, session
@@ -128,8 +128,8 @@ def measure(recording: Recording, model: Any) -> Sheet:
     """One session."""
     frames, times, performed = recording
     sheet = Sheet(hours=float(times[-1]) / 3600)
-    front = FrontEnd("cuts", *frames.shape[1:])
-    machine = Recognizer(front, model)
+    machine = Sensor("cuts", Scene(model.gestures, frames.shape[1:]), model)
+    front = machine.front_end
     looks: list[tuple[NDArray[np.float64], float]] = []  # baseline and noise, as known at each frame
     decided: list[Decided] = []
     for t, values in zip(times, frames, strict=True):
@@ -170,7 +170,7 @@ def measure(recording: Recording, model: Any) -> Sheet:
     return sheet
 
 
-def at_marks(front: FrontEnd, recording: Recording, act: Truth, baseline: NDArray[np.float64], noise: float) -> Segment:
+def at_marks(front: Any, recording: Recording, act: Truth, baseline: NDArray[np.float64], noise: float) -> Segment:
     """The segment of somebody who knows when the finger came and left."""
     times = recording.times
     first = int(np.searchsorted(times, act.onset))

@@ -34,10 +34,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.events import Cancelled, Onset, Release
-from gestured.core.found import Contact, Cut, Draft, Preview
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import FrontEnd
+from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown, Void
 
 Finger = tuple[float, float, float]  # row, column, amplitude
 Fingers = Callable[[float], list[Finger]]  # by the share of a step's time that has passed
@@ -181,12 +179,12 @@ class Player:
     scenario: Scenario
     seed: int = 0
     start: float = 0.0  # s
-    events: list[Contact] = field(default_factory=list)
+    events: list[Found] = field(default_factory=list)
     segment: Segment | None = None  # the last one
 
     def __post_init__(self) -> None:
         sensor = self.scenario.sensor
-        self.front_end = FrontEnd("s", sensor.rows, sensor.columns, wait_for_double_tap=sensor.waiting)
+        self.front_end = FrontEnd(sensor.rows, sensor.columns, wait_for_double_tap=sensor.waiting)
         self._rng = np.random.default_rng(self.seed)
         self._sampling = self._rng.uniform()
         # Taxels differ: in their baseline, and in how much they show.
@@ -201,7 +199,7 @@ class Player:
         self._frame = 0
         self._lose = self._lost = 0
 
-    def play(self) -> list[Contact]:
+    def play(self) -> list[Found]:
         """Take every statement in order; AssertionError where an expectation is not met.
 
         Returns the events that no `expect` has asked for.
@@ -270,7 +268,7 @@ class Player:
             for frame in self.frames(step):
                 self._note(contacts(front_end, frame))
 
-    def _note(self, events: Sequence[Contact]) -> None:
+    def _note(self, events: Sequence[Found]) -> None:
         self.events += events
         for event in events:
             if isinstance(event, Cut):
@@ -314,11 +312,11 @@ def _exact(t: float) -> float:
     return round(t * 2**20) / 2**20
 
 
-def name(event: Contact) -> str:
+def name(event: Found) -> str:
     """An event as a scenario writes it."""
-    if isinstance(event, Cancelled):
+    if isinstance(event, Void):
         return f"cancelled {event.reason}"
-    return {Onset: "onset", Cut: "cut", Release: "release"}[type(event)]
+    return {Opened: "onset", Cut: "cut", Ended: "release"}[type(event)]
 
 
 def frames(*lines: str, seed: int = 0) -> list[Frame]:
@@ -327,6 +325,6 @@ def frames(*lines: str, seed: int = 0) -> list[Frame]:
     return [frame for step in player.scenario.steps for frame in player.frames(step)]
 
 
-def contacts(front_end: FrontEnd, frame: Frame) -> list[Contact]:
+def contacts(front_end: FrontEnd, frame: Frame) -> list[Found]:
     """What a frame says of contacts: all that a front end finds in it, but for those that are not over."""
-    return [found for found in front_end.push(frame) if not isinstance(found, Draft | Preview)]
+    return [found for found in front_end.push(frame) if not isinstance(found, Shown)]

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from gestured.control.sight import Seen
+from gestured.core.beside.habits import ALIKE, Habits, neighbours_alike
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
-from gestured.core.habits import ALIKE, Habits, neighbours_alike
 from gestured.core.mounting import SIDES, Mounting
 from gestured.core.wire import is_sensor
 
@@ -114,14 +114,17 @@ def _shapes(taxels: int) -> Iterator[Grid]:
 
 def _habits(seen: Seen, grid: Grid, inverted: bool) -> Habits:
     """What the daemon's own front end makes of the frames."""
-    front_end = FrontEnd("", *grid, mounting=Mounting(invert=inverted))
+    front_end, habits = FrontEnd(*grid, mounting=Mounting(invert=inverted)), Habits(*grid)
     last = -np.inf
     for t, frame in seen.matrices(*grid):
         last = max(t, last + STEP_S)
-        front_end.push(Frame(last, frame))
-    front_end.flush(last + 1.0)
-    front_end.habits.paused(last + 1.0)
-    return front_end.habits
+        for found in front_end.push(Frame(last, frame)):
+            habits.hear(found)
+        habits.see(front_end)
+    for found in front_end.flush(last + 1.0):
+        habits.hear(found)
+    habits.paused(last + 1.0)
+    return habits
 
 
 def split_address(address: str) -> tuple[str, str] | None:

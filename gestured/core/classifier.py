@@ -1,7 +1,7 @@
 """What scores segments: a model, or a ladder of them; and what it says of one."""
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,20 +34,18 @@ class Classifier(Protocol):
 
     gestures: tuple[str, ...]
 
+    @property
+    def certainty(self) -> Certainty | None:
+        """How sure it must be of contacts that are not over; None where it was not made for them."""
+        return None
+
     def classify(self, segment: Segment) -> Scores:
         """Score one segment; raises ModelError where it cannot."""
         ...
 
-
-@runtime_checkable
-class Foreseer(Classifier, Protocol):
-    """A classifier that can be asked about contacts that are not over."""
-
-    @property
-    def certainty(self) -> Certainty | None:
-        """How sure it must be of them; None where it was not made for that."""
-        ...
-
     def preview(self, segment: Segment) -> Scores | None:
-        """Score the beginning of a segment, None where that fails: no later answer may depend on it."""
-        ...
+        """Score the beginning of a segment, None where that fails: no later answer may depend on it.
+
+        It is asked only where there is a `certainty`.
+        """
+        return None

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gestured.core.conditioning import Conditioner, Look
 from gestured.core.contact import Place
-from gestured.core.frames import Segment, Touch
+from gestured.core.frames import Segment
 from gestured.core.holes import CLEAR_S, HOLE_S, Sight, clear
 from gestured.core.taxels import Inspection
 
@@ -24,7 +24,6 @@ class Kept(NamedTuple):
 
     t: float  # s
     above: NDArray[np.float64]  # (N,) counts above the baseline
-    touches: tuple[Touch, ...]
     lost: int  # frames, just before this one
     place: Place | None  # where it is pressed, if it is
     new: float  # s, since when the sensor has shown just that: a frame that is repeated tells nothing
@@ -70,13 +69,13 @@ class Cutter:
         """The sensor restarted: what was kept is no part of what follows."""
         self._kept.clear()
 
-    def keep(self, look: Look, touches: tuple[Touch, ...], lost: int, place: Place | None) -> None:
+    def keep(self, look: Look, lost: int, place: Place | None) -> None:
         """Take a frame. Of a sensor that stands still when idle, a repeated one is as good as any."""
         t, shown = look.t, look.raw.tobytes()
         if shown != self._shown or not self._conditioner.noise.lively:
             self._new = t
         self._shown = shown
-        self._kept.append(Kept(t, look.above, touches, lost, place, self._new))
+        self._kept.append(Kept(t, look.above, lost, place, self._new))
 
     def trim(self, t: float) -> None:
         """Nothing is open at `t` s: keep what the next contact may need before its onset."""
@@ -140,7 +139,6 @@ class Cutter:
         first = int(np.searchsorted(times, onset))
         last = int(np.searchsorted(times, offset))
         frames = np.clip(conditioner.taxels.bridge(stack), -LARGEST, LARGEST).astype(np.float32)
-        touches = tuple(frame.touches for frame in kept) if any(frame.touches for frame in kept) else ()
         lost = sum(frame.lost for frame in kept[first + 1 : last + 1])
-        segment = Segment(frames, times, first, last, conditioner.noise.level, lost, touches)
+        segment = Segment(frames, times, first, last, conditioner.noise.level, lost)
         return segment, stack

@@ -39,7 +39,6 @@ class Segment:
     last: int
     noise: float  # counts, one standard deviation of an idle taxel
     lost: int = 0
-    touches: tuple[tuple[Touch, ...], ...] = ()  # one tuple a frame, or empty
 
     @property
     def onset(self) -> float:

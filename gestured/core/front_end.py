@@ -1,19 +1,58 @@
-"""One sensor's way from frame to segment: frames in, what was found in them out."""
+"""One sensor's way from frame to segment: frames in, what was found in them out.
+
+A front end knows neither its sensor's name nor who asks. Of each contact it gives `Opened`, then one of `Cut` and
+`Void`, and at last `Ended`; and `Shown` where the finger may have left.
+"""
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.conditioning import Conditioner, Look
-from gestured.core.cutter import LARGEST, Cutter
-from gestured.core.events import Cancelled, Onset, Release
-from gestured.core.found import Contact, Cut, Found
-from gestured.core.frames import Frame
-from gestured.core.habits import Habits
+from gestured.core.cutter import Cutter
+from gestured.core.frames import Frame, Segment
 from gestured.core.mounting import Mounting
 from gestured.core.pace import Pace
 from gestured.core.segmenter import Action, Deed, Segmenter
 from gestured.core.timing import Timing
-from gestured.core.unfinished import Unfinished
+
+DRAFT_S = 0.085  # quiet for so long, all that a window takes in is there; the wait goes on to see the finger stay off
+
+
+class Opened(NamedTuple):
+    """A contact began."""
+
+    onset: float  # s
+
+
+class Shown(NamedTuple):
+    """A segment as it will be cut if the finger stays off; its name may be looked for meanwhile."""
+
+    segment: Segment
+
+
+class Cut(NamedTuple):
+    """A segment that is complete and waits for its name."""
+
+    segment: Segment  # the same object as was shown last, unless more has become known since
+    decided: float  # s, when it was complete
+    hole_s: float  # the longest time until then in which the finger may have done anything unseen
+
+
+class Void(NamedTuple):
+    """A contact of which no segment is made."""
+
+    reason: str  # held, silence, restart, glitch, stuck
+
+
+class Ended(NamedTuple):
+    """The sensor was let go."""
+
+    offset: float  # s
+
+
+Found = Opened | Shown | Cut | Void | Ended
 
 
 class FrontEnd:
@@ -21,7 +60,6 @@ class FrontEnd:
 
     def __init__(
         self,
-        sensor: str,
         rows: int,
         columns: int,
         *,
@@ -29,31 +67,19 @@ class FrontEnd:
         wait_for_double_tap: bool = True,
         timing: Timing | None = None,
     ) -> None:
-        self.sensor = sensor
         self.sent = (rows, columns)
         self.mounting = mounting or Mounting()
         self.timing = timing or Timing()
-        self.segments = 0  # so far; their ids
-        self.previews = False  # whether contacts are shown before they are over
+        self.rows, self.columns = self.mounting.shape(rows, columns)  # after mounting
         self.conditioner = Conditioner(self.rows, self.columns)
         travel = self.timing.tap_travel * min(rows, columns)
         self._segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
         self._cutter = Cutter(self.conditioner, travel)
-        self.habits = Habits(rows, columns)
-        self.latest: tuple[Frame | None, Look | None] = (None, None)  # the last frame, and how it was seen
+        self._as_sent = self.mounting == Mounting()
+        self.frame: Frame | None = None  # the last one that was taken
+        self.look: Look | None = None  # how it was seen; None before the idle sensor is known
         self._pace = Pace()
-        self._unfinished = Unfinished(self._segmenter, self._cutter, self._pace, self.timing)
         self._below_since: float | None = None  # s, since when the frames lie far below the baseline
-
-    @property
-    def rows(self) -> int:
-        """Rows of taxels after mounting."""
-        return self.mounting.shape(*self.sent)[0]
-
-    @property
-    def columns(self) -> int:
-        """Columns of taxels after mounting."""
-        return self.mounting.shape(*self.sent)[1]
 
     @property
     def ready(self) -> bool:
@@ -64,6 +90,31 @@ class FrontEnd:
     def touched(self) -> bool:
         """Whether a contact is going on, given up or not."""
         return self._segmenter.phase.touched
+
+    @property
+    def pending(self) -> bool:
+        """Whether a contact is going on of which it is open what becomes of it."""
+        return self._segmenter.phase.pending
+
+    @property
+    def let_go(self) -> bool:
+        """Whether the finger of the contact that goes on is off, perhaps for good."""
+        return self._segmenter.phase.let_go
+
+    @property
+    def second(self) -> bool:
+        """Whether the second contact of the segment has begun: the first was a tap."""
+        return self._segmenter.second
+
+    @property
+    def last_touched(self) -> float:
+        """When it was touched last, in s."""
+        return self._segmenter.last_touched
+
+    @property
+    def sure(self) -> float:
+        """Until when no frame is overdue, in s."""
+        return self._pace.sure
 
     @property
     def baseline(self) -> NDArray[np.float64]:
@@ -94,49 +145,52 @@ class FrontEnd:
         """The segmenter's phase at `t` s, and the activity (noise units) that is strong then, and not quiet."""
         return self._segmenter.phase.name, self._segmenter.levels(t)
 
+    @property
+    def on(self) -> float:
+        """Noise units: activity from which there is a contact, if the last one has left nothing behind."""
+        return self._segmenter.on
+
+    def inverted_activity(self, look: Look) -> float:
+        """Noise units: the activity that a frame would have, were its counts inverted."""
+        return self.conditioner.fallen(look)
+
     def push(self, frame: Frame) -> list[Found]:
         """Take one frame, give all that was found, in order.
 
-        Its time must lie after the last one's (ValueError), its grid must be the sensor's. One with a value that is
-        not finite, or beyond float32, is passed over as if it had been lost.
+        Its time must lie after the last one's (ValueError), its grid must be the sensor's, its values finite and within
+        float32.
         """
         t = frame.t
-        raw = self.mounting.frame(frame.values).astype(np.float64).reshape(-1)
-        # What is no number is found by both; at this size `argmax` is cheaper than `max`.
-        if not (raw.item(raw.argmax()) <= LARGEST and raw.item(raw.argmin()) >= -LARGEST):
-            return []
+        values = frame.values if self._as_sent else self.mounting.frame(frame.values)
+        raw = values.astype(np.float64).reshape(-1)
         found = self._pass(t)
         conditioner, segmenter, cutter = self.conditioner, self._segmenter, self._cutter
+        self.frame, self.look = frame, None
         if not conditioner.ready:
-            self.latest = frame, None
             if conditioner.settle(t, raw):
                 cutter.settled(t)
             return found
-        look = conditioner.look(t, raw, segmenter.after)
-        self.latest = frame, look
-        if look.burst and (fallen := conditioner.fallen(look)) >= segmenter.on:
-            self.habits.fall(t, frame.values, fallen)
+        self.look = look = conditioner.look(t, raw, segmenter.after)
         if look.shifted:
             return found + self._shift(look)
         self._below_since = None
-        touches = self.mounting.touches(frame.touches, *self.sent) if frame.touches else ()
         place = conditioner.place(look) if look.activity >= segmenter.off else None
-        cutter.keep(look, touches, frame.lost, place)
+        cutter.keep(look, frame.lost, place)
         deeds = segmenter.push(t, look.activity, place)
         if deeds:
             found += self._done(deeds, t)
         if segmenter.phase.pending and len(cutter) > self.timing.limit_frames:
             found += self.give_up(t)
         if segmenter.phase.pending:
-            self.habits.pressed(frame.values, look.activity)
             conditioner.busy(look)
-            found += self._unfinished.show(self.segments, t, previews=self.previews)
+            if segmenter.phase.let_go and t - segmenter.last_touched >= DRAFT_S and not self.fleeting:
+                segment = cutter.draft(segmenter.onset, segmenter.last_touched)
+                found += [] if segment is None else [Shown(segment)]
             return found
         cutter.trim(t)
         if segmenter.phase.touched:
             conditioner.settle(t, raw)  # what stays on the sensor becomes part of its baseline
         else:
-            self.habits.idle(t, frame.values)
             conditioner.idle(look, recovering=segmenter.after.recovering(t))
         return found
 
@@ -146,21 +200,29 @@ class FrontEnd:
 
         Where a frame is overdue before that moment, nothing is decided without it: it may show the finger again.
         """
-        off = self._unfinished.due if self.previews else None
-        due = self._segmenter.over if off is None else off  # that a finger is off shows before a contact is over
-        return due if due is not None and due <= self._pace.sure else None
+        over = self._segmenter.over
+        return over if over is not None and over <= self._pace.sure else None
 
     def wait(self, t: float) -> list[Found]:
-        """No frame has come until `t` s: a finger may be off, a contact may be over. A later frame finds the same."""
-        found: list[Found] = []
-        until = min(t, self._pace.sure)
-        if self.previews and (off := self._unfinished.due) is not None and off <= until:
-            found += self._unfinished.wait(self.segments, off)
-        if (over := self._segmenter.over) is not None and over <= until:
-            found += self._done(self._segmenter.flush(until, until), t)
-        return found
+        """No frame has come until `t` s: a contact may be over. A later frame finds the same."""
+        until, over = min(t, self._pace.sure), self._segmenter.over
+        return [] if over is None or over > until else self._done(self._segmenter.flush(until, until), t)
 
-    def give_up(self, t: float) -> list[Contact]:
+    @property
+    def fleeting(self) -> bool:
+        """Whether the contact that goes on is so far surely shorter than any finger's."""
+        return self._pace.longest_s(self._segmenter.onset, self.last_touched) < self.timing.glitch_s
+
+    def so_far(self) -> Segment | None:
+        """All that has come of the contact that goes on; None where nothing is left of it without its bad taxels."""
+        segment = self._cutter.so_far(self._segmenter.onset, self.last_touched)
+        return segment if segment.frames.max() >= self._segmenter.off * segment.noise else None
+
+    def hole(self, segment: Segment, t: float) -> float:
+        """The longest time in s in which a finger may have done anything unseen, from before a segment to `t` s."""
+        return self._cutter.hole(segment.onset, segment.offset, t)
+
+    def give_up(self, t: float) -> list[Found]:
         """A contact that goes on has taken too long by another clock than its frames': it is cancelled as held."""
         return self._done(self._segmenter.give_up(t), t)
 
@@ -180,7 +242,7 @@ class FrontEnd:
         self.conditioner.baseline.doubt()
         return found
 
-    def reset(self) -> list[Contact]:
+    def reset(self) -> list[Found]:
         """The sensor restarted: start clean and learn the idle sensor anew; an open contact is cancelled."""
         return self._restart(keep=False)
 
@@ -190,19 +252,17 @@ class FrontEnd:
         segmenter, step = self._segmenter, self._pace.step(t)
         if step > self.timing.stale_s:
             found += self.flush(t)
-        else:
-            if segmenter.phase.touched:
-                found += self.wait(t)
-                found += self._done(segmenter.flush(t, self._pace.sure), t)
-            self._pace.learn(step)
-        self._pace.last = t
+        elif segmenter.phase.touched:
+            found += self.wait(t)
+            found += self._done(segmenter.flush(t, self._pace.sure), t)
+        self._pace.take(t, step, after_silence=step > self.timing.stale_s)
         if not segmenter.phase.touched:
             segmenter.after.fade(t)
         return found
 
-    def _shift(self, look: Look) -> list[Contact]:
+    def _shift(self, look: Look) -> list[Found]:
         """Frames far below the baseline. Interference passes, and they are lost; a sensor that restarted stays so."""
-        found: list[Contact] = []
+        found: list[Found] = []
         if self._below_since is None:
             self._below_since = look.t
         if look.t - self._below_since >= self.timing.shift_s:
@@ -210,54 +270,41 @@ class FrontEnd:
         self.conditioner.settle(look.t, look.raw)
         return found
 
-    def _restart(self, *, keep: bool) -> list[Contact]:
+    def _restart(self, *, keep: bool) -> list[Found]:
         """Start clean. `keep`: the frames that may show the idle sensor as it is now count already."""
         found = self._cancel("restart") if self.touched else []
         self._segmenter.reset()
         self.conditioner.baseline.forget(keep=keep)
         self._cutter.clear()
         self._below_since = None
-        if not keep:
-            self.habits.clear()
         return found
 
-    def _done(self, deeds: list[Deed], seen: float) -> list[Contact]:
+    def _done(self, deeds: list[Deed], seen: float) -> list[Found]:
         """What the segmenter decided, the sensor having been seen until then (s)."""
-        found: list[Contact] = []
+        found: list[Found] = []
         for action, onset, offset, decided in deeds:
             if action is Action.OPEN:
-                found += self._open(onset)
+                found.append(Opened(onset))
             elif action is Action.HELD:
-                found.append(Cancelled(self.sensor, self.segments, "held"))
+                found.append(Void("held"))
             elif action is Action.LEFT:
-                found.append(Release(self.sensor, self.segments, offset))
+                found.append(Ended(offset))
             else:
                 found += self._close(onset, offset, decided, min(seen, decided))
                 if action is Action.SPLIT:
-                    found += self._open(self._segmenter.onset)
+                    found.append(Opened(self._segmenter.onset))
         return found
 
-    def _open(self, onset: float) -> list[Contact]:
-        """A segment begins, with the next id."""
-        self.segments += 1
-        self.habits.rise()
-        self._unfinished.begin()
-        return [Onset(self.sensor, self.segments, onset)]
-
-    def _close(self, onset: float, offset: float, t: float, seen: float) -> list[Contact]:
+    def _close(self, onset: float, offset: float, t: float, seen: float) -> list[Found]:
         """A segment is over, as decided at `t` s: it is cut, unless it was no finger's."""
-        release = Release(self.sensor, self.segments, offset)
         if self._pace.longest_s(onset, offset) < self.timing.glitch_s:
-            return [Cancelled(self.sensor, self.segments, "glitch"), release]
-        self.habits.touched()
+            return [Void("glitch"), Ended(offset)]
         made = self._cutter.cut(onset, offset)
         if made.peak < self._segmenter.off * made.segment.noise:  # nothing is left without its bad taxels
-            return [Cancelled(self.sensor, self.segments, "stuck"), release]
-        return [Cut(self.segments, made.segment, t, self._cutter.hole(onset, offset, seen)), release]
+            return [Void("stuck"), Ended(offset)]
+        return [Cut(made.segment, t, self._cutter.hole(onset, offset, seen)), Ended(offset)]
 
-    def _cancel(self, reason: str) -> list[Contact]:
+    def _cancel(self, reason: str) -> list[Found]:
         """The contact that goes on has no answer, and ends."""
-        release = Release(self.sensor, self.segments, self._segmenter.last_touched)
-        if not self._segmenter.phase.pending:  # it has been cancelled already
-            return [release]
-        return [Cancelled(self.sensor, self.segments, reason), release]
+        ended = Ended(self.last_touched)
+        return [Void(reason), ended] if self.pending else [ended]  # else it was given up already

@@ -11,20 +11,20 @@ a bug does not end the program: a daemon in a vehicle that dies of one sensor's 
 import math
 from collections.abc import Collection, Sequence
 
+from gestured.core.beside.view import View
 from gestured.core.classifier import Classifier
 from gestured.core.facts import Changed, Dropped, Fact, Fault
-from gestured.core.feed import Feed
 from gestured.core.owner import Source
 from gestured.core.reading import Reading
 from gestured.core.scene import Scene
-from gestured.core.view import View
+from gestured.core.sensor import Sensor
 from gestured.core.wire import Arrival, Decoder
 
 FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one that sends
 REMEMBERED = 4096  # names of sensors that are not there, whose numbers are known
 HOSTS = 1024  # decisions about who may send that are known
 
-Waiting = dict[str, tuple[Feed, list[Arrival]]]  # by sensor: its frames among some packets
+Waiting = dict[str, tuple[Sensor, list[Arrival]]]  # by sensor: its frames among some packets
 
 
 class Hub:
@@ -32,13 +32,13 @@ class Hub:
 
     def __init__(self, scene: Scene, classifier: Classifier) -> None:
         """`classifier` must know the scene's gestures (ValueError)."""
-        self._feeds: dict[str, Feed] = {}
+        self._sensors: dict[str, Sensor] = {}
         self._numbers: dict[str, tuple[int, int]] = {}  # sequence and id that sensors which are not there have used
         self._missed = 0  # times that this machine had no room for a packet
-        self._told: dict[str, int] = {}  # of each sensor: how many of these times its feed was told of
+        self._told: dict[str, int] = {}  # of each sensor: how many of these times it was told of
         self._owners: frozenset[Source] = frozenset()
         self._asked: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
-        self._waits: dict[str, Feed] = {}  # sensors in which a contact may be over before the next frame
+        self._waits: dict[str, Sensor] = {}  # sensors in which a contact may be over before the next frame
         self._due = math.inf  # s, when the first contact of all sensors may be over
         self._set(scene, classifier)
 
@@ -66,45 +66,45 @@ class Hub:
                 self._decode(packet, source, now, waiting, facts)
             except Exception as error:  # what came before and after it is good
                 facts.append(Fault(None, error))
-        for name, (feed, arrivals) in waiting.items():
+        for name, (sensor, arrivals) in waiting.items():
             missed = self._told[name] != self._missed
             self._told[name] = self._missed
             if name in self._waits:
-                feed.wait(now, facts)
-            feed.take(arrivals, now, facts, missed=missed)
-            due = feed.due
+                sensor.elapse(now, facts)
+            sensor.receive(arrivals, now, facts, missed=missed)
+            due = sensor.arrives
             if due < math.inf:
-                self._waits[name], self._due = feed, min(self._due, due)
+                self._waits[name], self._due = sensor, min(self._due, due)
         return facts
 
     def wait(self, now: float) -> list[Fact]:
         """No packets have come until `now`: contacts may be over."""
         facts: list[Fact] = []
         if now >= self._due:
-            for feed in sorted(self._waits.values(), key=lambda feed: feed.due):
-                feed.wait(now, facts)
-            due = {name: feed.due for name, feed in self._waits.items()}
-            self._waits = {name: feed for name, feed in self._waits.items() if due[name] < math.inf}
+            for sensor in sorted(self._waits.values(), key=lambda sensor: sensor.arrives):
+                sensor.elapse(now, facts)
+            due = {name: sensor.arrives for name, sensor in self._waits.items()}
+            self._waits = {name: sensor for name, sensor in self._waits.items() if due[name] < math.inf}
             self._due = min(due.values(), default=math.inf)
         return facts
 
     def tick(self, now: float) -> list[Fact]:
         """What the time alone decides, once everything that arrived until `now` was received: `wait`, and silences."""
         facts = self.wait(now)
-        feeds = self._feeds.values()
-        self._owners = frozenset(feed.owner.source for feed in feeds if now - feed.owner.heard <= FORGET_S)
-        for feed in feeds:
-            feed.review()
-            if not feed.silent and feed.stale(now):
-                facts.append(Changed(feed.name, "silent", feed.owner.source))
-                feed.flush(now, facts)
+        sensors = self._sensors.values()
+        self._owners = frozenset(sensor.owner.source for sensor in sensors if now - sensor.owner.heard <= FORGET_S)
+        for sensor in sensors:
+            sensor.review()
+            if not sensor.silent and sensor.stale(now):
+                facts.append(Changed(sensor.name, "silent", sensor.owner.source))
+                sensor.end(now, facts)
         return facts
 
     def flush(self, now: float) -> list[Fact]:
         """Nothing more will come: what is open is answered or cancelled."""
         facts: list[Fact] = []
-        for feed in self._feeds.values():
-            feed.flush(now, facts)
+        for sensor in self._sensors.values():
+            sensor.end(now, facts)
         return facts
 
     def missed(self) -> None:
@@ -115,15 +115,15 @@ class Hub:
         """Learn these sensors anew; their open contacts are cancelled."""
         facts: list[Fact] = []
         for name in sensors:
-            self._feeds[name].restart(now, facts)
+            self._sensors[name].restart(now, facts)
         return facts
 
     def change(self, scene: Scene, classifier: Classifier, now: float) -> list[Fact]:
         """Go on in another scene, with another classifier; what was learned of a sensor stays where it holds."""
         facts: list[Fact] = []
         self._set(scene, classifier)
-        for feed in self._feeds.values():
-            feed.change(scene, classifier, now, facts)
+        for sensor in self._sensors.values():
+            sensor.change(scene, classifier, now, facts)
         return facts
 
     def foresee(self, sensors: Collection[str] | None) -> None:
@@ -132,8 +132,8 @@ class Hub:
         It costs up to 15 runs of the model a second and sensor while it is touched.
         """
         self._asked = None if sensors is None else frozenset(sensors)
-        for feed in self._feeds.values():
-            feed.foresee(asked=self.foreseen(feed.name))
+        for sensor in self._sensors.values():
+            sensor.foresee(asked=self.foreseen(sensor.name))
 
     def foreseen(self, name: str) -> bool:
         """Whether somebody asks for a sensor's provisional events."""
@@ -141,27 +141,27 @@ class Hub:
 
     def number(self, name: str) -> tuple[int, int]:
         """The next sequence and id of a sensor, for an event that is made up; they count as used."""
-        if name in self._feeds:
-            return self._feeds[name].count()
+        if name in self._sensors:
+            return self._sensors[name].count()
         sequence, number = self._numbers.get(name, (0, 0))
         self._numbers[name] = sequence + 1, number + 1
         return self._numbers[name]
 
     def sequences(self) -> dict[str, int]:
         """The last sequence of each sensor that was heard, or tested."""
-        numbers = self._numbers | {name: feed.numbers for name, feed in self._feeds.items()}
+        numbers = self._numbers | {name: sensor.numbers for name, sensor in self._sensors.items()}
         return {name: sequence for name, (sequence, _) in numbers.items()}
 
     def readings(self, now: float) -> dict[str, Reading]:
         """What is known of each sensor, heard or in the scene, at `now`. Any thread may ask."""
         silent = {name: Reading("no_data", self._scene.grid_of(name)) for name in self._scene.sensors}
-        return silent | {name: feed.reading(now) for name, feed in tuple(self._feeds.items())}
+        return silent | {name: sensor.reading(now) for name, sensor in tuple(self._sensors.items())}
 
-    def view(self, sensor: str, now: float, *, raw: bool) -> tuple[View, Reading] | None:
+    def view(self, name: str, now: float, *, raw: bool) -> tuple[View, Reading] | None:
         """A sensor as it is felt now, and what is known of it; None where it was not heard."""
-        feed = self._feeds.get(sensor)
-        found = None if feed is None else feed.view(raw=raw)
-        return None if feed is None or found is None else (found, feed.reading(now))
+        sensor = self._sensors.get(name)
+        found = None if sensor is None else sensor.view(raw=raw)
+        return None if sensor is None or found is None else (found, sensor.reading(now))
 
     def _set(self, scene: Scene, classifier: Classifier) -> None:
         missing = [gesture for gesture in scene.gestures if gesture not in classifier.gestures]
@@ -181,9 +181,9 @@ class Hub:
         for error in errors:
             facts.append(Dropped(error.reason, source, text=str(error)))
         for arrival in arrivals:
-            feed = self._admit(arrival.sensor, source, now, facts)
-            if feed is not None:
-                waiting.setdefault(arrival.sensor, (feed, []))[1].append(arrival)
+            sensor = self._admit(arrival.sensor, source, now, facts)
+            if sensor is not None:
+                waiting.setdefault(arrival.sensor, (sensor, []))[1].append(arrival)
 
     def _may_send(self, host: str) -> bool:
         known = self._allowed.get(host)
@@ -193,23 +193,23 @@ class Hub:
             known = self._allowed[host] = self._scene.may_send(host)
         return known
 
-    def _admit(self, name: str, source: Source, now: float, facts: list[Fact]) -> Feed | None:
+    def _admit(self, name: str, source: Source, now: float, facts: list[Fact]) -> Sensor | None:
         """The sensor that a packet of `source` may feed, or None where it may not."""
-        feed = self._feeds.get(name)
-        if feed is None:
+        sensor = self._sensors.get(name)
+        if sensor is None:
             if self._full(name, now):
                 facts.append(Dropped("too_many_sensors", source))
                 return None
             numbers = self._numbers.pop(name, (0, 0))
-            feed = self._feeds[name] = Feed(name, source, self._scene, self._classifier, numbers)
-            feed.foresee(asked=self.foreseen(name))
+            sensor = self._sensors[name] = Sensor(name, self._scene, self._classifier, source, numbers)
+            sensor.foresee(asked=self.foreseen(name))
             self._told[name] = self._missed
             facts.append(Changed(name, "new", source))
-        if not feed.owner.admits(source, now, self._scene.stale_s):
+        if not sensor.owner.admits(source, now, self._scene.stale_s):
             facts.append(Dropped("second_source", source))
             return None
-        feed.silent = False
-        return feed
+        sensor.silent = False
+        return sensor
 
     def _full(self, name: str, now: float) -> bool:
         """Whether there is no place for a new sensor; places for those of the scene are kept free.
@@ -221,20 +221,20 @@ class Hub:
             return False
         if now <= self._full_until:
             return True
-        strangers = [feed for feed in self._feeds.values() if feed.name not in named]
+        strangers = [sensor for sensor in self._sensors.values() if sensor.name not in named]
         if len(strangers) < self._scene.max_sensors - len(named):
             return False
-        longest = min(strangers, key=lambda feed: feed.owner.heard, default=None)
+        longest = min(strangers, key=lambda sensor: sensor.owner.heard, default=None)
         if longest is None or now - longest.owner.heard <= FORGET_S:
             self._full_until = now if longest is None else longest.owner.heard + FORGET_S
             return True
         self._forget(longest)
         return False
 
-    def _forget(self, feed: Feed) -> None:
+    def _forget(self, sensor: Sensor) -> None:
         """Take a sensor off the list; what it has numbered is numbered on should it return."""
-        del self._feeds[feed.name], self._told[feed.name]
-        self._waits.pop(feed.name, None)
+        del self._sensors[sensor.name], self._told[sensor.name]
+        self._waits.pop(sensor.name, None)
         if len(self._numbers) >= REMEMBERED:
             self._numbers.pop(next(iter(self._numbers)))
-        self._numbers[feed.name] = feed.numbers
+        self._numbers[sensor.name] = sensor.numbers

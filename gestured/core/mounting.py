@@ -6,8 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.frames import Touch
-
 SIDES = (2, 64)  # taxels of a grid's side, least and most
 
 
@@ -32,7 +30,7 @@ class Grid(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """How a sensor is mounted: first mirrored left to right, then turned clockwise. Applied to frames and touches."""
+    """How a sensor is mounted: first mirrored left to right, then turned clockwise."""
 
     rotate: int = 0  # degrees clockwise: 0, 90, 180, 270
     mirror: bool = False
@@ -56,22 +54,3 @@ class Mounting:
         if self.mirror:
             values = values[:, ::-1]
         return np.rot90(values, -(self.rotate // 90)) if self.rotate else values
-
-    def point(self, x: float, y: float, rows: int, columns: int) -> tuple[float, float]:
-        """A position on a sensor that sends R x C taxels, as sent -> as a person in front of it sees it.
-
-        Both in taxel pitches: x to the right, y upward, the origin at the bottom left.
-        """
-        if self.mirror:
-            x = columns - 1 - x
-        if self.rotate == 90:
-            return y, columns - 1 - x
-        if self.rotate == 180:
-            return columns - 1 - x, rows - 1 - y
-        if self.rotate == 270:
-            return rows - 1 - y, x
-        return x, y
-
-    def touches(self, sent: tuple[Touch, ...], rows: int, columns: int) -> tuple[Touch, ...]:
-        """The touches of a frame of R x C taxels, as a person in front of the sensor sees them."""
-        return tuple(Touch(touch.id, *self.point(touch.x, touch.y, rows, columns)) for touch in sent)

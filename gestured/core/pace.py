@@ -28,9 +28,11 @@ class Pace:
             raise ValueError(f"frame times must increase: {t} s after {self.last} s")
         return step
 
-    def learn(self, step: float) -> None:
-        """A frame has come so many seconds after the last one, without a silence between them."""
-        self.interval_s += (step - self.interval_s) * (SHARE if self.interval_s else 1.0)
+    def take(self, t: float, step: float, *, after_silence: bool) -> None:
+        """A frame has come at `t` s, `step` s after the last one; a silence says nothing of the usual interval."""
+        self.last = t
+        if not after_silence:
+            self.interval_s += (step - self.interval_s) * (SHARE if self.interval_s else 1.0)
 
     def longest_s(self, first: float, last: float) -> float:
         """The longest that something can have lasted which frames from `first` to `last` s have shown."""

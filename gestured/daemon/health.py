@@ -55,7 +55,7 @@ class Canary:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._front_end = FrontEnd("canary", CANARY_TAXELS, CANARY_TAXELS)
+        self._front_end = FrontEnd(CANARY_TAXELS, CANARY_TAXELS)
         self._random = Random(0)
         self._t = 0.0
 

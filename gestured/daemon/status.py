@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from gestured import __version__
 from gestured.core.address import Address
+from gestured.core.beside.view import View
 from gestured.core.mounting import Grid
 from gestured.core.own import Examples, to_dict
 from gestured.core.reading import Reading
-from gestured.core.view import View
 from gestured.daemon.metrics import Counter, Metrics
 from gestured.daemon.snapshot import Snapshot
 

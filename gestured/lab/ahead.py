@@ -17,9 +17,8 @@ from gestured.core.classifier import Classifier
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.facts import events_of
 from gestured.core.frames import Frame
-from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Recognizer
-from gestured.core.scene import DOUBLE_TAP, ONE_TAP
+from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
+from gestured.core.sensor import Sensor
 from gestured.lab.dataset import Truth, truths
 from gestured.lab.online import NON_GESTURE_SHARE, SESSION_S
 from gestured.lab.progress import progress
@@ -121,11 +120,10 @@ def _median(values: Sequence[float]) -> float | None:
 
 def heard(times: NDArray[np.float64], frames: NDArray[np.generic], classifier: Classifier) -> list[Event]:
     """The events of a session, (N,) s and (N, R, C) counts, provisional ones among them."""
-    front = FrontEnd("lab", *frames.shape[1:])
-    front.previews = True
-    recognizer = Recognizer(front, classifier)
-    found = [one for t, values in zip(times, frames, strict=True) for one in recognizer.push(Frame(float(t), values))]
-    return events_of([*found, *recognizer.flush(float(times[-1]) + 5.0)])
+    sensor = Sensor("lab", Scene(classifier.gestures, frames.shape[1:]), classifier)
+    sensor.foresee(asked=True)
+    found = [one for t, values in zip(times, frames, strict=True) for one in sensor.push(Frame(float(t), values))]
+    return events_of([*found, *sensor.flush(float(times[-1]) + 5.0)])
 
 
 def takes(which: str, count: int, seed: int) -> Iterator[Take]:

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
-from gestured.core.found import Cut
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import FrontEnd
+from gestured.core.front_end import Cut, FrontEnd
 from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.lab.samples import WINDOW, Sample, Samples, collect, sample
@@ -57,7 +56,7 @@ class Truth:
 
 def cuts(frames: NDArray[np.generic], times: NDArray[np.float64]) -> list[Segment]:
     """(N, R, C) raw frames of one recording and their times (N,) -> what the front end cuts out of them."""
-    front = FrontEnd("lab", *frames.shape[1:])
+    front = FrontEnd(*frames.shape[1:])
     found = [x for values, t in zip(frames, times, strict=True) for x in front.push(Frame(float(t), values))]
     found += front.flush(float(times[-1]) + front.timing.stale_s)
     return [x.segment for x in found if isinstance(x, Cut)]

@@ -9,10 +9,9 @@ from typing import Any
 
 from gestured.core.classifier import Classifier
 from gestured.core.events import Gesture
-from gestured.core.feed import front_end_of
 from gestured.core.frames import Frame
-from gestured.core.recognizer import Recognizer
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
+from gestured.core.sensor import Sensor
 from gestured.lab.made_of import made_of
 from gestured.lab.online import tallied
 from gestured.lab.progress import progress
@@ -38,9 +37,9 @@ def read(model: Classifier, take: Take, wait_s: float) -> tuple[Counter[str], li
     """What was done and what it was taken for, with counts; how long right single taps waited for their answer, s."""
     rows, columns = take.frames.shape[1:]
     scene = Scene(gestures=model.gestures, grid=(rows, columns), tap_gap_s=wait_s)
-    recognizer = Recognizer(front_end_of("pad", scene), model)
-    found = [one for t, frame in zip(take.times, take.frames, strict=True) for one in recognizer.push(Frame(t, frame))]
-    found += recognizer.flush(float(take.times[-1]))
+    sensor = Sensor("pad", scene, model)
+    found = [one for t, frame in zip(take.times, take.frames, strict=True) for one in sensor.push(Frame(t, frame))]
+    found += sensor.flush(float(take.times[-1]))
     events = [{"type": "gesture"} | asdict(event) for event in found if isinstance(event, Gesture)]
     tally, outcomes = tallied(take, 0.0, events)
     counts = Counter({"missed": tally.counts["missed"]})

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gestured.core.cutter import LARGEST
 from gestured.core.errors import SettingsError
 from gestured.core.events import Event
 from gestured.core.facts import events_of
-from gestured.core.feed import front_end_of
 from gestured.core.frames import Frame, Touch
 from gestured.core.mounting import Mounting
-from gestured.core.recognizer import Recognizer
 from gestured.core.scene import Scene, Setup
+from gestured.core.sensor import Sensor
 from gestured.core.timing import Timing
 from gestured.core.wire import is_sensor
 from gestured.model import own_file
@@ -34,10 +34,10 @@ class Embedded:
     first second without a touch teaches it the idle sensor; until then there are no events.
     """
 
-    def __init__(self, recognizer: Recognizer, gestures: tuple[str, ...]) -> None:
+    def __init__(self, sensor: Sensor, gestures: tuple[str, ...]) -> None:
         self.gestures = gestures  # in use, in the model's order
-        self._recognizer = recognizer
-        self._shape = recognizer.front_end.sent
+        self._sensor = sensor
+        self._shape = sensor.front_end.sent
         self._last = -math.inf  # s
 
     def push(self, t: float, values: ArrayLike, *, touches: Sequence[Touch] = (), lost: int = 0) -> list[Event]:
@@ -56,12 +56,14 @@ class Embedded:
         if not hasattr(lost, "__index__") or lost < 0:
             raise ValueError(f"lost: expected a count of frames, found {lost!r}")
         self._last = t
-        return events_of(self._recognizer.push(Frame(t, frame, tuple(touches), lost)))
+        if not np.all(np.abs(frame) <= LARGEST):  # NaN is no larger, and no smaller
+            return []
+        return events_of(self._sensor.push(Frame(t, frame, tuple(touches), lost)))
 
     @property
     def due(self) -> float | None:
         """When `wait` will have an answer unless a frame comes before, in s; None where nothing waits."""
-        return self._recognizer.due
+        return self._sensor.due
 
     def wait(self, t: float) -> list[Event]:
         """No frame has come until `t` s: answer a contact that is over.
@@ -69,7 +71,7 @@ class Embedded:
         Whoever does not call it gets the same answer with the next frame. Raises ValueError for a time before the
         last frame's.
         """
-        return events_of(self._recognizer.wait(self._now(t)))
+        return events_of(self._sensor.wait(self._now(t)))
 
     def flush(self, t: float) -> list[Event]:
         """The stream paused or ended at `t` s: decide what can be decided, cancel the rest.
@@ -77,11 +79,11 @@ class Embedded:
         A pause of more than a second needs none: the next frame notices it. Raises ValueError for a time before the
         last frame's.
         """
-        return events_of(self._recognizer.flush(self._now(t)))
+        return events_of(self._sensor.flush(self._now(t)))
 
     def reset(self) -> list[Event]:
         """The sensor restarted: cancel what is open, learn the idle sensor anew."""
-        return events_of(self._recognizer.reset())
+        return events_of(self._sensor.reset())
 
     def _now(self, t: float) -> float:
         if not self._last <= t < math.inf:
@@ -136,10 +138,9 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
         )
     except (TypeError, ValueError) as error:
         raise SettingsError(str(error)) from None
-    front_end = front_end_of(sensor, scene)
-    front_end.previews = provisional
-    recognizer = Recognizer(front_end, ladder, gestures=used, thresholds=scene.thresholds)
-    return Embedded(recognizer, (*used, *ladder.own.gestures))
+    found = Sensor(sensor, scene, ladder)
+    found.foresee(asked=provisional)
+    return Embedded(found, (*used, *ladder.own.gestures))
 
 
 def _own(ladder: Ladder, path: Path) -> Own:

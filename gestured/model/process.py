@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from gestured.core.classifier import Scores
+from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
 
@@ -40,8 +40,8 @@ _children: "weakref.WeakSet[subprocess.Popen[bytes]]" = weakref.WeakSet()  # one
 _ending = False
 
 
-class ModelProcess:
-    """A model in a process of its own; implements `Classifier`. One thread at a time may ask it."""
+class ModelProcess(Classifier):
+    """A model in a process of its own. One thread at a time may ask it."""
 
     def __init__(self, data: bytes, name: str) -> None:
         """Opens and tests the file's bytes. ValueError says what is wrong with them."""

@@ -62,8 +62,8 @@ def _text(value: object) -> str:
     return value
 
 
-class Mute:
-    """A `Classifier` that has no answers: for what can be said of the frames alone."""
+class Mute(Classifier):
+    """One that has no answers: for what can be said of the frames alone."""
 
     def __init__(self, gestures: Sequence[str]) -> None:
         self.gestures = tuple(gestures)

@@ -17,13 +17,11 @@ from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, Unknown
 from gestured.core.facts import Fault, events_of
-from gestured.core.foresight import Foresight
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import FrontEnd
 from gestured.core.hub import Hub
 from gestured.core.prototypes import Match
-from gestured.core.recognizer import Recognizer
 from gestured.core.scene import Scene
+from gestured.core.sensor import Sensor
 from gestured.model.ladder import RETRY_S, SLOW_RUNS, Ladder
 from gestured.model.model import Model
 from tests.daemon.harness import Hand, floats
@@ -72,13 +70,14 @@ def touching(seer: Seer) -> list[Segment]:
     return [segment for segment in seer.looked if segment.offset == segment.times[-1]]
 
 
-def recognizer(seer: Any, *, asked: bool = True, taps: bool = True, **more: Any) -> Recognizer:
-    front_end = FrontEnd("arm", 9, 9, wait_for_double_tap="double_tap" in (more.get("gestures") or GESTURES))
-    front_end.previews = asked
-    return Recognizer(front_end, seer, foresight=Foresight("arm", taps=taps), **more)
+def recognizer(seer: Any, *, asked: bool = True, taps: bool = True, **more: Any) -> Sensor:
+    gestures = tuple(more.pop("gestures", GESTURES))
+    subject = Sensor("arm", Scene(gestures, (9, 9), provisional_taps=taps, **more), seer)
+    subject.foresee(asked=asked)
+    return subject
 
 
-def run(subject: Recognizer, stream: Sequence[Frame]) -> list[Event]:
+def run(subject: Sensor, stream: Sequence[Frame]) -> list[Event]:
     return events_of(event for frame in stream for event in subject.push(frame))
 
 

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from gestured.core.beside.vitals import Vitals
 from gestured.core.frames import Frame
-from gestured.core.front_end import FrontEnd
 from gestured.core.mounting import Mounting
-from gestured.core.vitals import Vitals
+from gestured.core.scene import Scene, Setup
+from gestured.core.sensor import Sensor
+from gestured.record.replay import Mute
 
 RATE_HZ = 15.0
 
@@ -24,20 +26,27 @@ def session(rows: int, columns: int, sign: float = 1.0, contacts: int = 4, seed:
     return 500 + np.array(frames) + rng.normal(0, 2, (len(frames), rows, columns))
 
 
-def played(frames: np.ndarray, **more) -> FrontEnd:
-    front_end = FrontEnd("arm", *frames.shape[1:], **more)
+def played(frames: np.ndarray, mounting: Mounting | None = None) -> Sensor:
+    sensors = {"arm": Setup(mounting=mounting or Mounting())}
+    sensor = Sensor("arm", Scene(("one_tap",), frames.shape[1:], sensors), Mute(("one_tap",)))
     for n, values in enumerate(frames):
-        front_end.push(Frame(n / RATE_HZ, values))
-    return front_end
+        sensor.push(Frame(n / RATE_HZ, values))
+    return sensor
+
+
+def seen(sensor: Sensor) -> tuple[bool, bool]:
+    """Whether its counts fall when it is touched, and whether its rows and columns are exchanged."""
+    reading = sensor.reading(0.0)
+    return sensor.state(0.0) == "inverted", reading.exchanged
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_counts_that_fall_under_a_finger_are_noticed_and_inverting_them_helps(seed: int) -> None:
     falling = played(session(9, 9, -1.0, seed=seed))
-    assert falling.habits.inverted and falling.segments == 0
-    assert not played(session(9, 9, 1.0, seed=seed)).habits.inverted
+    assert seen(falling)[0] and falling.segments == 0
+    assert not seen(played(session(9, 9, 1.0, seed=seed)))[0]
     mended = played(session(9, 9, -1.0, seed=seed), mounting=Mounting(invert=True))
-    assert mended.segments == 4 and not mended.habits.inverted
+    assert mended.segments == 4 and not seen(mended)[0]
 
 
 def test_inverted_counts_are_read_as_if_they_rose() -> None:
@@ -53,29 +62,29 @@ def test_inverted_counts_are_read_as_if_they_rose() -> None:
 def test_exchanged_rows_and_columns_are_noticed(rows: int, columns: int, mounting: Mounting) -> None:
     frames = session(rows, columns, contacts=5)
     right = played(frames, mounting=mounting)
-    assert right.segments == 5 and not right.habits.exchanged
+    assert right.segments == 5 and not seen(right)[1]
     wrong = played(frames.reshape(-1, columns, rows), mounting=mounting)
-    assert wrong.habits.exchanged
+    assert seen(wrong)[1]
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(6, 12), (12, 6)])
 def test_rows_and_columns_that_are_exchanged_are_noticed_where_counts_fall_as_well(rows: int, columns: int) -> None:
     frames = session(rows, columns, -1.0, contacts=5)
-    right, wrong = (played(each).habits for each in (frames, frames.reshape(-1, columns, rows)))
-    assert right.inverted and not right.exchanged
-    assert wrong.inverted and wrong.exchanged
+    right, wrong = (seen(played(each)) for each in (frames, frames.reshape(-1, columns, rows)))
+    assert right == (True, False)
+    assert wrong == (True, True)
 
 
 def test_what_was_noticed_is_forgotten_when_the_sensor_is_learned_anew() -> None:
     falling = played(session(9, 9, -1.0))
     falling.reset()
-    assert not falling.habits.inverted
+    assert not seen(falling)[0]
 
 
 def stretch(vitals: Vitals, begin: float, seconds: float, *, missed: bool = False) -> float:
     """Frames for some seconds, then silence; when the next stretch may begin."""
     for n in range(round(seconds * RATE_HZ)):
-        vitals.arrived(begin + n / RATE_HZ, 1, RATE_HZ, missed=missed and n == 0)
+        vitals.arrived(begin + n / RATE_HZ, 1, missed=missed and n == 0)
     vitals.silent()
     return begin + seconds + 3.0
 

@@ -13,7 +13,7 @@ import pytest
 
 from gestured.control.export import sessions_of
 from gestured.core.certainty import Certainty
-from gestured.core.classifier import Scores
+from gestured.core.classifier import Classifier, Scores
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, Release, Unknown
 from gestured.core.facts import Changed, Dropped, Taken
 from gestured.core.frames import Segment
@@ -30,7 +30,7 @@ GESTURES = ("swipe", "double_tap")
 Arrived = tuple[float, bytes, tuple[str, int]]  # s, packet, source
 
 
-class Sure:
+class Sure(Classifier):
     """A classifier that calls everything a swipe."""
 
     gestures: tuple[str, ...] = GESTURES

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gestured.core.beside.view import view_of
 from gestured.core.contact import Memory
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.mounting import Mounting
 from gestured.core.segmenter import CONTACT, GAP, IDLE, RELEASING, SPENT, Signal
 from gestured.core.timing import Timing
-from gestured.core.view import view_of
 from tests.core.test_habits import RATE_HZ, session
 
 
@@ -32,7 +32,7 @@ def test_the_thresholds_that_are_shown_are_those_that_decide(phase, peak: float,
 
 
 def test_before_and_after_the_sensor_is_learned() -> None:
-    front_end = FrontEnd("arm", 9, 9)
+    front_end = FrontEnd(9, 9)
     assert view_of(front_end, raw=False) is None
     frames = session(9, 9)
     front_end.push(Frame(0.0, frames[0]))
@@ -52,7 +52,7 @@ def test_a_bad_taxel_is_marked_and_shows_what_it_is_bridged_with() -> None:
     rng = np.random.default_rng(0)
     frames = session(9, 9)
     frames[:, 2, 3] += rng.normal(0, 100, len(frames))
-    front_end = FrontEnd("arm", 9, 9, mounting=Mounting(90))
+    front_end = FrontEnd(9, 9, mounting=Mounting(90))
     for n, values in enumerate(frames):
         front_end.push(Frame(n / RATE_HZ, values))
         shown = view_of(front_end, raw=True)

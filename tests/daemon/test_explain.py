@@ -5,9 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from gestured.core.found import Cut
 from gestured.core.frames import Frame
-from gestured.core.front_end import FrontEnd
+from gestured.core.front_end import Cut, FrontEnd
 from gestured.core.timing import Timing
 from gestured.daemon.explain import explain
 from gestured.model.shipped import shipped
@@ -20,7 +19,7 @@ JITTER_S = 0.003
 def waited(tap_gap_s: float, seed: int) -> float:
     """Seconds from the last touched frame of a made tap to its answer."""
     rng = np.random.default_rng(seed)
-    front = FrontEnd("wait", 9, 9, timing=Timing(tap_gap_s=tap_gap_s))
+    front = FrontEnd(9, 9, timing=Timing(tap_gap_s=tap_gap_s))
     down, right = np.ogrid[:9, :9]
     finger = 600 * np.exp(-((down - 4) ** 2 + (right - 4) ** 2) / 2)
     first, last = 30, 32

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gestured.core.beside.vitals import Vitals, faulty
 from gestured.core.classifier import Scores
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.measures import MEASURES
 from gestured.core.reading import STATES, Reading
-from gestured.core.vitals import Vitals, faulty
 from gestured.core.window import Window
 from gestured.daemon.exposition import exposition
 from gestured.daemon.metrics import NAMED_SENSORS, Metrics
@@ -120,9 +120,10 @@ def test_several_sensors_together_are_as_their_worst() -> None:
 
 def test_jitter_is_none_for_an_even_stream_and_grows_with_an_uneven_one() -> None:
     even, uneven = Vitals(), Vitals()
+    even.interval_s = uneven.interval_s = 1 / 15
     for n in range(200):
-        even.arrived(n / 15, 1, 15.0, missed=False)
-        uneven.arrived(n / 15 + (0.02 if n % 2 else 0.0), 1, 15.0, missed=False)
+        even.arrived(n / 15, 1, missed=False)
+        uneven.arrived(n / 15 + (0.02 if n % 2 else 0.0), 1, missed=False)
     assert even.jitter_s < 1e-9 and uneven.jitter_s == pytest.approx(0.02, rel=0.01)
 
 
@@ -144,7 +145,7 @@ def test_drift_is_the_way_of_the_baseline_in_units_of_noise(model: Path) -> None
 
 @pytest.mark.parametrize(("noisy", "too_many"), [(0, False), (20, False), (21, True)])
 def test_a_sensor_with_more_than_a_quarter_of_bad_taxels_is_faulty(noisy: int, too_many: bool) -> None:
-    front_end, rng = FrontEnd("a", 9, 9), np.random.default_rng(0)
+    front_end, rng = FrontEnd(9, 9), np.random.default_rng(0)
     for n in range(90):
         counts = 300 + rng.normal(0, 2, 81)
         counts[:noisy] += rng.normal(0, 200, noisy)

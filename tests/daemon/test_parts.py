@@ -17,8 +17,8 @@ import pytest
 
 from gestured.core.address import Address
 from gestured.core.errors import SettingsError
-from gestured.core.front_end import FrontEnd
 from gestured.core.scene import Scene
+from gestured.core.sensor import Sensor
 from gestured.core.wire import Decoder
 from gestured.daemon import http, log, udp
 from gestured.daemon.health import Pulse
@@ -99,15 +99,15 @@ def test_a_bug_in_the_path_of_one_sensor_ends_its_contact_and_nothing_else(parts
     hand, events = Hand(), parts.events
     t = max(parts.feed(name, hand.idle(2.0), 0.0) for name in ("good", "bad"))
     parts.feed("bad", hand.tap(), t)
-    push = FrontEnd.push
+    push = Sensor.push
 
     def broken(self, frame):
-        if self.sensor == "bad":
+        if self.name == "bad":
             raise ZeroDivisionError("a bug")
         return push(self, frame)
 
     with monkeypatch.context() as patch:
-        patch.setattr(FrontEnd, "push", broken)
+        patch.setattr(Sensor, "push", broken)
         parts.feed("bad", hand.tap(), t + 0.2)
         parts.feed("good", hand.swipe("left") + hand.idle(1.0), t)
     kinds = [(type(e).__name__, e.sensor) for e in events]

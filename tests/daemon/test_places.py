@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from gestured.core.events import Cancelled, Gesture, Onset
-from gestured.core.feed import HELD_S
 from gestured.core.hub import FORGET_S
+from gestured.core.sensor import HELD_S
 from tests import encoding
 from tests.daemon.harness import RATE_HZ, Frame, Hand, floats
 from tests.daemon.parts import SOURCE, Parts

@@ -15,9 +15,8 @@ import gestured
 from gestured.core.events import Event
 from gestured.core.facts import events_of
 from gestured.core.frames import Frame
-from gestured.core.front_end import FrontEnd
 from gestured.core.messages import event_type
-from gestured.core.recognizer import Recognizer
+from gestured.core.scene import Scene
 from gestured.daemon import status
 from gestured.daemon.asked import scene_of
 from gestured.daemon.merge import load_settings
@@ -57,10 +56,11 @@ def session(seed: int) -> list[tuple[float, harness.Frame]]:
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_online_is_offline(shared: Daemon, model: Path, seed: int) -> None:
     name, timed = f"session{seed}", session(seed)
-    recognizer = Recognizer(FrontEnd(name, 9, 9), open_model(model))
+    opened = open_model(model)
+    sensor = gestured.Sensor(name, Scene(opened.gestures, (9, 9)), opened)
     offline: list[Event] = []
     for t, frame in timed:
-        offline += events_of(recognizer.push(Frame(t, frame.astype(np.float32))))
+        offline += events_of(sensor.push(Frame(t, frame.astype(np.float32))))
     assert len(offline) > 50 and {"gesture", "cancelled"} < {event_type(event) for event in offline}
     same(said(shared, name, timed, len(offline)), offline)
 

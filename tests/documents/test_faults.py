@@ -11,7 +11,7 @@ PAGE = (ROOT / "docs" / "sensors.md").read_text().partition("## What a sensor ma
 ROWS = [[cell.strip() for cell in line.strip("|").split("|")] for line in PAGE.splitlines() if line.startswith("| ")]
 FAULTS = ROWS[1:]
 SCENARIOS = ROOT / "tests" / "scenarios"
-TESTS = (ROOT / "tests" / "core" / "test_conditioning.py").read_text()
+TESTS = "".join((ROOT / "tests" / "core" / f"test_{name}.py").read_text() for name in ("conditioning", "wire"))
 EXPECTED = {
     "clipped", "still", "stuck", "freezes", "noisy", "drifts", "restarted", "shifted", "bursts", "spikes",
     "after-effect", "under a hand", "object", "no number", "repeats",

@@ -23,10 +23,10 @@ from typing import Any
 
 from gestured.core.events import Cancelled, Gesture, Onset, Unknown
 from gestured.core.facts import events_of
-from gestured.core.found import Cut
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Recognizer
+from gestured.core.front_end import Cut, FrontEnd, Void
+from gestured.core.scene import Scene
+from gestured.core.sensor import Sensor
 from gestured.lab.ahead import Ahead, heard, table
 from gestured.lab.dataset import Truth
 from gestured.lab.made_of import made_of, renew
@@ -78,7 +78,7 @@ def _frames(recording: Take) -> Iterator[Frame]:
 def _decided(events: list[Any]) -> tuple[list[Any], list[Any]]:
     """What was answered (Cut, Gesture or Unknown), and what was cancelled."""
     return [e for e in events if isinstance(e, Cut | Gesture | Unknown)], [
-        e for e in events if isinstance(e, Cancelled)
+        e for e in events if isinstance(e, Void | Cancelled)
     ]
 
 
@@ -110,11 +110,18 @@ def _pieces(segment: Segment) -> int:
     return int(strong[0]) + int((strong[1:] & ~strong[:-1]).sum())
 
 
+def _machine(grid: tuple[int, int], classifier: Any | None) -> tuple[Any, FrontEnd]:
+    """What takes the frames, and its front end, which is all of it where there is no classifier."""
+    if classifier is None:
+        front = FrontEnd(*grid)
+        return front, front
+    sensor = Sensor("foreign", Scene(classifier.gestures, grid), classifier)
+    return sensor, sensor.front_end
+
+
 def judge(recording: Take, seed: int, level: str, classifier: Any | None) -> Outcome:
     """Run one take through a fresh front end (and recognizer, where a classifier is given)."""
-    rows, columns = recording["frames"].shape[1:]
-    front = FrontEnd("foreign", rows, columns)
-    machine: Any = front if classifier is None else Recognizer(front, classifier)
+    machine, front = _machine(recording["frames"].shape[1:], classifier)
     onset, release = recording["onset"], recording["release"]
     events: list[Any] = []
     ready = False
@@ -286,8 +293,7 @@ def sessions(source: str, level: str, count: int, first: int) -> dict[str, Any]:
     errors: Counter[str] = Counter()
     for seed in range(first, first + count):
         recording = session(seed, level, SESSION_S)
-        front = FrontEnd("foreign", 9, 9)
-        machine = Recognizer(front, classifier)
+        machine = Sensor("foreign", Scene(classifier.gestures, (9, 9)), classifier)
         events: list[Any] = []
         for frame in _frames(recording):
             events += machine.push(frame)

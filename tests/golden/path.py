@@ -12,21 +12,20 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from gestured.core.events import Cancelled, Event, Gesture, Unknown
+from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
-from gestured.core.feed import front_end_of
-from gestured.core.found import Contact, Draft, Preview
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import FrontEnd
+from gestured.core.front_end import Ended, Found, FrontEnd, Opened, Shown, Void
 from gestured.core.hub import Hub
 from gestured.core.reading import Reading
+from gestured.core.sensor import Sensor
 from gestured.core.stamping import Stamp, Stamper
 from gestured.core.wire import Decoder
 from gestured.daemon.asked import scene_of
 from gestured.daemon.settings import Settings
 from gestured.model.ladder import Ladder
 from gestured.record import tape as mcap
-from gestured.record.replay import Replay, maker
+from gestured.record.replay import Mute, Replay, maker
 from tests.golden.tape import Tape
 
 Line = dict[str, Any]
@@ -113,16 +112,17 @@ def replay(tape: Tape, model: Ladder) -> list[Line]:
     return [as_line(event) for event in player.events()]
 
 
-def front_ends(tape: Tape) -> Iterator[tuple[FrontEnd, Stamp, list[Contact]]]:
-    """Each sensor's front end after each of its frames, with the frame's stamp, and what the front end found.
+def front_ends(tape: Tape) -> Iterator[tuple[str, FrontEnd, Stamp, list[tuple[int, Found]]]]:
+    """Each sensor's front end after each of its frames, with the frame's stamp, and what it found, with contacts' ids.
 
-    Whoever sends may feed every sensor, and touches are kept. A dropped frame is passed over, but its stamp is given.
+    Whoever sends may feed every sensor. A dropped frame is passed over, but its stamp is given.
     """
     settings = Settings.model_validate(dict(tape.settings))
     gestures = ("double_tap",) if settings.gestures is None else settings.gestures
     scene = scene_of(settings, SimpleNamespace(gestures=gestures, rows=9, columns=9))  # type: ignore[arg-type]
     decoder = Decoder(scene.addresses, scene.grid_of, keep_touches=True)
-    sensors: dict[str, tuple[Any, FrontEnd]] = {}
+    sensors: dict[str, tuple[Stamper, FrontEnd]] = {}
+    numbers: Counter[str] = Counter()
     for now, waiting in tape.steps():
         arrived: dict[str, list[Any]] = {}
         for packet, source in waiting or ():
@@ -130,16 +130,27 @@ def front_ends(tape: Tape) -> Iterator[tuple[FrontEnd, Stamp, list[Contact]]]:
                 arrived.setdefault(arrival.sensor, []).append(arrival)
         for name, arrivals in arrived.items():
             if name not in sensors:
-                sensors[name] = Stamper(scene.clock_of(name)), front_end_of(name, scene)
+                sensors[name] = Stamper(scene.clock_of(name)), Sensor(name, scene, Mute(scene.gestures)).front_end
             stamper, front_end = sensors[name]
             for arrival, stamp in zip(arrivals, stamper.stamp(arrivals, now), strict=True):
-                found: list[Contact] = []
+                found: list[tuple[int, Found]] = []
                 if not stamp.dropped:
-                    if stamp.restarted:
-                        found += front_end.reset()
-                    frame = Frame(stamp.t, arrival.values, arrival.touches, stamp.lost)
-                    found += [one for one in front_end.push(frame) if not isinstance(one, Draft | Preview)]
-                yield front_end, stamp, found
+                    each = front_end.reset() if stamp.restarted else []
+                    each += front_end.push(Frame(stamp.t, arrival.values, arrival.touches, stamp.lost))
+                    for one in each:
+                        numbers[name] += isinstance(one, Opened)
+                        if not isinstance(one, Shown):
+                            found.append((numbers[name], one))
+                yield name, front_end, stamp, found
+
+
+def contact_line(sensor: str, number: int, found: Opened | Void | Ended) -> Line:
+    """What a front end found of a contact, as the event that is made of it."""
+    if isinstance(found, Opened):
+        return as_line(Onset(sensor, number, found.onset))
+    if isinstance(found, Void):
+        return as_line(Cancelled(sensor, number, found.reason))
+    return as_line(Release(sensor, number, found.offset))
 
 
 def window(segment: Segment, model: Ladder) -> Any:

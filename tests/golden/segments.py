@@ -5,12 +5,11 @@ sensor), every contact its lines, and every segment the digests of its arrays an
 """
 
 import hashlib
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from gestured.core.found import Contact, Cut
+from gestured.core.front_end import Cut
 from gestured.model.ladder import Ladder
 from tests.golden import path
 from tests.golden.path import Line
@@ -45,29 +44,27 @@ def found(tape: Tape, model: Ladder) -> list[Line]:
     """The lines of a tape."""
     lines: list[Line] = []
     seen: dict[str, _Seen] = {}
-    for front_end, stamp, contacts in path.front_ends(tape):
-        sensor = seen.setdefault(front_end.sensor, _Seen())
+    for name, front_end, stamp, contacts in path.front_ends(tape):
+        sensor = seen.setdefault(name, _Seen())
         sensor.frames += 1
         sensor.stamps.append(tuple(stamp))
         sensor.looks.append((front_end.ready, front_end.touched, front_end.noise, front_end.bad_taxels))
-        lines += [_line(front_end.sensor, contact, model) for contact in contacts]
+        lines += [_line(name, number, contact, model) for number, contact in contacts]
         if sensor.frames % EVERY == 0:
-            lines.append(sensor.line(front_end.sensor))
+            lines.append(sensor.line(name))
     return [*lines, *(sensor.line(name) for name, sensor in seen.items() if sensor.stamps)]
 
 
-def _line(sensor: str, contact: Contact, model: Ladder) -> Line:
+def _line(sensor: str, number: int, contact: Any, model: Ladder) -> Line:
     if not isinstance(contact, Cut):
-        return path.as_line(contact)
+        return path.contact_line(sensor, number, contact)
     segment, window = contact.segment, path.window(contact.segment, model)
-    touches = [[asdict(touch) for touch in frame] for frame in segment.touches]
     arrays = {"frames": segment.frames, "times": segment.times, "window": window}
     return {
-        "type": "Cut", "sensor": sensor, "id": contact.id, "onset": segment.onset, "offset": segment.offset,
+        "type": "Cut", "sensor": sensor, "id": number, "onset": segment.onset, "offset": segment.offset,
         "decided": contact.decided, "hole_s": contact.hole_s, "first": segment.first, "last": segment.last,
-        "lost": segment.lost, "noise": segment.noise, "touches": sum(map(len, touches)),
+        "lost": segment.lost, "noise": segment.noise,
         "shapes": {name: list(array.shape) for name, array in arrays.items()},
         "sums": {name: float(np.sum(array, dtype=np.float64)) for name, array in arrays.items()},
-        "digests": {name: _digest(np.ascontiguousarray(array).tobytes()) for name, array in arrays.items()}
-        | {"touches": _digest(repr(touches).encode())},
+        "digests": {name: _digest(np.ascontiguousarray(array).tobytes()) for name, array in arrays.items()},
     }  # fmt: skip

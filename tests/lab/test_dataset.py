@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gestured.core.classifier import Scores
+from gestured.core.classifier import Classifier, Scores
 from gestured.core.events import Event
 from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Recognizer
+from gestured.core.scene import Scene
+from gestured.core.sensor import Sensor
 from gestured.lab.dataset import (
     OTHER_TRIALS,
     STREAMS,
@@ -44,13 +44,13 @@ def take_of(kind: str, person: int = 70) -> Take:
     return gesture_take(kind, Participant(person), SimulatedSensor.nominal(day=person), generator(person, 3))
 
 
-class Sure:
+class Sure(Classifier):
     """A classifier that knows one gesture, and sees it everywhere."""
 
-    gestures = ("one_tap",)
+    gestures = ("one_tap", "double_tap")
 
     def classify(self, segment: Segment) -> Scores:
-        return Scores(np.ones(1, np.float32), 0.0, "sure")
+        return Scores(np.ones(2, np.float32), 0.0, "sure")
 
 
 def decided(found: list[Event | Decided]) -> list[Segment]:
@@ -60,11 +60,11 @@ def decided(found: list[Event | Decided]) -> list[Segment]:
 def test_what_is_learned_from_is_what_the_daemon_would_have_classified() -> None:
     take = session(Participant(71), SimulatedSensor.nominal(day=71), generator(71, 4), 40.0)
     heard: list[Segment] = []
-    front_end = FrontEnd("armrest", *take.frames.shape[1:])
-    recognizer = Recognizer(front_end, Sure())
+    sure = Sure()
+    sensor = Sensor("armrest", Scene(sure.gestures, take.frames.shape[1:]), sure)
     for t, values in zip(take.times, take.frames, strict=True):
-        heard += decided(recognizer.push(Frame(float(t), values)))
-    heard += decided(recognizer.flush(float(take.times[-1]) + 2))
+        heard += decided(sensor.push(Frame(float(t), values)))
+    heard += decided(sensor.flush(float(take.times[-1]) + 2))
     found = cuts(take.frames, take.times)
     assert len(found) == len(heard) > 5
     for ours, theirs in zip(found, heard, strict=True):

@@ -50,7 +50,7 @@ def denormals_table(windows: WindowList) -> Table:
 
 
 def _felt(frames: Array) -> None:
-    front = FrontEnd("stability", *frames.shape[1:])
+    front = FrontEnd(*frames.shape[1:])
     for k, values in enumerate(frames):
         front.push(Frame(k / 15, values))
 

@@ -15,8 +15,8 @@ from gestured.core.events import Event, Gesture, Onset
 from gestured.core.facts import events_of
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Recognizer
+from gestured.core.scene import Scene
+from gestured.core.sensor import Sensor
 from gestured.core.window import Window
 from gestured.lab.samples import WINDOW
 from gestured.lab.stability.made import IDLE_LEVEL, NOISE, swipes
@@ -135,24 +135,23 @@ def month_table(classifier: Classifier, days: float) -> Table:
     step, swing = 0.9, 50.0
     times = np.arange(int(days * 86_400 / step)) * step + 2.0
     rng = np.random.default_rng(30)
-    front = FrontEnd("stability", 9, 9)
-    recognizer = Recognizer(front, classifier)
+    sensor = Sensor("stability", Scene(classifier.gestures, (9, 9)), classifier)
     for k in range(30):
-        recognizer.push(Frame(k / 15, IDLE_LEVEL + NOISE * rng.standard_normal((9, 9))))
+        sensor.push(Frame(k / 15, IDLE_LEVEL + NOISE * rng.standard_normal((9, 9))))
     heard: Counter[type] = Counter()
     for part in np.array_split(times, max(len(times) // 10_000, 1)):
         noise = NOISE * rng.standard_normal((len(part), 9, 9))
         noise += IDLE_LEVEL + swing * np.sin(2 * np.pi * part / 86_400.0)[:, None, None]
         for t, frame in zip(part, noise, strict=True):
-            heard.update(map(type, events_of(recognizer.push(Frame(float(t), frame)))))
+            heard.update(map(type, events_of(sensor.push(Frame(float(t), frame)))))
     end = float(times[-1])
     level = IDLE_LEVEL + swing * float(np.sin(2 * np.pi * end / 86_400.0))
-    off = level - front.baseline
+    off = level - sensor.front_end.baseline
     after, _ = swipes(1, level=level)
     found: list[Event] = []
     for t, frame in zip(after.times + end + 0.1, after.frames, strict=True):
-        found += events_of(recognizer.push(Frame(float(t), frame)))
-    found += events_of(recognizer.flush(end + 10.0))
+        found += events_of(sensor.push(Frame(float(t), frame)))
+    found += events_of(sensor.flush(end + 10.0))
     return Table(
         "Running means after a long time idle",
         ("days", "frames", "contacts", "gestures", "baseline off by (noise)", "noise found / true", "then a swipe is"),
@@ -163,7 +162,7 @@ def month_table(classifier: Classifier, days: float) -> Table:
                 heard[Onset],
                 heard[Gesture],
                 float(np.abs(off).max() / NOISE),
-                front.noise / NOISE,
+                sensor.front_end.noise / NOISE,
                 " ".join(labels(found)),
             )
         ],

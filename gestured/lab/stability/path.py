@@ -14,7 +14,8 @@ from gestured.core.facts import events_of
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.mounting import Mounting
-from gestured.core.recognizer import Recognizer
+from gestured.core.scene import Scene, Setup
+from gestured.core.sensor import Sensor
 from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
 
 Array = NDArray[Any]
@@ -39,14 +40,15 @@ def simulated_series(count: int, seed: int = 41) -> Iterator[tuple[str, Series]]
 
 def contacts(stream: Series, mounting: Mounting | None = None) -> list[Any]:
     """What the front end makes of it."""
-    front = FrontEnd("stability", *stream.frames.shape[1:], mounting=mounting)
+    front = FrontEnd(*stream.frames.shape[1:], mounting=mounting)
     return _run(front.push, front.flush, stream)
 
 
 def events(stream: Series, classifier: Classifier, mounting: Mounting | None = None) -> list[Event]:
     """What a recognizer makes of it."""
-    recognizer = Recognizer(FrontEnd("stability", *stream.frames.shape[1:], mounting=mounting), classifier)
-    return events_of(_run(recognizer.push, recognizer.flush, stream))
+    mounted = {"stability": Setup(mounting=mounting or Mounting())}
+    sensor = Sensor("stability", Scene(classifier.gestures, stream.frames.shape[1:], mounted), classifier)
+    return events_of(_run(sensor.push, sensor.flush, stream))
 
 
 def _run(push: Callable[[Frame], list[Any]], flush: Callable[[float], list[Any]], stream: Series) -> list[Any]:

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.front_end import Cut, Found, FrontEnd, Opened, Void
+
 Array = NDArray[np.float64]
 Counts = NDArray[np.generic]
 
@@ -39,23 +41,29 @@ class Habits:
         """Whether rows and columns are exchanged."""
         return self.exchanges >= ENOUGH and self.exchanges >= MOSTLY * self.fits
 
-    def fall(self, t: float, values: Counts, activity: float) -> None:
-        """A frame (R, C), as it was sent at `t` s, lies as far below the baseline as a touched one lies above it."""
-        if self.paused(t):
-            self.falls += 1
-            self._strongest = 0.0, None
-        self._fell, self._falling = t, True
-        self.pressed(values, activity)
+    def hear(self, found: Found) -> None:
+        """Hear what a front end has found of a contact."""
+        if isinstance(found, Opened):
+            self.rises += 1
+            self._strongest, self._falling = (0.0, None), False
+        elif isinstance(found, Cut) or (isinstance(found, Void) and found.reason == "stuck"):
+            self._compare()
 
-    def rise(self) -> None:
-        """A contact began, whose strongest frame is yet to come."""
-        self.rises += 1
-        self._strongest, self._falling = (0.0, None), False
-
-    def idle(self, t: float, values: Counts) -> None:
-        """A frame (R, C) without a contact, as it was sent at `t` s."""
-        if self.paused(t):
-            self._idle = values
+    def see(self, front_end: FrontEnd) -> None:
+        """See the last frame that a front end has taken. Where R equals C, only `Look.burst` says something."""
+        frame, look = front_end.frame, front_end.look
+        if frame is None or look is None:
+            return
+        if look.burst and (fallen := front_end.inverted_activity(look)) >= front_end.on:
+            if self.paused(frame.t):
+                self.falls += 1
+                self._strongest = 0.0, None
+            self._fell, self._falling = frame.t, True
+            self._press(frame.values, fallen)
+        if front_end.pending:
+            self._press(frame.values, look.activity)
+        elif not front_end.touched and not look.shifted and self.paused(frame.t):
+            self._idle = frame.values
 
     def paused(self, t: float) -> bool:
         """Whether no contact in which counts fell goes on at `t` s; one that is over is compared."""
@@ -63,15 +71,15 @@ class Habits:
             return False
         if self._falling:
             self._falling = False
-            self.touched()
+            self._compare()
         return True
 
-    def pressed(self, values: Counts, activity: float) -> None:
+    def _press(self, values: Counts, activity: float) -> None:
         """A frame (R, C) of a contact, as it was sent."""
         if activity > self._strongest[0]:
             self._strongest = activity, values
 
-    def touched(self) -> None:
+    def _compare(self) -> None:
         """A contact is over: its strongest frame is compared with an idle one."""
         pressed = self._strongest[1]
         if self._rows == self._columns or self._idle is None or pressed is None:

@@ -16,6 +16,7 @@ class Vitals:
 
     def __init__(self) -> None:
         self.jitter_s = 0.0
+        self.interval_s = 0.0  # from frame to frame, as of the last tick; 0 before it is known
         self.first: NDArray[np.float64] | None = None  # (N,) counts
         self._last: float | None = None
         self._began = 0.0  # s, the first frame after the last silence
@@ -26,7 +27,7 @@ class Vitals:
         """Whether the sensor falls silent again and again, after a few seconds each time."""
         return self._stretches >= STRETCHES and (self._last is None or self._last - self._began < SHORT_S)
 
-    def arrived(self, now: float, frames: int, rate_hz: float, *, missed: bool) -> None:
+    def arrived(self, now: float, frames: int, *, missed: bool) -> None:
         """`frames` came together at `now` s. Interarrival jitter as RTP has it.
 
         `missed`: this machine may have had no room for frames before these. Then the silence before them need not be
@@ -34,14 +35,15 @@ class Vitals:
         """
         if missed:
             self._stretches = 0
-        if self._last is not None and rate_hz > 0:
-            self.jitter_s += (abs(now - self._last - frames / rate_hz) - self.jitter_s) * WEIGHT
+        if self._last is not None and self.interval_s > 0:
+            self.jitter_s += (abs(now - self._last - frames * self.interval_s) - self.jitter_s) * WEIGHT
         if self._last is None:
             self._began = now
         self._last = now
 
     def review(self, front_end: FrontEnd) -> None:
-        """Keep the first baseline that was learned. Beside the way of a frame, now and then."""
+        """Keep the first baseline that was learned, and the interval. Beside the way of a frame, with each tick."""
+        self.interval_s = front_end.interval_s
         if self.first is None and front_end.ready:
             self.first = front_end.baseline
 

@@ -8,25 +8,26 @@ import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gestured.core.classifier import Scores
+from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.facts import Decided, events_of
-from gestured.core.found import Contact, Cut, Draft, Preview
 from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import FrontEnd
-from gestured.core.recognizer import Recognizer
+from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown, Void
+from gestured.core.scene import Scene
+from gestured.core.sensor import Sensor
 from gestured.core.timing import Timing
 from gestured.core.window import Window
 from tests.scenario import contacts, frames
 
-GESTURES = ("tap", "left", "right")
+GESTURES = ("double_tap", "left", "right")
 TAP = "press 4,4 0.8 for 130ms"
 SWIPE = "move 4,1 to 4,7 0.8 in 400ms"
 
@@ -40,7 +41,7 @@ SURE = says(0.9, 0.06, 0.04)
 
 
 @dataclass
-class Fake:
+class Fake(Classifier):
     """Gives one answer after the other, the last one for ever; an exception is raised."""
 
     answers: Sequence[Scores | Exception] = (SURE,)
@@ -55,11 +56,16 @@ class Fake:
         return answer
 
 
-def recognizer(classifier: Fake, **settings: object) -> Recognizer:
-    return Recognizer(FrontEnd("armrest", 9, 9), classifier, **settings)  # type: ignore[arg-type]
+def recognizer(classifier: Fake, sequence: int = 0, **settings: Any) -> Sensor:
+    scene = Scene(**{"gestures": classifier.gestures, "grid": (9, 9)} | settings)
+    return Sensor("armrest", scene, classifier, numbers=(sequence, 0))
 
 
-def run(subject: Recognizer, stream: Sequence[Frame]) -> list[Event]:
+def reload(subject: Sensor, classifier: Fake) -> None:
+    subject.change(Scene(classifier.gestures, (9, 9)), classifier, 0.0, [])
+
+
+def run(subject: Sensor, stream: Sequence[Frame]) -> list[Event]:
     return events_of(event for frame in stream for event in subject.push(frame))
 
 
@@ -101,7 +107,7 @@ def test_what_is_asked_ahead_is_what_is_cut() -> None:
     window = Window(9, 9, 15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
     for line in (SWIPE, TAP, "move 1,1 to 7,7 0.5 in 700ms"):
         stream = frames("quiet for 1500ms", line, "quiet for 900ms")
-        classifier, front_end = Fake(), FrontEnd("armrest", 9, 9)
+        classifier, front_end = Fake(), FrontEnd(9, 9)
         run(recognizer(classifier), stream)
         (segment,) = [x.segment for frame in stream for x in front_end.push(frame) if isinstance(x, Cut)]
         (asked,) = classifier.seen
@@ -114,18 +120,18 @@ def test_what_is_asked_ahead_is_what_is_cut() -> None:
 def cut_late(stream: Sequence[Frame]) -> list[Segment]:
     """Segments with all frames up to their cut: nothing is drafted before."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("gestured.core.unfinished.DRAFT_S", math.inf)
+        patch.setattr("gestured.core.front_end.DRAFT_S", math.inf)
         return [x.segment for x in cut_out(stream) if isinstance(x, Cut)]
 
 
 @pytest.mark.parametrize("lines", [(SWIPE,), (TAP,), (TAP, "quiet for 150ms", TAP), (TAP, "quiet for 150ms", SWIPE)])
 def test_a_draft_comes_before_its_cut_and_is_the_same_segment(lines: tuple[str, ...]) -> None:
-    front_end = FrontEnd("armrest", 9, 9)
+    front_end = FrontEnd(9, 9)
     drafts: list[Segment] = []
     cuts = 0
     for frame in frames("quiet for 1500ms", *lines, "quiet for 900ms", *lines, "quiet for 900ms"):
         for found in front_end.push(frame):
-            if isinstance(found, Draft | Preview):
+            if isinstance(found, Shown):
                 drafts.append(found.segment)
             elif isinstance(found, Cut):
                 cuts += 1
@@ -142,8 +148,8 @@ def test_no_frame_changes_what_the_time_has_decided(lines: tuple[str, ...]) -> N
     pressed = next(frame for frame in stream if frame.t >= touch_of(stream))
     late = [*stream[:decided], replace(stream[decided], values=pressed.values)]
     one, other = cut_out(stream[: decided + 1]), cut_out(late)
-    assert kinds(one) == ["Onset", "Cut", "Release"]
-    assert kinds(other) == ["Onset", "Cut", "Release", "Onset"]
+    assert kinds(one) == ["Opened", "Cut", "Ended"]
+    assert kinds(other) == ["Opened", "Cut", "Ended", "Opened"]
     for expected, found in zip(one, other[:3], strict=True):
         if isinstance(expected, Cut) and isinstance(found, Cut):
             assert np.array_equal(expected.segment.frames, found.segment.frames)
@@ -189,8 +195,8 @@ def touched(stream: Sequence[Frame]) -> tuple[int, int]:
     return times.index(cut.segment.onset), times.index(cut.segment.offset)
 
 
-def cut_out(stream: Sequence[Frame]) -> list[Contact]:
-    front_end = FrontEnd("armrest", 9, 9)
+def cut_out(stream: Sequence[Frame]) -> list[Found]:
+    front_end = FrontEnd(9, 9)
     return [x for frame in stream for x in contacts(front_end, frame)]
 
 
@@ -340,18 +346,19 @@ def test_a_subset_is_not_given_what_falls_to_the_others() -> None:
     (answer,) = answers(run(recognizer(classifier, gestures=["left", "right"]), SWIPED))
     assert isinstance(answer, Unknown)
     assert answer.confidence == pytest.approx(0.3) and answer.scores == pytest.approx({"left": 0.3, "right": 0.1})
-    (answer,) = answers(run(recognizer(classifier, gestures=["right", "tap"]), SWIPED))
-    assert isinstance(answer, Gesture) and answer.gesture == "tap" and answer.confidence == pytest.approx(0.6)
+    (answer,) = answers(run(recognizer(classifier, gestures=["right", "double_tap"]), SWIPED))
+    assert isinstance(answer, Gesture) and answer.gesture == "double_tap" and answer.confidence == pytest.approx(0.6)
 
 
 def test_a_gesture_is_not_repeated_within_its_refractory_time() -> None:
     """The time counts from the end of the last one that was published; the others are free."""
     tap, left = SURE, says(0, 1, 0)
     classifier = Fake([tap, tap, left, left, tap])
-    events = run(recognizer(classifier, refractory={"tap": 2.5}), swipes(5))
+    events = run(recognizer(classifier, refractory={"double_tap": 2.5}), swipes(5))
     found = [(type(e), getattr(e, "reason", None) or e.gesture) for e in answers(events)]
     assert found == [
-        (Gesture, "tap"), (Cancelled, "refractory"), (Gesture, "left"), (Gesture, "left"), (Gesture, "tap"),
+        (Gesture, "double_tap"), (Cancelled, "refractory"), (Gesture, "left"), (Gesture, "left"),
+        (Gesture, "double_tap"),
     ]  # fmt: skip
     ends = [e.offset for e in events if isinstance(e, Release)]
     begins = [e.onset for e in events if isinstance(e, Onset)]
@@ -360,7 +367,7 @@ def test_a_gesture_is_not_repeated_within_its_refractory_time() -> None:
 
 def test_what_is_unknown_has_no_refractory_time() -> None:
     classifier = Fake([says(0.2, 0.1, 0.1), SURE])
-    events = answers(run(recognizer(classifier, refractory={"tap": 60}), swipes(2)))
+    events = answers(run(recognizer(classifier, refractory={"double_tap": 60}), swipes(2)))
     assert [type(event) for event in events] == [Unknown, Gesture]
 
 
@@ -411,13 +418,13 @@ def test_a_classifier_that_is_replaced_while_a_second_tap_is_waited_for_is_asked
     for frame in frames("quiet for 1500ms", TAP, "quiet for 900ms"):
         events += answers(subject.push(frame))
         if first.seen:
-            subject.classifier = Fake([says(0.2, 0.8)], gestures=("pinch", "zigzag"))
+            reload(subject, Fake([says(0.2, 0.8)], gestures=("double_tap", "zigzag")))
     assert [(type(event), event.gesture) for event in events] == [(Gesture, "zigzag")]  # type: ignore[union-attr]
 
 
 def test_another_classifier_may_know_other_gestures() -> None:
     subject = recognizer(Fake())
-    subject.classifier = Fake([says(0.2, 0.8)], gestures=("pinch", "zigzag"))
+    reload(subject, Fake([says(0.2, 0.8)], gestures=("double_tap", "zigzag")))
     (answer,) = answers(run(subject, SWIPED))
     assert isinstance(answer, Gesture) and answer.gesture == "zigzag"
 
@@ -436,7 +443,7 @@ OPEN = {
 @pytest.mark.parametrize("wait", [0.01, 2.0])
 @pytest.mark.parametrize(
     ("what", "expected"),
-    [("nothing", []), ("finger", ["silence"]), ("lifted", ["tap"]), ("tapped", ["tap"]), ("held", [])],
+    [("nothing", []), ("finger", ["silence"]), ("lifted", ["double_tap"]), ("tapped", ["double_tap"]), ("held", [])],
 )
 def test_a_flush_ends_what_is_open(what: str, expected: list[str], wait: float) -> None:
     stream = frames(*OPEN[what])
@@ -483,7 +490,7 @@ def test_a_stream_that_was_flushed_goes_on() -> None:
 
 def decided_after(stream: Sequence[Frame], **settings: object) -> list[tuple[float, float]]:
     """Seconds from offset to decision of each segment, and its length."""
-    front_end = FrontEnd("s", 9, 9, **settings)  # type: ignore[arg-type]
+    front_end = FrontEnd(9, 9, **settings)  # type: ignore[arg-type]
     cuts = [event for frame in stream for event in front_end.push(frame) if isinstance(event, Cut)]
     return [(cut.decided - cut.segment.offset, cut.segment.offset - cut.segment.onset) for cut in cuts]
 
@@ -511,17 +518,17 @@ def test_the_times_are_settings() -> None:
     ((waited, _),) = decided_after(tapped, timing=Timing(tap_gap_s=0.3, release_s=0.2))
     assert 0.3 <= waited < 0.44
     held = frames("quiet for 1500ms", "press 4,4 0.8 for 2s", "quiet for 1s")
-    front_end = FrontEnd("s", 9, 9, timing=Timing(limit_s=1.0))
+    front_end = FrontEnd(9, 9, timing=Timing(limit_s=1.0))
     events = [event for frame in held for event in contacts(front_end, frame)]
-    assert [type(event) for event in events] == [Onset, Cancelled, Release]
+    assert [type(event) for event in events] == [Opened, Void, Ended]
     assert events[1].reason == "held"  # type: ignore[union-attr]
 
 
 # --- silences
 
 
-def kinds(events: Sequence[Contact]) -> list[str]:
-    return [event.reason if isinstance(event, Cancelled) else type(event).__name__ for event in events]
+def kinds(events: Sequence[Found]) -> list[str]:
+    return [event.reason if isinstance(event, Void) else type(event).__name__ for event in events]
 
 
 @pytest.mark.parametrize("silence", [1.5, 3.0, 5.5, 60.0])
@@ -530,10 +537,10 @@ def test_a_silence_means_the_same_however_long_it_was(what: str, answer: str, si
     """A daemon asks after `stale_s`, replay when the next frame comes: both hear the same."""
     stream = frames(*OPEN[what])
     idle = stream[5].values
-    front_end = FrontEnd("s", 9, 9)
+    front_end = FrontEnd(9, 9)
     for frame in stream:
         front_end.push(frame)
-    assert kinds(contacts(front_end, Frame(stream[-1].t + silence, idle))) == [answer, "Release"]
+    assert kinds(contacts(front_end, Frame(stream[-1].t + silence, idle))) == [answer, "Ended"]
 
 
 def fast(rate: float) -> list[Frame]:
@@ -561,8 +568,8 @@ def fast(rate: float) -> list[Frame]:
 
 @pytest.mark.parametrize("rate", [15.0, 30.0, 200.0, 1000.0])
 def test_a_tap_before_a_swipe_is_a_segment_of_its_own(rate: float) -> None:
-    front_end = FrontEnd("s", 9, 9)
+    front_end = FrontEnd(9, 9)
     events = [event for frame in fast(rate) for event in contacts(front_end, frame)]
-    assert kinds(events) == ["Onset", "Cut", "Release"] * 2
+    assert kinds(events) == ["Opened", "Cut", "Ended"] * 2
     tap, swipe = (event.segment for event in events if isinstance(event, Cut))
     assert 1.5 <= tap.onset <= tap.offset < 1.63 and 1.83 <= swipe.onset <= swipe.offset < 2.145

@@ -28,7 +28,7 @@ class View:
 
 def view_of(front_end: FrontEnd, *, raw: bool) -> View | None:
     """A sensor's view now; None before its first frame."""
-    frame, look = front_end.latest
+    frame, look = front_end.frame, front_end.look
     if frame is None:
         return None
     phase, (on, off) = front_end.levels(frame.t)

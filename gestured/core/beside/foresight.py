@@ -1,0 +1,129 @@
+"""What is said of a contact before its answer, and when a model is sure enough of it.
+
+A provisional event is no answer: the gesture, unknown or cancelled of the same id that follows confirms or revokes it.
+Nothing that decides an answer reads what is written here.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple, TypeVar
+
+from gestured.core.certainty import Certainty
+from gestured.core.events import Cancelled, Gesture, Provisional, Unknown
+from gestured.core.frames import Segment
+from gestured.core.front_end import DRAFT_S, FrontEnd
+from gestured.core.scene import DOUBLE_TAP, ONE_TAP
+
+PREVIEW_S = 0.0666  # from one preview to the next: 15 a second, a little less than 1/15 because times are rounded
+EACH_FRAME_S = 0.0635  # a sensor this slow is shown with each frame: at 15 Hz its rate is known to some per cent
+
+Answer = TypeVar("Answer", bound=Gesture | Unknown | Cancelled)
+
+
+class Preview(NamedTuple):
+    """What of a contact that is not over has come so far."""
+
+    segment: Segment
+    t: float  # s, now
+    down: bool  # whether the finger is on the sensor; else it has left, perhaps for good
+    drafted: bool  # whether the segment is the one that the front end has just shown
+    second: bool  # whether the second contact of the segment has begun: the first was a tap
+    hole_s: float  # the longest time from one frame to the next so far
+
+
+class Foresight:
+    """What was said of the contact that goes on: at most one provisional event for each id."""
+
+    def __init__(self, sensor: str, *, taps: bool) -> None:
+        """`taps`: whether one tap is said before a second one may come."""
+        self._sensor, self.taps = sensor, taps
+        self.asked = False  # whether somebody asks for it
+        self._id = 0
+        self._said: Provisional | None = None
+        self._best = ""  # what the last frames were sure enough of
+        self._row = 0  # how many of them in a row
+        self._passed_over = 0  # frames since the last preview of a finger that is down
+        self._left: float | None = None  # s, the last touched frame of the contact whose end was shown
+
+    def begin(self, number: int) -> None:
+        """Another contact begins, of which nothing was shown or said; `number` is its id."""
+        self._id, self._said, self._row, self._passed_over = number, None, 0, 0
+
+    def due(self, front_end: FrontEnd) -> float | None:
+        """When a finger that has left will have been off for `DRAFT_S`, in s; None where that was shown."""
+        offset = front_end.last_touched
+        return offset + DRAFT_S if self.asked and front_end.let_go and self._left != offset else None
+
+    def see(self, front_end: FrontEnd, t: float, shown: Segment | None) -> Preview | None:
+        """What a model may look at, with a frame at `t` s in which the front end has `shown` that.
+
+        While the finger is down, that is at most 15 times a second, and with every frame at 15 Hz.
+        """
+        if front_end.let_go:
+            if t - front_end.last_touched >= DRAFT_S and not front_end.fleeting:
+                self._left = front_end.last_touched
+            return None if shown is None else self._preview(front_end, shown, t, drafted=True)
+        if front_end.fleeting:
+            return None
+        self._passed_over += 1
+        interval_s = front_end.interval_s
+        if self._passed_over * interval_s < PREVIEW_S and interval_s < EACH_FRAME_S:
+            return None
+        self._passed_over = 0
+        segment = front_end.so_far()
+        return None if segment is None else self._preview(front_end, segment, t, drafted=False)
+
+    def wait(self, front_end: FrontEnd, until: float) -> Preview | None:
+        """What a model may look at because no frame has come until `until` s: the finger is off."""
+        due = self.due(front_end)
+        if due is None or due > until:
+            return None
+        self._left = front_end.last_touched
+        segment = None if front_end.fleeting else front_end.so_far()
+        return None if segment is None else self._preview(front_end, segment, due, drafted=False)
+
+    def _preview(self, front_end: FrontEnd, segment: Segment, t: float, *, drafted: bool) -> Preview:
+        hole_s = front_end.hole(segment, t)
+        return Preview(segment, t, not front_end.let_go, drafted, front_end.second, hole_s)
+
+    def wants(self, preview: Preview, certainty: Certainty, gestures: Iterable[str]) -> bool:
+        """Whether anything can be said now, of these gestures, if the model is sure enough; else it need not look."""
+        if self._said is None and any(self._needed(preview, certainty, name) is not None for name in gestures):
+            return True
+        self._row = 0
+        return False
+
+    def say(
+        self, preview: Preview, certainty: Certainty, best: str, confidence: float, least: float
+    ) -> Provisional | None:
+        """What is to be said now that a model has looked. `least`: the confidence that an answer would need."""
+        needed = self._needed(preview, certainty, best)
+        if needed is None or not confidence >= max(needed, least):  # NaN is not enough either
+            self._row = 0
+            return None
+        self._row = self._row + 1 if best == self._best else 1
+        self._best = best
+        if preview.down and self._row < certainty.in_a_row:
+            return None
+        self._said = Provisional(self._sensor, self._id, best, confidence, preview.segment.onset, preview.t)
+        return self._said
+
+    def judged(self, answer: Answer) -> Answer:
+        """The answer of a contact, with what became of what was said of it."""
+        said = self._said
+        if said is None or said.id != answer.id:
+            return answer
+        right = isinstance(answer, Gesture) and answer.gesture == said.gesture
+        return replace(answer, provisional="confirmed" if right else "revoked")
+
+    def _needed(self, preview: Preview, certainty: Certainty, gesture: str) -> float | None:
+        """The confidence that a gesture needs to be said now, None where it is not.
+
+        A finger that has just come down may still become anything, so it is a tap only once it has left. A second
+        contact that is no tap will be none of this one: there, two taps are all that can be said.
+        """
+        if not preview.down:
+            return certainty.tap if gesture == ONE_TAP and self.taps and not preview.second else None
+        if gesture == ONE_TAP or (gesture == DOUBLE_TAP) != preview.second:
+            return None
+        return certainty.needed(gesture, preview.t - preview.segment.onset)

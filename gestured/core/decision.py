@@ -1,0 +1,69 @@
+"""What the scores of a segment mean in a scene: which gesture it is, and whether that is sure enough."""
+
+import math
+from collections.abc import Sequence
+
+from gestured.core.classifier import Scores
+from gestured.core.frames import Segment
+from gestured.core.holes import bearable_s
+from gestured.core.pace import outside
+from gestured.core.prototypes import NEAR, Match
+from gestured.core.scene import Scene
+
+
+class Decision:
+    """Thresholds, gestures in use, and pauses of a scene, for one sensor.
+
+    What falls to gestures that are not in use is not given to those that are left. What is not sure enough, or has a
+    hole in which the finger may have moved unseen, is unknown. A gesture of the user's own may take what the model does
+    not know, and what is much nearer to it than to the model's gestures.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._in_use = frozenset(scene.gestures)
+        self._thresholds, self._refractory = scene.thresholds, scene.refractory
+        self._last_offset: dict[str, float] = {}  # s, of the last time that each gesture was published
+
+    def best(self, gestures: Sequence[str], answer: Scores) -> tuple[dict[str, float], str, float]:
+        """The scores of those of the classifier's `gestures` that are in use, the best of them, and how sure it is."""
+        scores = {
+            gesture: float(value)
+            for gesture, value in zip(gestures, answer.values, strict=True)
+            if gesture in self._in_use
+        }
+        best = max(scores, key=scores.__getitem__)
+        return scores, best, scores[best] * (1.0 - answer.unknown)
+
+    def threshold(self, gesture: str, answer: Scores) -> float:
+        """The confidence from which an answer is that gesture."""
+        return self._thresholds.get(gesture, answer.threshold)
+
+    def is_own(self, match: Match | None, *, known: bool) -> bool:
+        """Whether a gesture of the user's own may have a segment; `known`: the model would have it, too."""
+        if match is None or (known and not match.nearer):
+            return False
+        return match.confidence >= self._thresholds.get(match.name, NEAR)
+
+    def too_early(self, gesture: str, segment: Segment) -> bool:
+        """Whether it is too early to publish that gesture again."""
+        since = segment.onset - self._last_offset.get(gesture, -math.inf)
+        return since < self._refractory.get(gesture, 0.0)
+
+    def published(self, gesture: str, segment: Segment) -> None:
+        """A gesture is published: its pause begins."""
+        self._last_offset[gesture] = segment.offset
+
+
+def whole(hole_s: float, interval_s: float) -> bool:
+    """Whether the longest time without a frame is too short for the finger to have moved unseen.
+
+    `interval_s`: from frame to frame, as they come.
+    """
+    return hole_s <= bearable_s(interval_s)
+
+
+def reason(rate_hz: float, *, whole: bool) -> str:
+    """Why a segment is unknown; a sensor that is too slow or too fast explains it first."""
+    if outside(rate_hz):
+        return "rate"
+    return "confidence" if whole else "hole"

@@ -1,0 +1,373 @@
+"""One sensor: its frames in, events out, and what was decided.
+
+`t` is seconds on the stream's clock, by which everything is decided; `now` is seconds on the hub's clock, by which
+frames arrive. Whoever has no arrivals (`gestured.open`, the lab) uses `push`, `wait`, `flush`, `reset` and `due` alone.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+from gestured.core.beside.foresight import Foresight, Preview
+from gestured.core.beside.habits import Habits
+from gestured.core.beside.view import View, view_of
+from gestured.core.beside.vitals import Vitals, faulty
+from gestured.core.classifier import Classifier, Scores
+from gestured.core.decision import Decision, reason, whole
+from gestured.core.errors import ModelError
+from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
+from gestured.core.facts import Arrived, Changed, Decided, Fact, Fault, Taken
+from gestured.core.frames import Frame, Segment
+from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown
+from gestured.core.owner import Owner, Source
+from gestured.core.reading import Reading
+from gestured.core.scene import Scene
+from gestured.core.stamping import Stamper
+from gestured.core.wire import Arrival
+
+ABSENT_S = 60.0  # of silence: whoever touches a sensor that sends only then has gone, or it has
+HELD_S = 60.0  # of arrivals: a contact that lasts longer by the sensor's own clock is given up
+NOBODY: Source = ("", 0)  # who feeds a sensor that is in no hub
+
+Told = Event | Decided
+
+
+class Sensor:
+    """One sensor of a scene. `classifier` may be replaced between two frames.
+
+    The classifier is asked while the segmenter still waits whether the finger stays off: once it is sure, the answer
+    is there. Where the finger comes back, that answer is thrown away. Where somebody asks for provisional events, it is
+    asked about contacts that are not over as well, and what it is sure of is said; no answer depends on that.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        scene: Scene,
+        classifier: Classifier,
+        source: Source = NOBODY,
+        numbers: tuple[int, int] = (0, 0),
+    ) -> None:
+        """`numbers`: the sequence and the id that it has used before."""
+        self.name, self.classifier = name, classifier
+        self.owner = Owner(source)
+        self.silent = False  # and has been flushed
+        self.sequence, self.segments = numbers
+        self.front_end = _front_end(name, scene)
+        self._scene, self._decision = scene, Decision(scene)
+        self._stamper = Stamper(scene.clock_of(name))
+        self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # no scores where it failed
+        self._foresight = Foresight(name, taps=scene.provisional_taps)
+        self._habits, self._vitals = Habits(*self.front_end.sent), Vitals()
+        self._square = self.front_end.rows == self.front_end.columns  # its idle frames say nothing of its habits
+        self._fresh = True  # no frame was used since it came or restarted
+        self._open: int | None = None  # id of the contact that was not released yet
+        self._answered = True  # whether that contact has its answer
+        self._since = 0.0  # s, on the hub's clock: when the frame arrived that opened it
+        self._lost = 0  # frames
+        self._lost_at: float | None = None  # s
+
+    # --- by the stream's time
+
+    def push(self, frame: Frame) -> list[Told]:
+        """Take one frame, give what it decides; see `FrontEnd.push`."""
+        front_end, foresight = self.front_end, self._foresight
+        told = self._late(frame.t) if foresight.asked else []
+        found = front_end.push(frame)
+        if found:
+            told += self._tell(found)
+        if front_end.pending and foresight.asked:
+            last = found[-1] if found else None
+            preview = foresight.see(front_end, frame.t, last.segment if isinstance(last, Shown) else None)
+            told += self._foresee(preview)
+        if not self._square or ((look := front_end.look) is not None and look.burst):
+            self._habits.see(front_end)
+        return told
+
+    @property
+    def due(self) -> float | None:
+        """When `wait` will have something to say unless a frame comes before, in s; None where nothing waits."""
+        off = self._foresight.due(self.front_end)  # that a finger is off shows before a contact is over
+        if off is None:
+            return self.front_end.due
+        return off if off <= self.front_end.sure else None
+
+    def wait(self, t: float) -> list[Told]:
+        """No frame has come until `t` s: a contact may be over; see `FrontEnd.wait`."""
+        return self._late(t) + self._tell(self.front_end.wait(t))
+
+    def give_up(self, t: float) -> list[Told]:
+        """A contact that goes on has taken too long by another clock than its frames': it is cancelled as held."""
+        return self._tell(self.front_end.give_up(t))
+
+    def flush(self, t: float) -> list[Told]:
+        """The stream paused or ended at `t` s: decide what can be decided, cancel the rest."""
+        return self._late(t) + self._tell(self.front_end.flush(t))
+
+    def reset(self) -> list[Told]:
+        """The sensor restarted: cancel what is open, learn the idle sensor anew."""
+        self._habits.clear()
+        return self._tell(self.front_end.reset())
+
+    def _tell(self, found: Sequence[Found]) -> list[Told]:
+        """What a front end has found, signed and numbered."""
+        told: list[Told] = []
+        for one in found:
+            if isinstance(one, Shown):
+                self._ask(one.segment)
+                continue
+            self._habits.hear(one)
+            if isinstance(one, Opened):
+                self.segments += 1
+                self._foresight.begin(self.segments)
+                told.append(Onset(self.name, self.segments, one.onset))
+            elif isinstance(one, Ended):
+                told.append(Release(self.name, self.segments, one.offset))
+            else:
+                told += self._decide(one) if isinstance(one, Cut) else [self._cancelled(one.reason)]
+        return told
+
+    def _ask(self, segment: Segment) -> Scores | None:
+        """The classifier is asked once for each segment."""
+        classifier, asked = self.classifier, self._asked
+        if asked is None or asked[0] is not classifier or asked[1] is not segment:
+            try:
+                asked = classifier, segment, classifier.classify(segment)
+            except ModelError:
+                asked = classifier, segment, None
+            self._asked = asked
+        return asked[2]
+
+    def _decide(self, cut: Cut) -> list[Told]:
+        """The answer, and what was decided, where a model could."""
+        name, segment, decision = self.name, cut.segment, self._decision
+        answer = self._ask(segment)
+        self._asked = None
+        if answer is None:
+            return [self._cancelled("model")]
+        scores, best, confidence = decision.best(self.classifier.gestures, answer)
+        seen = whole(cut.hole_s, self.front_end.interval_s)
+        known = seen and confidence >= decision.threshold(best, answer)
+        decided = Decided(name, segment, answer, known)
+        own = answer.own if seen and decision.is_own(answer.own, known=known) else None
+        if own is not None:
+            best, confidence = own.name, own.confidence
+        what = (
+            segment.onset, segment.offset, cut.decided, segment.last - segment.first + 1, segment.lost,
+            answer.model, answer.degraded, scores,
+        )  # fmt: skip
+        if not known and own is None:
+            why = reason(self.front_end.rate_hz, whole=seen)
+            return [self._foresight.judged(Unknown(name, self.segments, confidence, *what, reason=why)), decided]
+        if decision.too_early(best, segment):
+            return [self._cancelled("refractory"), decided]
+        decision.published(best, segment)
+        self.sequence += 1
+        gesture = Gesture(name, self.segments, best, confidence, self.sequence, *what, own=own is not None)
+        return [self._foresight.judged(gesture), decided]
+
+    def _cancelled(self, why: str) -> Cancelled:
+        return self._foresight.judged(Cancelled(self.name, self.segments, why))
+
+    def _late(self, t: float) -> list[Told]:
+        """What is said before the answer because no frame has come until `t` s."""
+        return self._foresee(self._foresight.wait(self.front_end, min(t, self.front_end.sure)))
+
+    def _foresee(self, preview: Preview | None) -> list[Told]:
+        """What can be said of a contact that is not over."""
+        classifier, foresight, decision = self.classifier, self._foresight, self._decision
+        if preview is None or (certainty := classifier.certainty) is None:
+            return []
+        seen = whole(preview.hole_s, self.front_end.interval_s)
+        if not seen or not foresight.wants(preview, certainty, self._scene.gestures):
+            return []
+        answer = self._ask(preview.segment) if preview.drafted else classifier.preview(preview.segment)
+        if answer is None:
+            return []
+        _, best, confidence = decision.best(classifier.gestures, answer)
+        least = decision.threshold(best, answer)
+        held = decision.too_early(best, preview.segment) or decision.is_own(answer.own, known=confidence >= least)
+        said = foresight.say(preview, certainty, best, confidence, math.inf if held else least)
+        return [] if said is None else [said]
+
+    # --- by the hub's time: what is found is added to `facts`
+
+    @property
+    def numbers(self) -> tuple[int, int]:
+        """The last sequence and the last id."""
+        return self.sequence, self.segments
+
+    def count(self) -> tuple[int, int]:
+        """The next sequence and id, for an event that is made up; they count as used."""
+        self.sequence += 1
+        self.segments += 1
+        return self.numbers
+
+    def receive(self, arrivals: Sequence[Arrival], now: float, facts: list[Fact], *, missed: bool) -> None:
+        """Take frames that were found waiting at `now`; `missed`: this machine may have had no room for others."""
+        try:
+            stamps = self._stamper.stamp(arrivals, now, missed=missed)
+        except Exception as error:
+            self._recover(error, self._stamper.at(now), facts)
+            return
+        self._vitals.arrived(now, len(arrivals), missed=missed)
+        taken = lost = duplicates = late = implausible = 0
+        for arrival, stamp in zip(arrivals, stamps, strict=True):
+            if stamp.dropped:
+                duplicates += stamp.dropped == "duplicate"
+                late += stamp.dropped == "late"
+                continue
+            lost += stamp.lost
+            implausible += stamp.implausible
+            frame = Frame(stamp.t, arrival.values, arrival.touches, stamp.lost)
+            try:
+                if stamp.restarted:
+                    facts.append(Changed(self.name, "restarted", self.owner.source))
+                    self.restart(now, facts)
+                told = self.push(frame)
+            except Exception as error:
+                self._recover(error, stamp.t, facts)
+                continue
+            taken += 1
+            if self._scene.frames:
+                facts.append(Taken(self.name, now, frame, self._fresh, self.front_end.ready))
+            self._fresh = False
+            if told:
+                self._add(told, now, facts)
+        if self._open is not None and now - self._since > HELD_S:
+            self._run(self.give_up, now, facts)
+        if lost:
+            self._lost, self._lost_at = self._lost + lost, now
+        facts.append(Arrived(self.name, taken, lost, duplicates, late, implausible))
+
+    @property
+    def arrives(self) -> float:
+        """When `elapse` will find something unless a frame comes before; infinite where nothing waits."""
+        due = None if self._open is None else self.due  # nothing waits where there is no contact
+        return math.inf if due is None else self._stamper.when(due)
+
+    def elapse(self, now: float, facts: list[Fact]) -> None:
+        """No frame has come until `now`: a contact may be over."""
+        self._run(self.wait, now, facts)
+
+    def end(self, now: float, facts: list[Fact]) -> None:
+        """The sensor has nothing more to say: what is open is answered or cancelled."""
+        self.silent = True
+        self._vitals.silent()
+        self._run(self.flush, now, facts)
+
+    def restart(self, now: float, facts: list[Fact]) -> None:
+        """Learn the sensor anew; a contact that is open is cancelled."""
+        self._vitals.restart()
+        self._fresh = True
+        self._add(self.reset(), now, facts)
+
+    def change(self, scene: Scene, classifier: Classifier, now: float, facts: list[Fact]) -> None:
+        """Go on in another scene; what was learned stays where it still holds."""
+        before, self._scene = self._scene, scene
+        old, new = self.front_end, _front_end(self.name, scene)
+        another_clock = scene.clock_of(self.name) != before.clock_of(self.name)
+        alike = (old.sent, old.mounting, old.timing) == (new.sent, new.mounting, new.timing)
+        if another_clock or not alike or scene.waits_for_double_tap != before.waits_for_double_tap:
+            self._add(self.reset(), now, facts)
+            self.front_end, self._habits = new, Habits(*new.sent)
+            self._square = new.rows == new.columns
+        if another_clock:
+            self._stamper = Stamper(scene.clock_of(self.name))
+        self.classifier, self._decision, self._asked = classifier, Decision(scene), None
+        self._foresight.taps = scene.provisional_taps
+
+    def foresee(self, *, asked: bool) -> None:
+        """Say of contacts from now on, or no longer, what they will most probably be."""
+        self._foresight.asked = asked
+
+    def review(self) -> None:
+        """Look at what is not looked at with each frame."""
+        self._vitals.review(self.front_end)
+
+    def stale(self, now: float) -> bool:
+        """Whether the sensor is silent."""
+        return now - self.owner.heard > self._scene.stale_s
+
+    def state(self, now: float) -> str:
+        """How the sensor is; see `Reading`."""
+        front_end = self.front_end
+        if self._vitals.intermittent and now - self.owner.heard <= ABSENT_S:
+            return "intermittent"
+        if self.stale(now):
+            return "stale"
+        if not front_end.ready:
+            return "starting"
+        if self._habits.inverted:
+            return "inverted"
+        return "faulty" if faulty(front_end) else "degraded" if front_end.bad_taxels else "ok"
+
+    def reading(self, now: float) -> Reading:
+        """All that is known of the sensor."""
+        front_end = self.front_end
+        return Reading(
+            self.state(now),
+            self._scene.grid_of(self.name),
+            interval_s=front_end.interval_s,
+            jitter_s=self._vitals.jitter_s,
+            bad_taxels=front_end.bad_taxels,
+            noise=front_end.noise,
+            source=self.owner.source,
+            heard=self.owner.heard,
+            lost=self._lost,
+            lost_at=self._lost_at,
+            exchanged=self._habits.exchanged,
+            touched=front_end.touched,
+            contact=self._open,
+            sequence=self.sequence,
+            segments=self.segments,
+            first=self._vitals.first,
+            baseline=front_end.baseline if front_end.ready else None,
+        )
+
+    def view(self, *, raw: bool) -> View | None:
+        """The sensor as it is felt now; None before its first frame."""
+        return view_of(self.front_end, raw=raw)
+
+    def _run(self, act: Callable[[float], list[Told]], now: float, facts: list[Fact]) -> None:
+        t = self._stamper.at(now)
+        try:
+            self._add(act(t), now, facts)
+        except Exception as error:
+            self._recover(error, t, facts)
+
+    def _recover(self, error: Exception, t: float, facts: list[Fact]) -> None:
+        """After a bug: start clean, and end what consumers believe to be open."""
+        facts.append(Fault(self.name, error))
+        try:
+            self.reset()
+        except Exception as second:
+            facts.append(Fault(self.name, second))
+        if self._open is not None:
+            if not self._answered:
+                facts.append(self._foresight.judged(Cancelled(self.name, self._open, "internal_error")))
+            facts.append(Release(self.name, self._open, t))
+            self._open = None
+
+    def _add(self, told: Sequence[Told], now: float, facts: list[Fact]) -> None:
+        """Tell of it, and remember what is open for those who hear it."""
+        for one in told:
+            if isinstance(one, Onset):
+                self._open, self._answered, self._since = one.id, False, now
+            elif isinstance(one, Gesture | Unknown | Cancelled):
+                self._answered = True
+            elif isinstance(one, Release):
+                self._open = None
+        facts += told
+
+
+Recognizer = Sensor  # its public name before version 0.2
+
+
+def _front_end(name: str, scene: Scene) -> FrontEnd:
+    """A sensor's front end, new."""
+    return FrontEnd(
+        *scene.grid_of(name),
+        mounting=scene.setup(name).mounting,
+        wait_for_double_tap=scene.waits_for_double_tap,
+        timing=scene.timing,
+    )
