@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, settings
 from gestured.model.shipped import LADDER
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
-from tests.small_model import build
+from tests.small_model import GESTURES, build
 from tests.sockets import PATIENCE_S, FakeDaemon
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -111,7 +111,10 @@ def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     directory.mkdir()
     for name in LADDER:
         build(directory / f"{name}.onnx", takes="features" if name == "touch_pattern_rf" else "frames")
-    files = {p.name: {"sha256": hashlib.sha256(p.read_bytes()).hexdigest()} for p in directory.iterdir()}
+    files = {
+        path.name: {"sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "gestures": GESTURES}
+        for path in directory.iterdir()
+    }
     (directory / "manifest.json").write_text(json.dumps({"models": files}))
     monkeypatch.setattr("gestured.model.shipped._shipped_directory", lambda: directory)
     empty = tmp_path / "empty"

@@ -58,7 +58,6 @@ def build(
     extra: str = "",
     drop: tuple[str, ...] = (),
     keep_graph: bool = True,
-    twice: str = "",
     **metadata: str,
 ) -> Path:
     """A small real ONNX model with everything that the contract asks for; the arguments break it."""
@@ -106,8 +105,6 @@ def build(
         tensors[2].external_data.add(key="location", value="/etc/hostname")
     if extra == "lying dims":
         tensors[1].dims[0] = 1 << 32
-    if extra == "sparse":
-        tensors.pop()
     inputs = [helper.make_tensor_value_info(takes, dtype, shape)]
     if extra == "two inputs":
         inputs.append(helper.make_tensor_value_info("more", dtype, shape))
@@ -122,12 +119,6 @@ def build(
         ],
         tensors,
     )
-    if extra == "sparse":
-        graph.sparse_initializer.add(
-            values=numpy_helper.from_array(np.array([-2], np.float32), "minus_two"),
-            indices=numpy_helper.from_array(np.array([0], np.int64), "at"),
-            dims=[1],
-        )
     proto = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
     random = np.random.default_rng(1)
     example = 0.05 * random.random((2, len(names)) if features else (2, 5, 9, 9), np.float32)
@@ -148,8 +139,6 @@ def build(
         props["features"] = json.dumps(names)
     props |= metadata
     helper.set_model_props(proto, {k: v for k, v in props.items() if k not in drop})
-    if twice:
-        proto.metadata_props.add(key=twice, value=props[twice])
     if not keep_graph:
         proto.ClearField("graph")
     path.write_bytes(proto.SerializeToString())

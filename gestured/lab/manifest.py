@@ -1,6 +1,5 @@
 """`manifest.json`: what each model file of a folder is, and what was measured of it."""
 
-import hashlib
 import json
 import math
 from collections.abc import Mapping
@@ -9,7 +8,7 @@ from typing import Any
 
 from gestured.core.errors import ModelError
 from gestured.lab.digest import file_digest
-from gestured.model.file import inspect
+from gestured.model.model import Model
 from gestured.record.files import PUBLIC, atomic_write
 
 NAME = "manifest.json"
@@ -27,23 +26,23 @@ def write_manifest(directory: Path, figures: Mapping[str, Any]) -> None:
     """Write `manifest.json` over the directory's .onnx files.
 
     `figures` holds what was measured of each, by file name without suffix. Raises ModelError for a file that
-    has no metadata.
+    is no model.
     """
     models = {}
     for path in sorted(directory.glob("*.onnx")):
         data = path.read_bytes()
         try:
-            said = inspect(data)
-            models[path.name] = {
-                "sha256": hashlib.sha256(data).hexdigest(),
-                "size": len(data),
-                "kind": said["kind"],
-                "version": said["version"],
-                "gestures": json.loads(said["gestures"]),
-                "figures": figures.get(path.stem, {}),
-            }
-        except (ValueError, KeyError) as error:
+            model = Model(data, path.stem)
+        except ValueError as error:
             raise ModelError(f"{path}: {error}") from error
+        models[path.name] = {
+            "sha256": model.sha256,
+            "size": model.size,
+            "kind": model.metadata.kind,
+            "version": model.metadata.version,
+            "gestures": list(model.gestures),
+            "figures": figures.get(path.stem, {}),
+        }
     with atomic_write(directory / NAME, PUBLIC) as file:
         file.write((json.dumps({"models": _plain(models)}, indent=2, allow_nan=False) + "\n").encode())
 

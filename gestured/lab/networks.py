@@ -19,7 +19,6 @@ from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Decision, Judged, Opinion
 from gestured.lab.samples import WINDOW
 from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan, calibration_set, judged, learn
-from gestured.model.file import inspect
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.simulator import GESTURES
@@ -90,7 +89,7 @@ def compare_rules(trained: Trained, calibrated: Calibrated, data: TrainingData, 
     """Print how early and how rightly each rule of `field` decides on the test sets, with the network in `path`."""
     name = path.stem
     module, _, _ = judged(trained, name, calibrated)
-    rule = json.loads(inspect(path.read_bytes())["provisional"])
+    rule = json.loads(open_model(path).properties["provisional"])
     teach = Foretold.of([(trained.nets, data.calibrate)]).contacts(name, module.decision)
     print(f"{'rule':<40}{'earliness':>10}{'accuracy':>10}{'harmonic mean':>15}", flush=True)
     for test, samples in data.tests.items():

@@ -1,8 +1,4 @@
-"""What is in an .onnx file, read without onnxruntime: its metadata, and the self-test that it brings.
-
-A model file may be damaged or hostile. Before its bytes reach onnxruntime, `inspect` walks them once, with a stack of
-its own and a bounded number of steps: it takes the metadata, and refuses data kept in other files and tensors that
-claim to be larger than what is there. Field numbers are those of onnx.proto (ONNX 1.23).
+"""A model's file before onnxruntime sees it: its bytes, its digest, no other file; and the self-test that it brings.
 
 Functions here raise ValueError with the reason; `model.open_model` adds the file's name.
 """
@@ -13,6 +9,7 @@ import hashlib
 import json
 import math
 import os
+import re
 import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,48 +19,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.model.protobuf import BYTES, VARINT, Field, fields, varint
-
-MAX_MODEL_BYTES = 64 << 20  # far more than a net for a grid of taxels needs; a file is held in memory
-MAX_FIELDS = 500_000  # protobuf fields that are looked at; a shipped model has some thousands
-MAX_MESSAGE_DEPTH = 16  # messages inside messages
-MAX_PROPERTIES = 64  # entries of metadata; a shipped model has a dozen
-MAX_TEXT = 2 << 20  # bytes of one entry of metadata; the largest is the self-test, some kilobytes
-MAX_METADATA = 4 << 20  # bytes of all entries of metadata together
+MAX_MODEL_BYTES = (
+    32 << 20
+)  # far more than a net for a grid of taxels needs; while it is opened, memory holds it some five times
 # What stands in a file before the 64 characters of its digest: the head of a protobuf entry of `metadata_props`.
 DIGEST = b"\x72\x4a\x0a\x06digest\x12\x40"
-MAX_SELF_TEST = 400_000  # numbers of a self-test's input; more do not fit into MAX_TEXT
-MOST_VALUES = 1 << 63  # values of a tensor, as far as they are counted: what claims more claims too much anyway
-
-# (message, field number) -> the message inside that is looked at; everything else is skipped. "property" stands for
-# StringStringEntryProto.
-_INSIDE = {
-    ("model", 7): "graph",
-    ("model", 14): "property",
-    ("model", 25): "function",
-    ("graph", 1): "node",
-    ("graph", 5): "tensor",
-    ("function", 7): "node",
-    ("function", 11): "attribute",
-    ("node", 5): "attribute",
-    ("attribute", 5): "tensor",
-    ("attribute", 6): "graph",
-    ("attribute", 10): "tensor",
-    ("attribute", 11): "graph",
-}
-# (message, field number) -> what a model may have, and none of ours does.
-_REFUSED = {
-    ("model", 20): "training information",
-    ("graph", 15): "sparse tensors",
-    ("attribute", 22): "sparse tensors",
-    ("attribute", 23): "sparse tensors",
-}
-# The fields of a tensor that tell how much it holds, and where.
-DIMS, DATA_TYPE, RAW_DATA, EXTERNAL_DATA, DATA_LOCATION = 1, 2, 9, 13, 14
-# TensorProto.DataType -> bytes of a value in raw_data, where that is a whole number.
-_ITEM_BYTES = {
-    1: 4, 2: 1, 3: 1, 4: 2, 5: 2, 6: 4, 7: 8, 9: 1, 10: 2, 11: 8, 12: 4, 13: 8, 14: 8, 15: 16, 16: 2,
-}  # fmt: skip
+MAX_SELF_TEST = 400_000  # numbers of a self-test's input; more do not fit into metadata.MAX_TEXT
+# The name under which a tensor says which file holds its data, after its length as protobuf may write that.
+_LOCATION = re.compile(rb"(?:\x08|\x88\x80*\x00)location")
 
 
 def read_bytes(path: Path) -> bytes:
@@ -107,83 +70,14 @@ def has_digest(data: bytes) -> bool:
     return True
 
 
-def inspect(data: bytes) -> dict[str, str]:
-    """The model's `metadata_props`, after a bounded walk over everything that holds a tensor."""
-    properties: dict[str, str] = {}
-    graphs = 0
-    steps = 0
-    stack = [("model", 0, len(data), 0)]
-    while stack:
-        kind, start, end, depth = stack.pop()
-        if depth > MAX_MESSAGE_DEPTH:
-            raise ValueError(f"nests deeper than {MAX_MESSAGE_DEPTH} messages")
-        found: list[Field] = []
-        for field in fields(data, start, end):
-            steps += 1
-            if steps > MAX_FIELDS:
-                raise ValueError(f"has more than {MAX_FIELDS} fields, too many for a gesture model")
-            number, wire, first, last = field
-            if (kind, number) in _REFUSED:
-                raise ValueError(f"has {_REFUSED[kind, number]}, which gestured does not take")
-            if kind in ("tensor", "property"):
-                found.append(field)
-            elif (inside := _INSIDE.get((kind, number))) is not None:
-                if wire != BYTES:
-                    raise ValueError("is not an ONNX model (or damaged)")
-                graphs += (kind, inside) == ("model", "graph")
-                stack.append((inside, first, last, depth + 1))
-        if kind == "tensor":
-            _check_tensor(data, found, end - start)
-        elif kind == "property":
-            _add_property(data, found, properties)
-    if graphs != 1:
-        raise ValueError("is not an ONNX model: expected one graph in it")
-    return properties
+def check_alone(data: bytes) -> None:
+    """ValueError for a model with data in another file, which onnxruntime would read with this process's rights.
 
-
-def _check_tensor(data: bytes, found: list[Field], size: int) -> None:
-    """A tensor must bring its values itself: as many as its dimensions claim."""
-    count = 1
-    item = 0
-    raw = -1
-    for number, wire, first, last in found:
-        if number == EXTERNAL_DATA or (number == DATA_LOCATION and first != 0):
-            raise ValueError("keeps data in another file, expected everything in this one")
-        if number == DIMS and wire == VARINT:
-            count *= first
-        elif number == DIMS:  # several of them, packed
-            at = first
-            while at < last:
-                value, at = varint(data, at, last)
-                count = min(count * value, MOST_VALUES)
-        elif number == DATA_TYPE:
-            item = _ITEM_BYTES.get(first, 0)
-        elif number == RAW_DATA:
-            raw = last - first
-        count = min(count, MOST_VALUES)
-    # Packed 4-bit values are two to a byte; every other encoding needs at least a byte a value.
-    if (raw >= 0 and item and count * item != raw) or count > 2 * size:
-        raise ValueError(f"has a tensor that claims {count} values but does not hold them")
-
-
-def _add_property(data: bytes, found: list[Field], properties: dict[str, str]) -> None:
-    texts = {1: "", 2: ""}  # field number -> key, value
-    for number, wire, first, last in found:
-        if wire == BYTES and number in texts:
-            if last - first > MAX_TEXT:
-                # What is too long may come before its own name, or be it.
-                raise ValueError(f"has metadata {texts[1][:64]!r} of {last - first} bytes, expected at most {MAX_TEXT}")
-            try:
-                texts[number] = data[first:last].decode()
-            except UnicodeDecodeError:
-                raise ValueError("has metadata that is not UTF-8") from None
-    if texts[1] in properties:
-        raise ValueError(f"has the metadata key {texts[1][:64]!r} twice")
-    properties[texts[1]] = texts[2]
-    if len(properties) > MAX_PROPERTIES:
-        raise ValueError(f"has too many metadata, expected at most {MAX_PROPERTIES}")
-    if sum(len(key) + len(text) for key, text in properties.items()) > MAX_METADATA:
-        raise ValueError(f"has too long metadata, expected at most {MAX_METADATA} bytes in all")
+    Of a graph that it is given as bytes it follows relative names from the current folder on; 1.24 follows links and
+    absolute names, too, and addresses in memory. What names no location it refuses (tests/test_models.py).
+    """
+    if _LOCATION.search(data):
+        raise ValueError("keeps data in another file, expected everything in this one")
 
 
 @dataclass(frozen=True, eq=False)

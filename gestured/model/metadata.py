@@ -17,6 +17,7 @@ from gestured.core.prototypes import Space
 from gestured.core.window import Window
 from gestured.model.file import SelfTest
 
+MAX_TEXT = 2 << 20  # characters of one value; the longest is the self-test, some thousands
 MAX_ITEMS = 50_000  # of the lists and objects in one value; each costs a hundred times as much memory as text
 MAX_NESTING = 16  # lists and objects inside each other in one value
 USUAL_THRESHOLD = 0.5  # of a model whose calibration has none: more probably right than wrong
@@ -118,6 +119,8 @@ def _naming(key: str) -> Iterator[None]:
 
 def _check_extent(key: str, text: str) -> None:
     """Counts what JSON in a value would become, before it is parsed."""
+    if len(text) > MAX_TEXT:
+        raise ValueError(f"metadata {key[:64]!r} has {len(text)} characters, expected at most {MAX_TEXT}")
     items = depth = 0
     for found in re.finditer(r"[][{},]", text):
         items += found[0] in "[{,"

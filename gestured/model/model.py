@@ -1,6 +1,6 @@
 """A model: the bytes of an .onnx file, verified, self-tested and opened as a classifier.
 
-They are inspected without onnxruntime, opened, held against their own metadata and made to reproduce their self-test.
+They are held against their digest, opened, held against their own metadata and made to reproduce their self-test.
 """
 
 import hashlib
@@ -14,7 +14,7 @@ from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.features import touch_pattern
 from gestured.core.frames import Segment
-from gestured.model.file import has_digest, inspect
+from gestured.model.file import check_alone, has_digest
 from gestured.model.metadata import Metadata
 from gestured.model.session import Session
 
@@ -35,13 +35,15 @@ class Model:
         self.size = len(data)
         self.sha256 = hashlib.sha256(data).hexdigest()
         self.sealed = has_digest(data)  # where it is not, nothing but the self-test finds damage
-        self.metadata = Metadata.parse(inspect(data), sealed=self.sealed)
+        check_alone(data)
+        self._session = Session(data)
+        self.properties = self._session.properties()
+        self.metadata = Metadata.parse(self.properties, sealed=self.sealed)
         self.gestures = self.metadata.gestures
         self.rows = self.metadata.rows
         self.columns = self.metadata.columns
         self.threshold = self.metadata.threshold
         self.certainty = self.metadata.provisional
-        self._session = Session(data)
         self._input = self._session.check(self.metadata)
         self.embeds = "embedding" in self._session.outputs
         self.space = self.metadata.own if self.embeds else None

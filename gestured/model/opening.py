@@ -5,16 +5,13 @@ does not: `process`), and opened from those bytes. Whatever is wrong is one `Mod
 was expected.
 """
 
-import hashlib
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
-from gestured.model.file import inspect
-from gestured.model.metadata import Metadata
 from gestured.model.model import Model
 from gestured.model.process import ModelProcess, try_out
-from gestured.model.shipped import naming, read
+from gestured.model.shipped import manifest_gestures, naming, read
 
 # Models of this process by sha256 and name: they have no state, so that any number of ladders may hold one.
 _opened: WeakValueDictionary[tuple[str, str], Model] = WeakValueDictionary()
@@ -26,8 +23,7 @@ def open_model(source: str | Path, tried: str | None = None) -> Model:
     What does not ship is tried in a process of its own first, which takes about half a second, at most some seconds;
     not where its sha256 is that of a file that was `tried` before. One that is open already is shared.
     """
-    path, name, data = read(source)
-    sha256 = hashlib.sha256(data).hexdigest()
+    path, name, data, sha256 = read(source)
     with naming(path):
         if name is None and tried is not None and tried != sha256:
             raise ValueError("is not the file that was tried any more; a reload takes the new one")
@@ -44,26 +40,25 @@ def look_at(source: str | Path) -> tuple[tuple[str, ...], str]:
 
     Raises ModelError.
     """
-    path, name, data = read(source)
-    sha256 = hashlib.sha256(data).hexdigest()
+    path, name, data, sha256 = read(source)
     with naming(path):
         if (model := _opened.get((sha256, path.stem))) is not None:
             return model.gestures, sha256
         if name is None:
             return tuple(try_out(data)["gestures"]), sha256
-        return Metadata.parse(inspect(data)).gestures, sha256
+        return manifest_gestures(path), sha256
 
 
 def open_apart(source: str | Path) -> ModelProcess:
     """Open and verify a model in a process of its own, and leave it there. Raises ModelError."""
-    path, _, data = read(source)
+    path, _, data, _ = read(source)
     with naming(path):
         return ModelProcess(data, path.stem)
 
 
 def check(source: str | Path) -> dict[str, Any]:
     """What `gesturectl check` reports of a good model, as JSON values; raises ModelError for any other."""
-    path, name, data = read(source)
+    path, name, data, _ = read(source)
     with naming(path):
         report = try_out(data) if name is None else Model(data, path.stem).report()
     first = {key: report[key] for key in ("kind", "version")}

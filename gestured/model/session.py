@@ -29,6 +29,7 @@ class Session:
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idling burns cores otherwise
+        options.add_session_config_entry("session.load_model_format", "ONNX")  # and not a format of its own
         options.enable_mem_reuse = False  # planning it is slow, and makes no run faster or smaller
         options.log_severity_level = FATAL
         try:
@@ -38,6 +39,14 @@ class Session:
         except Exception as error:  # onnxruntime has a dozen error types of its own, and MemoryError
             raise ValueError(f"onnxruntime cannot open it: {_brief(error)}") from error
         self.outputs: list[str] = [output.name for output in self._session.get_outputs()]
+
+    def properties(self) -> dict[str, str]:
+        """The file's `metadata_props`; ValueError where they are no text."""
+        try:
+            found: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
+        except UnicodeDecodeError:
+            raise ValueError("has metadata that is not UTF-8") from None
+        return found
 
     def check(self, metadata: Metadata) -> str:
         """The input's name, once names, types and shapes agree with the metadata; ValueError where they do not."""

@@ -9,6 +9,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from gestured.core.errors import ModelError
 from gestured.model.file import read_bytes
@@ -58,16 +59,18 @@ def _locate(source: str | Path) -> tuple[Path, str | None]:
     return path, None
 
 
-def read(source: str | Path) -> tuple[Path, str | None, bytes]:
-    """(path, the shipped model's name where it is one, its bytes). A shipped file is held against its manifest."""
+def read(source: str | Path) -> tuple[Path, str | None, bytes, str]:
+    """(path, the shipped model's name where it is one, its bytes, their sha256).
+
+    A shipped file is held against its manifest.
+    """
     path, name = _locate(source)
     with naming(path):
         data = read_bytes(path)
-        if name is not None:
-            expected = _manifest_sha256(path)
-            if hashlib.sha256(data).hexdigest() != expected:
-                raise ValueError(f"is not the shipped file: expected the sha256 {expected} of manifest.json")
-    return path, name, data
+        sha256 = hashlib.sha256(data).hexdigest()
+        if name is not None and sha256 != (expected := _manifest(path, "sha256")):
+            raise ValueError(f"is not the shipped file: expected the sha256 {expected} of manifest.json")
+    return path, name, data, sha256
 
 
 @contextmanager
@@ -79,9 +82,13 @@ def naming(path: Path) -> Iterator[None]:
         raise ModelError(f"{path}: {error}") from error
 
 
-def _manifest_sha256(path: Path) -> str:
+def manifest_gestures(path: Path) -> tuple[str, ...]:
+    """What a shipped model knows, without opening it; ValueError where its manifest does not say."""
+    return tuple(_manifest(path, "gestures"))
+
+
+def _manifest(path: Path, key: str) -> Any:
     try:
-        manifest = json.loads((path.parent / "manifest.json").read_text())
-        return str(manifest["models"][path.name]["sha256"])
+        return json.loads((path.parent / "manifest.json").read_text())["models"][path.name][key]
     except (OSError, ValueError, KeyError, TypeError):
-        raise ValueError("is a shipped model, expected its sha256 in the manifest.json beside it") from None
+        raise ValueError(f"is a shipped model, expected its {key} in the manifest.json beside it") from None

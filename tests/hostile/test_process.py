@@ -292,7 +292,7 @@ def test_a_model_file_that_nests_without_end_is_refused(tmp_path: Path) -> None:
         nested = bytes([field, size & 0x7F | 0x80, size >> 7 & 0x7F | 0x80, size >> 14]) + nested
     path = tmp_path / "deep.onnx"
     path.write_bytes(nested)
-    with pytest.raises(ModelError, match=r"deep\.onnx: nests deeper than"):
+    with pytest.raises(ModelError, match=r"deep\.onnx: onnxruntime cannot open it"):
         open_model(path)
 
 

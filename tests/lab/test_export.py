@@ -24,7 +24,6 @@ from gestured.lab.export import Facts, export_forest, export_net
 from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.manifest import measured, write_manifest
 from gestured.lab.recordings.origin import Origin, said
-from gestured.model.file import inspect
 from gestured.model.opening import open_model
 
 GESTURES = ("one_tap", "swipe_up", "swipe_left")
@@ -171,7 +170,7 @@ def test_a_file_holds_the_embedding_and_older_ones_have_none(net: tuple[Net, Pat
     for one, other in zip(model.run(frames), old.run(frames), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-5)
     assert (model.embeds, old.embeds) == (True, False)
-    said = inspect((tmp_path / "new.onnx").read_bytes())
+    said = model.properties
     assert {key: json.loads(said[key]) for key in more} == more
     with pytest.raises(ValueError, match="cannot run"):
         old.embed(frames)

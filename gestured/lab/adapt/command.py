@@ -89,7 +89,7 @@ def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, recordings:
     """What the new file says of itself."""
     new, gestures = found.new, own.samples.take(own.samples.labels != NONE)
     cut = new.answers.confidence >= 0
-    before = json.loads(base.properties.get(KEY, "[]"))
+    before = json.loads(base.model.properties.get(KEY, "[]"))
     learned = base.model.metadata.training_data + own.samples.digest() + simulated.digest()
     return Facts(
         kind=base.kind,

@@ -22,7 +22,7 @@ from gestured.lab.export import PARITY
 from gestured.lab.fit import CLASSES, RECURRENT, build
 from gestured.lab.nets import Decision, Judged, Opinion
 from gestured.lab.samples import WINDOW
-from gestured.model.file import inspect, read_bytes
+from gestured.model.file import read_bytes
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
@@ -33,11 +33,10 @@ GATES = [0, 2, 3, 1]  # torch's order i f g o, in ONNX's i o f c
 
 @dataclass(frozen=True)
 class Base:
-    """A model that can be adapted: its file's answers, its networks, and what the file says of itself."""
+    """A model that can be adapted: its file's answers, and its networks."""
 
     model: Model
     judged: Judged
-    properties: Mapping[str, str]
 
     @property
     def kind(self) -> str:
@@ -54,16 +53,16 @@ def base_of(source: str) -> Base:
         raise ModelError(f"{path}: is not adaptable: its kind is {metadata.kind}, expected {' or '.join(RECURRENT)}")
     if metadata.gestures != tuple(GESTURES) or metadata.window != WINDOW:
         raise ModelError(f"{path}: is not adaptable: expected the gestures and the window that this version trains")
-    data = read_bytes(path)
-    properties = inspect(data)
-    if json.loads(properties.get("classes", "null")) not in (None, CLASSES):
+    if json.loads(model.properties.get("classes", "null")) not in (None, CLASSES):
         raise ModelError(f"{path}: is not adaptable: expected the classes that this version trains")
     try:
-        judged = read(onnx.load_model_from_string(data), metadata.kind, metadata.calibration.get("temperature"))
+        judged = read(
+            onnx.load_model_from_string(read_bytes(path)), metadata.kind, metadata.calibration.get("temperature")
+        )
         _compare(judged, model)
     except ValueError as error:
         raise ModelError(f"{path}: is not adaptable: {error}") from error
-    return Base(model, judged, properties)
+    return Base(model, judged)
 
 
 def untrained(kind: str) -> Judged:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gestured.lab.digest import file_digest
-from gestured.model.file import inspect, read_bytes
+from gestured.model.file import read_bytes
 from gestured.record.arrays import read
 
 KEY = "learned_from"  # in an .onnx file's metadata: a JSON list of Origin
@@ -40,7 +40,14 @@ def _origin(path: Path) -> Origin:
 
 def said(model: Path) -> list[Origin] | None:
     """The recordings that a model says it learned from; None where it does not say. ValueError for no model."""
-    text = inspect(read_bytes(model)).get(KEY)
+    import onnx
+    from google.protobuf.message import DecodeError
+
+    try:
+        proto = onnx.load_model_from_string(read_bytes(model))
+    except DecodeError as error:
+        raise ValueError(f"is not an ONNX model: {error}") from error
+    text = {entry.key: entry.value for entry in proto.metadata_props}.get(KEY)
     if text is None:
         return None
     try:

@@ -14,7 +14,6 @@ from gestured.lab.cli import main
 from gestured.lab.own import command as own
 from gestured.lab.own.learn import Seen
 from gestured.lab.recordings.origin import said
-from gestured.model.file import inspect
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.record.arrays import write
@@ -83,7 +82,7 @@ def test_a_model_that_is_written_says_whom_it_learned_from(
 def test_an_adapted_model_still_learns_gestures_of_its_users_own(run: Run, tmp_path: Path) -> None:
     write(tmp_path / "mine.npz", cut_gestures(("07", "08"), GESTURES))
     run("mine.npz", "--out", "my.onnx", "--steps", "1", "--force")
-    said_of = inspect((tmp_path / "my.onnx").read_bytes())
+    said_of = open_model(tmp_path / "my.onnx").properties
     assert json.loads(said_of["classes"])[: len(GESTURES)] == list(GESTURES)
     assert json.loads(said_of["provisional"])["elapsed_s"][0] == 0
     model = open_model(tmp_path / "my.onnx")
