@@ -14,10 +14,10 @@ from benchmarks.timing import Row, cpu_us, interleaved, ratio
 from benchmarks.traffic import touched
 from gestured.client.sensor import Form
 from gestured.core import messages, osc
+from gestured.core.address import Grid
 from gestured.core.events import Gesture
 from gestured.core.frames import Frame
 from gestured.core.front_end import Cut, FrontEnd
-from gestured.core.mounting import Grid
 from gestured.core.osc import Layouts
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor

@@ -16,8 +16,8 @@ from gestured.client.engine import Engine
 from gestured.client.osc_out import dated
 from gestured.client.sensor import Form
 from gestured.client.stream import Stream
+from gestured.core.address import Grid
 from gestured.core.frames import Frame, Touch
-from gestured.core.mounting import Grid
 from gestured.core.wire import Addresses, Decoder
 from gestured.lab.made_of import made_of
 from gestured.model.shipped import shipped

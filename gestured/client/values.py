@@ -3,8 +3,7 @@
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
 
-from gestured.core.address import Address
-from gestured.core.mounting import Grid
+from gestured.core.address import Address, Grid
 from gestured.core.wire import is_sensor
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import gestured
 from gestured.control.status import RATES, span
 from gestured.core.errors import ModelError
-from gestured.core.pace import outside as rate_is_outside
+from gestured.core.timing import outside as rate_is_outside
 from gestured.model.opening import check
 
 BUFFER_BYTES = 4 << 20  # the receive buffer that the daemon asks of the kernel

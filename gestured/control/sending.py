@@ -16,9 +16,9 @@ from gestured.client.sensor import sent_after_refusal
 from gestured.client.stream import Stream
 from gestured.control.diff import ONSET_S, Line
 from gestured.core.address import Address
+from gestured.core.beside.reading import SILENT
 from gestured.core.errors import GesturedError
 from gestured.core.messages import EVENT_TYPES
-from gestured.core.reading import SILENT
 from gestured.core.stamping import Stamper
 from gestured.record.replay import Replay
 from gestured.record.tape import Packet, Tape

@@ -16,9 +16,9 @@ from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json, tell
 from gestured.control.address import add_sockets, connect
 from gestured.control.shadow import words as shadow_words
+from gestured.core.beside.reading import SILENT
 from gestured.core.errors import GesturedError
-from gestured.core.pace import RANGE_HZ, outside
-from gestured.core.reading import SILENT
+from gestured.core.timing import RANGE_HZ, outside
 
 CLEAR = "\x1b[2J\x1b[H"
 REFRESH_S = 1.0

@@ -1,6 +1,8 @@
-"""HOST:PORT: how an address is written and read."""
+"""How addresses and grids are written and read: HOST:PORT, ROWSxCOLUMNS."""
 
 from typing import NamedTuple
+
+from gestured.core.mounting import SIDES
 
 
 class Address(NamedTuple):
@@ -26,3 +28,22 @@ class Address(NamedTuple):
 
 def _is_port(text: str) -> bool:
     return text.isascii() and text.isdecimal() and len(text) <= 5 and int(text) < 65536
+
+
+class Grid(NamedTuple):
+    """Rows and columns of a sensor's frames as they are sent, before rotation."""
+
+    rows: int
+    columns: int
+
+    def __str__(self) -> str:
+        return f"{self.rows}x{self.columns}"
+
+    @classmethod
+    def parse(cls, text: str) -> "Grid":
+        """ROWSxCOLUMNS. ValueError, which says what was expected, for anything else."""
+        rows, _, columns = text.partition("x")
+        sides = [int(side) if side.isascii() and side.isdecimal() and len(side) <= 3 else 0 for side in (rows, columns)]
+        if not all(SIDES[0] <= side <= SIDES[1] for side in sides):
+            raise ValueError(f"ROWSxCOLUMNS, each from {SIDES[0]} to {SIDES[1]}, such as 9x9 or 27x15")
+        return cls(*sides)

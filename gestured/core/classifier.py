@@ -8,7 +8,17 @@ from numpy.typing import NDArray
 
 from gestured.core.certainty import Certainty
 from gestured.core.frames import Segment
-from gestured.core.prototypes import Match
+
+NEAR = 0.5  # confidence from which a segment is a gesture of the user's own, where nothing else is set
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """The gesture of the user's own that a segment is nearest to."""
+
+    name: str
+    confidence: float
+    nearer: bool  # than any of the model's gestures, by so much that it may take a segment from them
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,12 +3,11 @@
 import math
 from collections.abc import Sequence
 
-from gestured.core.classifier import Scores
+from gestured.core.classifier import NEAR, Match, Scores
+from gestured.core.cutter import bearable_s
 from gestured.core.frames import Segment
-from gestured.core.holes import bearable_s
-from gestured.core.pace import outside
-from gestured.core.prototypes import NEAR, Match
 from gestured.core.scene import Scene
+from gestured.core.timing import outside
 
 
 class Decision:

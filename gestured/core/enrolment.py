@@ -6,9 +6,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from gestured.core.cutter import bearable_s
 from gestured.core.events import Cancelled
 from gestured.core.frames import Segment
-from gestured.core.holes import bearable_s
 from gestured.core.own import Example
 
 SHORTEST_S = 0.15  # of an example: what is shorter is a tap, whatever was meant

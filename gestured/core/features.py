@@ -1,15 +1,20 @@
-"""Touch-pattern features of a window: what was pressed and for how long, without the order of the frames.
+"""Numbers that describe a window: touch-pattern features, which the forest takes, and what a gesture looked like.
 
-Source: the paper's touch-pattern set (mean and maximum pressure, variability, row-wise and column-wise means, maximum
-and mean contact area, duration). Variability is taken of the frames, of the taxels, and of each row and column; the
-contact area also of the whole gesture. Pressures are shares of the segment's own peak, so that they do not depend on
-the sensor's gain.
+Source of the features: the paper's touch-pattern set (mean and maximum pressure, variability, row-wise and column-wise
+means, maximum and mean contact area, duration). Variability is taken of the frames, of the taxels, and of each row and
+column; the contact area also of the whole gesture. Pressures are shares of the segment's own peak, so that they do not
+depend on the sensor's gain. Measures of the training data stand in a model's metadata (`quantiles`), those of a
+deployment are held against them.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 PRESSED = 0.2  # of the peak: a taxel in contact
+
+MEASURES = ("duration_s", "area", "speed", "noise")
+ACTIVE = 0.15  # of the peak: a frame in contact
+COVERED = 0.2  # of the peak: a taxel in contact
 
 
 def feature_names(rows: int, columns: int) -> tuple[str, ...]:
@@ -43,3 +48,28 @@ def touch_pattern(window: NDArray[np.float32], rate_hz: float) -> NDArray[np.flo
         [area.max(), area.mean(), whole, len(touched) / rate_hz],
     ]
     return np.concatenate(values).astype(np.float32)
+
+
+def measures(window: NDArray[np.float32], rate_hz: float) -> dict[str, float]:
+    """(T, R, C) window -> `MEASURES`, all 0 for one without contact.
+
+    duration_s: of the frames in contact. area: mean share of the grid in contact. speed: way of the centroid, in
+    sides of the grid a second. noise: share of the pressure outside of the contact, which is the sensor's noise, hum
+    and crosstalk, and the contact's skirts.
+    """
+    active = window[window.max(axis=(1, 2)) >= ACTIVE].astype(np.float64)
+    if not len(active):
+        return dict.fromkeys(MEASURES, 0.0)
+    contact = np.where(active >= COVERED, active, 0.0)
+    total = contact.sum(axis=(1, 2))
+    inside = contact[total > 0] / total[total > 0, None, None]
+    rows, columns = window.shape[1:]
+    down = inside.sum(axis=2) @ (np.arange(rows) / rows)
+    across = inside.sum(axis=1) @ (np.arange(columns) / columns)
+    duration = len(active) / rate_hz
+    return {
+        "duration_s": duration,
+        "area": float((active >= COVERED).mean()),
+        "speed": float(np.hypot(np.diff(down), np.diff(across)).sum()) / duration,
+        "noise": 1.0 - float(total.sum()) / float(active.sum()),
+    }

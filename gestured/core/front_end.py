@@ -13,9 +13,8 @@ from gestured.core.conditioning import Conditioner, Look
 from gestured.core.cutter import Cutter
 from gestured.core.frames import Frame, Segment
 from gestured.core.mounting import Mounting
-from gestured.core.pace import Pace
 from gestured.core.segmenter import Action, Deed, Segmenter
-from gestured.core.timing import Timing
+from gestured.core.timing import Pace, Timing
 
 DRAFT_S = 0.085  # quiet for so long, all that a window takes in is there; the wait goes on to see the finger stay off
 

@@ -11,11 +11,11 @@ a bug does not end the program: a daemon in a vehicle that dies of one sensor's 
 import math
 from collections.abc import Collection, Sequence
 
+from gestured.core.beside.reading import Reading
 from gestured.core.beside.view import View
 from gestured.core.classifier import Classifier
 from gestured.core.facts import Changed, Dropped, Fact, Fault
 from gestured.core.owner import Source
-from gestured.core.reading import Reading
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.core.wire import Arrival, Decoder

@@ -1,11 +1,21 @@
-"""What a client of the event socket is told: events and the other lines, as JSON."""
+"""The lines of the event socket, as JSON: what a client is told, and what it asks to hear.
+
+A request that is none is a ProtocolError with the reason `subscription`.
+"""
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, fields
 from typing import Any, get_args
 
-from gestured.core.events import Event
+from gestured.core.errors import ProtocolError
+from gestured.core.events import Event, Gesture, Provisional, Status
+from gestured.core.wire import is_sensor
+
+MAX_LINE = 4096  # bytes of a client's request
+LONGEST = 60  # characters of what a peer sent, in an answer to it
+EVENT_TYPES = tuple(cls.__name__.lower() for cls in get_args(Event))
+_STREAM_TIMES = frozenset(("onset", "offset", "decided"))
 
 
 def json_object(text: str | bytes) -> dict[str, Any] | None:
@@ -20,11 +30,6 @@ def json_object(text: str | bytes) -> dict[str, Any] | None:
 def event_type(event: Event) -> str:
     """What an event is called on the wire: "gesture", "onset" ..."""
     return type(event).__name__.lower()
-
-
-LONGEST = 60  # characters of what a peer sent, in an answer to it
-EVENT_TYPES = tuple(cls.__name__.lower() for cls in get_args(Event))
-_STREAM_TIMES = frozenset(("onset", "offset", "decided"))
 
 
 def to_json(event: Event, epoch: float, *, test: bool = False) -> bytes:
@@ -89,3 +94,63 @@ def _plain_value(value: Any) -> Any:
 
 
 _ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False, default=_plain_value)
+
+
+@dataclass(frozen=True, slots=True)
+class Subscription:
+    """What a client wants to hear; None is no filter."""
+
+    types: frozenset[str] = frozenset(("gesture",))
+    sensors: frozenset[str] | None = None
+    gestures: frozenset[str] | None = None
+
+    @property
+    def foresees(self) -> bool:
+        """Whether it asks for provisional events."""
+        return "provisional" in self.types
+
+    def matches(self, event: Event) -> bool:
+        """`sensors` filters what is one sensor's, `gestures` what has a gesture's name; the rest passes."""
+        if event_type(event) not in self.types:
+            return False
+        if self.sensors is not None and not isinstance(event, Status) and event.sensor not in self.sensors:
+            return False
+        return self.gestures is None or not isinstance(event, Gesture | Provisional) or event.gesture in self.gestures
+
+
+def parse_subscription(line: bytes, gestures: Collection[str]) -> Subscription:
+    """A client's request, `{"subscribe": {...}}`; raises ProtocolError whose text says what was expected.
+
+    `gestures` are those that there are. A sensor may be named before it comes.
+    """
+    if len(line) > MAX_LINE:
+        raise _refused(f"a request has at most {MAX_LINE} bytes, found {len(line)}")
+    try:
+        request = json.loads(line.decode())
+    except UnicodeDecodeError:
+        raise _refused("a request is UTF-8") from None
+    except (ValueError, RecursionError):
+        raise _refused('expected one JSON object a line, as {"subscribe":{"types":["gesture"]}}') from None
+    wanted = request.get("subscribe") if isinstance(request, dict) and len(request) == 1 else None
+    if not isinstance(wanted, dict):
+        raise _refused('expected one key "subscribe" with an object, as {"subscribe":{"types":["gesture"]}}')
+    return Subscription(**{key: _names(key, value, gestures) for key, value in wanted.items()})
+
+
+def _names(key: str, value: object, gestures: Collection[str]) -> frozenset[str]:
+    """One filter of a request. Raises ProtocolError."""
+    if key not in ("types", "sensors", "gestures"):
+        raise _refused(f"subscribe: unknown key {quoted(key)}, expected types, sensors or gestures")
+    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+        raise _refused(f"subscribe.{key}: expected a list of strings")
+    for item in value:
+        if key == "sensors":
+            if not is_sensor(item):
+                raise _refused(f"subscribe.sensors: {quoted(item)} cannot be a sensor's name")
+        elif item not in (known := EVENT_TYPES if key == "types" else gestures):
+            raise _refused(f"subscribe.{key}: unknown {quoted(item)}, expected any of {', '.join(known)}")
+    return frozenset(value)
+
+
+def _refused(text: str) -> ProtocolError:
+    return ProtocolError("subscription", text)

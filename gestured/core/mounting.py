@@ -1,31 +1,11 @@
-"""How a sensor is built and mounted: its grid, and what makes `swipe_up` up for the person in front of it."""
+"""How a sensor is mounted, so that `swipe_up` is up for the person in front of it."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 SIDES = (2, 64)  # taxels of a grid's side, least and most
-
-
-class Grid(NamedTuple):
-    """Rows and columns of a sensor's frames as they are sent, before rotation."""
-
-    rows: int
-    columns: int
-
-    def __str__(self) -> str:
-        return f"{self.rows}x{self.columns}"
-
-    @classmethod
-    def parse(cls, text: str) -> "Grid":
-        """ROWSxCOLUMNS. ValueError, which says what was expected, for anything else."""
-        rows, _, columns = text.partition("x")
-        sides = [int(side) if side.isascii() and side.isdecimal() and len(side) <= 3 else 0 for side in (rows, columns)]
-        if not all(SIDES[0] <= side <= SIDES[1] for side in sides):
-            raise ValueError(f"ROWSxCOLUMNS, each from {SIDES[0]} to {SIDES[1]}, such as 9x9 or 27x15")
-        return cls(*sides)
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.classifier import NEAR, Match
+
 EXAMPLES = 5  # of one gesture, at most
-NEAR = 0.5  # confidence from which a segment is a gesture of the user's own, where nothing else is set
 DIMENSIONS = 512  # of a space or an embedding, at most
 SUREST = 40.0  # log odds that a confidence tells: beyond them it is 0 or 1 in any case, and `exp` would overflow
 
@@ -110,15 +111,6 @@ class Prototype:
         """0 to 1 of a place (K,); NEAR at the threshold."""
         ahead = self.space.slope * (self.nearness(place) - self.threshold)
         return float(1.0 / (1.0 + np.exp(-np.clip(ahead, -SUREST, SUREST))))
-
-
-@dataclass(frozen=True, slots=True)
-class Match:
-    """The gesture of the user's own that a segment is nearest to."""
-
-    name: str
-    confidence: float
-    nearer: bool  # than any of the model's gestures, by so much that it may take a segment from them
 
 
 def nearest(space: Space, prototypes: Mapping[str, Prototype], place: Array) -> Match | None:

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 
 from gestured.core.beside.foresight import Foresight, Preview
 from gestured.core.beside.habits import Habits
+from gestured.core.beside.reading import Reading, Vitals, faulty
 from gestured.core.beside.view import View, view_of
-from gestured.core.beside.vitals import Vitals, faulty
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.decision import Decision, reason, whole
 from gestured.core.errors import ModelError
@@ -19,7 +19,6 @@ from gestured.core.facts import Arrived, Changed, Decided, Fact, Fault, Taken
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown
 from gestured.core.owner import Owner, Source
-from gestured.core.reading import Reading
 from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
 from gestured.core.wire import Arrival

@@ -1,7 +1,7 @@
 """Who wants to hear what: the clients of the event stream, in classes of those that ask for the same."""
 
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
-from gestured.core.subscription import Subscription
+from gestured.core.messages import Subscription
 from gestured.daemon.client import Client
 
 

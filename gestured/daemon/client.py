@@ -14,7 +14,7 @@ from typing import Protocol
 
 from gestured.core import messages
 from gestured.core.errors import ProtocolError
-from gestured.core.subscription import MAX_LINE, Subscription, parse_subscription
+from gestured.core.messages import MAX_LINE, Subscription, parse_subscription
 from gestured.daemon.metrics import Metrics
 
 BACKLOG_BYTES = 256 << 10  # bytes that wait for one client at most; who is further behind wants the newest

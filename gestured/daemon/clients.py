@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection
 
 from gestured.core import messages
 from gestured.core.events import Event
-from gestured.core.subscription import Subscription
+from gestured.core.messages import Subscription
 from gestured.daemon.audience import Audience
 from gestured.daemon.client import Client
 from gestured.daemon.log import Throttle, log

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from gestured import __version__
-from gestured.core.reading import STATES, Reading
+from gestured.core.beside.reading import STATES, Reading
 from gestured.daemon.metrics import Counter, Histogram, Metrics
 from gestured.daemon.snapshot import Snapshot
 

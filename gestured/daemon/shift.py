@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from gestured.core.classifier import Scores
+from gestured.core.features import MEASURES, measures
 from gestured.core.frames import Segment
-from gestured.core.measures import MEASURES, measures
 from gestured.core.window import Window
 
 LAST = 100  # gestures

@@ -4,8 +4,8 @@ import socket
 from typing import Protocol
 
 from gestured.core.address import Address
+from gestured.core.beside.reading import SILENT
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Status, Unknown
-from gestured.core.reading import SILENT
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.settings import Settings

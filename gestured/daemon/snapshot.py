@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gestured.core.reading import SILENT, Reading
+from gestured.core.beside.reading import SILENT, Reading
 from gestured.daemon.settings import Settings
 from gestured.daemon.shift import Shift
 from gestured.model.ladder import Ladder

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured import __version__
-from gestured.core.address import Address
+from gestured.core.address import Address, Grid
+from gestured.core.beside.reading import Reading
 from gestured.core.beside.view import View
-from gestured.core.mounting import Grid
 from gestured.core.own import Examples, to_dict
-from gestured.core.reading import Reading
 from gestured.daemon.metrics import Counter, Metrics
 from gestured.daemon.snapshot import Snapshot
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator
 
-from gestured.core.address import Address
-from gestured.core.mounting import Grid
+from gestured.core.address import Address, Grid
 
 SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.measures import ACTIVE
+from gestured.core.features import ACTIVE
 from gestured.lab.decide import Answers, confidence
 from gestured.lab.prefixes import floors
 from gestured.lab.samples import Samples, packed

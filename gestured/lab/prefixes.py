@@ -8,7 +8,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from gestured.core.measures import ACTIVE
+from gestured.core.features import ACTIVE
 from gestured.lab.samples import OF_EACH, WINDOW, Samples, packed
 
 

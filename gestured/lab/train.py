@@ -20,8 +20,7 @@ from sklearn.ensemble import RandomForestClassifier
 from torch import Tensor, nn
 
 import gestured
-from gestured.core.features import feature_names
-from gestured.core.measures import MEASURES, measures
+from gestured.core.features import MEASURES, feature_names, measures
 from gestured.lab.adapt.material import own_recordings
 from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import OTHER_TRIALS, TRIALS, recorded, simulated

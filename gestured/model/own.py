@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.classifier import NEAR, Match
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
 from gestured.core.own import Example, Examples
-from gestured.core.prototypes import NEAR, Array, Match, Prototype, Space, clashes, nearest
+from gestured.core.prototypes import Array, Prototype, Space, clashes, nearest
 from gestured.model.model import RUN_S, Model
 
 

@@ -13,13 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gestured.core.certainty import Certainty
-from gestured.core.classifier import Scores
+from gestured.core.classifier import Match, Scores
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, Unknown
 from gestured.core.facts import Fault, events_of
 from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
-from gestured.core.prototypes import Match
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.model.ladder import RETRY_S, SLOW_RUNS, Ladder

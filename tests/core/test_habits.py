@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gestured.core.beside.vitals import Vitals
+from gestured.core.beside.reading import Vitals
 from gestured.core.frames import Frame
 from gestured.core.mounting import Mounting
 from gestured.core.scene import Scene, Setup

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from gestured.core.contact import Place
-from gestured.core.holes import Sight, clear
+from gestured.core.cutter import Sight, clear
 
 STEP_S = 1 / 15
 TRAVEL = 1.35  # taxel pitches, of a sensor of 9 x 9

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from gestured.core.errors import ProtocolError
 from gestured.core.events import Gesture, Onset, Release, Status
-from gestured.core.messages import error_json
-from gestured.core.subscription import Subscription, parse_subscription
+from gestured.core.messages import Subscription, error_json, parse_subscription
 
 GESTURE = Gesture("armrest", 41, "swipe_up", 0.98, 17, 10.0, 10.5, 10.6, 12, 0, "cnn_lstm", False, {"swipe_up": 1.0})
 

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from gestured.core.beside.reading import Reading
 from gestured.core.events import Event
 from gestured.core.hub import Hub
-from gestured.core.reading import Reading
 from gestured.daemon.asked import scene_of
 from gestured.daemon.cli import parser
 from gestured.daemon.desk import Desk

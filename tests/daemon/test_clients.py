@@ -12,7 +12,7 @@ import pytest
 from gestured.core import messages
 from gestured.core.errors import ProtocolError
 from gestured.core.events import Onset
-from gestured.core.subscription import Subscription
+from gestured.core.messages import Subscription
 from gestured.daemon import client as one_client
 from gestured.daemon import clients
 from gestured.daemon.clients import EventServer

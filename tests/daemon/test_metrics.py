@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gestured.core.beside.vitals import Vitals, faulty
+from gestured.core.beside.reading import STATES, Reading, Vitals, faulty
 from gestured.core.classifier import Scores
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
+from gestured.core.features import MEASURES
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
-from gestured.core.measures import MEASURES
-from gestured.core.reading import STATES, Reading
 from gestured.core.window import Window
 from gestured.daemon.exposition import exposition
 from gestured.daemon.metrics import NAMED_SENSORS, Metrics

@@ -12,7 +12,7 @@ import pytest
 
 from gestured.core import messages
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
-from gestured.core.subscription import parse_subscription
+from gestured.core.messages import parse_subscription
 from gestured.model.shipped import shipped
 from tests.daemon.harness import Sensor
 from tests.documents.blocks import ROOT, Block, blocks

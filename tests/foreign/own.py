@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gestured.core.classifier import NEAR
 from gestured.core.frames import Segment
-from gestured.core.prototypes import EXAMPLES, NEAR, Array, Prototype, Space, nearest
+from gestured.core.prototypes import EXAMPLES, Array, Prototype, Space, nearest
 from gestured.lab.dataset import cuts
 from gestured.model.model import Model
 from gestured.model.opening import open_model

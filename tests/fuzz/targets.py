@@ -14,8 +14,8 @@ import numpy as np
 
 from gestured.core.errors import ModelError, ProtocolError
 from gestured.core.frames import Segment
+from gestured.core.messages import parse_subscription
 from gestured.core.stamping import Stamper
-from gestured.core.subscription import parse_subscription
 from gestured.core.wire import Addresses, Arrival, Decoder
 from gestured.daemon.client import Client, Server
 from gestured.model.model import Model

@@ -12,12 +12,12 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from gestured.core.beside.reading import Reading
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Ended, Found, FrontEnd, Opened, Shown, Void
 from gestured.core.hub import Hub
-from gestured.core.reading import Reading
 from gestured.core.sensor import Sensor
 from gestured.core.stamping import Stamp, Stamper
 from gestured.core.wire import Decoder

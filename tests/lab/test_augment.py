@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from gestured.core.measures import ACTIVE
+from gestured.core.features import ACTIVE
 from gestured.lab.augment import symmetry_table, turned, varied
 from gestured.lab.dataset import from_take
 from gestured.lab.fit import CLASSES

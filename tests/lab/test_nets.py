@@ -5,7 +5,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from gestured.core.measures import ACTIVE
+from gestured.core.features import ACTIVE
 from gestured.lab.fit import NETS, build
 from gestured.lab.nets import CnnLstm, Decision, Judged, Lstm
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features

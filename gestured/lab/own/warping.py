@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.measures import ACTIVE
+from gestured.core.features import ACTIVE
 from gestured.core.prototypes import EXAMPLES
 from gestured.lab.own.learn import Seen
 from gestured.lab.own.play import REPETITIONS

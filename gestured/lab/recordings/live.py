@@ -9,6 +9,7 @@ import numpy as np
 
 from gestured.client.say import shown
 from gestured.core.address import Address
+from gestured.core.beside.reading import Reading
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled, Event, Onset, Release, Status
@@ -16,7 +17,6 @@ from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault,
 from gestured.core.frames import Frame
 from gestured.core.hub import Hub
 from gestured.core.owner import Source
-from gestured.core.reading import Reading
 from gestured.core.scene import Scene
 from gestured.lab.recordings.quality import Captured
 

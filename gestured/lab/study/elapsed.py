@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from gestured.core.measures import ACTIVE
+from gestured.core.features import ACTIVE
 from gestured.lab.prefixes import floors
 from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.study.training import Indices, Net
