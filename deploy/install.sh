@@ -36,7 +36,7 @@ mkdir "$work/source"
 cp -RP pyproject.toml README.md LICENSE NOTICE gestured models gestured_models "$work/source"
 rm -rf "$new" "$old"
 mkdir -p "$(dirname "$new")"
-"$venv/bin/pip" install --no-compile --target "$new" "$work/source[record,mqtt,zenoh,serial]" >"$venv/pip.log" 2>&1 </dev/null || {
+"$venv/bin/pip" install --no-compile --target "$new" "$work/source[mqtt,zenoh,serial]" >"$venv/pip.log" 2>&1 </dev/null || {
     echo "pip could not install gestured: $(grep -i error "$venv/pip.log" | tail -n 1) (all of it: $venv/pip.log)" >&2
     exit 1
 }

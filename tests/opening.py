@@ -116,9 +116,7 @@ def main() -> None:
     missing = Path("/nowhere/at/all")
     refused(kind, missing)  # whatever is imported and started for it is there now
     if kind == "mcap":
-        from gestured.record.tape import library
-
-        library()
+        import mcap.stream_reader  # noqa: F401
     before, mapped = _kib("VmRSS"), _kib("VmSize")
     limit = 1024 * mapped + (int(mib) << 20)
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))

@@ -11,8 +11,6 @@ from gestured.control.cli import main
 from gestured.record import tape_reader
 from tests.opening import in_bounds, refused
 
-pytest.importorskip("mcap", reason="recordings need the extra [record]")
-
 MIB = 400  # for a file; the bombs below want a gigabyte or more
 MAGIC = b"\x89MCAP0\r\n"
 TABLE = {"pressure": "/{sensor}/pressure", "trajectory": "/{sensor}/trajectory"}

@@ -81,7 +81,6 @@ def test_a_recording_is_not_written_through_a_planted_link(tmp_path: Path) -> No
 
 
 def test_recordings_and_tapes_are_their_owners_alone(tmp_path: Path) -> None:
-    pytest.importorskip("mcap", reason="recordings need the extra [record]")
     recording.write(tmp_path / "07.npz", session())
     with tape_writer.Writer(tmp_path / "a.mcap", {}, 1 << 20):
         assert mode(tmp_path / "a.mcap") == 0o600
@@ -89,7 +88,6 @@ def test_recordings_and_tapes_are_their_owners_alone(tmp_path: Path) -> None:
 
 
 def test_a_tape_is_not_written_through_a_link(tmp_path: Path) -> None:
-    pytest.importorskip("mcap", reason="recordings need the extra [record]")
     (tmp_path / "a.mcap").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(RecordingError, match=r"a\.mcap: cannot be made"):
         tape_writer.Writer(tmp_path / "a.mcap", {}, 1 << 20)

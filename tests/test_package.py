@@ -26,7 +26,6 @@ EXTRAS = (
     "pytest",
     "hypothesis",
     "setuptools",
-    "mcap",
     "aiomqtt",
     "paho",
     "zenoh",

@@ -12,7 +12,6 @@ from gestured.client.program import Commands
 from gestured.client.say import tell
 from gestured.control.address import add_sockets, connect
 from gestured.control.record import Keeper
-from gestured.record.tape import library
 from gestured.record.tape_writer import Writer
 
 LIMIT_BYTES = 2 << 30  # more than the ring may hold
@@ -37,7 +36,6 @@ def add(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fetch it and write it."""
     path = args.file or flag_path(Path())
-    library()  # what is missing here is said before a daemon is asked
     with connect(args) as control:
         keeper = flag(control, path, args.note)
     kept = {"file": str(path), "packets": keeper.packets, "events": keeper.events, "model": keeper.scene["model"]}

@@ -16,7 +16,6 @@ from gestured.client.say import say, say_json
 from gestured.control.address import add_sockets, connect, finish_after, finish_on_signals
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
-from gestured.record.tape import library
 from gestured.record.tape_writer import Writer
 
 FLUSH_S = 1.0  # seconds of a recording that a crash or a power cut costs
@@ -47,7 +46,6 @@ def run(args: argparse.Namespace) -> int:
         raise GesturedError(f"--max-mib {args.max_mib}: expected 1 to {1 << 20}")
     if args.seconds is not None and not 0 < args.seconds < 1e9:
         raise GesturedError(f"--seconds {args.seconds:g}: expected more than 0")
-    library()  # before anything is asked of the daemon
     with connect(args) as control:
         finish_on_signals(control)
         scene = control.ask("tap")

@@ -14,7 +14,6 @@ from typing import Any
 from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame
 from gestured.record.files import atomic_write
-from gestured.record.tape import library
 
 IMAGE, STRING = "sensor_msgs/msg/Image", "std_msgs/msg/String"
 RULE = "=" * 80
@@ -89,12 +88,13 @@ def write(path: Path, sessions: Mapping[str, Sequence[Frame]], events: Sequence[
 
     Raises RecordingError where it cannot be written; then nothing has changed.
     """
-    mcap = library()
+    from mcap.writer import Writer  # who exports nothing need not wait for it
+
     found = [(nanoseconds(frame.t), sensor, frame) for sensor, frames in sessions.items() for frame in frames]
     told = [(nanoseconds(event.get("decided", event["offset"])), event["sensor"], event) for event in events]
     try:
         with atomic_write(path) as file:
-            writer = mcap.writer.Writer(file)
+            writer = Writer(file)
             writer.start(profile="ros2", library="gestured")
             schemas = {name: writer.register_schema(name, "ros2msg", text.encode()) for name, text in SCHEMAS.items()}
 

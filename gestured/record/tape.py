@@ -7,8 +7,7 @@ with which model and settings. So a tape replays through the same code to the sa
 
 For the eye of others `gesturectl export --ros2` makes a file with pictures (ros2.py).
 
-A tape is written once, never changed, and is good up to its last whole chunk, wherever writing was cut off. The mcap
-library comes with the extra `[record]`.
+A tape is written once, never changed, and is good up to its last whole chunk, wherever writing was cut off.
 """
 
 from collections.abc import Mapping
@@ -16,7 +15,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from gestured.core.address import Address
-from gestured.core.errors import RecordingError
 
 PACKETS, EVENTS, SCENE = "/gestured/packets", "/gestured/events", "scene"
 # Of a line of the event stream; it may say more.
@@ -56,12 +54,3 @@ class Tape:
     packets: tuple[Packet, ...]
     events: tuple[Mapping[str, Any], ...]
     whole: bool
-
-
-def library() -> Any:
-    """The mcap package; RecordingError says how to get it."""
-    try:
-        import mcap.writer
-    except ImportError:
-        raise RecordingError("recordings need the mcap package: pip install 'gestured[record]'") from None
-    return mcap

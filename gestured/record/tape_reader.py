@@ -9,7 +9,7 @@ from gestured.core.errors import RecordingError
 from gestured.core.messages import json_object
 from gestured.record.files import open_regular
 from gestured.record.mcap import CHANNEL, MESSAGE, METADATA, Budget, CutOff, Damaged, Fields, TooLarge, records
-from gestured.record.tape import EVENT_SCHEMA, EVENTS, PACKETS, SCENE, Packet, Tape, library
+from gestured.record.tape import EVENT_SCHEMA, EVENTS, PACKETS, SCENE, Packet, Tape
 
 TEXT_BYTES = 8 << 20  # of one channel or metadata record that is read; a scene may hold a user's own gestures
 ITEM_COSTS = 250  # bytes of memory for a packet or an event, besides what it holds
@@ -31,7 +31,6 @@ NEEDED = {
 
 def read(path: str | Path) -> Tape:
     """Read a file, as far as it is good. Raises RecordingError for what is no tape, and for what wants to be larger."""
-    library()
     reading = _Reading()
     whole = True
     try:

@@ -9,7 +9,7 @@ from typing import Any
 
 from gestured.core.errors import RecordingError
 from gestured.record.files import create
-from gestured.record.tape import EVENT_SCHEMA, EVENTS, PACKETS, SCENE, library
+from gestured.record.tape import EVENT_SCHEMA, EVENTS, PACKETS, SCENE
 
 CHUNK_BYTES = 1 << 20  # bytes that are written at a time, unless a flush comes before
 MESSAGE_BYTES = 32  # of the file for a message, besides its content: its header, and its place in the index
@@ -21,13 +21,14 @@ class Writer:
 
     def __init__(self, path: Path, scene: Mapping[str, Any], limit_bytes: int) -> None:
         """Never more than about `limit_bytes` (what is written before the limit stays good)."""
-        mcap = library()
+        from mcap.writer import Writer as Mcap  # who records nothing need not wait for it
+
         self.path, self.limit_bytes = path, limit_bytes
         try:
             self._file = create(path)
         except OSError as error:
             raise RecordingError(f"{path}: cannot be made: {error.strerror}") from error
-        self._mcap = mcap.writer.Writer(self._file, chunk_size=CHUNK_BYTES)
+        self._mcap = Mcap(self._file, chunk_size=CHUNK_BYTES)
         self._mcap.start(profile="gestured", library="gestured")
         self._mcap.add_metadata(SCENE, {"json": json.dumps(scene)})
         schema = self._mcap.register_schema("gestured.Event", "jsonschema", json.dumps(EVENT_SCHEMA).encode())

@@ -282,7 +282,6 @@ def test_an_error_about_a_file_is_one_line(run, tmp_path: Path) -> None:
 
 
 def test_replay_shows_what_was_recorded(recorded, run, daemon, tmp_path: Path) -> None:
-    pytest.importorskip("mcap", reason="recordings need the extra [record]")
     path, _ = recorded(gestures(daemon, "tape", "left", "tap"))
     found = tape_reader.read(path)
     with tape_writer.Writer(tmp_path / "hostile.mcap", found.scene, 1 << 30) as writer:

@@ -52,7 +52,6 @@ def said(out: str) -> list[str]:
 def test_what_a_daemon_answers_is_compared_with_what_was_recorded(
     recorded, replay, daemon: Daemon, serve, tmp_path: Path
 ) -> None:
-    pytest.importorskip("mcap", reason="recordings need the extra [record]")
     path, _ = recorded(gestures(daemon, "cmp", "left", "tap", "up"))
     same = to(serve("--clock", "sensor"))
     for _ in range(2):  # the second time it knows the sensor, whose clock is far ahead
@@ -188,7 +187,6 @@ def test_flags_that_do_not_go_together_are_one_sentence(replay, wrongly: Path, f
 def test_what_was_said_before_an_answer_is_on_the_tape_and_can_be_said_again(
     start, serve, replay, tmp_path: Path
 ) -> None:
-    pytest.importorskip("mcap", reason="recordings need the extra [record]")
     model = tiny_model.make(tmp_path / "tiny.onnx", provisional=tiny_model.PROVISIONAL)
     daemon, path = serve("--clock", "sensor", model=model), tmp_path / "a.mcap"
     recorder = start("record", path, "--control", daemon.ready["control"])

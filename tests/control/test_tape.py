@@ -3,7 +3,6 @@
 import json
 import os
 import socket
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,6 @@ from gestured.record import tape_reader, tape_writer
 from tests.control.conftest import gestures
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor
-
-pytest.importorskip("mcap", reason="recordings need the extra [record]")
 
 
 def test_a_recording_holds_every_packet_and_replays_to_the_same_events(recorded, run, daemon, tmp_path) -> None:
@@ -186,13 +183,6 @@ def test_what_is_no_recording_is_one_sentence(capsys, tmp_path: Path) -> None:
         assert out == "" and err.count("\n") == 1 and str(path) in err
     assert main(["replay", str(tmp_path / "none.mcap")]) == 1
     assert "No such file" in capsys.readouterr().err
-
-
-def test_without_the_extra_it_says_what_to_install(capsys, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setitem(sys.modules, "mcap", None)
-    for command in (["record", "x.mcap"], ["flag", "x.mcap"], ["replay", "x.mcap"], ["export", "x.mcap", "x.npz"]):
-        assert main(command) == 1
-        assert "pip install 'gestured[record]'" in capsys.readouterr().err
 
 
 def test_differences_match_contacts_by_sensor_and_onset() -> None:

@@ -179,7 +179,6 @@ def is_answer(fact: object) -> bool:
 
 def write(path: Path, arrived: list[Arrived], **settings: object) -> Path:
     """A tape as the daemon would have written it."""
-    pytest.importorskip("mcap", reason="recordings need the extra [record]")
     told = {
         "gestures": GESTURES,
         "model": {"name": "sure", "sha256": "", "rows": 9, "columns": 9},

@@ -25,7 +25,6 @@ def _npz(folder: Path) -> list[bytes]:
 
 
 def _mcap(folder: Path) -> list[bytes]:
-    pytest.importorskip("mcap", reason="recordings need the extra [record]")
     from gestured.record import tape_writer
     from tests import encoding
     from tests import test_bad_tapes as tapes

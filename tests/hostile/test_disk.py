@@ -27,7 +27,6 @@ def refuses(number: int):
 
 
 def test_a_disk_that_is_full_ends_a_recording_with_a_sentence_and_costs_the_daemon_nothing(start, tmp_path) -> None:
-    pytest.importorskip("mcap", reason="recordings need the extra [record]")
     daemon = start("--clock", "sensor", "--control", tmp_path / "control.sock")
     path = tmp_path / "drive.mcap"
     command = [sys.executable, "-m", "gestured.control", "record", path, "--control", daemon.ready["control"]]
@@ -51,7 +50,6 @@ def test_a_disk_that_is_full_ends_a_recording_with_a_sentence_and_costs_the_daem
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
 def test_a_tape_whose_disk_fails_says_so_and_is_closed(tmp_path: Path, monkeypatch, number: int) -> None:
-    pytest.importorskip("mcap", reason="recordings need the extra [record]")
     path = tmp_path / "a.mcap"
     with pytest.raises(RecordingError, match=os.strerror(number)), tape_writer.Writer(path, SCENE, 1 << 30) as writer:
         writer.packet(1, "127.0.0.1:1", b"one")
@@ -78,5 +76,4 @@ def test_a_place_where_nothing_can_be_written_is_named(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="cannot be written"):
         recording.write(place, example())
     with pytest.raises(RecordingError, match="cannot be made"):
-        pytest.importorskip("mcap", reason="recordings need the extra [record]")
         tape_writer.Writer(place, SCENE, 1 << 20)
