@@ -4,8 +4,8 @@ set -eu
 root=$1 prefix=$2
 put=$root$prefix/lib/gestured/installed
 
-folders() {  # folders PATTERN: those of the installed files that match, once each
-    sed -n "s|^\(.*$1.*\)/[^/]*\$|\1|p" "$put" | sort -u | paste -s -d ' '
+folders() {  # folders PATTERN: those of the installed files that match, once each; no comma, which ends it for sed
+    sed -n "s,^\(.*\($1\).*\)/[^/]*\$,\1,p" "$put" | sort -u | paste -s -d ' '
 }
 
 echo "installed${root:+ below $root}:"
@@ -13,7 +13,7 @@ echo "  programs        $(grep '/bin/' "$put" | paste -s -d ' ')"
 echo "  packages        $prefix/lib/gestured"
 echo "  systemd units   $(folders '/systemd/system')"
 echo "  man pages       $(folders '/man/')"
-echo "  completions     $(folders '-completion/\|/site-functions\|/vendor_completions')"
+echo "  completions     $(folders '-completion/\|/vendor[-_]completions')"
 echo "  documents       $(folders '/doc/')"
 echo "  settings        /etc/gestured/gestured.toml (yours: it stays as it is)"
 if [ -n "$root" ]; then

@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
                 show.say(
                     f"The daemon listens on {engine.listen} with the model {engine.ready['model']}.",
                     f"A simulated sensor of {rows} x {columns} taxels sends OSC to it at {args.rate:g} Hz.",
-                    *([f"In a browser it is seen at {address}"] if address else []),
+                    *([f"Until the demo ends, a browser shows it at {address}"] if address else []),
                     "For two seconds nobody touches it. Ctrl-C ends.",
                     "",
                 )
@@ -152,6 +152,7 @@ class Show:
                 f"  {programs / 'gestured'} --model {self.model}",
                 f"  {programs / 'gesturectl'} simulate --sensor armrest",
                 f"  {programs / 'gesturectl'} listen",
+                f"{programs / 'gesturectl'} view shows that sensor in a browser.",
             )
 
     def _draw(self, control: Control) -> None:

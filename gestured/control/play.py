@@ -1,6 +1,7 @@
 """What the simulated sensor plays: a person who performs gesture after gesture, and the frames of it."""
 
 import argparse
+import textwrap
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain, cycle
@@ -21,6 +22,7 @@ from gestured.simulator import (
     session,
 )
 
+KINDS = GESTURES + NON_GESTURES + SEQUENCES
 PART_S = 600.0  # what is simulated at a time; between two parts the sensor is off
 OFF_S = 3.0
 UNTOUCHED_S = 2.0  # untouched at first: the daemon learns the baseline
@@ -59,7 +61,9 @@ def frames(start: float, take: Take) -> Iterator[tuple[int, Frame]]:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The flags of what is played."""
+    """The flags of what is played; the help ends with the kinds that there are."""
+    kinds = textwrap.indent(textwrap.fill(", ".join(KINDS), 98), "  ")
+    parser.epilog = f"{parser.epilog}\n\nkinds for --kinds:\n{kinds}"
     parser.add_argument(
         "--participant",
         type=int,
@@ -70,10 +74,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="another sequence of gestures (default: 0)")
     parser.add_argument(
         "--kinds",
-        type=some_of(GESTURES + NON_GESTURES + SEQUENCES),
+        type=some_of(KINDS),
         default=(),
         metavar="A,B",
-        help="perform these in turn (default: at random)",
+        help="perform these kinds, listed below, in turn (default: at random)",
     )
     parser.add_argument(
         "--non-gestures",

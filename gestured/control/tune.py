@@ -138,7 +138,7 @@ def _words(tuned: Tuned) -> Iterator[str]:
     yield f"proposed {best.threshold:.2f}: {_said(best)}"
     yield "for the configuration file:"
     for name in tuned.model.gestures:
-        yield f"gestures.{name}.threshold = {tuned.each.get(name, best).threshold:.2f}"
+        yield from (f"[gestures.{name}]", f"threshold = {tuned.each.get(name, best).threshold:.2f}")
     few = len(tuned.model.gestures) - len(tuned.each)
     if few:
         yield f"# {few} were performed less than {ENOUGH} times: they have what suits all"

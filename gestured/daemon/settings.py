@@ -15,10 +15,9 @@ from gestured.daemon.values import (
     GridField,
     Listed,
     NetworkField,
+    SensorNameField,
     SocketField,
 )
-
-SENSOR_NAME = r"^[A-Za-z0-9_-]{1,64}$"
 
 
 class Part(BaseModel):
@@ -145,7 +144,7 @@ class Settings(Part):
         "$STATE_DIRECTORY/own-gestures.json; without either, none can be enrolled",
     )
     log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="how much is logged")
-    sensors: dict[Annotated[str, Field(pattern=SENSOR_NAME)], SensorSettings] = Field(
+    sensors: dict[SensorNameField, SensorSettings] = Field(
         default={}, description="tables `[sensors.NAME]`, in the file only"
     )
     per_gesture: dict[str, GestureSettings] = Field(

@@ -8,6 +8,7 @@ from typing import Annotated
 from pydantic import BeforeValidator
 
 from gestured.core.address import Address, Grid
+from gestured.core.wire import is_sensor
 
 SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
 
@@ -30,6 +31,12 @@ def _destination(value: object) -> Address:
 
 def _grid(value: object) -> Grid:
     return Grid.parse(value if isinstance(value, str) else "")
+
+
+def _sensor(value: object) -> str:
+    if not isinstance(value, str) or not is_sensor(value):
+        raise ValueError("a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -")
+    return value
 
 
 def _socket(value: object) -> Path:
@@ -57,4 +64,5 @@ AddressField = Annotated[Address, BeforeValidator(_address)]
 GridField = Annotated[Grid, BeforeValidator(_grid)]
 NetworkField = Annotated[ipaddress.IPv4Network | ipaddress.IPv6Network, BeforeValidator(_network)]
 DestinationField = Annotated[Address, BeforeValidator(_destination)]
+SensorNameField = Annotated[str, BeforeValidator(_sensor)]
 SocketField = Annotated[Path, BeforeValidator(_socket)]

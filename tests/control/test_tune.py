@@ -1,6 +1,7 @@
 """`gesturectl tune`: what thresholds cost is counted rightly, and what it proposes costs least."""
 
 import json
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from gestured.client.score import Performed
 from gestured.control.cli import main
 from gestured.control.tuning import THRESHOLDS, Counts, Played, counted, for_each, proposed
 from gestured.record.arrays import write
+from gestured.simulator import GESTURES
 from tests.lab.adapt.recorded import whole_session
 
 NAMES = ("one_tap", "swipe_left", "swipe_right")
@@ -80,7 +82,9 @@ def test_a_labelled_session_gives_a_table_a_picture_and_settings(
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
     assert sum(line.lstrip().startswith("0.") for line in lines) == len(THRESHOLDS)
-    assert any(line.startswith("gestures.swipe_left.threshold = 0.") for line in lines)
+    pasted = "[sensors.armrest]\nrotate = 90\n" + "\n".join(lines[lines.index("for the configuration file:") + 1 :])
+    thresholds = {name: table["threshold"] for name, table in tomllib.loads(pasted)["gestures"].items()}
+    assert set(thresholds) == set(GESTURES) and set(thresholds.values()) <= set(THRESHOLDS)
     assert main(["tune", str(recorded), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     rows = found["thresholds"]

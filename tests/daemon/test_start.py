@@ -138,6 +138,7 @@ def unread(*flags: object, env: dict[str, str] | None = None) -> str:
             "[gestures.one_tap]\nthreshold = 2",
             ("gestures.one_tap.threshold", "2", "less than or equal to 1"),
         ),
+        ((), {}, "[sensors.'arm rest']", ("'arm rest'", "expected a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -")),
         ((), {}, "[addresses]\npressure = 'x'", ("addresses", "pressure", "{sensor}")),
         ((), {}, "max_sensors = 0", ("max_sensors", "0", "greater than or equal to 1")),
         ((), {}, "listen = !", ("gestured.toml", "TOML", "line 1")),

@@ -10,6 +10,8 @@ PUT = """/opt/bin/gestured
 /opt/lib/systemd/system/gestured.socket
 /opt/share/man/man8/gestured.8
 /opt/share/bash-completion/completions/gestured
+/opt/share/zsh/vendor-completions/_gestured
+/opt/share/fish/vendor_completions.d/gestured.fish
 /opt/share/doc/gestured/operating.md
 """
 
@@ -31,6 +33,11 @@ def test_make_install_says_what_went_where_and_what_comes_next(tmp_path: Path) -
     for where in ("/opt/bin/gestured", "/opt/bin/gesturectl", "/opt/lib/gestured", "/opt/lib/systemd/system",
                   "/opt/share/man", "/opt/share/doc/gestured", "/etc/gestured/gestured.toml"):  # fmt: skip
         assert where in text
+    completions = [line.split()[1:] for line in text.splitlines() if line.startswith("  completions")]
+    assert completions == [
+        ["/opt/share/bash-completion/completions", "/opt/share/fish/vendor_completions.d",
+         "/opt/share/zsh/vendor-completions"],
+    ]  # fmt: skip
     commands = [line.strip() for line in text.splitlines() if line.startswith("  sudo ")]
     assert len(commands) == 2 and commands[1] == "sudo systemctl enable --now gestured.service"
     operating = (ROOT / "docs" / "operating.md").read_text()

@@ -4,10 +4,11 @@ import argparse
 import ipaddress
 import os
 import signal
+import sys
 from pathlib import Path
 
 from gestured.client.program import Commands
-from gestured.client.say import tell
+from gestured.client.say import say, tell
 from gestured.client.values import bind_address
 from gestured.control.address import add_sockets, connect, control_path
 from gestured.core.address import Address
@@ -54,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
     with Server(args.listen, source, door) as server:
         address = f"http://{server.address}/?token={door.token}"
         tell(args.json, {"type": "view", "address": address}, address)
+        say("Open this address in a browser on this machine; it works once. Ctrl-C ends the view.", to=sys.stderr)
         try:
             server.serve_forever()
         finally:
