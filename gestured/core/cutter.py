@@ -32,6 +32,9 @@ BENT = math.radians(75.0)  # the same angle where both ways bend to the same sid
 SLOWEST = 0.75  # times the speed beside the hole: who got less far has turned a corner, or stopped
 
 
+_new = tuple.__new__  # Kept(...) takes twice the time
+
+
 class Kept(NamedTuple):
     """A frame that a segment may need."""
 
@@ -95,7 +98,7 @@ class Cutter:
         if shown != self._shown or not self._conditioner.noise.lively:
             self._new = t
         self._shown = shown
-        self._kept.append(Kept(t, look.above, lost, place, self._new))
+        self._kept.append(_new(Kept, (t, look.above, lost, place, self._new)))
 
     def trim(self, t: float) -> None:
         """Nothing is open at `t` s: keep what the next contact may need before its onset."""

@@ -273,6 +273,8 @@ class Segmenter:
 
     def push(self, t: float, activity: float, place: Place | None) -> list[Deed]:
         """One frame at `t` s, after `flush(t)`; `place`: the centroid (row, column), if activity is at least `off`."""
+        if activity < self.off and self.phase is IDLE:
+            return []  # what the first row of the table says, without looking it up
         return self._step(self.phase.reads(self._memory, t, activity), t, activity, place)
 
     @property

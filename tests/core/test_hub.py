@@ -3,6 +3,7 @@
 import ipaddress
 import math
 import socket
+import statistics
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from benchmarks.house import idle_calls
 from gestured.control.export import sessions_of
 from gestured.core.certainty import Certainty
 from gestured.core.classifier import Classifier, Scores
@@ -284,3 +286,8 @@ def test_who_pauses_still_owns_a_sensor_until_it_is_forgotten() -> None:
     assert states(hub, 0.9 * FORGET_S) == {"arm": "stale"} and hub.owners == {FIRST}
     hub.tick(1.1 + FORGET_S)
     assert hub.owners == set()
+
+
+def test_a_frame_that_says_nothing_is_cheap() -> None:
+    """Counted in calls, which do not depend on the machine: an idle frame of a scene with nothing but a model."""
+    assert statistics.median_low(idle_calls()) <= 35

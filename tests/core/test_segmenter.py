@@ -86,7 +86,8 @@ def test_when_something_is_decided_changes_nothing_that_is(stream: Stream, wait:
 
 
 def test_no_row_is_there_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen = set()
+    seen = {(IDLE, Signal.QUIET)}  # of all rows the most frequent: `push` does not look it up
+    assert TRANSITIONS[IDLE, Signal.QUIET] == Row(IDLE)
 
     class Watched(dict[tuple[Phase, Signal], Row]):
         def __getitem__(self, key: tuple[Phase, Signal]) -> Row:
