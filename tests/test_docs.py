@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from gestured.daemon.explain import explain
+from gestured.daemon.settings import Settings
 from gestured.model.shipped import shipped
 from tests.programs import PARSERS, subcommands
 
@@ -150,4 +152,6 @@ def test_the_first_screen_quotes_the_tables():
         assert cells(performance, begins)[1] in screen, begins
     assert f"{float(cells(performance, 'resident memory, one sensor')[1].split()[0]):.0f} MiB" in screen
     (false,) = re.findall(r"(\d\.\d+) false events a minute", readme)
-    assert f"{false} false ones" in screen
+    assert f"{60 * float(false):.0f} an hour" in screen
+    (felt,) = [line for line in explain(Settings(), {}).splitlines() if "is answered" in line]
+    assert all(f"{seconds} after" in screen for seconds in re.findall(r"(\S+ s) after", felt))
