@@ -16,7 +16,12 @@ LAYERS = {"core": 0, "daemon": 2, "control": 2, "bridge": 2, "lab": 2}  # everyt
 LAB_ONLY = {"torch", "sklearn", "onnx", "joblib", "scipy"}
 ONLY_IN = {
     "onnxruntime": {"gestured/model/session.py"},
-    "mcap": {"gestured/record/mcap.py", "gestured/record/ros2.py", "gestured/record/tape_writer.py"},
+    "mcap": {
+        "gestured/record/mcap.py",
+        "gestured/record/tape_reader.py",
+        "gestured/record/tape_writer.py",
+        "gestured/record/ros2.py",
+    },
     "pythonosc": {"gestured/client/osc_out.py"},
     "prometheus_client": {"gestured/daemon/exposition.py", "gestured/bridge/counts.py"},
     "aiomqtt": {"gestured/bridge/broker.py"},

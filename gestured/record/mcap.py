@@ -1,19 +1,18 @@
 """The records of an MCAP file (mcap.dev/spec) that may be cut off, damaged or hostile.
 
-No size that a file says is believed before it is held against a bound: not a record's, not a chunk's, not what all
-chunks unpack to. The library that writes our files reads whatever a size says.
+The mcap library takes a record apart, once it lies in memory whole; it believes whatever size stands in a file. So each
+record's size, what its chunk unpacks to, and the sum of all chunks are held against a bound before.
 """
 
 import io
 import os
 import struct
-import zlib
 from collections.abc import Iterator
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 MAGIC = b"\x89MCAP0\r\n"
-FOOTER, CHANNEL, MESSAGE, CHUNK, METADATA = 2, 4, 5, 6, 12  # opcodes
 RECORD_BYTES = 16 << 20  # of one record, and of what a chunk unpacks to; ours have little more than a mebibyte
+TEXT_BYTES = 8 << 20  # of one channel or metadata record; a scene may hold a user's own gestures
 GROWTH = 500  # bytes of memory for a byte of the file: an idle sensor that sends zeros leaves next to nothing
 GROWTH_BYTES = 64 << 20  # bytes of memory for any file, however small
 KEPT_BYTES = 4 << 30  # bytes of memory at most, however large the file is
@@ -52,115 +51,75 @@ class Budget:
             raise TooLarge("unpacks to more than a recording of its size does")
 
 
-def records(file: BinaryIO, budget: Budget) -> Iterator[tuple[int, bytes]]:
-    """(opcode, content) of each record up to the footer; a chunk's stand in its place."""
+def records(file: BinaryIO, budget: Budget) -> Iterator[Any]:
+    """The library's Channel, Message and Metadata records up to the footer; a chunk's stand in its place."""
+    from mcap.records import Chunk, Footer  # who reads no tape need not wait for it
+
     if file.read(len(MAGIC)) != MAGIC:
         raise Damaged("expected an MCAP file")
-    for opcode, content in _framed(file):
-        if opcode == CHUNK:
-            data = _unpacked(content)
+    for record in _records(file):
+        if isinstance(record, Chunk):
+            data = _unpacked(record)
             budget.unpack(len(data))
-            inside = io.BytesIO(data)
-            while inside.tell() < len(data):
-                yield _record(inside)
-        else:
-            yield opcode, content
-        if opcode == FOOTER:
+            yield from _records(io.BytesIO(data))
+        elif isinstance(record, Footer):
             break
+        else:
+            yield record
     if file.read(len(MAGIC)) != MAGIC:
         raise CutOff
 
 
-def _framed(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
-    while True:
-        yield _record(file)
+def _records(file: BinaryIO) -> Iterator[Any]:
+    """Those that a tape is made of, until the file's end; what else there is is passed over."""
+    from mcap.data_stream import ReadDataStream
+    from mcap.exceptions import McapError
+    from mcap.opcode import Opcode
+    from mcap.records import Channel, Chunk, Footer, Message, Metadata
+
+    kinds: dict[int, Any] = {
+        Opcode.CHANNEL: Channel,
+        Opcode.CHUNK: Chunk,
+        Opcode.FOOTER: Footer,
+        Opcode.METADATA: Metadata,
+    }
+    while head := file.read(9):
+        if len(head) < 9:
+            raise CutOff
+        opcode, size = struct.unpack("<BQ", head)
+        most = TEXT_BYTES if opcode in (Opcode.CHANNEL, Opcode.METADATA) else RECORD_BYTES
+        if not opcode or size > most:
+            raise Damaged(f"a record of type {opcode} and {size} bytes, expected one of 1 to 255 and at most {most}")
+        content = file.read(size)
+        if len(content) < size:
+            raise CutOff
+        if opcode != Opcode.MESSAGE and opcode not in kinds:
+            continue
+        stream = ReadDataStream(io.BytesIO(content))
+        try:
+            record = Message.read(stream, size) if opcode == Opcode.MESSAGE else kinds[opcode].read(stream)
+        except (McapError, struct.error, UnicodeDecodeError) as error:
+            raise Damaged(f"a record that cannot be read: {error}") from error
+        yield record
 
 
-def _record(file: BinaryIO) -> tuple[int, bytes]:
-    head = file.read(9)
-    if len(head) < 9:
-        raise CutOff
-    opcode, size = struct.unpack("<BQ", head)
-    if size > RECORD_BYTES:
-        raise Damaged(f"a record of {size} bytes, expected at most {RECORD_BYTES}")
-    content = file.read(size)
-    if len(content) < size:
-        raise CutOff
-    return opcode, content
+def _unpacked(chunk: Any) -> bytes:
+    """What is in a chunk; Damaged where that is not as long as it says."""
+    import zstandard
+    from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
 
-
-def _unpacked(chunk: bytes) -> bytes:
-    """What is in a chunk: times, its size and checksum, how it is packed, the packed records."""
-    fields = Fields(chunk)
-    _, _, size, checksum = fields.take("<QQQI")
-    compression = fields.text()
-    packed = fields.rest(*fields.take("<Q"))
+    size, packed = chunk.uncompressed_size, chunk.data
     if size > RECORD_BYTES:
         raise Damaged(f"a chunk unpacks to {size} bytes, expected at most {RECORD_BYTES}")
+    if chunk.compression not in ("zstd", ""):
+        raise Damaged(f"a chunk is packed as {chunk.compression[:20]!r}, expected zstd")
     try:
-        data = _unpack(compression, packed, size + 1)
-    except Damaged:
-        raise
-    except Exception as error:  # each library has errors of its own
+        told = zstandard.frame_content_size(packed) if chunk.compression else len(packed)
+        if told not in (size, -1):  # the library unpacks as much as this says; nothing said (-1), as the chunk says
+            raise Damaged(f"a chunk unpacks to {told} bytes, expected its {size}")
+        stream, found = get_chunk_data_stream(chunk, validate_crc=True)
+    except (zstandard.ZstdError, CRCValidationError) as error:
         raise Damaged(f"a chunk cannot be unpacked: {error}") from error
-    if len(data) != size or (checksum and zlib.crc32(data) != checksum):
-        raise Damaged(f"a chunk does not unpack to its {size} bytes")
-    return data
-
-
-def _unpack(compression: str, packed: bytes, most: int) -> bytes:
-    """At most so many bytes, whatever the packed ones say of themselves."""
-    if compression == "":
-        return packed
-    if compression == "zstd":
-        import zstandard
-
-        decompressor = zstandard.ZstdDecompressor(max_window_size=RECORD_BYTES)
-        with decompressor.stream_reader(packed) as stream:
-            return stream.read(most)
-    if compression == "lz4":
-        import lz4.frame
-
-        found: bytes = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=most)
-        return found
-    raise Damaged(f"a chunk is packed as {compression[:20]!r}, expected zstd or lz4")
-
-
-class Fields:
-    """The fields of one record, taken from its front. Damaged where it ends too early."""
-
-    def __init__(self, content: bytes) -> None:
-        self._content, self._at = content, 0
-
-    def take(self, form: str) -> tuple[int, ...]:
-        """Numbers, as `struct` writes them."""
-        try:
-            found = struct.unpack_from(form, self._content, self._at)
-        except struct.error:
-            raise Damaged("a record ends in the middle of a number") from None
-        self._at += struct.calcsize(form)
-        return found
-
-    def rest(self, size: int | None = None) -> bytes:
-        """So many bytes; all that is left unless told."""
-        end = len(self._content) if size is None else self._at + size
-        if end > len(self._content):
-            raise Damaged(f"a record ends before {size} bytes that it says it has")
-        found, self._at = self._content[self._at : end], end
-        return found
-
-    def text(self) -> str:
-        """A string behind its length."""
-        try:
-            return self.rest(*self.take("<I")).decode()
-        except UnicodeDecodeError:
-            raise Damaged("a text that is no UTF-8") from None
-
-    def pairs(self) -> dict[str, str]:
-        """Strings by name, behind the length of all of them."""
-        inside = Fields(self.rest(*self.take("<I")))
-        found = {}
-        while inside._at < len(inside._content):
-            name = inside.text()
-            found[name] = inside.text()
-        return found
+    if found != size:
+        raise Damaged(f"a chunk unpacks to {found} bytes, expected its {size}")
+    return stream.read(size)

@@ -94,7 +94,7 @@ def write(path: Path, sessions: Mapping[str, Sequence[Frame]], events: Sequence[
     told = [(nanoseconds(event.get("decided", event["offset"])), event["sensor"], event) for event in events]
     try:
         with atomic_write(path) as file:
-            writer = Writer(file)
+            writer: Any = Writer(file)
             writer.start(profile="ros2", library="gestured")
             schemas = {name: writer.register_schema(name, "ros2msg", text.encode()) for name, text in SCHEMAS.items()}
 

@@ -8,10 +8,9 @@ from gestured.core.address import Address
 from gestured.core.errors import RecordingError
 from gestured.core.messages import json_object
 from gestured.record.files import open_regular
-from gestured.record.mcap import CHANNEL, MESSAGE, METADATA, Budget, CutOff, Damaged, Fields, TooLarge, records
+from gestured.record.mcap import Budget, CutOff, Damaged, TooLarge, records
 from gestured.record.tape import EVENT_SCHEMA, EVENTS, PACKETS, SCENE, Packet, Tape
 
-TEXT_BYTES = 8 << 20  # of one channel or metadata record that is read; a scene may hold a user's own gestures
 ITEM_COSTS = 250  # bytes of memory for a packet or an event, besides what it holds
 EVENT_COSTS = 24  # bytes of memory for a byte of JSON, where it is all empty lists
 NOBODY = Address("", 0)  # the source of a channel that holds no packets
@@ -36,8 +35,8 @@ def read(path: str | Path) -> Tape:
     try:
         with open_regular(path) as file:
             budget = Budget(file)
-            for opcode, content in records(file, budget):
-                reading.take(opcode, content, budget)
+            for record in records(file, budget):
+                reading.take(record, budget)
     except CutOff:
         whole = False
     except Damaged as error:
@@ -66,36 +65,27 @@ class _Reading:
         self.events: list[Mapping[str, Any]] = []
         self._channels: dict[int, tuple[str, Address]] = {}  # topic, "" where we do not know it; source
 
-    def take(self, opcode: int, content: bytes, budget: Budget) -> None:
+    def take(self, record: Any, budget: Budget) -> None:
         """One record; what we do not know is passed over."""
-        if opcode == MESSAGE:
-            self._message(content, budget)
-        elif opcode in (CHANNEL, METADATA):
-            if len(content) > TEXT_BYTES:
-                raise Damaged(f"a channel or metadata of {len(content)} bytes, expected at most {TEXT_BYTES}")
-            fields = Fields(content)
-            if opcode == CHANNEL:
-                self._channel(fields)
-            elif fields.text() == SCENE:
-                self.scene = _scene(fields.pairs())
+        from mcap.records import Channel, Message, Metadata
 
-    def _channel(self, fields: Fields) -> None:
-        number, _ = fields.take("<HH")
-        topic, _ = fields.text(), fields.text()
-        topic = topic if topic in (PACKETS, EVENTS) else ""
-        source = fields.pairs().get("source") if topic == PACKETS else None
-        self._channels[number] = topic, NOBODY if source is None else _source(source)
+        if isinstance(record, Message):
+            self._message(record, budget)
+        elif isinstance(record, Channel):
+            topic = record.topic if record.topic in (PACKETS, EVENTS) else ""
+            source = record.metadata.get("source") if topic == PACKETS else None
+            self._channels[record.id] = topic, NOBODY if source is None else _source(source)
+        elif isinstance(record, Metadata) and record.name == SCENE:
+            self.scene = _scene(record.metadata)
 
-    def _message(self, content: bytes, budget: Budget) -> None:
-        fields = Fields(content)
-        number, _, t_ns, _ = fields.take("<HIQQ")
-        if number not in self._channels:
-            raise Damaged(f"a message of channel {number}, which there is not")
-        topic, source = self._channels[number]
-        data = fields.rest() if topic else b""
+    def _message(self, message: Any, budget: Budget) -> None:
+        if message.channel_id not in self._channels:
+            raise Damaged(f"a message of channel {message.channel_id}, which there is not")
+        topic, source = self._channels[message.channel_id]
+        data = message.data
         if topic == PACKETS:
             budget.keep(ITEM_COSTS + len(data))
-            self.packets.append(Packet(t_ns, source, data))
+            self.packets.append(Packet(message.log_time, source, data))
         elif topic == EVENTS:
             budget.keep(ITEM_COSTS + EVENT_COSTS * len(data))
             self.events.append(_event(data, len(self.events) + 1))

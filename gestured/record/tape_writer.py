@@ -28,7 +28,7 @@ class Writer:
             self._file = create(path)
         except OSError as error:
             raise RecordingError(f"{path}: cannot be made: {error.strerror}") from error
-        self._mcap = Mcap(self._file, chunk_size=CHUNK_BYTES)
+        self._mcap: Any = Mcap(self._file, chunk_size=CHUNK_BYTES)
         self._mcap.start(profile="gestured", library="gestured")
         self._mcap.add_metadata(SCENE, {"json": json.dumps(scene)})
         schema = self._mcap.register_schema("gestured.Event", "jsonschema", json.dumps(EVENT_SCHEMA).encode())
