@@ -1,6 +1,6 @@
 #!/bin/sh
 # What `make install` runs in the project's folder: deploy/install.sh VENV DESTDIR PREFIX. VENV was made by the
-# interpreter that the installed programs run under; its pip is used, nothing of it is installed.
+# interpreter that the installed programs run under; it is used to build, and nothing of it is installed.
 # The packages get a folder of their own below PREFIX/lib, made beside the one of before, whose place it then takes.
 set -eu
 umask 022
@@ -31,19 +31,24 @@ keep() {  # keep FILE PATH: an operator's file stays as it is, here and by `make
     [ -e "$root$2" ] || { mkdir -p "$root$(dirname "$2")"; cp "$1" "$root$2"; }
 }
 
+pip() {  # pip ARGUMENT...: install with the pip of VENV
+    "$venv/bin/pip" install "$@" >"$venv/pip.log" 2>&1 </dev/null || {
+        echo "pip could not install $*: $(grep -i error "$venv/pip.log" | tail -n 1) (all of it: $venv/pip.log)" >&2
+        exit 1
+    }
+}
+
 # The build leaves files beside its sources, so it gets a copy.
 mkdir "$work/source"
 cp -RP pyproject.toml README.md LICENSE NOTICE gestured models gestured_models "$work/source"
 rm -rf "$new" "$old"
 mkdir -p "$(dirname "$new")"
-"$venv/bin/pip" install --no-compile --target "$new" "$work/source[mqtt,zenoh,serial]" >"$venv/pip.log" 2>&1 </dev/null || {
-    echo "pip could not install gestured: $(grep -i error "$venv/pip.log" | tail -n 1) (all of it: $venv/pip.log)" >&2
-    exit 1
-}
+pip shtab  # makes the completions
+pip --no-compile --target "$new" "$work/source[mqtt,zenoh,serial]"
 rm -rf "${new:?}/bin"
 find "$new" -name __pycache__ -type d -prune -exec rm -rf {} +
 "$python" -m compileall -q -j 0 -s "$new" -p "$lib" "$new"
-PYTHONPATH=$new PYTHONDONTWRITEBYTECODE=1 "$python" -m deploy.generate install "$work/share"
+PYTHONPATH=$new PYTHONDONTWRITEBYTECODE=1 "$venv/bin/python" -m deploy.generate install "$work/share"
 if [ -e "$root$lib" ]; then mv "$root$lib" "$old"; fi
 mv "$new" "$root$lib"
 rm -rf "$old"

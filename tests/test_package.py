@@ -175,7 +175,7 @@ def test_each_subcommand_shows_an_example_that_is_valid(command: str):
 
 
 def test_what_prints_a_table_prints_json_too():
-    others = {"watch", "names"}  # a picture, and one name a line: no tables
+    others = {"watch"}  # a picture: no table
     for name, parser in subcommands("gesturectl").items():
         assert ("--json" in parser.format_help()) != (name in others), name
 

@@ -8,13 +8,12 @@ from deploy.generate import animation, completion, configuration, dashboard, man
 
 def install(share: Path) -> None:
     """Write man pages and completions below a `share` folder."""
-    found = programs.all_programs()
-    for name, text in man.pages(found).items():
+    for name, text in man.pages(programs.all_programs()).items():
         put(share / "man" / f"man{name[-1]}" / name, text)
-    for program in found:
-        put(share / "bash-completion" / "completions" / program.name, completion.bash(program))
-        put(share / "zsh" / "vendor-completions" / f"_{program.name}", completion.zsh(program))
-        put(share / "fish" / "vendor_completions.d" / f"{program.name}.fish", completion.fish(program))
+    for name, parser in programs.PARSERS.items():
+        put(share / "bash-completion" / "completions" / name, completion.completion(parser(), "bash"))
+        put(share / "zsh" / "vendor-completions" / f"_{name}", completion.completion(parser(), "zsh"))
+        put(share / "fish" / "vendor_completions.d" / f"{name}.fish", completion.completion(parser(), "fish"))
 
 
 def put(path: Path, text: str) -> None:

@@ -31,6 +31,9 @@ class Program:
     commands: tuple["Program", ...] = ()
 
 
+PARSERS = {"gestured": gestured, "gesturectl": gesturectl, "gestured-bridge": bridge}
+
+
 def options(parser: argparse.ArgumentParser) -> Iterator[Option]:
     """Its arguments, but for the subcommands."""
     for action in parser._actions:  # argparse has no public way to ask

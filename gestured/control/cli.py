@@ -28,7 +28,6 @@ SUBCOMMANDS = (
     ("tune", "add", ("tune",)),
     ("simulate", "add", ("simulate",)),
     ("check", "add", ("check",)),
-    ("names", "add", ("names",)),
     ("demo", "add", ("demo",)),
 )
 
