@@ -5,6 +5,7 @@ import json
 import re
 import threading
 import time
+from functools import partial
 from typing import Any
 
 from gestured.bridge.counts import Counts
@@ -33,7 +34,7 @@ class Zenoh:
         self._is_called = bool(args.listen or args.scout)  # nobody has to be there
         self._daemon = Daemon(args.sensors, args.gestures, counts)
         self._counts = counts
-        self._forward = Forward(args.to, counts) if args.frames else None
+        self._forward = Forward(self._key(), args.to, counts) if args.frames else None
         self._session: Any = None
         self._tokens: dict[str, Any] = {}
         self._latest: dict[str, bytes] = {}  # sensor -> its last gesture
@@ -54,13 +55,15 @@ class Zenoh:
     def close(self) -> None:
         """Leave the network: tell it that this session ends."""
         self._closed.set()
+        if self._forward is not None:
+            self._forward.close()
         if self._opening.is_alive():
             self._opening.join()
         if self._session is not None:
             self._session.close()
 
     def _open(self) -> None:
-        """Until it is open: a router that is not there yet is waited for. After that Zenoh connects again by itself."""
+        """Open a session: a router that is not there yet is waited for, and later Zenoh connects again by itself."""
         import zenoh
         from zenoh.handlers import Callback
 
@@ -73,13 +76,12 @@ class Zenoh:
                 self._closed.wait(AGAIN_S)
                 continue
             # Called by Zenoh's own threads: one of Python's that waits for Zenoh would abort the process at its end.
-            answer = Callback(self._answer, indirect=False)
-            self._answers = session.declare_queryable(self._key("**"), answer)
-            if self._forward is not None:
-                take = Callback(self._forward.take, indirect=False)
-                self._frames = session.declare_subscriber(self._key("*", "frames"), take)
+            self._answers = session.declare_queryable(self._key("**"), Callback(self._answer, indirect=False))
             self._session = session
             self._hold_tokens()
+            if self._forward is not None:
+                take = Callback(self._forward.take, indirect=False)
+                self._forward.hear(partial(session.declare_subscriber, handler=take))
             return
 
     def _publish(self, event: Line) -> None:

@@ -5,11 +5,15 @@ import queue
 import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from gestured.bridge import forward
+from gestured.bridge.counts import Counts
+from gestured.core.address import Address
 from tests.bridge.conftest import Process, emit, page, wait
 from tests.bridge.test_mqtt import STATUS, gesture
 from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, counted
@@ -233,6 +237,71 @@ def test_frames_are_of_the_sensor_that_their_key_says(bridge, site, fake, udp):
     for packet in (b"rubbish", counted("/other/pressure", np.zeros((9, 9)), 1), right):
         distant.put(packet)
     assert udp.recv(65536) == right
+
+
+def frames_in(bridge: Callable[..., Process], site: Site, fake: FakeDaemon, udp: socket.socket) -> str:
+    """A bridge for frames, and where its metrics are."""
+    to = f"127.0.0.1:{udp.getsockname()[1]}"
+    process = begin(bridge, site, fake, "--frames", "--to", to, "--metrics", "127.0.0.1:0")
+    fake.accept()
+    return str(process.ready()["metrics"])
+
+
+def test_a_key_with_a_wildcard_is_no_sensors(bridge, site, fake, udp):
+    metrics = frames_in(bridge, site, fake, udp)
+    distant = site.publisher("gestured/car/distant/frames")
+    keys = ("**", "*/**", "gestured/car/*/frames", "gestured/car/**/frames")
+    for key in keys:
+        site.client.put(key, counted("/*/pressure", np.zeros((9, 9)), 1))
+    right = counted("/distant/pressure", np.zeros((9, 9)), 1)
+    distant.put(right)
+    assert udp.recv(65536) == right
+    assert f'gestured_bridge_frames_total{{bridge="zenoh",result="refused"}} {len(keys)}.0' in page(metrics)
+
+
+def test_a_sensor_is_heard_beside_one_that_floods(bridge, site, fake, udp):
+    """Zenoh drops what does not fit through the way to the bridge: the flood must not even be sent there."""
+    metrics = frames_in(bridge, site, fake, udp)
+    sound, mad = (site.publisher(f"gestured/car/{name}/frames") for name in ("sound", "mad"))
+    sound.put(counted("/sound/pressure", np.zeros((9, 9)), 1))
+    packet = counted("/mad/pressure", np.zeros((9, 9)), 1)
+
+    def is_held_back() -> bool:
+        for _ in range(1000):
+            mad.put(packet)
+        return not mad.matching_status.matching
+
+    wait(is_held_back)
+    for n in range(2, 30):
+        wait(lambda: sound.matching_status.matching)  # it is subscribed to anew
+        right = counted("/sound/pressure", np.zeros((9, 9)), n)
+        sound.put(right)
+        while udp.recv(65536) != right:
+            pass
+        mad.put(packet)
+    assert 'result="flood"' in page(metrics)
+
+
+def test_who_is_silent_gives_its_place_to_another(udp, monkeypatch):
+    monkeypatch.setattr(forward, "MOST_SENDERS", 2)
+    now = 0.0
+    counts = Counts("zenoh")
+    to = Address(*udp.getsockname())
+    frames = forward.Forward("gestured/car", to, counts, clock=lambda: now)
+
+    def became(name: str) -> str:
+        """What became of a packet of a sensor."""
+        before = counts.values.copy()
+        payload = zenoh.ZBytes(counted(f"/{name}/pressure", np.zeros((9, 9)), 1))
+        frames.take(SimpleNamespace(key_expr=f"gestured/car/{name}/frames", payload=payload))
+        ((_, result),) = (counts.values - before).keys()
+        return result
+
+    assert [became(name) for name in ("a", "b", "c")] == ["sent", "sent", "overflow"]
+    now = forward.SILENT_S - 1.0
+    assert [became(name) for name in ("a", "c")] == ["sent", "overflow"]
+    now += 2.0
+    assert [became(name) for name in ("c", "a", "b")] == ["sent", "sent", "overflow"]
 
 
 @pytest.mark.parametrize(
