@@ -6,7 +6,7 @@ import numpy as np
 
 from gestured.core.classifier import Classifier
 from gestured.lab.stability.path import Series, events, labels, simulated_series
-from gestured.lab.stability.table import Table, Value
+from gestured.lab.table import Table, Value
 
 PEAKS = (2, 3, 4, 6, 10, 30, 100)  # counts
 

@@ -23,9 +23,9 @@ from gestured.lab.stability.path import simulated_series
 from gestured.lab.stability.precision import precision_table, state_table
 from gestured.lab.stability.relaxation import filters_table
 from gestured.lab.stability.seeds import seeds_table
-from gestured.lab.stability.table import Table
 from gestured.lab.stability.textbook import RANGES, points, textbook_table
 from gestured.lab.stability.wavelet_features import wavelets_table
+from gestured.lab.table import Table
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped
 

@@ -13,8 +13,8 @@ from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.lab.stability.made import IDLE_LEVEL, NOISE
 from gestured.lab.stability.path import Array
-from gestured.lab.stability.table import Table, Value
 from gestured.lab.stability.ways import WindowList, by_onnxruntime, difference, inputs_of
+from gestured.lab.table import Table, Value
 from gestured.model.shipped import LADDER, shipped
 
 DENORMAL = 1e-41  # of the peak; float32's least normal number is 1.2e-38

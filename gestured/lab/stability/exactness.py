@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from gestured.lab.samples import WINDOW
 from gestured.lab.stability.segments import segment_cases
-from gestured.lab.stability.table import Table, Value
 from gestured.lab.stability.ways import WindowList, by_onnxruntime, by_reference, difference, inputs_of
+from gestured.lab.table import Table, Value
 from gestured.model.shipped import LADDER, shipped
 
 LONGEST = 80  # frames; float64, operator by operator, takes minutes for more, and no front end gives more at 15 Hz

@@ -23,7 +23,7 @@ from gestured.lab.stability.made import IDLE_LEVEL, NOISE, swipes
 from gestured.lab.stability.path import events, fault, labels
 from gestured.lab.stability.segments import broken_segments, segment_cases
 from gestured.lab.stability.streams import Case, streams
-from gestured.lab.stability.table import Table, Value
+from gestured.lab.table import Table, Value
 from gestured.model.model import Model
 
 WINDOWS = (

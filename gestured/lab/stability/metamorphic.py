@@ -13,7 +13,7 @@ from gestured.core.classifier import Classifier
 from gestured.core.frames import Segment
 from gestured.lab.dataset import cuts
 from gestured.lab.stability.path import Array, Series, events, labels, simulated_series
-from gestured.lab.stability.table import Table, Value
+from gestured.lab.table import Table, Value
 
 MIRRORED = {
     "swipe_left": "swipe_right",

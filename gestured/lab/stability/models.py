@@ -6,7 +6,6 @@ import torch
 
 from gestured.lab.adapt.weights import base_of
 from gestured.lab.fit import RECURRENT
-from gestured.lab.stability.table import Table, Value
 from gestured.lab.stability.ways import (
     ScoreTable,
     Way,
@@ -19,6 +18,7 @@ from gestured.lab.stability.ways import (
     in_a_row,
     inputs_of,
 )
+from gestured.lab.table import Table, Value
 from gestured.model.shipped import LADDER, shipped
 
 LONG = (80, 10_000)  # frames; no segment at 15 Hz is longer than the first

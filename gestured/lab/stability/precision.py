@@ -10,9 +10,9 @@ import torch
 
 from gestured.lab.adapt.weights import base_of
 from gestured.lab.fit import RECURRENT
-from gestured.lab.stability.table import Table, Value
 from gestured.lab.stability.ways import WindowList, by_onnxruntime, difference, each, in_a_row, unchecked
 from gestured.lab.study.onnx_form import Graph, quantised
+from gestured.lab.table import Table, Value
 from gestured.model.shipped import shipped
 
 STEPS = (2, 3, 4, 6, 10)  # between nothing and the peak

@@ -12,7 +12,7 @@ import numpy as np
 
 from gestured.core.contact import AFTER_S
 from gestured.lab.stability.filters import DECAYS, FILTERS, Array, Filter
-from gestured.lab.stability.table import Table, Value
+from gestured.lab.table import Table, Value
 
 DECADES = (-9, -6, -3, -1, 0, 1, 3, 6, 9)  # of dt / tau
 DAY_S = 86_400.0

@@ -16,8 +16,8 @@ from gestured.lab.dataset import cuts
 from gestured.lab.fit import NETS, FitConfig, logits, pretrain, targets
 from gestured.lab.samples import Samples, collect, sample
 from gestured.lab.stability.path import simulated_series
-from gestured.lab.stability.table import Table, Value
 from gestured.lab.stability.ways import ScoreTable
+from gestured.lab.table import Table, Value
 
 TAUGHT, JUDGED = 11, 12  # seeds of the simulated people who are learned from, and who are judged
 BATCH = 16  # so that a small set makes enough steps

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.lab.stability.relaxation import exact, steps
-from gestured.lab.stability.table import Table
+from gestured.lab.table import Table
 
 TAXELS = 81
 SUBSTEPS = (1, 4, 16, 64, 256)

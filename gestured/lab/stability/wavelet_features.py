@@ -11,9 +11,9 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.lab.stability.table import Table, Value
 from gestured.lab.stability.ways import WindowList
 from gestured.lab.study.wavelets import TINY, WAVELET, WAVELET_LEVEL, spatio_temporal
+from gestured.lab.table import Table, Value
 
 STATISTICS = ("L1 norm", "L2 norm", "skewness", "kurtosis", "standard deviation")
 DIGITS = 50

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gestured.lab.stability import command
-from gestured.lab.stability.table import Table
+from gestured.lab.table import Table
 
 TABLE = Table("Errors", ("way", "error", "how many"), [("ours", 1.234e-16, 3), ("theirs", 0.5, 12)], ("A note.",))
 
