@@ -1,6 +1,6 @@
 """What must not change when the input changes, and what must change with it: exactly in front of the models.
 
-The changes and the streams are those of `gestured-lab stability`, which prints the figures; simulated gestures.
+The streams are simulated gestures.
 """
 
 from functools import cache
@@ -12,21 +12,11 @@ from hypothesis import strategies as st
 
 from gestured.core.mounting import Mounting
 from gestured.lab.dataset import cuts
-from gestured.lab.stability.metamorphic import (
-    Property,
-    doubled,
-    mirrored,
-    on_grid,
-    postponed,
-    raised,
-    renamed,
-    scaled,
-    upside_down,
-)
 from gestured.lab.stability.path import Series, events, labels, simulated_series
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped
+from tests.symmetries import Property, doubled, mirrored, on_grid, postponed, raised, renamed, scaled, upside_down
 
 COUNT = 60  # enough that LEAST lets one label differ
 LEAST = 0.98  # of the labels, where a learned net decides

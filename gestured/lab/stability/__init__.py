@@ -1,1 +1,1 @@
-"""Numerical stability, measured: filters, extremes, models and the metamorphic properties of the whole path."""
+"""Numerical stability, measured: filters, extreme inputs through the whole path, and models by their answers."""

@@ -1,9 +1,8 @@
-"""`gestured-lab stability`: its tables, as Markdown and as JSON, and its figure."""
+"""`gestured-lab stability`: its tables, as Markdown and as JSON."""
 
 import argparse
 import json
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -24,20 +23,14 @@ def test_a_table_is_markdown() -> None:
 def test_tables_are_printed_as_they_are_done_or_as_json(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def tables(quick: bool, out: Path | None) -> Iterator[Table]:
-        assert quick and out is None
+    def tables(quick: bool) -> Iterator[Table]:
+        assert quick
         yield TABLE
 
     monkeypatch.setattr(command, "all_tables", tables)
-    assert command.run(argparse.Namespace(quick=True, json=False, out=None)) == 0
+    assert command.run(argparse.Namespace(quick=True, json=False)) == 0
     assert str(TABLE) in capsys.readouterr().out
-    assert command.run(argparse.Namespace(quick=True, json=True, out=None)) == 0
+    assert command.run(argparse.Namespace(quick=True, json=True)) == 0
     said = json.loads(capsys.readouterr().out)
     assert "cores" in said["measured"]
     assert said["tables"][0]["rows"][0] == ["ours", 1.234e-16, 3]
-
-
-def test_the_figure_is_written_where_it_is_asked_for(tmp_path: Path) -> None:
-    some = command.all_tables(quick=True, out=tmp_path / "new")
-    assert [next(some).title.split(":")[0] for _ in range(2)] == ["Filters", "Methods"]
-    assert (tmp_path / "new" / "stability.svg").read_text().startswith("<svg")

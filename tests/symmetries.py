@@ -9,11 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gestured.core.classifier import Classifier
 from gestured.core.frames import Segment
-from gestured.lab.dataset import cuts
-from gestured.lab.stability.path import Array, Series, events, labels, simulated_series
-from gestured.lab.table import Table, Value
+from gestured.lab.stability.path import Array, Series
 
 MIRRORED = {
     "swipe_left": "swipe_right",
@@ -121,13 +118,6 @@ def doubled() -> Property:
     )
 
 
-def properties() -> list[Property]:
-    """Those of the table."""
-    gains = [scaled(gain) for gain in (1e-3, 2.0**-10, 0.5, 2.0, 2.0**10, 1e3)]
-    levels = [raised(counts) for counts in (-200.0, 1e4, 6e6)]
-    return [postponed(86_400.0), postponed(2.0**30), *gains, *levels, mirrored(), upside_down(), doubled()]
-
-
 def on_grid(stream: Series) -> Series:
     """The same with times that can be shifted exactly."""
     times = np.rint(stream.times / GRID_S) * GRID_S
@@ -138,32 +128,3 @@ def on_grid(stream: Series) -> Series:
 def renamed(found: tuple[str, ...], names: Mapping[str, str]) -> tuple[str, ...]:
     """Labels as they must be after the change."""
     return tuple(names.get(label, label) for label in found)
-
-
-def metamorphic_table(models: Mapping[str, Classifier], count: int) -> Table:
-    """Each property on so many simulated gestures: segments that are the same, labels as they must be, by model."""
-    streams = [on_grid(stream) for _, stream in simulated_series(count)]
-    cut = [cuts(stream.frames, stream.times) for stream in streams]
-    said = {name: [labels(events(stream, model)) for stream in streams] for name, model in models.items()}
-    rows: list[tuple[Value, ...]] = []
-    for change in properties():
-        after = [change.apply(stream) for stream in streams]
-        same = sum(map(change.holds, cut, (cuts(stream.frames, stream.times) for stream in after)))
-        shares: list[Value] = []
-        for name, model in models.items():
-            right = [
-                labels(events(stream, model)) == renamed(before, change.names)
-                for stream, before in zip(after, said[name], strict=True)
-            ]
-            shares.append(f"{100 * sum(right) / count:.1f} %")
-        rows.append((change.name, f"{same}/{count}" if change.exact else "-", *shares))
-    return Table(
-        "Symmetries of the whole path",
-        ("change", "segments the same, bit for bit", *models),
-        rows,
-        (
-            f"{count} simulated gestures of ten kinds. The models' columns: share of takes whose answers",
-            "(gesture, unknown or cancelled) are what they were before, with the names that must change",
-            "changed. Where counts are added, one step of float32 at the peak counts as the same.",
-        ),
-    )

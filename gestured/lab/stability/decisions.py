@@ -1,0 +1,145 @@
+"""Every way to run a shipped model, and fewer digits: how many answers differ from those of the same graph in float64.
+
+The reference evaluates the .onnx file itself with `onnx.reference` (numpy, operator by operator), all its weights,
+constants and casts widened to float64. The torch modules are those that `adapt` starts from.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import onnx
+import torch
+from numpy.typing import NDArray
+from onnx import TensorProto, numpy_helper
+from onnx.reference import ReferenceEvaluator
+from onnx.reference.op_run import OpRun
+
+from gestured.core.features import touch_pattern
+from gestured.lab.adapt.weights import base_of
+from gestured.lab.decide import Answers
+from gestured.lab.early import published
+from gestured.lab.fit import RECURRENT
+from gestured.lab.samples import WINDOW
+from gestured.lab.stability.segments import segment_cases
+from gestured.lab.study.onnx_form import Graph, quantised
+from gestured.lab.table import Table, Value
+from gestured.model.model import Model
+from gestured.model.shipped import shipped
+
+Windows = Sequence[NDArray[np.float32]]  # (T, R, C) each
+Run = Callable[[NDArray[Any]], Sequence[Any]]  # (B, T, R, C) or (B, F) -> scores (B, G), unknown (B,)
+LONGEST = 80  # frames: no front end gives more at 15 Hz, and the reference takes minutes for more
+
+
+class GatherElements(OpRun):  # type: ignore[misc, unused-ignore]
+    """onnx's own (1.23) bears 64 elements at most."""
+
+    def _run(self, data: NDArray[Any], indices: NDArray[Any], axis: int) -> tuple[NDArray[Any]]:
+        return (np.take_along_axis(data, indices, axis),)
+
+
+def extreme_windows(quick: bool) -> Windows:
+    """The windows of segments that no sensor should give, one of each that are the same; every fifth if quick."""
+    made = (WINDOW.apply(segment) for _, segment in segment_cases(quick))
+    kept = {window.tobytes(): window for window in made if 0 < len(window) <= LONGEST}
+    return list(kept.values())[:: 5 if quick else 1]
+
+
+def decisions_table(names: Sequence[str], windows: Windows, quick: bool) -> Table:
+    """Shipped models, on windows of simulated gestures and on extreme ones."""
+    sets = {"gestures": windows, "extreme windows": extreme_windows(quick)}
+    rows: list[tuple[Value, ...]] = []
+    for name in names:
+        data = shipped()[name].read_bytes()
+        model = Model(data, name)  # also sees to it that onnxruntime is imported without its telemetry
+        reference = by_reference(data)
+        for title, some in sets.items():
+            right = answers(reference, name, some)
+            for way, run in ways(name, data, model).items():
+                rows.append((name, f"{len(some)} {title}", way, *difference(answers(run, name, some), right, model)))
+            half = [window.astype(np.float16).astype(np.float32) for window in some]
+            found = answers(model.run, name, half)
+            rows.append((name, f"{len(some)} {title}", "float16 windows", *difference(found, right, model)))
+    return Table(
+        "Models: answers that differ from float64",
+        ("model", "input", "way", "answers that differ", "largest change of a score"),
+        rows,
+        (
+            "Against the same graph in float64, window by window. The extreme windows are those of the table of",
+            f"faults, of at most {LONGEST} frames, each once. An answer is the gesture that is published, or none.",
+            "Scores are from 0 to 1. An int8 model fails its self-test: the daemon would refuse it.",
+        ),
+    )
+
+
+def ways(name: str, data: bytes, model: Model) -> dict[str, Run]:
+    """How a shipped model can be run."""
+    found: dict[str, Run] = {"onnxruntime, as the daemon": model.run, "onnxruntime, two threads": unchecked(data, 2)}
+    if name in RECURRENT:
+        module = base_of(name).judged
+
+        def by_torch(frames: NDArray[Any]) -> Sequence[Any]:
+            with torch.no_grad():
+                return [output.numpy() for output in module(torch.from_numpy(frames))]
+
+        found["torch"] = by_torch
+        smaller = quantised(Graph(data))
+        if smaller is not None:
+            found["int8 weights"] = unchecked(smaller.data)
+    return found
+
+
+def by_reference(data: bytes) -> Run:
+    """The graph in float64."""
+    runner = ReferenceEvaluator(widened(data), new_ops=[GatherElements])
+    (name,) = runner.input_names
+
+    return lambda values: list(runner.run(["scores", "unknown"], {name: values.astype(np.float64)}))
+
+
+def unchecked(data: bytes, threads: int = 1) -> Run:
+    """A graph whose outputs need not be those of its self-test."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+    (name,) = (value.name for value in session.get_inputs())
+    return lambda values: list(session.run(("scores", "unknown"), {name: values}))
+
+
+def widened(data: bytes) -> onnx.ModelProto:
+    """The graph with float64 wherever it has float32."""
+    proto = onnx.load_from_string(data)
+
+    def wide(tensor: onnx.TensorProto) -> onnx.TensorProto:
+        if tensor.data_type != TensorProto.FLOAT:
+            return tensor
+        return numpy_helper.from_array(numpy_helper.to_array(tensor).astype(np.float64), tensor.name)
+
+    for tensor in proto.graph.initializer:
+        tensor.CopyFrom(wide(tensor))
+    for node in proto.graph.node:
+        for attribute in node.attribute:
+            if attribute.type == onnx.AttributeProto.TENSOR:
+                attribute.t.CopyFrom(wide(attribute.t))
+            if node.op_type == "Cast" and attribute.name == "to" and attribute.i == TensorProto.FLOAT:
+                attribute.i = TensorProto.DOUBLE
+    for value in (*proto.graph.input, *proto.graph.output, *proto.graph.value_info):
+        if value.type.tensor_type.elem_type == TensorProto.FLOAT:
+            value.type.tensor_type.elem_type = TensorProto.DOUBLE
+    return proto
+
+
+def answers(run: Run, name: str, windows: Windows) -> Answers:
+    """What is said of each window by itself; the forest is given its features."""
+    inputs = windows if name in RECURRENT else [touch_pattern(window, WINDOW.rate_hz) for window in windows]
+    scores, unknown = zip(*(run(one[np.newaxis])[:2] for one in inputs), strict=True)
+    return np.concatenate(scores), np.concatenate(unknown)
+
+
+def difference(found: Answers, right: Answers, model: Model) -> tuple[int, float]:
+    """(windows whose published answer is another one, largest change of any score)."""
+    changed = published(found, model.threshold) != published(right, model.threshold)
+    return int(changed.sum()), max(float(np.abs(one - two).max()) for one, two in zip(found, right, strict=True))
