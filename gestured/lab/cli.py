@@ -120,10 +120,9 @@ def parser() -> argparse.ArgumentParser:
     early.add_argument("--model", default="cnn_lstm", help="the model that is asked (default: cnn_lstm)")
     early.add_argument("--minutes", type=float, default=20, help="minutes of sessions of each kind (default: 20)")
     early.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (default: 900)")
-    stability = add("stability", "measure filters, extreme inputs, models and symmetries of the whole path",
+    stability = add("stability", "measure filters, extreme inputs through the whole path, and models by their answers",
                     "gestured-lab stability --quick")  # fmt: skip
     stability.add_argument("--quick", action="store_true", help="some seconds instead of some minutes")
-    stability.add_argument("--out", type=Path, help="folder for stability.svg, error against run time")
     study = add("study", "compare every method of the paper, and some beyond it, under several protocols; "
                 "writes one HTML page, study.json and CSV files; goes on where it was interrupted",
                 "gestured-lab study --out report/ --jobs 2")  # fmt: skip
@@ -135,7 +134,6 @@ def parser() -> argparse.ArgumentParser:
                        "picture is renewed")  # fmt: skip
     study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: "
                        "another generator's (python -m tests.foreign.recordings) or another sensor's")  # fmt: skip
-    study.add_argument("--recordings", **mine, help="recordings of your own")
     study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")
     study.add_argument(
         "--seed", type=int, default=0, help="of splits and training: same seed, same numbers (default: 0)"

@@ -10,17 +10,17 @@ from gestured.lab import train
 from gestured.lab.evaluate import outcome
 from gestured.lab.fit import targets
 from gestured.record.arrays import write
-from tests.lab.study.test_own import recordings
+from tests.lab.adapt.recorded import cut_gestures
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Four gestures, one of which nothing is to be seen of; and a session's file, which holds two of them again."""
-    made = recordings(("0", "1"))
+    made = cut_gestures(("0", "1"), ("swipe_up", "one_tap"))
     frames = made.frames.copy()
     frames[made.offsets[1] : made.offsets[2]] = frames[made.offsets[1]]
     cut = replace(made, frames=frames, subjects=np.array([0, 0, 1, 1]), kinds=made.labels)
-    again = replace(recordings(("0",)), subjects=np.array([0, 0]), kinds=made.labels[:2])
+    again = replace(cut_gestures(("0",), ("swipe_up", "one_tap")), subjects=np.array([0, 0]), kinds=made.labels[:2])
     for name, recorded in zip(train.REAL_FILES, (cut, again), strict=True):
         write(tmp_path / name, recorded)
     return tmp_path

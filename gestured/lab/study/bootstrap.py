@@ -1,7 +1,5 @@
 """95 % intervals by resampling participants: gestures of one person are alike, so people are what was drawn."""
 
-from collections.abc import Iterable
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -30,9 +28,3 @@ def summary(right: ArrayLike, people: ArrayLike) -> dict[str, float]:
     """The same with names, rounded to a hundredth of a per cent; None where there is nothing."""
     values = interval(right, people)
     return {name: round(value, 4) for name, value in zip(("right", "low", "high"), values, strict=True)}
-
-
-def curve(points: Iterable[tuple[ArrayLike, ArrayLike]]) -> dict[str, list[float]]:
-    """The summaries of several points, name by name."""
-    found = [summary(right, people) for right, people in points]
-    return {name: [point[name] for point in found] for name in ("right", "low", "high")}

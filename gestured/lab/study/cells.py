@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from joblib import Parallel, delayed, parallel_config
 
 from gestured.core.errors import GesturedError
@@ -73,21 +72,9 @@ class Schedule:
             )
 
 
-OWN_SET = "own"  # of a researcher's recordings, which may be too few to learn from
-
-
 def compute(task: Task, data: Data) -> tuple[Task, Result]:
-    """A task and its result; GesturedError where own recordings are too few to learn from."""
-    try:
-        return task, run(task, data)
-    except ValueError as error:
-        if task.data != OWN_SET:
-            raise
-        people = len(np.unique(data.gestures.people))
-        raise GesturedError(
-            f"--recordings: {len(data.gestures)} gestures of {people} people are too few for {task.method}: "
-            f"{' '.join(str(error).split())[:120]}; record more people, or leave --recordings out"
-        ) from None
+    """A task and its result."""
+    return task, run(task, data)
 
 
 @contextmanager

@@ -21,7 +21,7 @@ class Data:
     """A set of gestures. Two are equal where their keys are, so that a process prepares each once."""
 
     key: str  # a digest of all of it
-    name: str = field(compare=False)  # simulated, real or own
+    name: str = field(compare=False)  # simulated, real or foreign
     gestures: Samples = field(compare=False)
     wide: Samples | None = field(compare=False, default=None)  # other people on randomised sensors: to learn from only
     judges: Samples | None = field(compare=False, default=None)  # of another generator: they judge and teach nothing

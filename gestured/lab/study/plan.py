@@ -23,7 +23,6 @@ class Plan:
     tuning_steps: int = 250  # batches for networks while hyperparameters are compared
     wide: int = 4_000  # takes of the wide stream to learn from; two thirds are gestures
     real: int | None = None  # gestures of each real subject; None: all
-    learning: tuple[int, ...] = (4, 12)  # participants to learn from; the held-out protocol adds the last point
     timed: int = 60  # gestures that the run time is measured on, each cold (after 67 ms) and warm
     minutes: float = 20.0  # of continuous sessions for each model
 
@@ -32,7 +31,7 @@ class Plan:
         """What takes some minutes on two cores."""
         return cls(
             seed, True, 1, folds=2, tuning_people=0, new_people=1, steps=40, tuning_steps=0, wide=0, real=40,
-            learning=(), timed=3, minutes=0.0,
+            timed=3, minutes=0.0,
         )  # fmt: skip
 
     def trials(self) -> NDArray[np.int64]:

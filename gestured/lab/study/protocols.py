@@ -20,11 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.lab.study import elapsed
 from gestured.lab.study.material import JUDGE, SHIFT, Data, Form, Pool, pool
 from gestured.lab.study.methods import METHODS, Scorer
 from gestured.lab.study.shifting import THRESHOLD
-from gestured.lab.study.training import Indices, Net
+from gestured.lab.study.training import Indices
 from gestured.simulator import GESTURES
 
 PAPER, PADDED, CLEAN, PARTICIPANTS, REAL, FOREIGN = "paper", "padded", "clean", "participants", "real", "foreign"
@@ -46,11 +45,9 @@ class Task:
     data: str
     seed: int
     folds: int
-    people: int = 0  # learn from so many participants only; 0: from all that are not held out
     length: float = LENGTH  # of all windows in the paper's protocol: this quantile of the gestures' lengths
     box: float = THRESHOLD  # of the peak: what is in Algorithm 1's bounding box
     average: int = AVERAGE_FRAMES  # frames of the running average in the paper's protocol; 1: none
-    elapsed: bool = False  # ask the network in the middle of each gesture too
 
 
 def values_of(values: Any) -> tuple[tuple[str, Any], ...]:
@@ -101,9 +98,8 @@ def splits(task: Task, of: Pool) -> Iterator[tuple[Indices, Indices]]:
     everybody = rng.permutation(np.unique(people))
     for fold in np.array_split(everybody, min(task.folds, len(everybody))):
         others = everybody[~np.isin(everybody, fold)]
-        taught = others[: task.people] if task.people else others
-        owner = np.where(of.source >= 0, people[of.source], taught[0])  # strangers may always be learned from
-        yield np.flatnonzero(np.isin(owner, taught)), np.flatnonzero(np.isin(people, fold))
+        owner = np.where(of.source >= 0, people[of.source], others[0])  # strangers may always be learned from
+        yield np.flatnonzero(np.isin(owner, others)), np.flatnonzero(np.isin(people, fold))
 
 
 def fitted(task: Task, inputs: Any, train: Indices, labels: NDArray[np.int64]) -> Scorer:
@@ -115,13 +111,11 @@ def run(task: Task, data: Data) -> Result:
     """Every judged gesture of a cell: whose it was, what it was, what it was called and how surely.
 
     `same` and `version` (protocols that augment before they split): whether the very same window, and whether any
-        shifted version of the same gesture, was learned from. `elapsed`, where asked for: right or not at each of
-        `elapsed.POINTS`.
+        shifted version of the same gesture, was learned from.
     """
     of, inputs = material(task, data)
     found: dict[str, list[Any]] = {n: [] for n in ("source", "person", "truth", "predicted", "confidence", "fold")}
     seen: dict[str, list[bool]] = {"same": [], "version": []}
-    early: list[list[bool]] = []
     taught, seconds = 0, 0.0
     for fold, (train, test) in enumerate(splits(task, of)):
         start = time.perf_counter()
@@ -139,9 +133,5 @@ def run(task: Task, data: Data) -> Result:
             itself = of.source[train][of.same[train]]  # gestures that are learned from as they are
             seen["same"] += (of.same[test] & np.isin(of.source[test], itself)).tolist()
             seen["version"] += np.isin(of.source[test], of.source[train]).tolist()
-        if task.elapsed:
-            assert isinstance(model, Net)
-            named = elapsed.answers_over_time(model, of.samples, test, task.seed)
-            early += (named == of.labels[test, None]).tolist()
     folds = found["fold"][-1] + 1
-    return {**found, **seen, "elapsed": early, "train": taught // folds, "seconds": round(seconds, 3)}
+    return {**found, **seen, "train": taught // folds, "seconds": round(seconds, 3)}

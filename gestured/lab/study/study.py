@@ -4,7 +4,7 @@ import argparse
 import csv
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,16 +17,14 @@ from gestured.lab.dataset import simulated
 from gestured.lab.digest import file_digest
 from gestured.lab.made_of import made_of, renew
 from gestured.lab.samples import Samples
-from gestured.lab.study import cohort, elapsed, failures, own, signals, tables
+from gestured.lab.study import cohort, recorded, tables
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.choices import choices
 from gestured.lab.study.fields import renewed, with_fields
-from gestured.lab.study.learning import learning
 from gestured.lab.study.machine import machine
-from gestured.lab.study.material import SHIFT, Data
+from gestured.lab.study.material import Data
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
-from gestured.lab.study.protocols import PARTICIPANTS, Result
 from gestured.lab.study.report.choice import table
 from gestured.lab.study.report.page import write_report
 from gestured.lab.study.report.picture import write_picture
@@ -63,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
         raise GesturedError(f"--seeds: expected 1 or more, found {args.seeds}")
     plan = Plan.small(args.seed) if args.quick else Plan(args.seed, seeds=args.seeds)
     schedule = Schedule(args.cache / "study", args.jobs, args.cluster)
-    study = compute(plan, schedule, args.real, args.recordings, args.foreign)
+    study = compute(plan, schedule, args.real, args.foreign)
     study["about"]["command"] = args.words
     args.out.mkdir(parents=True, exist_ok=True)
     write(study, args.out)
@@ -84,24 +82,19 @@ def _kept(path: Path) -> dict[str, Any]:
         raise GesturedError(f"--draw: {path}: expected study.json or operating-points.json: {error!r}") from None
 
 
-def compute(
-    plan: Plan, schedule: Schedule, folder: Path | None, recordings: Sequence[Path], others: Path | None = None
-) -> dict[str, Any]:
+def compute(plan: Plan, schedule: Schedule, folder: Path | None, others: Path | None = None) -> dict[str, Any]:
     """Everything that study.json holds; `others` are recordings that judge and teach nothing."""
     start = time.monotonic()
     schedule.cache.mkdir(parents=True, exist_ok=True)
-    mine = own.own(recordings)  # first, so that a wrong file is told of before half an hour of work
+    real = recorded.real(folder, plan.real)  # first, so that a wrong file is told of before half an hour of work
+    foreign = recorded.judges(others) if others else None
     people = cohort.load_cohort(schedule.cache, plan.trials(), schedule.jobs)
-    real = own.real(folder, plan.real)
-    foreign = own.judges(others) if others else None
     wide = _strangers(plan, schedule)
     sets = {"simulated": Data.of("simulated", people.samples, wide)}
     if real:
         sets["real"] = Data.of("real", real[0], wide)
     if foreign:
         sets["foreign"] = Data.of("foreign", people.samples, wide, foreign[0])
-    if mine.samples is not None:
-        sets["own"] = Data.of("own", mine.samples)
     tuned, tuning = tune(plan, _others(plan, schedule), schedule)
     cells = tables.wanted(plan, sets)
     tasks = {cell: tables.tasks_of(cell, tuned, plan) for cell in cells}
@@ -122,19 +115,13 @@ def compute(
                 "performed": people.performed, "cut": len(people), "lost": people.lost,
             },
             "real": real[1] if real else None, "foreign": foreign[1] if foreign else None,
-            "own": mine.files, "left_out": mine.left_out,
         },
         "methods": {method.id: _about(method.id, tuned) for method in METHODS.values()},
         "cells": list(figures.values()),
         "copies": tables.copies(found),
         "tuning": tuning,
-        "elapsed": tables.elapsed_rows(found, elapsed.POINTS),
         "calibration": tables.calibration(found),
         "choices": [] if plan.quick else choices(plan, tuned, people, sets, schedule),
-        "learning": learning(plan, tuned, sets, schedule),
-        "failures": _failures(found, people),
-        "signals": signals.signals(),
-        "double_tap": signals.double_tap(),
     }  # fmt: skip
     # What is timed comes last and alone: nothing else of ours runs beside it.
     simulated_data = sets["simulated"]
@@ -158,18 +145,6 @@ def played(plan: Plan, tuned: dict[str, Values], data: Data, schedule: Schedule)
         "online", online.__module__, key, lambda: online(plan, tuned, data, schedule.cache / "models")
     )
     return made
-
-
-def _failures(found: Mapping[tables.Cell, Result], people: cohort.Cohort) -> list[dict[str, Any]]:
-    """Of each method's tuned setting with shifted copies, participants held out."""
-    by = failures.groups(people)
-    return [
-        entry
-        for method in METHODS
-        for entry in failures.failures(
-            method, found[tables.Cell(method, tables.TUNED, SHIFT, PARTICIPANTS, "simulated")], by
-        )
-    ]
 
 
 def _others(plan: Plan, schedule: Schedule) -> Data | None:
@@ -201,7 +176,7 @@ def write(study: Mapping[str, Any], out: Path) -> None:
     """study.json, and a CSV file for each section that is a table."""
     with atomic_write(out / "study.json", PUBLIC) as file:
         file.write(json.dumps(study).encode())
-    for name in ("cells", "copies", "run_time", "learning", "online"):
+    for name in ("cells", "copies", "run_time", "online"):
         rows = [{k: v for k, v in row.items() if not isinstance(v, list | dict)} for row in study.get(name, [])]
         if not rows:
             continue

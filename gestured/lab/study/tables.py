@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.lab.study.bootstrap import curve, summary
+from gestured.lab.study.bootstrap import summary
 from gestured.lab.study.material import AUGMENTATIONS, SHIFT, UNCHANGED, WIDE, Data
 from gestured.lab.study.methods import METHODS, Method
 from gestured.lab.study.plan import Plan
@@ -62,8 +62,7 @@ def tasks_of(cell: Cell, tuned: Mapping[str, Values], plan: Plan) -> list[Task]:
     if cell.settings == GIVEN:
         assert method.paper is not None
         values = method.paper[cell.augmentation]
-    early = (cell.settings, cell.augmentation, cell.protocol) == (TUNED, SHIFT, PARTICIPANTS) and method.elapses
-    first = task(method, values, cell.augmentation, cell.protocol, cell.data, plan, elapsed=early)
+    first = task(method, values, cell.augmentation, cell.protocol, cell.data, plan)
     return [replace(first, seed=plan.seed + k) for k in range(plan.seeds)]
 
 
@@ -78,17 +77,12 @@ def pooled(results: Sequence[Result]) -> Result:
     }
 
 
-def task(
-    method: Method, values: Values, augmentation: str, protocol: str, data: str, plan: Plan,
-    *, people: int = 0, elapsed: bool = False,
-) -> Task:  # fmt: skip
+def task(method: Method, values: Values, augmentation: str, protocol: str, data: str, plan: Plan) -> Task:
     """A task with the plan's seed, folds and batches."""
     chosen = dict(values)
     if plan.steps is not None and method.network:
         chosen["steps"] = plan.steps
-    return Task(
-        method.id, values_of(chosen), augmentation, protocol, data, plan.seed, plan.folds, people, elapsed=elapsed
-    )  # fmt: skip
+    return Task(method.id, values_of(chosen), augmentation, protocol, data, plan.seed, plan.folds)
 
 
 def right(result: Result) -> NDArray[np.bool_]:
@@ -140,15 +134,6 @@ def copies(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:
 
 def _mean(values: NDArray[np.bool_]) -> float | None:
     return round(float(values.mean()), 4) if len(values) else None
-
-
-def elapsed_rows(found: Mapping[Cell, Result], points: Sequence[Mapping[str, float]]) -> list[dict[str, Any]]:
-    """Right answers over the course of the gesture, of each network that was asked."""
-    return [
-        {"method": cell.method, "at": list(points), **curve((at, result["person"]) for at in zip(*early, strict=True))}
-        for cell, result in found.items()
-        if (early := result["elapsed"])
-    ]
 
 
 def calibration(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:

@@ -1,6 +1,5 @@
 """A study that nobody computed: plausible in form, plainly invented in its numbers."""
 
-import math
 import random
 from typing import Any
 
@@ -32,21 +31,6 @@ SHORT = {  # how a reader may expect them in a figure
     "trajectory": "trajectory gradient boosting",
 }
 NAMES = {method: SHORT.get(method, title) for method, (title, _, _) in METHODS.items()}
-GROUPS = {
-    "gesture": list(GESTURES),
-    "speed": ["slow", "normal", "fast"],
-    "inclination": ["arm pose 1", "arm pose 2", "arm pose 3"],
-    "participant": [f"{k:02d}" for k in range(34)],
-    "hand size": ["low: 9.01 to 11.2 mm", "middle: 11.2 to 12.8 mm", "high: 12.8 to 15.1 mm"],
-    "pressure": ["low: 112 to 391 counts", "middle: 391 to 640 counts", "high: 640 to 1.23e+03 counts"],
-    "place": [f"{part}: 0.123 to 2.34 taxels from the middle" for part in ("low", "middle", "high")],
-    "signal to noise": ["low: 12 to 40.1", "middle: 40.1 to 80.2", "high: 80.2 to 161"],
-}
-# The sections of a study that are lists.
-LISTS = (
-    "cells", "copies", "tuning", "choices", "run_time", "elapsed", "learning", "calibration", "failures", "online",
-    "online_shipped",
-)  # fmt: skip
 
 
 def made_study(seed: int = 5) -> Study:
@@ -59,6 +43,7 @@ def made_study(seed: int = 5) -> Study:
         "seeds": 3,
         "quick": False,
         "models": {"lstm": "ab" * 32},
+        "paper": "somebody, made up",
     }
     study: Study = {
         "about": {**about, "gestures": list(GESTURES)},
@@ -70,12 +55,7 @@ def made_study(seed: int = 5) -> Study:
         "tuning": [_tuning(method, chance) for method in ("st_knn", "st_svm", "tp_svm", "lstm")],
         "choices": _choices(chance),
         "run_time": [row for method in METHODS for row in _run_time(method, chance)],
-        "elapsed": [_elapsed(method, chance) for method in ("lstm", "cnn_lstm", "cnn_gru", "tcn")],
-        "learning": [_learning(method, chance) for method in ("tp_rf", "st_svm", "lstm", "cnn_lstm", "trajectory")],
         "calibration": [_calibration(method, chance) for method in ("tp_rf", "lstm", "cnn_lstm", "tcn")],
-        "failures": [_failure(method, by, chance) for method in ("tp_rf", "lstm", "cnn_lstm") for by in GROUPS],
-        "signals": {gesture: _signal(k) for k, gesture in enumerate(GESTURES)},
-        "double_tap": _double_tap(),
         "online": [_online(method, chance) for method in ("tp_rf", "lstm", "cnn_lstm")],
         "said": _said(),
         "online_shipped": [_online(method, chance) for method in ("lstm", "cnn_lstm")],
@@ -84,28 +64,6 @@ def made_study(seed: int = 5) -> Study:
         beaten = (r["median_us"] < row["median_us"] and r["right"] >= row["right"] for r in study["run_time"])
         row["front"] = not any(beaten)
     return study
-
-
-def small_study() -> Study:
-    """A little of every part: quick to draw."""
-    study = made_study()
-    few = ("tp_svm", "lstm", "tcn")
-    small: Study = {
-        name: [row for row in study[name] if row["method"] in few][:4]
-        for name in ("copies", "tuning", "run_time", "elapsed", "learning", "calibration")
-    }
-    small["cells"] = [cell for cell in study["cells"] if cell["method"] in few and cell["augmentation"] != "wide"]
-    by = ("gesture", "participant", "place")
-    small["failures"] = [row for row in study["failures"] if row["method"] == "lstm" and row["by"] in by]
-    return {**study, **small, "signals": {"one_tap": study["signals"]["one_tap"]}}
-
-
-def empty_study() -> Study:
-    """The same with nothing computed, as small as the schema allows."""
-    study = made_study()
-    data = {"simulated": study["data"]["simulated"], "real": None, "own": [], "left_out": []}
-    nothing: Study = {name: [] for name in LISTS}
-    return {**study, **nothing, "methods": {}, "data": data, "signals": {}, "double_tap": None}
 
 
 def _machine() -> Study:
@@ -131,16 +89,7 @@ def _data() -> Study:
             "lost": 49,
         },
         "real": {"name": "CapFingerId (made-up figures)", "subjects": 20, "gestures": 1801, "non_gestures": 350},
-        "own": [{"file": "mine.npz", "recordings": 30, "used": 28}],
-        "left_out": [
-            {"file": "mine.npz", "recording": 4, "field": "times", "reason": "times go back at frame 3"},
-            {
-                "file": "other.npz",
-                "recording": None,
-                "field": "frames",
-                "reason": "expected three dimensions, found two",
-            },
-        ],
+        "foreign": {"name": "foreign.npz", "participants": 20, "performed": 200, "cut": 199},
     }
 
 
@@ -275,65 +224,12 @@ def _said() -> list[Study]:
     return found
 
 
-def _elapsed(method: str, chance: random.Random) -> Study:
-    at = [{"share": share} for share in (0.25, 0.5, 0.75, 1.0)] + [{"after_s": after} for after in (0.0, 0.1, 0.2, 0.3)]
-    right = [_strength(method) * level - chance.uniform(0, 0.03) for level in (0.35, 0.62, 0.86, 0.97, 0.98, 1, 1, 1)]
-    return {
-        "method": method,
-        "at": at,
-        "right": right,
-        "low": [r - 0.03 for r in right],
-        "high": [r + 0.03 for r in right],
-    }
-
-
-def _learning(method: str, chance: random.Random) -> Study:
-    people = [2, 4, 8, 16, 28]
-    right = [_strength(method) - 0.5 / count + chance.uniform(-0.01, 0.01) for count in people]
-    return {
-        "method": method,
-        "participants": people,
-        "right": right,
-        "low": [r - 0.04 for r in right],
-        "high": [r + 0.04 for r in right],
-    }
-
-
 def _calibration(method: str, chance: random.Random) -> Study:
     bins = [
         {"confidence": c / 10 + 0.05, "right": c / 10 + chance.uniform(-0.08, 0.05), "n": 4 + c**3}
         for c in range(1, 10)
     ]
     return {"method": method, "bins": bins, "error": 0.043}
-
-
-def _failure(method: str, by: str, chance: random.Random) -> Study:
-    return {
-        "method": method,
-        "by": by,
-        "groups": [
-            {"name": name, "n": 90, **_between(_strength(method) - chance.uniform(0, 0.12), 0.05)}
-            for name in GROUPS[by]
-        ],
-    }
-
-
-def _signal(k: int) -> Study:
-    times = [t / 15 for t in range(20)]
-    return {
-        "times_s": times,
-        "sum": [900 * math.exp(-((t - 0.6) ** 2) / 0.08) * (1 + 0.1 * math.sin(9 * t + k)) for t in times],
-    }
-
-
-def _double_tap() -> Study:
-    times = [t / 15 for t in range(15)]
-    force = [math.exp(-((t - 0.25) ** 2) / 0.005) + 0.9 * math.exp(-((t - 0.62) ** 2) / 0.006) for t in times]
-    snaps = []
-    for t in (2, 4, 6, 9, 12):
-        frame = [[400 * force[t] * math.exp(-((r - 4) ** 2 + (c - 5) ** 2) / 1.5) for c in range(9)] for r in range(9)]
-        snaps.append({"t_s": times[t], "frame": frame})
-    return {"times_s": times, "sum": [1900 * f for f in force], "snapshots": snaps}
 
 
 def _online(method: str, chance: random.Random) -> Study:

@@ -6,12 +6,10 @@ import torch
 from sklearn.ensemble import HistGradientBoostingClassifier
 
 from gestured.lab.study import onnx_form, training
-from gestured.lab.study.elapsed import moments
 from gestured.lab.study.material import classes
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.nets import HistoryNet, sequence_net
 from gestured.lab.study.trajectory_boosting import trajectory_matrix
-from tests.lab.made import line, window
 from tests.lab.study.material_made import samples
 
 KINDS = ("lstm", "cnn_lstm", "cnn_gru", "tcn", "transformer")
@@ -75,8 +73,3 @@ def test_scores_come_in_the_order_that_was_asked_for() -> None:
     net = training.Net(sequence_net("lstm", 8, 10).eval())
     index = np.random.default_rng(0).permutation(len(made))
     assert np.allclose(net.scores(inputs, index), net.scores(inputs, np.arange(len(made)))[index], atol=1e-6)
-
-
-def test_moments_of_a_gesture() -> None:
-    first, at = moments(window(line((1, 4), (7, 4), 8)))  # a quiet frame before and after
-    assert (first, at) == (1, [2, 4, 6, 8])

@@ -14,10 +14,10 @@ from gestured.record.arrays import write
 from tests.foreign.recordings import recordings
 
 SECTIONS = (
-    "about", "machine", "data", "methods", "cells", "copies", "tuning", "choices", "run_time", "elapsed", "learning",
-    "calibration", "failures", "signals", "double_tap", "online",
+    "about", "machine", "data", "methods", "cells", "copies", "tuning", "choices", "run_time", "calibration",
+    "online",
 )  # fmt: skip
-LEFT = ("tp_knn", "lstm")
+LEFT = ("tp_knn", "tp_rf", "lstm", "cnn_lstm")  # the fastest, and those that ship
 
 
 @pytest.mark.slow

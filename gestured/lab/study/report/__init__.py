@@ -1,1 +1,1 @@
-"""The report: study.json drawn as one self-contained HTML page (page.py)."""
+"""The report: study.json as one self-contained HTML page and as Markdown (page.py), and the picture of the README."""

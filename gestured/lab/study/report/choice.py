@@ -36,15 +36,13 @@ HEAD = (
 
 def table(study: Study) -> list[str]:
     """Lines of Markdown; a model that was not timed is left out."""
-    rows = {
-        (row["method"], row["settings"]): row for row in reading.part(study, "run_time") if row["precision"] != "int8"
-    }
+    rows = {(row["method"], row["settings"]): row for row in study["run_time"] if row["precision"] != "int8"}
     return [*HEAD, *(_line(study, one, rows[one[:2]]) for one in CHOICES if one[:2] in rows)]
 
 
 def _line(study: Study, one: Choice, row: Row) -> str:
     ships = one.settings == "shipped"
-    played = {of["method"]: of for of in study.get("online_shipped" if ships else "online") or []}
+    played = {of["method"]: of for of in study["online_shipped" if ships else "online"]}
     fields = [row["fields"].get(field, {}) for field in FIELDS]
     wrong = ", ".join(formats.percent(of.get("wrong")) for of in fields)
     error = ", ".join(_with_interval(of) for of in fields)
@@ -53,7 +51,7 @@ def _line(study: Study, one: Choice, row: Row) -> str:
     cells = (
         name, one.when, wrong, error, formats.duration(row["cold_us"]),
         formats.NONE if memory is None else f"{memory / 2**20:.0f} MiB",
-        formats.number(played.get(one.method, {}).get("false_per_minute", formats.NONE)),
+        formats.number(played.get(one.method, {}).get("false_per_minute"), ".4g"),
     )  # fmt: skip
     return f"| {' | '.join(cells)} |"
 

@@ -9,42 +9,40 @@ NONE = "–"
 THIN = "\u202f"  # a narrow space that does not break
 
 
-def percent(share: float | None, digits: int = 1) -> str:
+def percent(share: float | None) -> str:
     """0.8321 -> 83.2; the unit stands in the heading or in the sentence."""
-    return NONE if share is None else f"{100 * share:.{digits}f}"
+    return NONE if share is None else f"{100 * share:.1f}"
 
 
-def with_unit(share: float | None, digits: int = 1) -> str:
-    """A share in percent with its unit: 0.8321 -> 83.2 %."""
-    return NONE if share is None else f"{percent(share, digits)}{THIN}%"
-
-
-def points(difference: float | None) -> str:
-    """A difference of two shares, in percentage points with its sign."""
-    return NONE if difference is None else f"{100 * difference:+.1f}".replace("-", "\u2212")
+def number(value: float | None, form: str = ".2f") -> str:
+    """A number in some form of Python's."""
+    return NONE if value is None else format(value, form)
 
 
 def interval(row: Mapping[str, Any]) -> str:
-    """A row's confidence interval in percent, empty where it has none."""
+    """A row's confidence interval in per cent, empty where it has none."""
     low, high = row.get("low"), row.get("high")
     return "" if low is None or high is None else f"{percent(low)}–{percent(high)}"
 
 
-def duration(value: float | None, unit_s: float = 1e-6) -> str:
-    """Microseconds, or another unit, in three digits and the unit that fits them."""
-    return NONE if value is None else EngFormatter("s", sep=THIN)(float(f"{value:.3g}") * unit_s)
+def share(row: Mapping[str, Any] | None) -> str:
+    """A share with its interval: 0.83 (0.81-0.85)."""
+    return NONE if row is None else f"{row['right']:.2f} ({row['low']:.2f}-{row['high']:.2f})"
 
 
-def count(number: int | None) -> str:
-    """A whole number with its thousands apart."""
-    return NONE if number is None else f"{number:,}".replace(",", THIN)
+def duration(microseconds: float) -> str:
+    """In three digits and the unit that fits them."""
+    return EngFormatter("s", sep=THIN)(float(f"{microseconds:.3g}") * 1e-6)
 
 
-def number(value: Any) -> str:
-    """A value of a hyperparameter."""
+def values(hyperparameters: Mapping[str, Any] | None) -> str:
+    """Hyperparameters by name; where they depend on the augmentation, those of each that differ from the first."""
+    found = dict(hyperparameters or {})
+    if not found or not all(isinstance(value, Mapping) for value in found.values()):
+        return ", ".join(f"{name} = {_value(value)}" for name, value in found.items()) or NONE
+    known, *others = found.items()
+    return "; ".join([values(known[1]), *(f"{name}: {values(of)}" for name, of in others if of != known[1])])
+
+
+def _value(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def plain(gesture: Any) -> str:
-    """The name of a gesture or group, as one says it."""
-    return str(gesture).replace("_", " ")
