@@ -53,7 +53,9 @@ class OscSlip(Protocol):
             values = last
         else:
             return None
-        return None if values is None else reading_of([*before, *values.tolist()], self.shape, values.dtype)
+        if values is None or values.size < self.taxels:  # what stands before the numbers is a counter, never a taxel
+            return None
+        return reading_of([*before, *values.tolist()], self.shape, values.dtype)
 
     @staticmethod
     def fits(data: bytes) -> str | None:

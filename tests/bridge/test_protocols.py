@@ -25,9 +25,10 @@ def frames(name: str, count: int, seed: int = 0) -> list[np.ndarray]:
 
 
 def message(address: str, *arguments: object) -> bytes:
+    """A message of values, or of (value, type tag)."""
     builder = OscMessageBuilder(address)
     for argument in arguments:
-        builder.add_arg(argument)
+        builder.add_arg(*argument if isinstance(argument, tuple) else (argument,))
     return builder.build().dgram
 
 
@@ -151,6 +152,20 @@ def test_forms_of_osc():
         assert np.array_equal(reading.values, values), name
         assert reading.counter == (7 if "counted" in name else None), name
     assert protocol.push(slip_encoded(message("/x", "text")) + slip_encoded(message("/x", *range(6)))) == []
+
+
+def test_what_stands_before_the_numbers_is_no_taxel():
+    protocol = opened("osc-slip")
+    numbers = list(map(float, range(SIZE)))
+    too_few = [
+        message("/x", before, *numbers[1:]) for before in ("text", b"blob", (2**62, "h"), (1e300, "d"), (0, "i"))
+    ]
+    too_many = [message("/x", 1, "text", *numbers), message("/x", 1, 2, *numbers), message("/x", "text", *numbers)]
+    for packet in too_few + too_many:
+        assert protocol.push(slip_encoded(packet)) == []
+    for before in ((7, "h"), (7.0, "d"), 7):
+        (reading,) = protocol.push(slip_encoded(message("/x", before, *numbers)))
+        assert reading.counter == 7 and np.array_equal(reading.values.ravel(), numbers)
 
 
 def test_a_number_before_a_line_counts_frames():
