@@ -46,7 +46,7 @@ def exposure(folder: Path, unit: str) -> float:
         ("gestured-standalone.service", None, 1.0),
         ("gestured@.service", None, 1.0),
         ("gestured-bridge@.service", None, 1.0),
-        ("gestured-serial@.service", None, 1.3),
+        ("gestured-serial@.service", None, 1.1),
     ],
 )
 def test_exposure(tmp_path: Path, unit: str, dropin: str | None, most: float):
