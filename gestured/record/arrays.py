@@ -61,7 +61,7 @@ def load(path: str | Path, without: Collection[str] = (), look: Callable[[Record
     try:
         with open_regular(path) as file:
             archive = Archive(file, _KNOWN.difference(without), MAX_RECORDING_BYTES)
-            forms = {field: header.stand_in() for field, header in archive.headers.items()}
+            forms = archive.forms
             missing = [field for field in _REQUIRED if field not in forms]
             if missing:
                 raise Wrong(f"{missing[0]}: is missing, expected the fields {', '.join(_REQUIRED)}", missing[0])
