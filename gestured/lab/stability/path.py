@@ -1,7 +1,7 @@
 """The whole path in one process: frames -> front end -> window -> model -> events; and what to send along it."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 from gestured.core.classifier import Classifier
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
-from gestured.core.facts import events_of
-from gestured.core.frames import Frame
-from gestured.core.front_end import FrontEnd
 from gestured.core.mounting import Mounting
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
+from gestured.model.embedded import Embedded
 from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
 
 Array = NDArray[Any]
@@ -38,24 +36,14 @@ def simulated_series(count: int, seed: int = 41) -> Iterator[tuple[str, Series]]
         yield kind, Series(take.sensor_times, take.frames.astype(np.float64))
 
 
-def contacts(stream: Series, mounting: Mounting | None = None) -> list[Any]:
-    """What the front end makes of it."""
-    front = FrontEnd(*stream.frames.shape[1:], mounting=mounting)
-    return _run(front.push, front.flush, stream)
-
-
 def events(stream: Series, classifier: Classifier, mounting: Mounting | None = None) -> list[Event]:
-    """What a recognizer makes of it."""
+    """What a recogniser makes of it, by the front door."""
     mounted = {"stability": Setup(mounting=mounting or Mounting())}
-    sensor = Sensor("stability", Scene(classifier.gestures, stream.frames.shape[1:], mounted), classifier)
-    return events_of(_run(sensor.push, sensor.flush, stream))
-
-
-def _run(push: Callable[[Frame], list[Any]], flush: Callable[[float], list[Any]], stream: Series) -> list[Any]:
-    out: list[Any] = []
+    scene = Scene(classifier.gestures, stream.frames.shape[1:], mounted)
+    recogniser, found = Embedded(Sensor("stability", scene, classifier), classifier.gestures), []
     for t, values in zip(stream.times, stream.frames, strict=True):
-        out += push(Frame(float(t), values))
-    return out + flush(float(stream.times[-1]) + FLUSH_AFTER_S)
+        found += recogniser.push(float(t), values)
+    return found + recogniser.flush(float(stream.times[-1]) + FLUSH_AFTER_S)
 
 
 def labels(found: list[Event]) -> tuple[str, ...]:
