@@ -5,7 +5,6 @@ the model that was there when it was enrolled had it.
 """
 
 import base64
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.frames import Segment
+from gestured.core.mounting import SIDES
 from gestured.core.prototypes import EXAMPLES
 from gestured.core.window import LEAST_PEAK, Window
 
@@ -22,12 +22,14 @@ LONGEST_NAME = 32  # characters
 RESERVED = ("use", "unknown", "none")  # of the configuration, of answers, and of recordings
 MOST = 20  # gestures
 MOST_FRAMES = 200  # of an example; the longest contact takes some 80 at 15 Hz
+MOST_S = 8.0  # of an example; a contact is given up after five seconds, and quiet frames stand around it
 MOST_VALUES = 16_384  # of an example
+RATES_HZ = (5.0, 1000.0)  # of an example
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Example:
-    """One performance, as a window."""
+    """One performance, as a window. Raises ValueError, which names the number, for what no performance can be."""
 
     frames: NDArray[np.float16]  # (T, R, C), 1 at its peak
     rate_hz: float
@@ -35,18 +37,38 @@ class Example:
     last: int  # and the last
     noise: float  # of an idle taxel, one standard deviation, in units of the peak
 
+    def __post_init__(self) -> None:
+        count, rows, columns = self.frames.shape
+        for name, value, least, most in (
+            ("rate_hz", self.rate_hz, *RATES_HZ),
+            ("frames", count, 1, min(MOST_FRAMES, MOST_S * self.rate_hz)),
+            ("rows", rows, *SIDES),
+            ("columns", columns, *SIDES),
+            ("values", self.frames.size, 1, MOST_VALUES),
+            ("first", self.first, 0, count - 1),
+            ("last", self.last, self.first, count - 1),
+            ("noise", self.noise, 0, 1),
+            ("lowest value", float(self.frames.min(initial=0.0)), 0, 1),
+            ("highest value", float(self.frames.max(initial=0.0)), 0, 1),
+        ):
+            if not least <= value <= most:  # NaN is in no range
+                raise ValueError(f"{name}: expected {least:g} to {most:g}, found {value!r:.40}")
+
     @classmethod
     def of(cls, segment: Segment, window: Window) -> "Example | None":
         """A segment as a model's window; None for one that is too long, or not finite."""
         frames = window.apply(segment)
-        if not (0 < len(frames) <= MOST_FRAMES and frames.size <= MOST_VALUES and np.isfinite(frames).all()):
+        if not len(frames):
             return None
         start = float(segment.times[window.span(segment)[0]])  # s, the window's first frame
         first, last = (
             min(max(round((t - start) * window.rate_hz), 0), len(frames) - 1) for t in (segment.onset, segment.offset)
         )
         peak = max(float(segment.frames.max()), window.floor * segment.noise, LEAST_PEAK)
-        return cls(frames.astype(np.float16), window.rate_hz, first, last, min(segment.noise / peak, 1.0))
+        try:
+            return cls(frames.astype(np.float16), window.rate_hz, first, last, min(segment.noise / peak, 1.0))
+        except ValueError:
+            return None
 
     def segment(self) -> Segment:
         """The same for a model to look at."""
@@ -97,17 +119,13 @@ def is_name(name: str) -> bool:
 
 def _example(told: Any, place: str) -> Example:
     try:
-        shape = tuple(int(n) for n in told["shape"])
-        rate_hz, noise = float(told["rate_hz"]), float(told["noise"])
-        first, last = int(told["first"]), int(told["last"])
-        if len(shape) != 3 or min(shape) < 1 or shape[0] > MOST_FRAMES or math.prod(shape) > MOST_VALUES:
-            raise ValueError
-        data = base64.b64decode(told["frames"], validate=True)
-        frames = np.frombuffer(data, "<f2").reshape(shape).astype(np.float16)
-        if not (0 <= first <= last < shape[0] and 0 < rate_hz <= 1000 and 0 <= noise <= 1):
-            raise ValueError
-        if not (np.isfinite(frames).all() and 0 <= frames.min() and frames.max() <= 1):
-            raise ValueError
+        frames = np.frombuffer(base64.b64decode(told["frames"], validate=True), "<f2").astype(np.float16)
+        rows, columns = told["shape"][1:]
+        frames = frames.reshape(told["shape"][0], rows, columns)
+        numbers = float(told["rate_hz"]), int(told["first"]), int(told["last"]), float(told["noise"])
     except (KeyError, TypeError, ValueError, OverflowError):
         raise ValueError(f"{place}: expected shape, rate_hz, first, last, noise and frames of an example") from None
-    return Example(frames, rate_hz, first, last, noise)
+    try:
+        return Example(frames, *numbers)
+    except ValueError as error:
+        raise ValueError(f"{place}: {error}") from None

@@ -11,6 +11,7 @@ from gestured.record.files import PRIVATE, atomic_write, open_regular
 
 FORMAT = 1
 MAX_BYTES = 8 << 20  # the longest examples of as many gestures as there may be take some 5 MiB
+MOST_MARKS = 4096  # brackets and commas; as many examples as there may be take some 1,100
 NAME = "own-gestures.json"
 REMEDY = "set own_gestures = FILE (--own-gestures FILE), or start it with systemd's StateDirectory="
 
@@ -56,6 +57,9 @@ def _read(path: Path | None) -> Examples:
     if len(data) > MAX_BYTES:
         raise OwnFileError(f"{path}: expected at most {MAX_BYTES} bytes")
     try:
+        # What reads JSON lets no other thread run before its end, and millions of empty lists fit into the bytes.
+        if sum(map(data.count, (b"[", b"{", b","))) > MOST_MARKS:
+            raise ValueError(f"expected at most {MOST_MARKS} brackets and commas")
         told = json.loads(data)
         if not isinstance(told, dict) or told.get("format") != FORMAT:
             raise ValueError(f"expected a JSON object with format {FORMAT}")

@@ -1,7 +1,10 @@
 """Own gestures in numbers: spaces, prototypes, examples, and what is said of each attempt."""
 
+import base64
 import dataclasses
 import json
+import math
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -125,6 +128,32 @@ def test_what_is_written_down_is_read_again() -> None:
     (again, _) = from_dict(told)["wave"]
     assert np.array_equal(again.frames, example.frames)
     assert (again.first, again.last, again.rate_hz) == (example.first, example.last, example.rate_hz)
+
+
+@given(
+    st.floats(0.05, 1200) | st.floats(),
+    st.integers(-1, 300),
+    st.sampled_from([(9, 9), (2, 64), (1, 9), (65, 2), (200, 81)]),
+)
+@settings(deadline=None)
+def test_whatever_numbers_are_read_the_work_is_bounded(rate_hz: float, count: int, sides: tuple[int, int]) -> None:
+    """An example that is read gives any model as much to look at as a contact of ten seconds, or less."""
+    frames = base64.b64encode(bytes(2 * max(count, 0) * sides[0] * sides[1])).decode()
+    told = {"shape": [count, *sides], "rate_hz": rate_hz, "first": 0, "last": count - 1, "noise": 0.1, "frames": frames}
+    try:
+        (example,) = from_dict({"wave": [told]})["wave"]
+    except ValueError as error:
+        assert re.match(r"gestures\.wave\[0\]: (rate_hz|frames|rows|columns|values|last|expected)", str(error))
+    else:
+        assert len(WINDOW.apply(example.segment())) <= 10 * WINDOW.rate_hz
+
+
+@pytest.mark.parametrize("rate_hz", [5e-324, 1e-9, 1e-4, 4.9, 1001.0, math.inf, math.nan])
+def test_a_rate_that_no_sensor_has_is_named(rate_hz: float) -> None:
+    told = to_dict({"wave": (Example(np.zeros((3, 9, 9), np.float16), 15.0, 0, 2, 0.0),)})
+    told["wave"][0]["rate_hz"] = rate_hz
+    with pytest.raises(ValueError, match=r"gestures\.wave\[0\]: rate_hz: expected 5 to 1000, found"):
+        from_dict(told)
 
 
 JSON = st.recursive(
