@@ -71,8 +71,11 @@ class Receiver:
         self._loop.add_reader(sock, self._wake)
 
     def served(self, now: float) -> float:
-        """The time until which everything that arrived was served: a sensor whose packets wait is not silent."""
-        return now - self._behind_s
+        """The time until which everything that arrived was served: a sensor whose packets wait is not silent.
+
+        What was read and waits counts, and what is still in the socket, behind the packets of others, does as well.
+        """
+        return min(now - self._behind_s, self._empty)
 
     def close(self) -> None:
         """Stop reading; the socket stays its owner's."""
@@ -113,7 +116,8 @@ class Receiver:
             found = [(packet, b"", source) for packet, _, source in found]
         self._found = len(found)
         much = len(found) > FEW and sum(len(packet) for packet, _, _ in found) > GROUP_BYTES
-        if found and (full or much or self._backlog or now - self._arrival(found[0][1], now) >= TOGETHER_S):
+        late = bool(found) and now - self._arrival(found[0][1], now) >= TOGETHER_S
+        if found and (full or much or late or self._backlog or self._backlog.flooded(now)):
             self._backlog.add(self._datagrams(found, now), now)
             self._count_drops(now)
         elif found:

@@ -12,7 +12,7 @@ from gestured.core.address import Address
 from tests import encoding
 
 BURST = 50  # packets at a time; fifty microseconds of work
-OWNERS = 58  # names, and so sensors, of kind "owners"
+OWNERS = 58  # names, and so sensors, of the kinds "owners" and "claims"
 CALM_S = 1.0  # for which they are sensors like any other, so that they own their names
 
 
@@ -25,7 +25,7 @@ def packets(kind: str) -> list[bytes]:
         return [encoding.message("/flood/pressure", "f" * 81, (values,))]
     if kind == "sensors":  # of a new sensor each time
         return [encoding.message(f"/flood{i}/pressure", "f" * 81, (values,)) for i in range(1000)]
-    names = [f"/flood{i}" for i in range(OWNERS)] if kind == "owners" else ["/flood"]
+    names = [f"/flood{i}" for i in range(OWNERS)] if kind in ("owners", "claims") else ["/flood"]
     frames = [encoding.message(f"{name}/pressure", "b", (bytes(81),)) for name in names]
     return [encoding.bundle([frame] * 500) for frame in frames]  # as many frames as a packet can hold
 
@@ -34,7 +34,7 @@ def main() -> int:
     """Send at the rate, or as fast as it goes; print how many packets a second went out."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("to", type=Address.parse)
-    parser.add_argument("kind", choices=("rubbish", "frames", "sensors", "full", "owners"))
+    parser.add_argument("kind", choices=("rubbish", "frames", "sensors", "full", "owners", "claims"))
     parser.add_argument("--rate", type=float, default=50_000.0, help="packets a second")
     parser.add_argument("--ports", type=int, default=1, help="sent from so many ports in turn (default: 1)")
     parser.add_argument("--seconds", type=float, default=5.0)

@@ -67,8 +67,13 @@ class Script:
         return self._hand.frame()
 
 
-def play(daemon: Daemon, sensors: int, rate_hz: float, stall_s: float, seconds: float) -> Result:
-    """Play `seconds` on so many sensors; the daemon stands still for `stall_s` in the middle of it."""
+def play(  # noqa: PLR0913 - each is a quantity of its own
+    daemon: Daemon, sensors: int, rate_hz: float, stall_s: float, seconds: float, rubbish: int = 0
+) -> Result:
+    """Play `seconds` on so many sensors; the daemon stands still for `stall_s` in the middle of it.
+
+    While it does, some other program sends it so many packets of `rubbish`.
+    """
     client = daemon.client().subscribe(*TYPES, "status")
     scripts = [Script(n, seconds) for n in range(sensors)]
     streams = [Sensor(daemon, f"s{n}") for n in range(sensors)]
@@ -89,6 +94,10 @@ def play(daemon: Daemon, sensors: int, rate_hz: float, stall_s: float, seconds: 
             if stopped != (stop <= now < go):
                 stopped = not stopped
                 daemon.signal(signal.SIGSTOP if stopped else signal.SIGCONT)
+                if stopped and rubbish:
+                    stranger = Sensor(daemon, "stranger")
+                    for _ in range(rubbish):
+                        stranger.sock.send(b"x" * 340)
             stream.sock.send(floats(f"/{stream.name}/pressure", script.frame(now), frame))
     lines += listen(client)
     for n, (script, tally) in enumerate(zip(scripts, tallies, strict=True)):
@@ -118,6 +127,7 @@ def main() -> int:
     parser.add_argument("--sensors", type=int, default=40)
     parser.add_argument("--rate", type=float, default=15.0, help="frames a second of each sensor (default: 15)")
     parser.add_argument("--stall", type=float, default=1.0, help="seconds for which the daemon stands still")
+    parser.add_argument("--rubbish", type=int, default=0, help="packets that a stranger sends meanwhile (default: 0)")
     parser.add_argument("--seconds", type=float, default=14.0, help="in all (default: 14)")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
@@ -125,7 +135,7 @@ def main() -> int:
         many = max(64, args.sensors)
         daemon = Daemon.start(Path(folder), args.model, "--metrics", "127.0.0.1:0", "--max-sensors", many)
         try:
-            result = play(daemon, args.sensors, args.rate, args.stall, args.seconds)
+            result = play(daemon, args.sensors, args.rate, args.stall, args.seconds, args.rubbish)
         finally:
             daemon.stop()
     found = result.verdicts

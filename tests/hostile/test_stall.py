@@ -30,6 +30,12 @@ def test_a_stall_changes_no_answer_at_any_rate(start, sensors: int, rate: float,
 
 
 @pytest.mark.hostile
+def test_rubbish_that_comes_while_the_daemon_stands_still_makes_no_sensor_silent(start) -> None:
+    daemon = start("--metrics", "127.0.0.1:0", model="cnn_lstm")
+    check(play(daemon, 20, 15.0, 1.3, 14.0, rubbish=1000))
+
+
+@pytest.mark.hostile
 def test_where_the_kernel_has_no_room_no_gesture_is_made_up(start) -> None:
     """So many packets that the buffer overflows: what was lost is a hole, and the rest is right."""
     daemon = start("--metrics", "127.0.0.1:0", "--max-sensors", "100", model="cnn_lstm")
