@@ -42,6 +42,12 @@ class Difference:
     recorded: Answer | None
     replayed: Answer | None
 
+    @property
+    def names(self) -> tuple[str, str]:
+        """What was recorded and what the replay says, without how sure; "nothing" for a side without the contact."""
+        recorded, replayed = ("nothing" if answer is None else answer.name for answer in (self.recorded, self.replayed))
+        return recorded, replayed
+
     def words(self) -> str:
         """For a person: `-` is what was recorded, `+` what the replay says."""
         sides = (("-", self.recorded), ("+", self.replayed))

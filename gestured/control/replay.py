@@ -5,6 +5,7 @@ import json
 import os
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
@@ -38,7 +39,8 @@ def add(commands: Commands) -> None:
         help="play a recording again",
         description="Run a recording through the daemon's own code here and print the events, or send it to a\n"
         "daemon (--to). --diff compares the events with the recorded ones, those of a labelled .npz with\n"
-        "its labels, and ends with status 1 where they differ. What was touched before the sensor was\n"
+        "its labels, and ends with status 1 where they differ. With another model than the recorded one it\n"
+        "compares names alone, and counts which was called what. What was touched before the sensor was\n"
         "known again is not compared.\n"
         'At another speed than 1 the daemon must run with clock = "sensor" (gestured --clock sensor): by the\n'
         "time of arrival all would be too fast.",
@@ -107,7 +109,8 @@ def _here(args: argparse.Namespace, source: Playable) -> int:
         raise RecordingError(f"{args.file}: {error}") from error
     lines = (json.loads(messages.to_json(event, replay.epoch)) for event in replay.events())
     if args.diff:
-        return _compare(args, source, list(lines), _knew(replay))
+        another = isinstance(source, Recorded) and ladder.model.sha256 != source.maker.sha256
+        return _compare(args, source, list(lines), _knew(replay), another=another)
     early: dict[str, dict[str, Any]] = {}  # for `readable`
     for line in lines:
         tell(args.json, line, readable(line, early))
@@ -171,8 +174,15 @@ def _knew(replay: Replay) -> Knew:
     return lambda sensor, t: sensor in replay.played and replay.played[sensor].knew(t - replay.epoch)
 
 
-def _compare(args: argparse.Namespace, source: Playable, lines: Iterable[Line], knew: Knew) -> int:
+def _compare(
+    args: argparse.Namespace, source: Playable, lines: Iterable[Line], knew: Knew, *, another: bool = False
+) -> int:
+    """Print the differences; of `another` model those of names alone, since its confidences are its own, counted."""
     compared, skipped, differences = source.compare(lines, knew)
+    if another:
+        differences = [one for one in differences if one.names[0] != one.names[1]]
+        for (before, after), count in Counter(one.names for one in differences).most_common():
+            say(f"{count:5d} x {before} -> {after}", to=sys.stderr)
     for difference in differences:
         if args.json:
             sides = {"recorded": difference.recorded, "replayed": difference.replayed}

@@ -57,6 +57,9 @@ def test_a_replay_with_another_model_shows_what_differs(recorded, run, daemon, t
     assert status == 1 and "2 differences" in err
     lines = [line.split(": ", 1)[0][:1] + line.split(": ", 1)[1].split()[0] for line in out.splitlines()]
     assert lines == ["-swipe_left", "+one_tap", "-one_tap", "+swipe_left"]
+    assert {" ".join(line.split()) for line in err.splitlines()[:-1]} == {
+        "1 x swipe_left -> one_tap", "1 x one_tap -> swipe_left",
+    }  # fmt: skip
     status, out, _ = run("replay", path, "--diff", "--model", other, "--json")
     assert [json.loads(line)["replayed"]["answer"] for line in out.splitlines()] == ["one_tap", "swipe_left"]
 
@@ -197,6 +200,7 @@ def test_differences_match_contacts_by_sensor_and_onset() -> None:
     assert differences([a], [elsewhere]) == [Difference(a, None), Difference(None, elsewhere)]
     assert differences([a, late], [late, near]) == []
     assert differences([a], [unsure]) == [Difference(a, unsure)]
+    assert Difference(a, unsure).names == (a.name, a.name) and Difference(None, a).names == ("nothing", a.name)
     assert differences([], [a]) == [Difference(None, a)]
     assert Difference(a, None).words().startswith("- ") and "arm: one_tap 0.900" in Difference(a, None).words()
 
