@@ -18,7 +18,6 @@ SUBCOMMANDS = (
     ("sniff", "add", ("sniff",)),
     ("operate", "add_reload", ("reload",)),
     ("operate", "add_recalibrate", ("recalibrate",)),
-    ("shadow", "add", ("shadow",)),
     ("operate", "add_emit", ("emit",)),
     ("own", "add", ("enrol", "gestures", "forget")),
     ("record", "add", ("record",)),

@@ -15,7 +15,6 @@ from gestured.client.lines import Unreachable
 from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json, tell
 from gestured.control.address import add_sockets, connect
-from gestured.control.shadow import words as shadow_words
 from gestured.core.beside.reading import SILENT
 from gestured.core.errors import GesturedError
 from gestured.core.timing import RANGE_HZ, outside
@@ -125,8 +124,6 @@ def screen(status: dict[str, Any]) -> Iterator[str]:
     )
     yield f"loop: {1000 * status['loop_lag_s']:.0f} ms late, {status['internal_errors']} bugs caught"
     yield f"shift: {_shift(status['shift'])}"
-    if status["shadow"]:
-        yield from shadow_words(status["shadow"])
 
 
 def _sensors(sensors: dict[str, dict[str, Any]]) -> Iterator[str]:

@@ -9,8 +9,8 @@ from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
+from gestured.daemon.shift import Shift
 from gestured.daemon.views import Views
-from gestured.daemon.watch import Watch
 
 CHANGES = {"silent": "sensor is silent", "restarted": "sensor restarted"}
 
@@ -18,8 +18,9 @@ CHANGES = {"silent": "sensor is silent", "restarted": "sensor restarted"}
 class Desk:
     """Takes facts, and the complaints of those who read packets."""
 
-    def __init__(self, metrics: Metrics, publisher: Publisher, watch: Watch, own: OwnGestures, views: Views) -> None:
-        self._metrics, self._publisher, self._watch, self._own, self._views = metrics, publisher, watch, own, views
+    def __init__(self, metrics: Metrics, publisher: Publisher, shift: Shift, own: OwnGestures, views: Views) -> None:
+        self._metrics, self._publisher, self._own, self._views = metrics, publisher, own, views
+        self.shift = shift  # of the model that answers
         self._throttle = Throttle()
 
     def take(self, facts: Sequence[Fact]) -> None:
@@ -40,7 +41,7 @@ class Desk:
             elif not isinstance(fact, Taken):
                 self._publisher.publish(fact)
         if decided:
-            self._beside("in what looks on while models answer", self._watch.see, decided)
+            self._beside("in what compares segments with the training's", self.shift.see, decided)
         if self._own.enrolling:
             self._beside("in what judges an example", self._own.see, facts)
         self._views.see(facts)

@@ -1,6 +1,5 @@
 """What an operator may ask of a running daemon: the table of the control socket's verbs."""
 
-import asyncio
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -19,8 +18,6 @@ from gestured.daemon.snapshot import Snapshot
 from gestured.daemon.status import scene
 from gestured.daemon.tap import Taps, as_lines
 from gestured.daemon.views import Views
-from gestured.daemon.watch import Watch
-from gestured.model.opening import open_apart
 
 TEST_SENSORS = 64  # names of sensors that are not there
 TEST_S = 0.4  # how long a made-up gesture took
@@ -39,7 +36,6 @@ SENSORS = Parameter(
 RAW = Parameter(bool, "true or false")
 COUNT = Parameter(int, "a number of examples")
 LABEL = Parameter(str, "a gesture's name", required=True)
-MODEL = Parameter((str, type(None)), "a model's path or name, or null to end it", required=True)
 
 
 @dataclass
@@ -49,7 +45,6 @@ class Operations:
     hub: Hub
     desk: Desk
     publisher: Publisher
-    watch: Watch
     taps: Taps
     own: OwnGestures
     views: Views
@@ -65,7 +60,6 @@ class Operations:
             "reload": Verb(self.reload, slow=True),
             "recalibrate": Verb(self.recalibrate, {"sensor": SENSOR}),
             "emit": Verb(self.emit, {"gesture": LABEL, "sensor": SENSOR}),
-            "shadow": Verb(self.shadow, {"model": MODEL}, slow=True),
             "view": Verb(self.view, {"sensor": NAMED, "raw": RAW}, changes=False),
             "follow": Verb(self.follow, {"sensors": SENSORS, "raw": RAW}, changes=False),
             "enrol": Verb(self.enrol, {"name": LABEL, "sensor": NAMED, "examples": COUNT}),
@@ -124,14 +118,6 @@ class Operations:
         self.publisher.publish(Gesture(sensor, number, gesture, 1.0, *answer, verdict, own), test=True)
         self.publisher.publish(Release(sensor, number, now), test=True)
         return {"sensor": sensor, "gesture": gesture, "sequence": sequence}
-
-    async def shadow(self, connection: Connection, model: str | None) -> Reply:
-        """Run a candidate beside the active model; null ends it. Gives what the last one was worth."""
-        if model is None:
-            last, self.watch.shadow = self.watch.shadow, None
-            return {"shadow": await asyncio.to_thread(last.finish) if last else None}
-        candidate = await asyncio.to_thread(open_apart, model)
-        return {"shadow": self.watch.compare(candidate).report()}
 
     async def view(self, connection: Connection, sensor: str, raw: bool = False) -> Reply:
         """One sensor as it is felt now."""

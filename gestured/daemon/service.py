@@ -23,6 +23,7 @@ from gestured.daemon.operations import Operations
 from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.reload import Loader, Reload
+from gestured.daemon.shift import Shift
 from gestured.daemon.sinks import Sink
 from gestured.daemon.snapshot import Models, Snapshot
 from gestured.daemon.sockets import kernel_drops
@@ -30,7 +31,6 @@ from gestured.daemon.status import status
 from gestured.daemon.tap import Taps
 from gestured.daemon.udp import Receiver
 from gestured.daemon.views import Views
-from gestured.daemon.watch import Watch
 
 STATUS_S = 1.0  # from one status to the next
 DRAIN_S = 0.5  # for clients to read what waits for them, when the daemon ends
@@ -57,7 +57,7 @@ class Service:
         self._own = OwnGestures(self._own_changed)
         self._own.follow(ladder, asked.own)
         self._hub = Hub(scene_of(settings, ladder), ladder)
-        self._watch, self._taps = Watch(ladder), Taps(settings.flight_recorder << 20)
+        self._taps = Taps(settings.flight_recorder << 20)
         self._clients = EventServer(
             bound.events.sock,
             self._hello,
@@ -69,10 +69,10 @@ class Service:
         self._views = Views(self._hub, self._state, self._foresee)
         self._foresee()
         self._publisher = Publisher(self._metrics, self._sinks())
-        self._desk = Desk(self._metrics, self._publisher, self._watch, self._own, self._views)
+        self._desk = Desk(self._metrics, self._publisher, Shift.of(ladder.model), self._own, self._views)
         self._receiver = Receiver(bound.udp, bound.since, self._hub, self._desk, self._taps)
         operations = Operations(
-            self._hub, self._desk, self._publisher, self._watch, self._taps, self._own,
+            self._hub, self._desk, self._publisher, self._taps, self._own,
             self._views, self.snapshot, self._state, self._reload.run,
         )  # fmt: skip
         self._control = ControlServer(bound.control.sock, operations.verbs())
@@ -85,7 +85,6 @@ class Service:
     def snapshot(self) -> Snapshot:
         """How the daemon is now. Any thread may ask."""
         now = time.monotonic()
-        shadow = self._watch.shadow
         return Snapshot(
             instance=self._instance,
             time=time.time(),
@@ -95,12 +94,11 @@ class Service:
             stopping=self._stopping,
             loop_age_s=self._pulse.age_s,
             loop_lag_s=self._pulse.lag_s,
-            models=Models.of(self._ladder, self._watch.shift, self._publisher.models_failed),
+            models=Models.of(self._ladder, self._desk.shift, self._publisher.models_failed),
             gestures=self._hub.scene.gestures,
             own=self._own.report(),
             sensors=self._hub.readings(self._receiver.served(now)),
             recent=self._publisher.recent(),
-            shadow=shadow.report() if shadow else None,
             clients=self._clients.count,
             backlog_bytes=self._clients.backlog,
             kernel_drops=kernel_drops(self._bound.udp),
@@ -217,7 +215,7 @@ class Service:
         self._settings, self._ladder = settings, ladder
         for key in self._awaiting_restart():
             log.warning("this setting changes at a restart only", key=key)
-        self._watch.follow(ladder)
+        self._desk.shift = Shift.of(ladder.model)
         before = self._gestures()
         self._own.follow(ladder, asked.own)
         self._desk.take(self._hub.change(scene_of(settings, ladder), ladder, time.monotonic()))

@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from gestured.core.classifier import Scores
+from gestured.core.facts import Decided
 from gestured.core.features import MEASURES, measures
 from gestured.core.frames import Segment
 from gestured.core.window import Window
+from gestured.model.model import Model
 
 LAST = 100  # gestures
 LEAST_GESTURES = 20  # before which nothing is said
@@ -38,14 +39,19 @@ class Shift:
         names = [*self.ranges, *([UNKNOWN] if _mostly_known(quantiles) else [])]
         self._outside: dict[str, deque[bool]] = {name: deque(maxlen=LAST) for name in names}
 
-    def see(self, segment: Segment, scores: Scores, known: bool) -> None:
+    @classmethod
+    def of(cls, model: Model) -> "Shift":
+        """What comes from now on, held against what a model's file says."""
+        return cls(model.metadata.quantiles, model.metadata.window)
+
+    def see(self, decided: Decided) -> None:
         """A segment was decided, as a gesture or as unknown. The quantiles say nothing of a fallback's answers."""
-        if not self._outside or scores.degraded:
+        if not self._outside or decided.scores.degraded:
             return
         if UNKNOWN in self._outside:
-            self._outside[UNKNOWN].append(not known)
-        if known:
-            self.add(measured(segment, self._window) | {"confidence": scores.confidence})
+            self._outside[UNKNOWN].append(not decided.known)
+        if decided.known:
+            self.add(measured(decided.segment, self._window) | {"confidence": decided.scores.confidence})
 
     def add(self, seen: Mapping[str, float]) -> None:
         """Take the quantities of one gesture."""

@@ -58,7 +58,6 @@ class Snapshot:
     own: Mapping[str, Any]  # the user's own; see `OwnGestures.report`
     sensors: Mapping[str, Reading]
     recent: tuple[Mapping[str, Any], ...]  # answers
-    shadow: Mapping[str, Any] | None
     clients: int  # of the event socket
     backlog_bytes: int  # that wait for slow clients
     kernel_drops: int  # packets that found no room

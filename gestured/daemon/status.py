@@ -54,7 +54,6 @@ def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
             "outside": {name: round(share, 3) for name, share in models.shift.items()},
             "unlike": list(models.unlike),
         },
-        "shadow": snapshot.shadow,
         "input": {"dropped": _by_label(metrics.dropped.values), "kernel_drops": snapshot.kernel_drops},
         "output": {
             "subscribers": snapshot.clients,

@@ -10,7 +10,7 @@ from typing import Any
 from weakref import WeakValueDictionary
 
 from gestured.model.model import Model
-from gestured.model.process import ModelProcess, try_out
+from gestured.model.process import try_out
 from gestured.model.shipped import manifest_gestures, naming, read
 
 # Models of this process by sha256 and name: they have no state, so that any number of ladders may hold one.
@@ -47,13 +47,6 @@ def look_at(source: str | Path) -> tuple[tuple[str, ...], str]:
         if name is None:
             return tuple(try_out(data)["gestures"]), sha256
         return manifest_gestures(path), sha256
-
-
-def open_apart(source: str | Path) -> ModelProcess:
-    """Open and verify a model in a process of its own, and leave it there. Raises ModelError."""
-    path, _, data, _ = read(source)
-    with naming(path):
-        return ModelProcess(data, path.stem)
 
 
 def check(source: str | Path) -> dict[str, Any]:

@@ -1,15 +1,13 @@
-"""A model file that is opened in a process of its own: whatever it does there, it costs the daemon nothing.
+"""A model file that nobody has vouched for is tried in a process of its own: whatever it does there costs us nothing.
 
 A graph of some kilobytes can ask onnxruntime for hours, for all memory, or for what crashes it; and a run that does
-not return cannot be ended from within a process. So a file that nobody has vouched for is opened, tested, and as a
-candidate also run, by `worker` in a child that has bounds for memory and for time.
+not return cannot be ended from within a process. So the file is opened and tested by `worker`, in a child that has
+bounds for memory and for time.
 
-The protocol: the parent writes messages: 8 bytes of length, a byte of seconds that the answer may take, the content.
-The first content is the model file, each other a segment (`numpy.savez`). The child answers each with one line of JSON.
-It ends when its standard input does.
+The child reads a byte, the seconds that it may take, and the file, to the end of its standard input. It answers with
+one line of JSON.
 """
 
-import io
 import json
 import os
 import signal
@@ -18,17 +16,11 @@ import sys
 import threading
 import weakref
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from gestured.core.classifier import Classifier, Scores
-from gestured.core.errors import ModelError
-from gestured.core.frames import Segment
-
 OPEN_S = 8  # s to start, to open a model and to test it; half a second is usual, and an operator's client waits for 20
-CHILD_RUN_S = 5  # s for a segment, after which the child ends; what can be ended otherwise is ended after model.RUN_S
 MAX_ANSWER = 16 << 20  # bytes of a line; a report holds some of the metadata, which are bounded
 # The folders of our own interpreter, wherever we were started, and nothing from the environment or the current folder.
 START = "import sys; sys.path[:] = sys.argv[1:]; from gestured.model.worker import main; main()"
@@ -40,91 +32,37 @@ _children: "weakref.WeakSet[subprocess.Popen[bytes]]" = weakref.WeakSet()  # one
 _ending = False
 
 
-class ModelProcess(Classifier):
-    """A model in a process of its own. One thread at a time may ask it."""
-
-    def __init__(self, data: bytes, name: str) -> None:
-        """Opens and tests the file's bytes. ValueError says what is wrong with them."""
-        self.name = name
-        with _turn:
-            self._child = _start()
-            try:
-                self.report: dict[str, Any] = self._ask(data, OPEN_S)  # `Model.report`
-            except BaseException:
-                self.close()
-                raise
-        self.gestures: tuple[str, ...] = tuple(self.report["gestures"])
-
-    def classify(self, segment: Segment) -> Scores:
-        """Scores of one segment. ModelError where the model fails; `alive` says whether it can go on."""
-        content = io.BytesIO()
-        np.savez(
-            content, frames=segment.frames, times=segment.times, first=segment.first, last=segment.last,
-            noise=segment.noise,
-        )  # fmt: skip
-        try:
-            answer = self._ask(content.getvalue(), CHILD_RUN_S)
-        except ValueError as error:
-            raise ModelError(f"{self.name}: {error}") from error
-        return Scores(
-            np.array(answer["scores"], np.float32), answer["unknown"], self.name, threshold=answer["threshold"]
-        )
-
-    @property
-    def alive(self) -> bool:
-        """Whether it can be asked."""
-        return self._child.poll() is None
-
-    def kill(self) -> None:
-        """End it at once; any thread may. Who waits for an answer gets an error."""
-        self._child.kill()
-
-    def close(self) -> None:
-        """End it, and let go of everything; for the thread that asks it."""
-        self.kill()
-        self._child.wait()
-        for pipe in (self._child.stdin, self._child.stdout):
-            if pipe is not None:
-                try:
-                    pipe.close()
-                except OSError:
-                    pass  # what was to be flushed has nobody to read it
-
-    def _ask(self, content: bytes, seconds: int) -> dict[str, Any]:
-        pipes = self._child
-        assert pipes.stdin is not None and pipes.stdout is not None
-        line = b""
-        try:
-            pipes.stdin.write(len(content).to_bytes(8, "big") + bytes([seconds]))
-            pipes.stdin.write(content)
-            pipes.stdin.flush()
-            line = pipes.stdout.readline(MAX_ANSWER)
-        except (OSError, ValueError):  # it has ended, or was closed
-            pass
-        if not line.endswith(b"\n"):
-            raise ValueError(self._end(seconds))
-        answer: dict[str, Any] = json.loads(line)
-        if "error" in answer:
-            raise ValueError(answer["error"])
-        return answer
-
-    def _end(self, seconds: int) -> str:
-        """What it died of."""
-        self.kill()
-        status = self._child.wait()
-        if status == -signal.SIGALRM:
-            return f"{'did not answer' if hasattr(self, 'report') else 'could not be opened'} within {seconds} s"
-        if status == -signal.SIGKILL:
-            return "was ended from outside: the program ends, or the machine has no memory left"
-        what = signal.Signals(-status).name if status < 0 else f"status {status}"
-        return f"onnxruntime dies of it ({what})"
-
-
 def try_out(data: bytes) -> dict[str, Any]:
     """`Model.report` of a file that opens and passes its self-test. ValueError says what is wrong with it."""
-    tried = ModelProcess(data, "")
-    tried.close()
-    return tried.report
+    with _turn, _start() as child:  # whoever leaves waits for its end
+        assert child.stdin is not None and child.stdout is not None
+        try:
+            with suppress(OSError):  # it has ended already
+                child.stdin.write(bytes([OPEN_S]))
+                child.stdin.write(data)
+            with suppress(OSError):
+                child.stdin.close()
+            line = child.stdout.readline(MAX_ANSWER)
+            if not line.endswith(b"\n"):
+                raise ValueError(_end_of(child))
+        finally:
+            child.kill()
+    answer: dict[str, Any] = json.loads(line)
+    if "error" in answer:
+        raise ValueError(answer["error"])
+    return answer
+
+
+def _end_of(child: "subprocess.Popen[bytes]") -> str:
+    """What it died of."""
+    child.kill()
+    status = child.wait()
+    if status == -signal.SIGALRM:
+        return f"could not be opened within {OPEN_S} s"
+    if status == -signal.SIGKILL:
+        return "was ended from outside: the program ends, or the machine has no memory left"
+    what = signal.Signals(-status).name if status < 0 else f"status {status}"
+    return f"onnxruntime dies of it ({what})"
 
 
 def end_all() -> None:

@@ -159,14 +159,11 @@ STATUS = {
     "input": {"dropped": {HOSTILE: 4}, "kernel_drops": 0},
     "output": {"subscribers": 0, "backlog_bytes": 0, "lines_lost": 0, "evicted": {}, "osc": {HOSTILE: 1}},
     "loop_lag_s": 0.0, "internal_errors": 0, "reloads": {},
-    "shadow": {"model": HOSTILE, "segments": 1, "failed": 0, "agreement": None,
-               "dropped": 0, "ended": HOSTILE, "disagreements": [{"count": 1, "active": HOSTILE, "candidate": LONG}]},
     "shift": {"gestures": 40, "outside": {HOSTILE: 0.5}, "unlike": [HOSTILE]},
 }  # fmt: skip
 ANSWERS = [
     (["status"], STATUS),
     (["doctor"], STATUS),
-    (["shadow"], STATUS),
     (["reload"], {"model": HOSTILE}),
     (["recalibrate"], {"sensors": [HOSTILE, LONG]}),
     (["emit", "one_tap"], {"gesture": HOSTILE, "sensor": HOSTILE, "sequence": HOSTILE}),

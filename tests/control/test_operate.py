@@ -1,4 +1,4 @@
-"""gesturectl's questions to a real daemon: status, doctor, sniff, emit, reload, recalibrate, shadow."""
+"""gesturectl's questions to a real daemon: status, doctor, sniff, emit, reload, recalibrate."""
 
 import json
 import re
@@ -17,7 +17,6 @@ from gestured.control.status import screen
 from gestured.core.address import Address
 from tests import encoding
 from tests.control.conftest import asked
-from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Hand, Sensor, floats
 from tests.sockets import FakeDaemon
 
@@ -44,7 +43,7 @@ STATUS = {
     "answers": {"gestures": {}, "unknown": 3, "cancelled": {"held": 2}}, "recent": [],
     "input": {"dropped": {"size": 4}, "kernel_drops": 0},
     "output": {"subscribers": 0, "backlog_bytes": 0, "lines_lost": 0, "evicted": {}},
-    "loop_lag_s": 0.0, "internal_errors": 0, "shadow": None,
+    "loop_lag_s": 0.0, "internal_errors": 0,
     "shift": {"gestures": 40, "outside": {"strength": 0.5, "area": 0.0}, "unlike": ["strength"]},
 }  # fmt: skip
 
@@ -109,22 +108,6 @@ def test_reload_names_what_only_a_restart_changes(start, fake: FakeDaemon) -> No
     fake.accept({"ok": True, "model": "tiny", "awaiting_restart": ["listen", "metrics"]})
     out, _ = process.communicate(timeout=30)
     assert process.returncode == 0 and re.search(rb"tiny answers; .*restart.*: listen, metrics\n$", out)
-
-
-def test_a_shadow_is_named_by_a_path_that_is_the_clients(ctl, run, start, daemon: Daemon, tmp_path: Path) -> None:
-    tiny_model.make(tmp_path / "next.onnx")
-    begin = start("shadow", "next.onnx", "--control", daemon.ready["control"], cwd=tmp_path)
-    started = "next runs in the shadow from now on: gesturectl shadow reports, gesturectl shadow --stop ends it\n"
-    assert begin.communicate(timeout=60)[0].decode() == started
-    assert ctl("shadow")[1].startswith("next in the shadow: 0 segments")
-    client = daemon.client()
-    Sensor(daemon, "lid").begin().perform("left", "tap")
-    client.events("gesture", "lid", 2)
-    status, out, _ = ctl("shadow", "--stop")
-    first, second, *_ = out.splitlines()
-    assert (status, first) == (0, "next runs in the shadow no longer; what came of it:")
-    assert second.startswith("next in the shadow: 2 segments, 0 failed") and "agreement 100.0 %" in out
-    assert ctl("shadow") == (1, "no model runs in the shadow\n", "")
 
 
 def test_sniff_shows_what_reaches_the_daemon_and_what_to_set(start, daemon: Daemon) -> None:

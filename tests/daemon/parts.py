@@ -14,10 +14,10 @@ from gestured.daemon.metrics import Metrics
 from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.settings import Settings
+from gestured.daemon.shift import Shift
 from gestured.daemon.snapshot import Models, Snapshot
 from gestured.daemon.tap import Taps
 from gestured.daemon.views import Views
-from gestured.daemon.watch import Watch
 from gestured.model.ladder import ladder_for
 from tests.daemon.harness import Frame, floats
 
@@ -25,7 +25,7 @@ SOURCE = ("10.0.0.1", 1)
 SNAPSHOT = Snapshot(
     instance="i", time=1.7e9, now=10.0, started=1.7e9, uptime_s=10.0, stopping=False, loop_age_s=0.1, loop_lag_s=0.0,
     models=Models("m", "m", 0, False, 0, "m.onnx", "1", "", (9, 9), False, 0, {}, ()), gestures=("one_tap",),
-    own={"gestures": {}}, sensors={"arm": Reading("ok", (9, 9))}, recent=(), shadow=None, clients=0, backlog_bytes=0,
+    own={"gestures": {}}, sensors={"arm": Reading("ok", (9, 9))}, recent=(), clients=0, backlog_bytes=0,
     kernel_drops=0, taps=0, flight_limit_bytes=0, flight_held_bytes=0, addresses={}, settings=Settings(),
     awaiting_restart=[],
 )  # fmt: skip
@@ -54,12 +54,12 @@ class Parts:
 
     def __init__(self, model: Path, **given: str) -> None:
         ladder = ladder_for(model)
-        self.metrics, self.watch, self.taps, kept = Metrics(), Watch(ladder), Taps(0), Kept()
+        self.metrics, self.taps, kept = Metrics(), Taps(0), Kept()
         self.events = kept.events
         self.hub = Hub(scene_of(load_settings({"model": str(model), **given}, {})[0], ladder), ladder)
         self.views = Views(self.hub, dict, lambda: None)
         publisher = Publisher(self.metrics, (kept,))
-        self.desk = Desk(self.metrics, publisher, self.watch, OwnGestures(lambda: None), self.views)
+        self.desk = Desk(self.metrics, publisher, Shift.of(ladder.model), OwnGestures(lambda: None), self.views)
 
     def feed(self, name: str, frames: list[Frame], t: float) -> float:
         """Frames of a sensor at 15 Hz, from `t` s on; when the last one came."""

@@ -99,7 +99,6 @@ def test_a_stranger_is_refused_even_where_the_file_lets_him_in(start, nobody) ->
         (b'{"verb":"emit","gesture":"one_tap","loud":true}\n', ("emit", '"loud"', "gesture, sensor")),
         (b'{"verb":"status","x":1}\n', ("status", '"x"', "no key")),
         (b'{"verb":"recalibrate","sensor":"nobody"}\n', ("nobody",)),
-        (b'{"verb":"shadow","model":"/no/such.onnx"}\n', ("/no/such.onnx",)),
         (b"[" * 4000 + b"\n", ("JSON object",)),
         (b"\xff\n", ("JSON object",)),
     ],
@@ -201,28 +200,6 @@ def test_a_reload_names_what_only_a_restart_changes_until_it_is_as_before(start,
         ):
             config.write_text(text)
             assert control.ask("reload")["awaiting_restart"] == named
-
-
-def test_a_shadow_sees_the_same_and_publishes_nothing(start, model: Path, tmp_path: Path) -> None:
-    swapped = list(tiny_model.GESTURES)
-    other = tiny_model.make(tmp_path / "candidate.onnx", version="9")
-    wrong = tiny_model.make(tmp_path / "wrong.onnx", gestures=("knock", *swapped[1:]))
-    daemon = start("--clock", "sensor")
-    client = daemon.client()
-    with Control(Path(daemon.ready["control"])) as control:
-        with pytest.raises(Refused, match="knock"):
-            control.ask("shadow", model=str(wrong))
-        assert control.ask("shadow", model=str(other))["shadow"]["segments"] == 0
-        Sensor(daemon, "arm").begin().perform("left", "up")
-        assert {e["model"] for e in client.events("gesture", "arm", 2)} == {"tiny"}
-        while (report := control.ask("status")["shadow"])["segments"] < 2:
-            pass  # it answers in its own time
-        assert (report["model"], report["segments"], report["agreement"]) == ("candidate", 2, 1.0)
-        assert (report["failed"], report["dropped"], report["ended"]) == (0, 0, None)
-        assert report["confidence"] == report["active_confidence"]
-        control.socket.sendall(b'{"verb":"shadow","model":null}\n')
-        assert next(control.lines())["shadow"]["segments"] == 2
-        assert control.ask("status")["shadow"] is None
 
 
 def test_a_tap_shows_packets_as_they_came_and_events(daemon: Daemon) -> None:
@@ -361,7 +338,7 @@ DOCUMENT = (Path(__file__).resolve().parents[2] / "docs" / "control.md").read_te
 def test_the_table_of_verbs_in_the_documents(daemon: Daemon) -> None:
     rows = re.findall(r"^\| `(\w+)` \| (.*?) \|", DOCUMENT, re.MULTILINE)
     described = {verb: tuple(re.findall(r"`(\w+)`", keys)) for verb, keys in rows}
-    assert described == {name: tuple(verb.parameters) for name, verb in Operations(*[None] * 10).verbs().items()}
+    assert described == {name: tuple(verb.parameters) for name, verb in Operations(*[None] * 9).verbs().items()}
 
 
 def test_the_example_in_the_documents(daemon: Daemon) -> None:

@@ -14,17 +14,14 @@ import pytest
 from gestured.core.beside.reading import STATES, Reading, Vitals, faulty
 from gestured.core.classifier import Scores
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
+from gestured.core.facts import Decided
 from gestured.core.features import MEASURES
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.window import Window
 from gestured.daemon.exposition import exposition
 from gestured.daemon.metrics import NAMED_SENSORS, Metrics
-from gestured.daemon.shadow import Comparison, Shadow
 from gestured.daemon.shift import LAST, LEAST_GESTURES, Shift, measured
-from gestured.daemon.watch import Watch
-from gestured.model.ladder import ladder_for
-from gestured.model.opening import open_apart
 from tests.daemon.harness import Daemon, Hand, Sensor
 from tests.daemon.parts import SNAPSHOT, Parts
 
@@ -197,26 +194,26 @@ def test_gestures_as_in_training_are_no_shift_and_others_are() -> None:
     assert shift.unlike() == ["confidence"]
 
 
-def decided(confidence: float, *, degraded: bool = False) -> tuple[Segment, Scores, bool]:
+def decided(confidence: float, *, degraded: bool = False) -> Decided:
     frames = np.zeros((8, 9, 9), np.float32)
     frames[1:7, 4, 4] = 50
     scores = Scores(np.array([confidence, 0], np.float32), 0.0, "m", degraded, threshold=0.5)
-    return Segment(frames, np.arange(8) / 15, 1, 6, 1.0), scores, confidence >= 0.5
+    return Decided("arm", Segment(frames, np.arange(8) / 15, 1, 6, 1.0), scores, confidence >= 0.5)
 
 
 def test_more_unknown_than_known_is_a_shift_and_a_fallback_says_nothing() -> None:
     shift = Shift(QUANTILES, WINDOW)
     for n in range(LAST):
-        shift.see(*decided(0.9 if n % 5 else 0.4))
-        shift.see(*decided(0.1, degraded=True))
+        shift.see(decided(0.9 if n % 5 else 0.4))
+        shift.see(decided(0.1, degraded=True))
     assert shift.shares()["unknown"] == 0.2 and shift.unlike() == []
     assert shift.shares()["confidence"] == shift.shares()["duration_s"] == 0.0
     for n in range(LAST):
-        shift.see(*decided(0.9 if n % 2 else 0.4))
+        shift.see(decided(0.9 if n % 2 else 0.4))
     assert shift.unlike() == ["unknown"]
     silent = Shift(QUANTILES | {"unknown": 0.7}, WINDOW)  # a model that mostly says unknown
     for _ in range(LAST):
-        silent.see(*decided(0.4))
+        silent.see(decided(0.4))
     assert silent.shares() == {}
 
 
@@ -258,41 +255,9 @@ def test_what_is_measured_is_what_the_lab_measures_of_its_training_data() -> Non
         assert ours[name] == pytest.approx(expected, rel=0.02, abs=2e-3), name
 
 
-def test_a_shadow_counts_where_it_agrees() -> None:
-    seen = Comparison()
-    assert seen.report()["agreement"] is None
-    for candidate in (("tap", 0.9), ("swipe", 0.8), ("unknown", 0.1), ("tap", 0.8)):
-        seen.add(("tap", 1.0), candidate)
-    report = seen.report()
-    assert (report["agreement"], report["confidence"], report["active_confidence"]) == (0.5, 0.65, 1.0)
-    assert report["disagreements"] == [
-        {"active": "tap", "candidate": "swipe", "count": 1}, {"active": "tap", "candidate": "unknown", "count": 1},
-    ]  # fmt: skip
-
-
-def test_a_shadow_that_dies_says_so_and_drops_the_rest(model: Path) -> None:
-    segment = Segment(np.ones((6, 9, 9), np.float32), np.arange(6) / 15, 1, 4, 1.0)
-    ladder = ladder_for(model)
-    scores = ladder.classify(segment)
-    shadow = Watch(ladder).compare(open_apart(model))
-    shadow.see(segment, scores)
-    while shadow.report()["agreement"] is None:
-        pass
-    shadow.candidate.kill()
-    shadow.see(segment, scores)
-    while shadow.report()["ended"] is None:
-        pass
-    for _ in range(20):
-        shadow.see(segment, scores)
-    report = shadow.finish()
-    assert (report["segments"], report["failed"], report["dropped"], report["agreement"]) == (2, 1, 20, 1.0)
-
-
 def test_what_looks_on_cannot_prevent_an_answer(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     parts, hand = Parts(model), Hand()
-    shadow = parts.watch.compare(open_apart(model))
-    monkeypatch.setattr(Shadow, "see", lambda self, segment, scores: 1 / 0)
+    monkeypatch.setattr(Shift, "see", lambda self, decided: 1 / 0)
     parts.feed("arm", hand.idle(2.0) + 2 * (hand.swipe("left") + hand.idle(1.0)), 0.0)
     assert [event.gesture for event in parts.events if isinstance(event, Gesture)] == ["swipe_left"] * 2
     assert parts.metrics.internal_errors.total() == 2
-    shadow.close()

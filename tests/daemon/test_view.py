@@ -50,7 +50,7 @@ def test_it_is_made_at_most_thirty_times_a_second_and_only_when_somebody_asks(mo
     clock: Any = SimpleNamespace(now=100.0, monotonic=lambda: clock.now, time=lambda: 1.7e9 + clock.now)
     monkeypatch.setattr(views, "time", clock)
     verbs = operations.Operations(
-        parts.hub, parts.desk, None, parts.watch, parts.taps, None, parts.views, lambda: SNAPSHOT, dict, None
+        parts.hub, parts.desk, None, parts.taps, None, parts.views, lambda: SNAPSHOT, dict, None
     ).verbs()
     parts.feed("arm", Hand().idle(2.0), 90.0)
     assert made == []

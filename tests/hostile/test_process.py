@@ -1,6 +1,5 @@
 """What happens to the process and to what it stands on: its clock, its model, its memory, its output, its end."""
 
-import json
 import os
 import resource
 import signal
@@ -166,17 +165,14 @@ def test_the_end_does_not_wait_for_a_model_at_the_start(model: Path, tmp_path: P
     assert not alive(tried) and not (tmp_path / "events.sock").exists()
 
 
-@pytest.mark.parametrize("verb", ["reload", "shadow"])
-def test_the_end_does_not_wait_for_a_model_that_is_being_opened(start, model: Path, tmp_path: Path, verb: str) -> None:
+def test_the_end_does_not_wait_for_a_model_that_is_being_opened(start, model: Path, tmp_path: Path) -> None:
     path = tmp_path / "mine.onnx"
     path.write_bytes(model.read_bytes())
     daemon = start("--clock", "sensor", model=path)
     client = daemon.client()
     bad_models.endless(model, tmp_path / "bad.onnx").replace(path)
     with Control(Path(daemon.ready["control"])) as control:
-        control.socket.sendall(
-            json.dumps({"verb": verb} | ({"model": str(path)} if verb == "shadow" else {})).encode() + b"\n"
-        )
+        control.socket.sendall(b'{"verb":"reload"}\n')
         tried = trial_of(daemon)
         Sensor(daemon, "arm").begin().perform("left")
         assert client.line()["gesture"] == "swipe_left"  # frames are served meanwhile
@@ -203,42 +199,10 @@ def test_a_model_whose_opening_never_ends_changes_nothing(start, model: Path, tm
     with Control(Path(daemon.ready["control"])) as control:
         with pytest.raises(Refused, match="could not be opened within"):
             control.ask("reload")
-        with pytest.raises(Refused, match="could not be opened within"):
-            control.ask("shadow", model=str(path))
     client = daemon.client()
     Sensor(daemon, "arm").begin().perform("left")
     assert client.line()["gesture"] == "swipe_left"
     assert daemon.stop() == 0
-
-
-def test_a_shadow_that_never_answers_holds_nobody_up(start, model: Path, tmp_path: Path) -> None:
-    bad = bad_models.stuck(model, tmp_path / "bad.onnx")
-    daemon = start("--clock", "sensor")
-    client = daemon.client().subscribe("gesture", "unknown")
-    with Control(Path(daemon.ready["control"])) as control:
-        control.ask("shadow", model=str(bad))
-        sensor = Sensor(daemon, "arm").begin().perform("left")
-        press(sensor)  # from here on it hangs
-        sensor.perform(*["left"] * 20)
-        assert [client.line().get("gesture") for _ in range(22)] == ["swipe_left", None, *["swipe_left"] * 20]
-        while (report := control.ask("status")["shadow"])["ended"] is None:
-            pass
-        assert "did not answer" in report["ended"] and report["dropped"] > 0
-        assert (report["segments"], report["failed"], report["agreement"]) == (2, 1, 1.0)
-        assert control.ask("shadow", model=str(model))["shadow"]["ended"] is None  # the next one can be tried
-
-
-def test_the_end_does_not_wait_for_a_shadow_that_never_answers(start, model: Path, tmp_path: Path) -> None:
-    bad = bad_models.stuck(model, tmp_path / "bad.onnx")
-    daemon = start("--clock", "sensor")
-    client = daemon.client().subscribe("unknown")
-    with Control(Path(daemon.ready["control"])) as control:
-        control.ask("shadow", model=str(bad))
-        candidate = trial_of(daemon)
-        press(Sensor(daemon, "arm").begin())
-        client.line()
-        assert daemon.stop() == 0
-    assert not alive(candidate) and "Traceback" not in daemon.stderr()
 
 
 def trial_of(daemon: Daemon) -> int:

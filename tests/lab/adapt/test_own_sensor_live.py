@@ -4,6 +4,7 @@ import itertools
 import json
 import shlex
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -221,13 +222,15 @@ def test_the_live_steps_lead_to_an_own_gesture(
     settings.write_text(f'model = "cnn_lstm"\nlisten = "{place}"\n{proposed}')
     with started(tmp_path, "--config", settings, "--own-gestures", tmp_path / "own.json") as daemon:
         control = ("--control", daemon.ready["control"])
-        shadow = lines.next("gesturectl", "shadow")
-        assert shadow[1] == "/etc/gestured/my.onnx"
-        ended(gesturectl(["shadow", str(tmp_path / "my.onnx")], *control))
+        recorder = gesturectl(lines.next("gesturectl", "record"), *control)
+        assert recorder.stderr is not None and "recording into" in recorder.stderr.readline()
+        client = daemon.client().subscribe("gesture")
         sensor.sends(sensor.textile.rests(), sensor.textile.feels("swipe_right"))
-        while ask(daemon, "status")["shadow"]["segments"] == 0:
-            pass
-        assert "1 segments, 0 failed" in ended(gesturectl(lines.next("gesturectl", "shadow"), *control))
+        client.events("gesture", "armrest")
+        recorder.send_signal(signal.SIGINT)
+        ended(recorder)
+        replay = lines.next("gesturectl", "replay")
+        ended(gesturectl([word.replace("/etc/gestured", str(tmp_path)) for word in replay]))  # 0: no difference
         settings.write_text(f'model = "{tmp_path}/my.onnx"\nlisten = "{place}"\n{proposed}')
         assert "my answers" in ended(gesturectl(lines.next("gesturectl", "reload"), *control))
 
