@@ -15,10 +15,9 @@ from typing import Any
 from gestured.bridge.counts import Counts
 from gestured.bridge.options import destination
 from gestured.client.sensor import sent_after_refusal
-from gestured.core.address import Address
+from gestured.core.address import Address, is_sensor
 from gestured.core.errors import ProtocolError
 from gestured.core.osc import decode
-from gestured.core.wire import is_sensor
 
 MOST_SENDERS = 512  # sensors from Zenoh, each with a socket of its own: the daemon shares its work out by sources
 SILENT_S = 60.0  # a sender that says nothing for so long gives its place to another, as in the daemon

@@ -22,8 +22,8 @@ from gestured.client.program import Commands
 from gestured.client.say import say
 from gestured.client.sensor import Form, sent_after_refusal
 from gestured.client.values import rows_by_columns
+from gestured.core.address import is_sensor
 from gestured.core.frames import Frame
-from gestured.core.wire import is_sensor
 
 KEPT = 8  # frames that are sent where more have come at once: the newest
 QUIET_S = 0.002  # a line that says nothing for so long has ended its frame; a byte takes 0.1 ms at 115,200 baud

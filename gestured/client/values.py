@@ -3,8 +3,7 @@
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
 
-from gestured.core.address import Address, Grid
-from gestured.core.wire import is_sensor
+from gestured.core.address import Address, Grid, is_sensor
 
 
 def host_port(text: str) -> Address:

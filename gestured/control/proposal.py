@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from gestured.control.sight import Seen
+from gestured.core.address import SIDES, is_sensor
 from gestured.core.beside.habits import ALIKE, Habits, neighbours_alike
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
-from gestured.core.mounting import SIDES, Mounting
-from gestured.core.wire import is_sensor
+from gestured.core.mounting import Mounting
 
 USUAL = "/{sensor}/pressure"
 LONGEST_ADDRESS = 255  # characters of an address that is proposed

@@ -20,9 +20,9 @@ from gestured.control.labelled import Labelled
 from gestured.control.listen import readable
 from gestured.control.sending import Hearing, retimed, send
 from gestured.core import messages
+from gestured.core.address import is_sensor
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.core.scene import Scene
-from gestured.core.wire import is_sensor
 from gestured.model.ladder import Ladder, ladder_for
 from gestured.model.own import Own
 from gestured.model.shipped import shipped

@@ -1,8 +1,15 @@
-"""How addresses and grids are written and read: HOST:PORT, ROWSxCOLUMNS."""
+"""How addresses, grids and sensors are written and read: HOST:PORT, ROWSxCOLUMNS, a name. It needs no numpy."""
 
 from typing import NamedTuple
 
-from gestured.core.mounting import SIDES
+SIDES = (2, 64)  # taxels of a grid's side, least and most
+NAME_CHARACTERS = 64  # of a sensor's name, at most
+NAME_LETTERS = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-")
+
+
+def is_sensor(name: str) -> bool:
+    """Whether `name` can be a sensor's: `[A-Za-z0-9_-]{1,64}`."""
+    return 0 < len(name) <= NAME_CHARACTERS and NAME_LETTERS.issuperset(name)
 
 
 class Address(NamedTuple):

@@ -8,9 +8,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, get_args
 
+from gestured.core.address import is_sensor
 from gestured.core.errors import ProtocolError
 from gestured.core.events import Event, Gesture, Provisional, Status
-from gestured.core.wire import is_sensor
 
 MAX_LINE = 4096  # bytes of a client's request
 LONGEST = 60  # characters of what a peer sent, in an answer to it

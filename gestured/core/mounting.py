@@ -5,8 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-SIDES = (2, 64)  # taxels of a grid's side, least and most
-
 
 @dataclass(frozen=True, slots=True)
 class Mounting:

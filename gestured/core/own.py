@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.address import SIDES
 from gestured.core.frames import Segment
-from gestured.core.mounting import SIDES
 from gestured.core.prototypes import EXAMPLES
 from gestured.core.window import LEAST_PEAK, Window
 

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from gestured.core.mounting import SIDES, Mounting
+from gestured.core.address import SIDES
+from gestured.core.mounting import Mounting
 from gestured.core.timing import Timing
 from gestured.core.wire import Addresses
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core import osc
+from gestured.core.address import NAME_LETTERS, is_sensor
 from gestured.core.errors import ProtocolError
 from gestured.core.frames import Touch
 from gestured.core.osc import Argument, Layouts, Message
@@ -22,13 +23,6 @@ MAX_TOUCHES = 3
 _BLOBS: dict[float, np.dtype[Any]] = {4: np.dtype(">f4"), 2: np.dtype(">u2"), 1: np.dtype(">u1")}
 _MAX_ROUTES = 4096  # one or two for each sensor; fewer than there are sensors would be as good as none
 _MAX_PENDING = 256
-MAX_NAME = 64
-_NAME = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-")
-
-
-def is_sensor(name: str) -> bool:
-    """Whether `name` can be a sensor's: `[A-Za-z0-9_-]{1,64}`."""
-    return 0 < len(name) <= MAX_NAME and _NAME.issuperset(name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +66,7 @@ def _rest(a: str, b: str, cut: Callable[[str, str], str]) -> bool:
     """Whether one ends (or begins) with the other, and what is left could be part of a sensor's name."""
     short, long = sorted((a, b), key=len)
     rest = cut(long, short)
-    return len(rest) == len(long) - len(short) and _NAME.issuperset(rest)
+    return len(rest) == len(long) - len(short) and NAME_LETTERS.issuperset(rest)
 
 
 _new = tuple.__new__  # Arrival(...) takes twice the time

@@ -5,10 +5,10 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from itertools import chain
 
+from gestured.core.address import is_sensor
 from gestured.core.beside.reading import Reading
 from gestured.core.events import Gesture, Onset, Provisional, Release
 from gestured.core.hub import Hub
-from gestured.core.wire import is_sensor
 from gestured.daemon.caller import Connection
 from gestured.daemon.desk import Desk
 from gestured.daemon.own import OwnGestures

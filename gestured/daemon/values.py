@@ -7,8 +7,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator
 
-from gestured.core.address import Address, Grid
-from gestured.core.wire import is_sensor
+from gestured.core.address import Address, Grid, is_sensor
 
 SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gestured.core.address import is_sensor
 from gestured.core.cutter import LARGEST
 from gestured.core.errors import SettingsError
 from gestured.core.events import Event
@@ -20,7 +21,6 @@ from gestured.core.mounting import Mounting
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
 from gestured.core.timing import Timing
-from gestured.core.wire import is_sensor
 from gestured.model import own_file
 from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, require_gestures
 from gestured.model.own import Own

@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 from gestured.client.say import MOST, shown
 from gestured.control.proposal import propose
 from gestured.control.sight import Sight
+from gestured.core.address import is_sensor
 from gestured.core.errors import RecordingError
-from gestured.core.wire import Addresses, is_sensor
+from gestured.core.wire import Addresses
 from gestured.record import arrays as recording
 from gestured.record import tape_reader, tape_writer
 from tests.control.conftest import ROOT, gestures

@@ -10,8 +10,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from gestured.core import wire
+from gestured.core.address import is_sensor
 from gestured.core.frames import Touch
-from gestured.core.wire import Addresses, Arrival, Decoder, is_sensor
+from gestured.core.wire import Addresses, Arrival, Decoder
 from tests import encoding
 
 GRID = (3, 4)
