@@ -33,6 +33,10 @@ class Counts:
         """Count so many more under a name and a label."""
         self.values[name, label] += count
 
+    def say(self, words: str) -> None:
+        """Tell whoever reads the log."""
+        say(f"gestured-bridge {self.bridge}: {words}", to=sys.stderr)
+
     def connected(self, side: str, is_there: bool, words: str) -> None:
         """Whether a side is there now; said where it changes."""
         key = ("connected", side)
@@ -41,7 +45,7 @@ class Counts:
         if is_there and key in self.values:
             self.add("reconnects", side)
         self.values[key] = is_there
-        say(f"gestured-bridge {self.bridge}: {words}", to=sys.stderr)
+        self.say(words)
         self._words[side] = words
         here = all(value for (name, _), value in self.values.items() if name == "connected")
         # gesturectl doctor reads its first word. READY: to be started does not mean that the others are there.

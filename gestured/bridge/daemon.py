@@ -5,7 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from gestured.bridge.counts import Counts
+from gestured.client.fields import wrong_field
 from gestured.client.subscriber import Subscriber
+from gestured.core.messages import quoted
+from gestured.core.wire import is_sensor
 
 NOTICE_S = 0.25  # after which a daemon that went is noticed
 GONE = "gone"  # the type of a line of ours: the daemon hung up, and is called until it is back
@@ -16,22 +19,36 @@ OLD_S = 1.0  # an event that is older helps nobody any more: the window would op
 Line = Mapping[str, Any]
 
 
-def follow(subscriber: Subscriber) -> Iterator[Line]:
+def follow(subscriber: Subscriber, counts: Counts) -> Iterator[Line]:
     """Each line of a daemon, its hello among them, and GONE where it went; until the subscriber is closed.
 
-    The subscriber has a timeout of NOTICE_S.
+    The subscriber has a timeout of NOTICE_S. What no daemon says is passed over and counted, and said the first time.
     """
     connected = False
     while True:
         try:
             for _, line in subscriber.lines():
-                connected = connected or line.get("type") == "hello"
+                if words := wrong_field(line) or _wrong_name(line):
+                    if ("events", "wrong") not in counts.values:
+                        counts.say(f"a line of the daemon is passed over: {words}")
+                    counts.add("events", "wrong")
+                    continue
+                connected = connected or line["type"] == "hello"
                 yield line
             return
         except TimeoutError:
             if connected and not subscriber.connected:
                 connected = False
                 yield {"type": GONE}
+
+
+def _wrong_name(line: Line) -> str | None:
+    """Which name in a line cannot stand in a topic or a key; None where all can."""
+    said = line["sensors"] if line["type"] in ("hello", "status") else ()
+    for name in (line["type"], line.get("sensor", "-"), *said):
+        if not is_sensor(name):
+            return f"{quoted(name)}: expected letters, digits, _ and -, at most 64"
+    return None
 
 
 class Daemon:
@@ -48,7 +65,7 @@ class Daemon:
 
     def take(self, line: Line) -> None:
         """One line of `follow`."""
-        match line.get("type"):
+        match line["type"]:
             case "hello":
                 self.hello = line
                 self._gestures(line["gestures"])

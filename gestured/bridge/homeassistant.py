@@ -8,6 +8,7 @@ home-assistant.io/integrations/event.mqtt and home-assistant.io/integrations/dev
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from gestured.bridge.options import plain
 from gestured.core.messages import json_object
 
 # What the event entity makes of a gesture's line: what it is, and some of what is known of it.
@@ -57,7 +58,7 @@ def discovery(
             "payload": gesture,
             "value_template": "{{ value_json.gesture }}",
         }
-        yield f"{prefix}/device_automation/{node}/{sensor}-{gesture}/config", trigger | common
+        yield f"{prefix}/device_automation/{node}/{sensor}-{plain(gesture)}/config", trigger | common
 
 
 def gesture_of(payload: bytes) -> str | None:

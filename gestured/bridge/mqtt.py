@@ -71,7 +71,7 @@ async def _main(args: argparse.Namespace) -> None:
 
     def hear() -> None:
         try:
-            for line in follow(source):
+            for line in follow(source, counts):
                 loop.call_soon_threadsafe(bridge.take, line)
         except GesturedError as error:  # a subscription that is refused, for one
             failed.append(error)

@@ -56,7 +56,7 @@ class Mqtt:
             decided = time.monotonic() - self._daemon.age(line, time.time())
             topic = topic_of(self._host, line["sensor"], line["type"])
             self._outbox.put(Outgoing(decided, topic, self._daemon.payload(line)))
-        if line.get("type") in ("hello", "gestures", STATUS, GONE):
+        if line["type"] in ("hello", "gestures", STATUS, GONE):
             self._changed.set()
 
     def stop(self) -> None:

@@ -63,12 +63,14 @@ def destination(to: Address) -> tuple[int, Any]:
     return family, address
 
 
-def host_name(named: str | None) -> str:
-    """The name that was given, else this machine's, with an underscore for all but letters, digits, _ and -.
+def plain(name: str) -> str:
+    """A name with an underscore for all but letters, digits, _ and -: Home Assistant's discovery takes nothing else."""
+    return re.sub(r"[^A-Za-z0-9_-]", "_", name)
 
-    Home Assistant takes nothing else in a topic of discovery.
-    """
-    return re.sub(r"[^A-Za-z0-9_-]", "_", named or socket.gethostname())
+
+def host_name(named: str | None) -> str:
+    """The plain name that was given, else this machine's."""
+    return plain(named or socket.gethostname())
 
 
 def on_stop(act: Callable[[], object]) -> None:

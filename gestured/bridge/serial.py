@@ -10,7 +10,6 @@ import os
 import select
 import socket
 import stat
-import sys
 import time
 from typing import Any
 
@@ -19,7 +18,6 @@ from gestured.bridge.options import BridgeError, add_destination, add_metrics, d
 from gestured.bridge.protocols import PROTOCOLS, looks_like
 from gestured.bridge.readings import COUNTER, MOST_TAXELS, Reading
 from gestured.client.program import Commands
-from gestured.client.say import say
 from gestured.client.sensor import Form, sent_after_refusal
 from gestured.client.values import rows_by_columns
 from gestured.core.address import is_sensor
@@ -186,7 +184,7 @@ class Serial:
         """What came so far without a frame; None once it is said that it is no frame. Raises BridgeError."""
         if not data and time.monotonic() > began + SILENT_S:
             hint = "" if self._protocol.request else " (eTextile's E256 speaks only when it is asked: --protocol e256)"
-            say(f"gestured-bridge serial: {self._device} is open, but nothing comes{hint}", to=sys.stderr)
+            self._counts.say(f"{self._device} is open, but nothing comes{hint}")
             return None
         if len(data) < JUDGED_BYTES + JUDGED_TAXEL_BYTES * self._rows * self._columns:
             return data
@@ -194,7 +192,7 @@ class Serial:
         if words := looks_like(data):
             raise BridgeError(f"{what}: these bytes look like {words}: set --protocol and --grid so")
         remedy = f"is --baud {self._baud} right, and --protocol?"
-        say(f"gestured-bridge serial: {what}, nor of another protocol: {remedy}", to=sys.stderr)
+        self._counts.say(f"{what}, nor of another protocol: {remedy}")
         return None
 
 

@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         counts.serve(args.metrics)
         bridge.begin()
-        for line in follow(source):
+        for line in follow(source, counts):
             bridge.take(line)
     finally:
         source.close()

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from gestured.client.fields import wrong_field
 from gestured.client.lines import Lines, Refused, Unreachable
 
 PROTOCOL = 1
@@ -43,3 +44,5 @@ def check_hello(line: str, message: Mapping[str, Any], path: Path) -> None:
     """Raises Refused unless the first line on `path` is the hello of a daemon that this client understands."""
     if message.get("type") != "hello" or message.get("protocol") != PROTOCOL:
         raise Refused(f"{path} does not speak protocol {PROTOCOL} of gestured: {line[:80]!r}")
+    if words := wrong_field(message):
+        raise Refused(f"{path} is not served by gestured, its hello is wrong: {words}")

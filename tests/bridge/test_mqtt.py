@@ -31,7 +31,15 @@ def gesture(sequence: int, name: str = "one_tap", **more: Any) -> dict[str, Any]
     return {
         "type": "gesture", "sensor": "armrest", "id": sequence, "gesture": name, "confidence": 0.9,
         "sequence": sequence, "onset": now, "offset": now, "decided": now,
+        "frames": 3, "lost": 0, "model": "m", "degraded": False, "scores": {name: 0.9},
     } | more  # fmt: skip
+
+
+MAD = (  # what no daemon says
+    {"type": ["gesture"]}, {"type": "gestures", "gestures": 7}, {"type": "status", "sensors": ["armrest"]},
+    STATUS | {"sensors": {"#": "ok"}}, gesture(1, decided="soon"), gesture(1, decided=float("nan")),
+    gesture(1, decided=10**400), gesture(1) | {"sensor": "**"}, gesture(1) | {"type": "x/#"},
+)  # fmt: skip
 
 
 class Listener:
@@ -470,6 +478,35 @@ def test_a_broker_that_is_not_there_yet_is_waited_for(bridge, fake):
     process = bridge("mqtt", "--broker", free_address(socket.SOCK_STREAM), "--socket", fake.path)
     assert "Connection refused" in process.until("trying again")
     assert process.stop() == 0
+
+
+def test_lines_of_a_mad_daemon_are_passed_over(bridge, broker, listen, fake):
+    at = broker()
+    listener = listen(at.port, "gestured/#")
+    process = begin(bridge, at, fake, "--metrics", "127.0.0.1:0")
+    fake.accept()
+    where = process.ready()["metrics"]
+    fake.say(*MAD, gesture(2))
+    assert listener.events(1)[0]["sequence"] == 2
+    assert process.said().count("passed over") == 1 and 'type ["gesture"]: expected' in process.said()
+    wait(lambda: f'gestured_bridge_events_total{{bridge="mqtt",result="wrong"}} {len(MAD)}.0' in page(where))
+
+
+def test_the_greeting_of_something_else_ends_the_bridge(bridge, broker, fake):
+    process = begin(bridge, broker(), fake)
+    fake.accept(HELLO | {"sensors": ["armrest"]})
+    assert process.end() == 1
+    assert "sensors" in process.said() and process.said().count("\n") <= 2
+
+
+def test_a_gesture_of_any_name_can_be_discovered(bridge, broker, listen, fake):
+    """A model of one's own may call its gestures anything, a topic of discovery may not."""
+    at = broker()
+    listener = listen(at.port, "homeassistant/#")
+    begin(bridge, at, fake)
+    fake.accept(HELLO | {"gestures": ["wave/#+ é"]})
+    trigger = listener.until("homeassistant/device_automation/gestured_car/armrest-wave_____/config")
+    assert json.loads(trigger.payload)["payload"] == "wave/#+ é"
 
 
 def test_a_subscription_that_the_daemon_refuses_ends_the_bridge(bridge, broker, fake):

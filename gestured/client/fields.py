@@ -1,0 +1,65 @@
+"""Whether a daemon's line has the fields that the protocol gives it: a peer may be mad, or no gestured at all."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, fields
+from typing import Any, get_args, get_type_hints
+
+from gestured.core.events import Event
+from gestured.core.messages import quoted
+
+LONGEST_S = 6e10  # how far from 1970 a time may be: in 1900 years Python's calendar ends
+
+
+def _is(*types: type) -> Callable[[Any], bool]:
+    return lambda value: type(value) in types
+
+
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float) and abs(value) < LONGEST_S  # neither NaN nor infinite
+
+
+def _object(of: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: isinstance(value, dict) and all(map(of, value.values()))
+
+
+# How a field is annotated -> whether a value is one, and what it is called.
+_KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
+    str: (_is(str), "a text"),
+    int: (_is(int), "a whole number"),
+    float: (_is_number, "a number"),
+    bool: (_is(bool), "true or false"),
+    str | None: (_is(str, type(None)), "a text or null"),
+    list[str]: (lambda value: isinstance(value, list) and all(map(_is(str), value)), "a list of texts"),
+    Mapping[str, float]: (_object(_is_number), "an object of numbers"),
+    Mapping[str, str]: (_object(_is(str)), "an object of texts"),
+    Mapping[str, int]: (_object(_is(int)), "an object of whole numbers"),
+}
+_EVENTS = {event.__name__.lower(): event for event in get_args(Event)}
+# Type of a line -> its fields, as they are annotated.
+_FIELDS: dict[str, dict[str, Any]] = {name: get_type_hints(event) for name, event in _EVENTS.items()} | {
+    "hello": {"version": str, "instance": str, "model": str, "gestures": list[str], "sensors": Mapping[str, int]},
+    "gestures": {"gestures": list[str]},
+    "lost": {"count": int},
+}
+# Fields that an older daemon does not say.
+_ADDED = {
+    name: {field.name for field in fields(event) if field.default is not MISSING} for name, event in _EVENTS.items()
+}
+
+
+def wrong_field(line: Mapping[str, Any]) -> str | None:
+    """What is wrong with a daemon's line, such as `decided "soon": expected a number`; None where it is sound.
+
+    A newer daemon may say more: fields that are not known are passed over, and so are all but `sensor` of an unknown
+    type of line.
+    """
+    name = line.get("type")
+    known = _FIELDS.get(name, {}) if isinstance(name, str) else {}
+    for key, annotation in ({"type": str, "sensor": str} | known).items():
+        fits, words = _KINDS[annotation]
+        if key not in line:
+            if key == "type" or (key in known and key not in _ADDED.get(str(name), ())):
+                return f"{key} is missing: expected {words}"
+        elif not fits(line[key]):
+            return f"{key} {quoted(line[key])}: expected {words}"
+    return None

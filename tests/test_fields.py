@@ -1,0 +1,69 @@
+"""Lines of a daemon that is mad: each fault of a field is found, and nothing that a daemon says is called one."""
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gestured.client.fields import wrong_field
+from gestured.core.events import Cancelled, Gesture, Onset, Provisional, Release, Status, Unknown
+from gestured.core.messages import gestures_json, hello_json, lost_json, quoted, to_json
+
+SAID = {"model": "m", "degraded": False, "scores": {"one_tap": 0.5}}
+EVENTS = [
+    Onset("a", 1, 1.0),
+    Provisional("a", 1, "one_tap", 0.9, 1.0, 1.5),
+    Gesture("a", 1, "one_tap", 0.9, 1, 1.0, 1.5, 2.0, 3, 0, **SAID, own=True),
+    Unknown("a", 1, 0.3, 1.0, 1.5, 2.0, 3, 0, **SAID),
+    Cancelled("a", 1, "held"),
+    Release("a", 1, 2.0),
+    Status("ok", {"a": "ok"}, "m", 2.0),
+]
+LINES = [
+    json.loads(line)
+    for line in (
+        *(to_json(event, 1.8e9) for event in EVENTS),
+        hello_json("0.1", "i", "m", ["one_tap"], {"a": 3}),
+        gestures_json(["one_tap"]),
+        lost_json(3),
+    )
+]
+ANY = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+)
+
+
+@pytest.mark.parametrize("line", LINES, ids=lambda line: line["type"])
+def test_what_a_daemon_says_is_sound(line):
+    assert wrong_field(line) is None
+    assert wrong_field(line | {"news": {"of": 2027}}) is None
+
+
+WRONG = {str: 3, int: "3", float: "soon", bool: 1, list: "one_tap", dict: ["a"], type(None): 3}  # type -> of another
+
+
+@pytest.mark.parametrize("line", LINES, ids=lambda line: line["type"])
+def test_another_type_of_a_field_is_named(line):
+    for key in line.keys() - {"protocol"}:  # whoever greets looks at that
+        assert (wrong_field(line | {key: WRONG[type(line[key])]}) or "").startswith(f"{key} "), key
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400, -1e11, True])
+def test_a_number_that_is_no_time_is_named(value):
+    assert wrong_field(LINES[0] | {"onset": value}) == f"onset {quoted(value)}: expected a number"
+
+
+@given(st.sampled_from(LINES), st.dictionaries(st.sampled_from(sorted({key for line in LINES for key in line})), ANY))
+def test_any_line_has_an_answer(line, changes):
+    words = wrong_field(line | changes)
+    assert words is None or len(words) < 200
+
+
+def test_lines_of_a_newer_and_an_older_daemon_are_sound():
+    assert wrong_field({"type": "gate", "sensor": "a", "armed": None}) is None
+    assert wrong_field({"type": "gate", "sensor": 7}) is not None
+    (gesture,) = [line for line in LINES if line["type"] == "gesture"]
+    assert wrong_field({key: value for key, value in gesture.items() if key not in ("own", "provisional")}) is None
+    assert wrong_field({key: value for key, value in gesture.items() if key != "sequence"}) is not None
