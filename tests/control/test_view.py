@@ -8,6 +8,8 @@ import socket
 import subprocess
 import threading
 from collections.abc import Callable, Iterator
+from email.message import Message
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -15,7 +17,8 @@ from urllib.parse import urlsplit
 import pytest
 
 from gestured.control.view import NICE
-from gestured.control.view.server import BODY_BYTES, FILES, PAGE
+from gestured.control.view.door import HEADER, at_home
+from gestured.control.view.server import BODY_BYTES, FILES, PAGE, STRANGERS
 from gestured.core.address import Address
 from gestured.record.tape_reader import read
 from tests.control.browser import PROGRAM, Browser
@@ -28,15 +31,14 @@ class Page:
 
     def __init__(self, said: str) -> None:
         where = urlsplit(said.strip())
-        self.whole, self.address, self.token = said.strip(), Address.parse(where.netloc), where.query
-        self.cookie = ""
-        self.header = ""
+        self.whole, self.address, self.token = said.strip(), Address.parse(where.netloc), where.fragment
+        self.secret = ""
 
     def ask(self, path: str, method: str = "GET", body: object = None, **headers: str) -> tuple[int, Any, bytes]:
-        """Status, headers and body; with the cookie, unless `headers` say otherwise."""
+        """Status, headers and body; with the secret, unless `headers` say otherwise."""
         connection = http.client.HTTPConnection(*self.address, timeout=DEADLINE_S)
-        given = {"Cookie": self.cookie} | {name.replace("_", "-"): value for name, value in headers.items()}
-        data = None if body is None else json.dumps(body)
+        given = {HEADER: self.secret} | {name.replace("_", "-"): value for name, value in headers.items()}
+        data = body if isinstance(body, bytes | None) else json.dumps(body)
         try:
             connection.request(method, path, data, {k: v for k, v in given.items() if v})
             answer = connection.getresponse()
@@ -46,9 +48,9 @@ class Page:
 
     def come_in(self) -> "Page":
         """Use the token."""
-        status, headers, _ = self.ask("/?" + self.token)
+        status, _, body = self.ask("/open", "POST", {}, X_Gestured_Token=self.token)
         assert status == 200
-        self.cookie = headers["Set-Cookie"].partition(";")[0]
+        self.secret = json.loads(body)["secret"]
         return self
 
     def stream(self, sensor: str = "") -> "Stream":
@@ -65,7 +67,7 @@ class Stream:
             self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, received)
         self.sock.settimeout(DEADLINE_S)
         self.sock.connect(page.address)
-        request = f"GET /stream?sensor={sensor} HTTP/1.1\r\nHost: {page.address}\r\nCookie: {page.cookie}\r\n\r\n"
+        request = f"GET /stream?sensor={sensor} HTTP/1.1\r\nHost: {page.address}\r\n{HEADER}: {page.secret}\r\n\r\n"
         self.sock.sendall(request.encode())
         self._file = self.sock.makefile("rb")
         assert b" 200 " in self._file.readline()
@@ -101,28 +103,68 @@ def view(process: "subprocess.Popen[bytes]") -> Page:
     return Page(process.stdout.readline().decode())
 
 
-def test_the_address_works_once_and_becomes_a_cookie(view: Page) -> None:
-    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{32}", view.whole)
-    assert view.ask("/")[0] == 403 and view.ask("/?token=x")[0] == 403 and view.ask("/stream")[0] == 403
+def test_the_address_works_once_and_becomes_a_secret_of_the_tab(view: Page) -> None:
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#[\w-]{32}", view.whole)
+    for token in ("", "x", "\x00=;;"):
+        assert view.ask("/stream", X_Gestured_Token=token)[0] == 403
+        assert view.ask("/open", "POST", {}, X_Gestured_Token=token)[0] == 403
     view.come_in()
-    assert view.ask("/")[0] == 200
-    status, _, body = view.ask("/?" + view.token, Cookie="")
+    assert view.ask("/open", "POST", {})[0] == 200  # a page that is loaded again
+    status, _, body = view.ask("/open", "POST", {}, X_Gestured_Token=view.token)
     assert status == 403 and b"Start gesturectl view again" in body
-    other = f"gestured-view-{view.address.port}=somebody"
-    assert view.ask("/", Cookie=other)[0] == 403 and view.ask("/", Cookie="\x00=;;")[0] == 403
+    assert view.ask("/stream", X_Gestured_Token=view.token)[0] == 403
 
 
 def test_what_a_browser_is_told_to_allow(view: Page) -> None:
-    _, headers, _ = view.ask("/?" + view.token)
-    assert "SameSite=Strict" in headers["Set-Cookie"] and "HttpOnly" in headers["Set-Cookie"]
-    view.cookie = headers["Set-Cookie"].partition(";")[0]
+    view.come_in()
     for path in FILES:
         status, headers, body = view.ask(path)
         assert status == 200 and body == (PAGE / FILES[path][0]).read_bytes()
         policy = headers["Content-Security-Policy"]
         assert policy.startswith("default-src 'none'") and "unsafe" not in policy and "frame-ancestors 'none'" in policy
         assert headers["Referrer-Policy"] == "no-referrer" and headers["X-Content-Type-Options"] == "nosniff"
-        assert not any(name.lower().startswith("access-control") for name in headers)
+        assert not any(name.lower().startswith(("access-control", "set-cookie")) for name in headers)
+
+
+def test_who_trickles_a_request_keeps_nobody_out(view: Page) -> None:
+    """Each further connection that has shown nothing takes the place of the oldest one."""
+    view.come_in()
+    slow = [socket.create_connection(view.address) for _ in range(2 * STRANGERS)]
+    for sock in slow:
+        sock.sendall(b"GET / HT")
+    assert view.ask("/")[0] == 200
+    stream = view.stream()
+    slow += [socket.create_connection(view.address) for _ in range(2 * STRANGERS)]
+    stream.until("sensors")
+    slow[0].settimeout(DEADLINE_S)
+    assert slow[0].recv(1) == b""
+    for sock in slow:
+        sock.close()
+
+
+def test_a_sensor_that_cannot_be_is_refused_and_the_other_pages_go_on(view: Page, real: Daemon) -> None:
+    view.come_in()
+    sensor = Sensor(real, "arm").begin()
+    stream = view.stream("arm")
+    sensor.send([sensor.hand.frame()])
+    stream.until("frame")
+    for name in ("arm%20rest", "a" * 65, "%00"):
+        assert view.ask(f"/stream?sensor={name}")[0] == 400
+    sensor.send([sensor.hand.frame()])
+    stream.until("frame")
+
+
+@pytest.mark.parametrize("listen", ["127.0.0.2:0", "localhost:0"])
+def test_each_loopback_address_is_at_home(start, real: Daemon, listen: str) -> None:
+    process = start("view", "--control", real.ready["control"], "--listen", listen)
+    page = Page(process.stdout.readline().decode())
+    assert page.ask("/")[0] == 200 and page.come_in().ask("/", Origin=f"http://{page.address}")[0] == 200
+
+
+def test_port_80_is_at_home_without_its_number() -> None:
+    asked = Message()
+    asked["Host"] = "127.0.0.1"
+    assert at_home(asked, Address("127.0.0.1", 80)) and not at_home(asked, Address("127.0.0.1", 81))
 
 
 @pytest.mark.parametrize(
@@ -137,28 +179,27 @@ def test_what_a_browser_is_told_to_allow(view: Page) -> None:
     ],
 )
 def test_another_site_gets_nothing(view: Page, headers: dict[str, str]) -> None:
-    assert view.ask("/?" + view.token, **headers)[0] == 403  # and the token is not used up
+    token = {"X_Gestured_Token": view.token}
+    assert view.ask("/open", "POST", {}, **token, **headers)[0] == 403  # and the token is not used up
     view.come_in()
     assert view.ask("/", **headers)[0] == 403 and view.ask("/stream", **headers)[0] == 403
-    _, hello = view.stream().until("hello")
-    assert view.ask("/flag", "POST", {}, X_Gestured_Token=hello["token"], **headers)[0] == 403
+    assert view.ask("/flag", "POST", {}, **headers)[0] == 403
 
 
 def test_what_changes_anything_needs_the_header(view: Page, real: Daemon) -> None:
     view.come_in()
     Sensor(real, "arm").begin()
-    _, hello = view.stream().until("hello")
-    for headers in ({}, {"X_Gestured_Token": "x"}, {"X_Gestured_Token": hello["token"], "Cookie": ""}):
+    for wrong in ("", "x", view.token):
         for path in ("/recalibrate", "/flag"):
-            status, _, body = view.ask(path, "POST", {"sensor": "arm"}, **headers)
+            status, _, body = view.ask(path, "POST", {"sensor": "arm"}, X_Gestured_Token=wrong)
             assert status == 403 and "error" in json.loads(body)
-    mine = {"X_Gestured_Token": hello["token"], "Origin": f"http://{view.address}"}
+    mine = {"Origin": f"http://{view.address}"}
     status, _, body = view.ask("/recalibrate", "POST", {"sensor": "arm"}, **mine)
     assert status == 200 and "arm: learned anew, leave" in json.loads(body)["done"]
     assert view.ask("/recalibrate", "POST", {"sensor": "nobody"}, **mine)[0] == 409
     assert view.ask("/else", "POST", {}, **mine)[0] == 404
-    for wrong in ([], {"sensor": 1}, {"note": "x" * BODY_BYTES}):
-        assert view.ask("/flag", "POST", wrong, **mine)[0] == 400
+    for sent in ([], {"sensor": 1}, {"note": "x" * BODY_BYTES}, b"[" * 4000):
+        assert view.ask("/flag", "POST", sent, **mine)[0] == 400
 
 
 @pytest.mark.parametrize("listen", ["0.0.0.0:0", "192.0.2.1:9109", "[::]:0"])
@@ -295,7 +336,7 @@ def test_a_swipe_is_drawn_named_and_flagged(view: Page, real: Daemon, browser: B
     browser.size(width, 900)
     browser.colours("dark" if width < 600 else "light")
     sensor = follow(view, browser, "armrest", real)
-    assert browser.run("location.search") == ""  # the token is gone from the address
+    assert browser.run("location.hash + location.search") == ""  # the token is gone from the address
     perform(sensor, browser, "right")
     browser.until("document.getElementById('answer').textContent.startsWith('swipe right')")
     path = browser.run("state.frames.filter(f => f.centroid).map(f => f.centroid[1])")
@@ -412,6 +453,38 @@ def test_everything_has_a_name_for_who_does_not_see_it(view: Page, real: Daemon,
         assert node.get("name", {}).get("value"), node
     assert {"button", "checkbox", "combobox", "slider", "textbox", "image", "region"} <= seen
     assert browser.run("document.querySelectorAll('[aria-live=polite]').length") == 1
+
+
+def test_a_page_on_another_port_of_this_machine_gets_nothing(view: Page, real: Daemon, browser: Browser) -> None:
+    """A neighbour serves it, and the owner's browser is led there after it has looked."""
+    follow(view, browser, "arm", real)
+    secret = browser.run("state.secret")
+    heard: list[str] = []
+
+    class Neighbour(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            heard.append(str(self.headers))
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+            self.wfile.write(b"<p id=evil>evil")
+
+        def log_message(self, *_: Any) -> None: ...
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Neighbour) as neighbour:
+        threading.Thread(target=neighbour.serve_forever, daemon=True).start()
+        browser.call("Page.navigate", url="http://{}:{}/".format(*neighbour.server_address))
+        browser.until("document.getElementById('evil') !== null")
+        assert browser.run("document.cookie + JSON.stringify(sessionStorage) + JSON.stringify(localStorage)") == "{}{}"
+        tried = f"""Promise.all(['include', 'omit'].flatMap(credentials => [
+            fetch('http://{view.address}/stream?sensor=arm', {{credentials}}).then(r => r.text(), () => 'refused'),
+            fetch('http://{view.address}/recalibrate', {{credentials, method: 'POST', body: '{{"sensor":"arm"}}',
+              headers: {{'X-Gestured-Token': 'x'}}}}).then(r => r.text(), () => 'refused')]))"""
+        assert browser.run(tried) == ["refused"] * 4
+        neighbour.shutdown()
+    assert heard and not any(secret in what or "Cookie" in what for what in heard)
+    browser.call("Page.navigate", url=f"http://{view.address}/")
+    browser.until("document.getElementById('sensor')?.value === 'arm'")  # the tab has kept its secret
 
 
 def test_a_name_is_never_markup(start, fake_control, browser: Browser) -> None:

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     source = Source(control_path(args), args.folder)
     door = Door()
     with Server(args.listen, source, door) as server:
-        address = f"http://{server.address}/?token={door.token}"
+        address = f"http://{server.address}/#{door.token}"
         tell(args.json, {"type": "view", "address": address}, address)
         say("Open this address in a browser on this machine; it works once. Ctrl-C ends the view.", to=sys.stderr)
         try:

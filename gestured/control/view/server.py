@@ -2,6 +2,9 @@
 
 import json
 import socket
+import threading
+from collections import deque
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -14,6 +17,8 @@ from gestured.control.view.outbox import Outbox
 from gestured.control.view.source import Source
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
+from gestured.core.messages import json_object
+from gestured.core.wire import is_sensor
 
 PAGE = Path(__file__).with_name("page")
 FILES = {
@@ -31,9 +36,10 @@ SAFE = {
     "Cache-Control": "no-store",
 }
 CLOSED = "This address has been used, or is not the right one. Start gesturectl view again, and open what it prints.\n"
-BROWSERS = 32  # connections at a time
+BROWSERS = 32  # streams at a time
+STRANGERS = 32  # connections at a time that have not shown the secret; a further one takes the oldest one's place
 BODY_BYTES = 4096  # of a request
-ASK_S = 10.0  # for a request to come
+ASK_S = 10.0  # for all of a request to come, and for its answer to go
 SEND_S = 60.0  # for a browser that is stalled; then it has to come again, which it does by itself
 ALIVE_S = 5.0  # without anything new, a comment says that the viewer is there
 SENT_BYTES = 32 << 10  # that may be on their way to a browser: a stalled one comes back to the present, not to the past
@@ -48,7 +54,8 @@ class Server(ThreadingHTTPServer):
     def __init__(self, listen: Address, source: Source, door: Door) -> None:
         self.source, self.door = source, door
         self.address_family = socket.AF_INET6 if ":" in listen.host else socket.AF_INET
-        self._busy = 0
+        self._strangers: deque[socket.socket] = deque()  # the oldest first
+        self._browsers = threading.Semaphore(BROWSERS)
         try:
             super().__init__((listen.host, listen.port), Handler)
         except OSError as error:
@@ -56,17 +63,39 @@ class Server(ThreadingHTTPServer):
             raise GesturedError(f"--listen {listen}: cannot be had: {reason}") from error
         self.address = Address(*self.socket.getsockname()[:2])
 
-    def verify_request(self, request: Any, client_address: Any) -> bool:
-        """Not more browsers than there is room for."""
-        return self._busy < BROWSERS
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """A new connection: who takes his time, or all places, gives his to others."""
+        while len(self._strangers) >= STRANGERS:
+            _hang_up(self._strangers.popleft())
+        self._strangers.append(request)
+        super().process_request(request, client_address)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """One connection, in its thread."""
-        self._busy += 1
+        """One connection, in its thread: one request."""
+        deadline = threading.Timer(ASK_S, self._late, (request,))
+        deadline.start()
         try:
             super().process_request_thread(request, client_address)
         finally:
-            self._busy -= 1
+            deadline.cancel()
+            self._no_stranger(request)
+
+    def begin_stream(self, request: socket.socket) -> bool:
+        """Who has shown the secret may stay; false where there is no place for a further stream."""
+        self._no_stranger(request)
+        return self._browsers.acquire(blocking=False)
+
+    def end_stream(self) -> None:
+        """A browser has gone."""
+        self._browsers.release()
+
+    def _late(self, request: socket.socket) -> None:
+        if request in self._strangers:
+            _hang_up(request)
+
+    def _no_stranger(self, request: socket.socket) -> None:
+        with suppress(ValueError):
+            self._strangers.remove(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that has gone is none of our business."""
@@ -83,31 +112,41 @@ class Handler(BaseHTTPRequestHandler):
         """The page, its parts, and the stream."""
         where = urlsplit(self.path)
         query = {key: values[0] for key, values in parse_qs(where.query).items()}
-        if not at_home(self.headers, self.port):
+        sensor = query.get("sensor", "")
+        if not at_home(self.headers, self.server.address):
             self._answer(HTTPStatus.FORBIDDEN, "text/plain", b"another host, or another site's page\n")
-        elif where.path == "/" and self.server.door.open(query.get("token", "")):
-            self._file("/", {"Set-Cookie": self.server.door.cookie(self.port)})
-        elif not self.server.door.knows(self.headers, self.port):
-            self._answer(HTTPStatus.FORBIDDEN, "text/plain", CLOSED.encode())
-        elif where.path == "/stream":
-            self._stream(Outbox(query.get("sensor", ""), query.get("raw") == "1"))
-        elif where.path in FILES:
-            self._file(where.path, {})
-        else:
+        elif where.path in FILES:  # nothing in them is anybody's
+            name, kind = FILES[where.path]
+            self._answer(HTTPStatus.OK, kind, (PAGE / name).read_bytes())
+        elif where.path != "/stream":
             self._answer(HTTPStatus.NOT_FOUND, "text/plain", b"no such page\n")
+        elif not self.server.door.knows(self.headers):
+            self._answer(HTTPStatus.FORBIDDEN, "text/plain", CLOSED.encode())
+        elif sensor and not is_sensor(sensor):
+            self._answer(HTTPStatus.BAD_REQUEST, "text/plain", b"sensor: expected 1 to 64 of A-Z, a-z, 0-9, _ and -\n")
+        elif not self.server.begin_stream(self.connection):
+            self._answer(HTTPStatus.SERVICE_UNAVAILABLE, "text/plain", b"too many pages look already\n")
+        else:
+            try:
+                self._stream(Outbox(sensor, query.get("raw") == "1"))
+            finally:
+                self.server.end_stream()
 
     def do_POST(self) -> None:  # noqa: N802
-        """Flag or recalibrate: the requests that change anything."""
+        """Come in, flag or recalibrate: what needs the token, and what changes anything."""
         door, source = self.server.door, self.server.source
-        may = at_home(self.headers, self.port) and door.knows(self.headers, self.port) and door.may_change(self.headers)
         try:
             length = int(self.headers.get("Content-Length", ""))
-            what = json.loads(self.rfile.read(length)) if 0 <= length <= BODY_BYTES else None
+            what = json_object(self.rfile.read(length)) if 0 <= length <= BODY_BYTES else None
         except (ValueError, OSError):
             what = None
-        if not may:
-            self._json(HTTPStatus.FORBIDDEN, {"error": "the page's token is missing; load the page again"})
-        elif not isinstance(what, dict) or not all(isinstance(value, str) for value in what.values()):
+        if not at_home(self.headers, self.server.address):
+            self._json(HTTPStatus.FORBIDDEN, {"error": "another host, or another site's page"})
+        elif self.path == "/open" and (secret := door.open(self.headers)) is not None:
+            self._json(HTTPStatus.OK, {"secret": secret})
+        elif not door.knows(self.headers):
+            self._json(HTTPStatus.FORBIDDEN, {"error": CLOSED.strip()})
+        elif what is None or not all(isinstance(value, str) for value in what.values()):
             self._json(
                 HTTPStatus.BAD_REQUEST, {"error": f"expected a JSON object of texts, at most {BODY_BYTES} bytes"}
             )
@@ -124,23 +163,14 @@ class Handler(BaseHTTPRequestHandler):
             except (GesturedError, OSError) as error:
                 self._json(HTTPStatus.CONFLICT, {"error": str(error)})
 
-    @property
-    def port(self) -> int:
-        """The port of the page itself."""
-        return self.server.address.port
-
     def log_message(self, format: str, *args: Any) -> None:
         """Nothing is logged: who looks is not our business, and an address holds the token."""
-
-    def _file(self, path: str, more: dict[str, str]) -> None:
-        name, kind = FILES[path]
-        self._answer(HTTPStatus.OK, kind, (PAGE / name).read_bytes(), more)
 
     def _json(self, status: HTTPStatus, what: dict[str, str]) -> None:
         self._answer(status, "application/json", json.dumps(what).encode())
 
-    def _answer(self, status: HTTPStatus, kind: str, body: bytes, more: dict[str, str] | None = None) -> None:
-        self._head(status, {"Content-Type": kind, "Content-Length": str(len(body))} | (more or {}))
+    def _answer(self, status: HTTPStatus, kind: str, body: bytes) -> None:
+        self._head(status, {"Content-Type": kind, "Content-Length": str(len(body))})
         self.wfile.write(body)
 
     def _head(self, status: HTTPStatus, headers: dict[str, str]) -> None:
@@ -153,7 +183,6 @@ class Handler(BaseHTTPRequestHandler):
         self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SENT_BYTES)
         self.connection.settimeout(SEND_S)
         self._head(HTTPStatus.OK, {"Content-Type": "text/event-stream"})
-        outbox.put("hello", {"token": self.server.door.header})
         self.server.source.join(outbox)
         try:
             while (what := outbox.take(ALIVE_S)) is not None:
@@ -162,3 +191,8 @@ class Handler(BaseHTTPRequestHandler):
             pass  # it has gone
         finally:
             self.server.source.leave(outbox)
+
+
+def _hang_up(connection: socket.socket) -> None:
+    with suppress(OSError):
+        connection.shutdown(socket.SHUT_RDWR)

@@ -6,27 +6,59 @@ const STEPS = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000, 50000,
 const PHASES = { IDLE: "idle", CONTACT: "contact", RELEASING: "releasing", GAP: "waiting for a second tap", SPENT: "held too long" };
 const SHADES = { IDLE: "#8a94a0", CONTACT: "#e69f00", RELEASING: "#56b4e9", GAP: "#009e73", SPENT: "#cc79a7" }; // Okabe and Ito
 const at = id => document.getElementById(id);
-const state = { token: "", stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0, early: null };
+const state = { secret: sessionStorage.getItem("secret") ?? "", stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0, early: null };
 
-history.replaceState(null, "", "/"); // the address's token has done its work
+const token = location.hash.slice(1); // works once: for a secret that this tab keeps, and no other origin can read
+history.replaceState(null, "", "/");
 for (const step of STEPS.slice(0, -2)) at("scale").append(new Option(`0 to ${step}`, step));
 
 function words(name) { return String(name).replaceAll("_", " "); }
 function percent(share) { return `${Math.round(100 * share)} %`; }
 function clock(s) { return new Date(1000 * s).toLocaleTimeString("en-GB") + "." + String(Math.floor(s % 1 * 10)); }
 
+const kinds = { sensors, frame, event, gone: gone => daemon(gone.reason, true) };
+
+async function ask(path, more) {
+  return fetch(path, { ...more, headers: { "X-Gestured-Token": state.secret || token, ...more?.headers } });
+}
+
+async function enter() {
+  if (token) state.secret = "";
+  const answer = await ask("open", { method: "POST", body: "{}" });
+  const told = await answer.json();
+  if (!answer.ok) { daemon(told.error, true); return; }
+  state.secret = told.secret;
+  sessionStorage.setItem("secret", told.secret);
+  open("");
+}
+
 function open(sensor) {
-  if (state.stream) state.stream.close();
+  if (state.stream) state.stream.abort();
   state.frames = []; state.full = 0; state.sensor = sensor;
-  const query = new URLSearchParams({ sensor, raw: at("raw").checked ? "1" : "0" });
-  const stream = state.stream = new EventSource("stream?" + query);
-  const on = (kind, act) => stream.addEventListener(kind, message => act(JSON.parse(message.data)));
-  on("hello", hello => { state.token = hello.token; });
-  on("sensors", sensors);
-  on("frame", frame);
-  on("event", event);
-  on("gone", gone => { daemon(gone.reason, true); });
-  stream.onerror = () => daemon("the viewer does not answer: is gesturectl view still running?", true);
+  state.stream = new AbortController();
+  listen(state.stream);
+}
+
+async function listen(stream) { // server-sent events; EventSource sends no header
+  const query = new URLSearchParams({ sensor: state.sensor, raw: at("raw").checked ? "1" : "0" });
+  while (!stream.signal.aborted) {
+    try {
+      const answer = await ask("stream?" + query, { signal: stream.signal });
+      if (!answer.ok) { daemon(await answer.text(), true); return; }
+      const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
+      for (let rest = "", part; !(part = await reader.read()).done;) {
+        const blocks = (rest + part.value).split("\n\n");
+        rest = blocks.pop();
+        for (const block of blocks) {
+          const told = /^event: (\w+)\ndata: (.*)$/.exec(block);
+          if (told && !stream.signal.aborted) kinds[told[1]]?.(JSON.parse(told[2]));
+        }
+      }
+    } catch { /* it has gone, or something else is looked at */ }
+    if (stream.signal.aborted) return;
+    daemon("the viewer does not answer: is gesturectl view still running?", true);
+    await new Promise(again => setTimeout(again, 1000));
+  }
 }
 
 function daemon(text, gone) {
@@ -37,16 +69,16 @@ function daemon(text, gone) {
 function sensors(told) {
   daemon(`gestured ${told.version}, ${told.state}, model ${told.model}`, false);
   const names = Object.keys(told.sensors), select = at("sensor");
-  if (names.join("\n") !== [...select.options].map(o => o.value).join("\n")) {
-    select.replaceChildren(...names.map(name => new Option(name, name, false, name === state.sensor)));
-    if (!names.includes(state.sensor) && names.length) { select.value = names[0]; open(names[0]); return; }
-  }
   at("sensors").tBodies[0].replaceChildren(...names.map(name => {
     const s = told.sensors[name];
     const tr = row([name, s.state + (s.touched ? ", touched" : ""), s.rate_hz.toFixed(1), `${Math.round(1000 * s.jitter_s)} ms`, s.lost ?? 0, s.bad_taxels]);
     if (name === state.sensor) tr.className = "now";
     return tr;
   }));
+  if (names.join("\n") !== [...select.options].map(o => o.value).join("\n")) {
+    select.replaceChildren(...names.map(name => new Option(name, name, false, name === state.sensor)));
+    if (!names.includes(state.sensor) && names.length) { select.value = names[0]; open(names[0]); }
+  }
 }
 
 function row(cells) {
@@ -269,7 +301,7 @@ function step(frames) {
 
 async function act(path, what) {
   at("done").textContent = "...";
-  const answer = await fetch(path, { method: "POST", headers: { "Content-Type": "application/json", "X-Gestured-Token": state.token }, body: JSON.stringify(what) }).then(r => r.json(), error => ({ error: String(error) }));
+  const answer = await ask(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(what) }).then(r => r.json(), error => ({ error: String(error) }));
   at("done").textContent = answer.error ?? answer.done;
 }
 
@@ -296,4 +328,4 @@ addEventListener("keydown", e => {
   const wanted = keys[e.key.length === 1 ? e.key.toLowerCase() : e.key];
   if (wanted && !(e.key === " " && e.target.type === "checkbox")) { e.preventDefault(); wanted(); }
 });
-open("");
+enter();
