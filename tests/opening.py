@@ -21,19 +21,9 @@ Open = Callable[[Path], object]
 
 
 def npz(path: Path) -> object:
-    """As `replay` plays it, and as `inspect` shows what is good of it."""
+    """As `replay` plays it."""
     from gestured.control.labelled import Labelled
-    from gestured.lab.recordings.looking import one, overview
-    from gestured.lab.recordings.safe import read_what_is_good
 
-    try:
-        good, left = read_what_is_good(path)
-    except GesturedError:
-        pass
-    else:
-        assert all(str(path) in str(what) for what in left)
-        if len(good):
-            json.dumps([overview(good), one(good, 0)])
     return Labelled(path, "arm").tape
 
 
@@ -62,28 +52,21 @@ def mcap(path: Path) -> object:
 
 
 def csv(path: Path) -> object:
-    """As `import --format csv` reads one gesture."""
+    """As `import` reads one gesture."""
     from gestured.lab.recordings.sources import Csv, read_csv
 
     return read_csv(path, Csv(3, 3, "s", "swipe_left", "07", ""))
 
 
 def wide(path: Path) -> object:
-    """As `import --format csv` reads a session of a large sensor."""
+    """As `import` reads a session of a large sensor."""
     from gestured.lab.recordings.sources import Csv, read_csv
 
     return read_csv(path, Csv(64, 64, "s", "session", "07", ""))
 
 
-def capfingerid(path: Path) -> object:
-    """As `import --format capfingerid` reads it."""
-    from gestured.lab.recordings.sources import read_capfingerid
-
-    return read_capfingerid(path)
-
-
 KINDS: dict[str, Open] = {
-    "npz": npz, "npz_alone": npz_alone, "mcap": mcap, "csv": csv, "wide": wide, "capfingerid": capfingerid,
+    "npz": npz, "npz_alone": npz_alone, "mcap": mcap, "csv": csv, "wide": wide,
 }  # fmt: skip
 
 

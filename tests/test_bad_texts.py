@@ -10,21 +10,19 @@ from tests.opening import in_bounds, refused
 MIB = 128
 
 
-@pytest.mark.parametrize("kind", ["csv", "capfingerid"])
-def test_one_line_of_gigabytes_is_not_read(tmp_path: Path, kind: str) -> None:
+def test_one_line_of_gigabytes_is_not_read(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     with path.open("wb") as file:
         file.write(b"1,2,3\n")
         file.truncate(6 << 30)
-    reason, mib = in_bounds(kind, path, MIB)
+    reason, mib = in_bounds("csv", path, MIB)
     assert "line 2: expected at most" in reason and mib < 32
 
 
-@pytest.mark.parametrize("kind", ["csv", "capfingerid"])
-def test_a_file_of_nothing_but_bad_lines_is_given_up(tmp_path: Path, kind: str) -> None:
+def test_a_file_of_nothing_but_bad_lines_is_given_up(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("x\n" * (4 << 20))
-    reason, mib = in_bounds(kind, path, MIB)
+    reason, mib = in_bounds("csv", path, MIB)
     assert "expected frames" in reason and mib < 64
 
 
@@ -70,12 +68,5 @@ def test_a_fifo_is_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
     os.mkfifo(tmp_path / "a.csv")
     assert "not a regular file" in refused("csv", tmp_path / "a.csv")
-    status = main(["import", "--format", "csv", "--participant", "07", str(tmp_path / "a.csv"), "--out", "b.npz"])
+    status = main(["import", "--participant", "07", str(tmp_path / "a.csv"), "--out", "b.npz"])
     assert status == 1 and "a.csv" in capsys.readouterr().out
-
-
-def test_who_and_what_of_a_line_is_bounded(tmp_path: Path) -> None:
-    path = tmp_path / "a.txt"
-    numbers = ",".join(["1"] * 407)
-    path.write_text("".join(f"7;left;{'ring' * 500};TAP;-1;{k},0,{numbers[4:]},\n" for k in range(5)))
-    assert "finger" in refused("capfingerid", path)

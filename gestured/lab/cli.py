@@ -29,7 +29,6 @@ PROGRAMS = {
     "study": "gestured.lab.study.study",
     "collect": "gestured.lab.recordings.collect",
     "import": "gestured.lab.recordings.importing",
-    "inspect": "gestured.lab.recordings.looking",
     "forget": "gestured.lab.recordings.forget",
 }
 

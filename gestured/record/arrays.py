@@ -6,7 +6,6 @@ recording, and what was expected.
 """
 
 import zipfile
-from collections.abc import Callable, Collection
 from dataclasses import fields
 from pathlib import Path
 from typing import IO
@@ -14,7 +13,7 @@ from typing import IO
 import numpy as np
 
 from gestured.core.errors import RecordingError
-from gestured.record.check import Wrong, check, check_all_but_frames, check_frames, shapes, structure
+from gestured.record.check import Wrong, check, check_all_but_frames, check_frames, shapes
 from gestured.record.files import PRIVATE, atomic_write, open_regular
 from gestured.record.npz import Archive, brief
 from gestured.record.recordings import Recordings
@@ -30,7 +29,7 @@ _REQUIRED = _FIELDS[:5]
 def read(path: str | Path) -> Recordings:
     """Read and check a file; RecordingError for what is no recording. It ignores unknown members."""
     try:
-        found = load(path, look=check_all_but_frames)
+        found = _load(path)
         check_frames(found)
     except Wrong as error:
         raise RecordingError(f"{path}: {error}") from error
@@ -53,21 +52,18 @@ def write(path: str | Path, recordings: Recordings) -> None:
         raise RecordingError(f"{path}: cannot be written: {brief(error)}") from error
 
 
-def load(path: str | Path, without: Collection[str] = (), look: Callable[[Recordings], None] = structure) -> Recordings:
-    """A file's fields as they stand there, `without` some; raises Wrong.
-
-    They are held against nothing but `look`, which gets zeros for the frames: those are unpacked last.
-    """
+def _load(path: str | Path) -> Recordings:
+    """A file's fields, checked but for the frames, which are unpacked last; raises Wrong."""
     try:
         with open_regular(path) as file:
-            archive = Archive(file, _KNOWN.difference(without), MAX_RECORDING_BYTES)
+            archive = Archive(file, _KNOWN, MAX_RECORDING_BYTES)
             forms = archive.forms
             missing = [field for field in _REQUIRED if field not in forms]
             if missing:
                 raise Wrong(f"{missing[0]}: is missing, expected the fields {', '.join(_REQUIRED)}", missing[0])
             shapes(Recordings(**forms))
             fields = {field: archive.array(field) for field in forms if field != "frames"}
-            look(Recordings(frames=forms["frames"], **fields))
+            check_all_but_frames(Recordings(frames=forms["frames"], **fields))
             return Recordings(frames=archive.array("frames"), **fields)
     except Wrong:
         raise

@@ -246,14 +246,6 @@ def hostile(tmp_path: Path) -> Path:
     return save(tmp_path / f"{name}.npz", session(), **texts, event_kinds=kinds, inclinations=np.array([name, name]))
 
 
-@pytest.mark.parametrize("more", [[], ["--index", "0"], ["--json"], ["--index", "1", "--json"]])
-def test_inspect_shows_names_of_recordings(hostile: Path, more) -> None:
-    status, out, err = lab("inspect", hostile, *more)
-    assert status == 0, err
-    assert "owned" in plain(out) if "--json" not in more else out.isascii() and "owned" in out
-    plain(err)
-
-
 def test_forget_shows_names_of_files(hostile: Path, tmp_path: Path) -> None:
     (tmp_path / "models").mkdir()
     (tmp_path / "models" / "\x1b[2J.onnx").write_bytes(b"\x1b[2J")
@@ -265,8 +257,8 @@ def test_forget_shows_names_of_files(hostile: Path, tmp_path: Path) -> None:
 
 def test_import_shows_what_a_line_says(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
-    path.write_text(f"{HOSTILE};left;index;TAP;-1;1,2,3\n" * 3)
-    status, out, err = lab("import", "--format", "capfingerid", path, "--out", tmp_path / "b.npz")
+    path.write_text(f"1,{HOSTILE}\n" * 3)
+    status, out, err = lab("import", "--participant", "07", path, "--out", tmp_path / "b.npz")
     assert status == 1
     plain(out + err)
 

@@ -50,14 +50,8 @@ def _csv(folder: Path) -> list[bytes]:
     return ["\n".join(["time" + ",t" * 9, *rows]).encode(), "\r\n".join(rows).encode("utf-8-sig")]
 
 
-def _capfingerid(folder: Path) -> list[bytes]:
-    counts = ",".join(str(n % 9) for n in range(405))
-    tasks = ["TAP", "TAP", "PAUSE", "DRAG", "TAP"]
-    return ["\n".join(f"7;left;ring;{task};-1;{k},{k}5,{counts}," for k, task in enumerate(tasks)).encode()]
-
-
 SEEDS: dict[str, Callable[[Path], list[bytes]]] = {
-    "npz": _npz, "mcap": _mcap, "csv": _csv, "capfingerid": _capfingerid,
+    "npz": _npz, "mcap": _mcap, "csv": _csv,
 }  # fmt: skip
 WORDS = (b"", b"\0", b"\xff" * 8, b"\n", b",", b";", b"1e308", b"-1", b"nan", b"[" * 3000, b"9" * 400, b'"', b"null",
          struct.pack("<Q", 1 << 40), struct.pack("<I", 0xFFFFFFFF), b"\x93NUMPY", b"PK\x01\x02")  # fmt: skip

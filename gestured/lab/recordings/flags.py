@@ -1,4 +1,4 @@
-"""The flags of `gestured-lab collect`, `import`, `inspect` and `forget`."""
+"""The flags of `gestured-lab collect`, `import` and `forget`."""
 
 import argparse
 import difflib
@@ -17,18 +17,13 @@ from gestured.simulator import GESTURES, NONE
 FOLDER = Path("recordings")
 NO_NAMES = (SESSION, UNNAMED)  # labels of recordings that are no gesture's, besides those that no gesture may have
 IMPORT = """\
-Make recordings of files of another form. What cannot be used is told and
+Make recordings of CSV files. What cannot be used is told and
 counted: the file, the line, the field, and what was expected.
 
-csv          A row for each frame: time, then rows x columns values, row by row,
-             the top row first; with commas, a heading or none. With a gesture as
-             --label the file holds one performance of it, whose touched frames
-             are marked as the daemon would see them.
-capfingerid  The text files of github.com/interactionlab/CapFingerId, a line for
-             each frame: participant;hand;finger;task;-1; then seconds, nanoseconds
-             and 27 x 15 counts with commas, one more at the end. Each file becomes
-             a session. Its tasks (TAP, DRAG, SCROLL) are no gestures: they become
-             events labelled "other"."""
+A file has a row for each frame: time, then rows x columns values, row by row,
+the top row first; with commas, a heading or none. With a gesture as --label the
+file holds one performance of it, whose touched frames are marked as the daemon
+would see them."""
 Add = Callable[[str, str, str], argparse.ArgumentParser]
 
 
@@ -53,24 +48,20 @@ def add_recordings(command: Add) -> None:
     collect.add_argument("--repeats", type=_count, default=1, metavar="N", help="times that each trial is done (1)")
     collect.add_argument("--countdown", type=_seconds, default=3, metavar="S", help="seconds before each gesture (3)")
 
-    bring = command("import", "make recordings of files of another form",
-                    "gestured-lab import --format csv --participant 07 --label one_tap a.csv --out b.npz")  # fmt: skip
+    bring = command("import", "make recordings of CSV files",
+                    "gestured-lab import --participant 07 --label one_tap a.csv --out b.npz")  # fmt: skip
     bring.formatter_class = argparse.RawDescriptionHelpFormatter
     bring.description = IMPORT
     bring.add_argument("files", type=Path, nargs="+", metavar="FILE", help="one recording each")
-    bring.add_argument("--format", choices=("csv", "capfingerid"), required=True, help="their form")
+    bring.add_argument("--format", choices=("csv",), default="csv", help="their form (csv)")
     bring.add_argument("--out", type=Path, required=True, metavar="F.npz", help="a new file for all of them")
-    only = bring.add_argument_group("only for --format csv")
-    only.add_argument("--grid", type=rows_by_columns, metavar="RxC", help="rows and columns (9x9)")
-    only.add_argument("--time-unit", choices=("s", "ms", "us"), help="of the first column (s)")
-    only.add_argument("--label", type=_label, metavar="LABEL",
+    bring.add_argument("--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="rows and columns (9x9)")
+    bring.add_argument("--time-unit", choices=("s", "ms", "us"), default="s", help="of the first column (s)")
+    bring.add_argument("--label", type=_label, default=SESSION, metavar="LABEL",
                       help="what was performed: a gesture, a name of your own, none, or session (session)")  # fmt: skip
-    only.add_argument("--participant", type=pseudonym, metavar="NAME", help="whose recordings they are, a pseudonym")
-    only.add_argument("--consent", type=_day, metavar="YYYY-MM-DD", help="the day of the participant's consent")
-    look = command("inspect", "print and draw what a file of recordings holds",
-                   "gestured-lab inspect recordings/07.npz --index 3")  # fmt: skip
-    look.add_argument("file", type=Path, metavar="FILE", help="a .npz file of recordings")
-    look.add_argument("--index", type=int, metavar="N", help="draw this recording over time, counted from 0")
+    bring.add_argument("--participant", type=pseudonym, required=True, metavar="NAME",
+                       help="whose recordings they are, a pseudonym")  # fmt: skip
+    bring.add_argument("--consent", type=_day, metavar="YYYY-MM-DD", help="the day of the participant's consent")
     forget = command("forget", "remove a participant from files of recordings, and say which models learned from them",
                      "gestured-lab forget 07 recordings --dry-run")  # fmt: skip
     forget.add_argument("participant", type=pseudonym, metavar="NAME", help="the pseudonym")

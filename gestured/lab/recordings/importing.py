@@ -1,21 +1,16 @@
-"""`gestured-lab import`: files of other forms -> one file of recordings."""
+"""`gestured-lab import`: CSV files -> one file of recordings."""
 
 import argparse
 import sys
-from collections.abc import Callable
-from functools import partial
-from pathlib import Path
 
 from gestured.client.say import say, tell
 from gestured.core.errors import GesturedError, RecordingError
-from gestured.lab.recordings.safe import LEFT_OUT_SHOWN, LeftOut
-from gestured.lab.recordings.sources import Csv, read_capfingerid, read_csv
+from gestured.lab.recordings.sources import Csv, LeftOut, read_csv
 from gestured.lab.recordings.store import join_recordings
 from gestured.record.arrays import write
-from gestured.record.check import SESSION
 from gestured.record.recordings import Recordings
 
-CSV_ALONE = ("grid", "time_unit", "label", "participant", "consent")
+LEFT_OUT_SHOWN = 10  # of the lines that were left out; the rest is counted
 
 
 def run(args: argparse.Namespace) -> int:
@@ -25,15 +20,14 @@ def run(args: argparse.Namespace) -> int:
     parts: list[Recordings] = []
     left: list[LeftOut] = []
     refused: list[str] = []
-    read = _reader(args)
+    rows, columns = args.grid
+    form = Csv(rows, columns, args.time_unit, args.label, args.participant, args.consent or "")
     for path in args.files:
         try:
-            recordings, gone = read(path)
+            recordings, gone = read_csv(path, form)
         except RecordingError as error:
             refused.append(str(error))
             continue
-        if parts and recordings.frames.shape[1:] != parts[0].frames.shape[1:]:
-            raise GesturedError(f"{path}: expected the grid of {args.files[0]}")
         parts.append(recordings)
         left += gone
     more = [f"and {len(left) - LEFT_OUT_SHOWN} lines more"] if len(left) > LEFT_OUT_SHOWN else []
@@ -48,17 +42,3 @@ def run(args: argparse.Namespace) -> int:
     words = f"{len(together)} recordings, {len(together.frames)} frames"
     tell(args.json, found, f"{args.out}: {words}; left out: {len(refused)} files, {len(left)} lines")
     return 0
-
-
-def _reader(args: argparse.Namespace) -> Callable[[Path], tuple[Recordings, list[LeftOut]]]:
-    if args.format == "capfingerid":
-        given = [name for name in CSV_ALONE if getattr(args, name) is not None]
-        if given:
-            raise GesturedError(f"--{given[0].replace('_', '-')}: only for --format csv; CapFingerId says it itself")
-        return read_capfingerid
-    if args.participant is None:
-        raise GesturedError("--participant: expected a pseudonym; a CSV file does not say whose it is")
-    rows, columns = args.grid or (9, 9)
-    form = Csv(rows, columns, args.time_unit or "s", args.label or SESSION,
-               args.participant, args.consent or "")  # fmt: skip
-    return partial(read_csv, form=form)

@@ -41,5 +41,5 @@ def test_the_document_leads_to_a_model(
         said = capsys.readouterr()
         assert status == 0 or (arguments[0] == "adapt" and "written: " in said.out), said.err
         ran.append(arguments[0])
-    assert ran == ["inspect", "tune", "adapt", "check"]
+    assert ran == ["tune", "adapt", "check"]
     assert open_model(Path("my.onnx")).space is not None  # it can learn gestures of its user's own
