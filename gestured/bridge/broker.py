@@ -15,7 +15,7 @@ EXPIRY_S = 1  # how long a broker keeps an event for a subscriber: as OLD_S says
 BROKER_S = 5.0  # s that the broker may take for any answer
 LAST_S = 1.0  # for its answer to our good-bye; without it, it publishes our last will
 KEEPALIVE_S = 5  # a broker that vanished without a word is noticed, and ours declared dead, after one and a half
-MOST_INCOMING = 1000  # messages that wait to be looked at; more are dropped
+MOST_BYTES = 65_536  # of a packet from the broker, which is told so; we subscribe to nothing, so that all are small
 QUIET = logging.Logger("mqtt", logging.CRITICAL)  # how the connection is, the bridge says in its own words
 UNNAMED = 128  # the reason code that the library gives where the broker named none
 _LOGIN = "set MQTT_USER and MQTT_PASSWORD, or --credentials FILE, as the broker knows them"
@@ -99,7 +99,7 @@ class Broker:
             timeout=BROKER_S,
             keepalive=KEEPALIVE_S,
             clean_start=True,
-            max_queued_incoming_messages=MOST_INCOMING,
+            properties=_properties("CONNECT", MaximumPacketSize=MOST_BYTES),
             tls_context=self._tls,
             logger=QUIET,
         )
@@ -127,12 +127,8 @@ class Connection:
     """A broker that is there. All is sent with QoS 1, so that it may come twice but is not lost on the way."""
 
     def __init__(self, client: Any, broker: Broker) -> None:
-        from paho.mqtt.packettypes import PacketTypes
-        from paho.mqtt.properties import Properties
-
         self._client, self._broker = client, broker
-        self._fresh = Properties(PacketTypes.PUBLISH)  # type: ignore[no-untyped-call]
-        self._fresh.MessageExpiryInterval = EXPIRY_S
+        self._fresh = _properties("PUBLISH", MessageExpiryInterval=EXPIRY_S)
 
     async def event(self, topic: str, payload: bytes) -> None:
         """Publish something that is soon old, and wait until the broker has it. Errors as `retain`."""
@@ -151,17 +147,26 @@ class Connection:
         """Say `offline`, our last word."""
         await self._client.publish(topic, "offline", qos=1, retain=True, timeout=LAST_S)
 
-    async def messages(self, filters: list[str]) -> AsyncIterator[tuple[str, bytes]]:
-        """(topic, payload) of what the broker has at these topics, and of what comes."""
-        for topics in filters:
-            await self._client.subscribe(topics)
-        async for message in self._client.messages:
-            yield message.topic.value, message.payload
+    async def lost(self) -> None:
+        """Until the connection ends, which raises the library's error."""
+        async for _ in self._client.messages:
+            pass  # nothing was subscribed to
 
     def check(self) -> None:
         """Raise BridgeError where the broker has refused to take something."""
         if self._client.refused is not None:
             raise self._broker.refusal(self._client.refused)
+
+
+def _properties(packet: str, **values: int) -> Any:
+    """Properties of a kind of packet of MQTT 5."""
+    from paho.mqtt.packettypes import PacketTypes
+    from paho.mqtt.properties import Properties
+
+    properties = Properties(getattr(PacketTypes, packet))  # type: ignore[no-untyped-call]
+    for name, value in values.items():
+        setattr(properties, name, value)
+    return properties
 
 
 def _cause(error: BaseException) -> BaseException:

@@ -7,8 +7,8 @@ from typing import Any
 from gestured.bridge.counts import Counts
 from gestured.client.fields import wrong_field
 from gestured.client.subscriber import Subscriber
+from gestured.core.address import is_sensor
 from gestured.core.messages import quoted
-from gestured.core.wire import is_sensor
 
 NOTICE_S = 0.25  # after which a daemon that went is noticed
 GONE = "gone"  # the type of a line of ours: the daemon hung up, and is called until it is back
@@ -58,7 +58,8 @@ class Daemon:
         """`sensors` and `gestures`: the subscription's filters, None for all. `counts` learns whether it is there."""
         self._counts = counts
         self.hello: Line = {}  # empty while it is away
-        self.states: dict[str, str] = {}  # sensor -> how it is; what was known before it went is kept
+        self.version = ""  # the last one that was there
+        self.states: dict[str, str] = {}  # sensor -> how it is, the one heard of last at the end; kept while it is away
         self.gestures: list[str] | None = None  # None until it has said them
         self._wanted_sensors, self._wanted_gestures = sensors, gestures
         self._lags: dict[str, tuple[float, float]] = {}  # sensor -> its smallest lag, and when that was found
@@ -67,7 +68,7 @@ class Daemon:
         """One line of `follow`."""
         match line["type"]:
             case "hello":
-                self.hello = line
+                self.hello, self.version = line, line["version"]
                 self._gestures(line["gestures"])
                 for name in line["sensors"]:
                     self._state(name, self.states.get(name, "no_data"))
@@ -104,8 +105,10 @@ class Daemon:
     def _state(self, name: str, state: str) -> None:
         if self._wanted_sensors is not None and name not in self._wanted_sensors:
             return
-        if name in self.states or len(self.states) < MOST_SENSORS:
-            self.states[name] = state
+        self.states.pop(name, None)
+        self.states[name] = state
+        if len(self.states) > MOST_SENSORS:
+            del self.states[next(iter(self.states))]
 
     def _gestures(self, known: Sequence[str]) -> None:
         wanted = self._wanted_gestures

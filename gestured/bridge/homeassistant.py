@@ -9,18 +9,12 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from gestured.bridge.options import plain
-from gestured.core.messages import json_object
 
 # What the event entity makes of a gesture's line: what it is, and some of what is known of it.
 EVENT = (
     "{{ {'event_type': value_json.gesture, 'confidence': value_json.confidence, 'sequence': value_json.sequence,"
     " 'instance': value_json.instance} | tojson }}"
 )
-
-
-def mine(prefix: str, host: str) -> list[str]:
-    """The filters of all discovery topics of a host, whatever its sensors are."""
-    return [f"{prefix}/{component}/gestured_{host}/+/config" for component in ("event", "device_automation")]
 
 
 def discovery(
@@ -59,9 +53,3 @@ def discovery(
             "value_template": "{{ value_json.gesture }}",
         }
         yield f"{prefix}/device_automation/{node}/{sensor}-{plain(gesture)}/config", trigger | common
-
-
-def gesture_of(payload: bytes) -> str | None:
-    """The gesture of a trigger that somebody published; None for an event entity and for what is none of ours."""
-    gesture = (json_object(payload) or {}).get("subtype")
-    return gesture if isinstance(gesture, str) else None

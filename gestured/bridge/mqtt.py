@@ -47,8 +47,7 @@ def add(commands: Commands) -> None:
     parser.add_argument("--credentials", type=Path, metavar="FILE", help="a file of one line, USER:PASSWORD")
     text = "discovery prefix of Home Assistant (default: homeassistant)"
     parser.add_argument("--discovery", default="homeassistant", metavar="PREFIX", help=text)
-    text = "publish no discovery, and clear what was published"
-    parser.add_argument("--no-discovery", action="store_true", help=text)
+    parser.add_argument("--no-discovery", action="store_true", help="publish nothing for Home Assistant")
     add_metrics(parser)
     parser.set_defaults(run=run)
 

@@ -87,17 +87,11 @@ class Mqtt:
         self._changed.set()
         self._counts.connected("broker", True, f"broker {self._broker.address} is there")
         await first_of(
-            self._hear(connection), self._keep(connection), self._outbox.send(connection.event), self._until_stopped()
+            self._keep(connection), self._outbox.send(connection.event), self._until_stopped(), connection.lost()
         )
 
     async def _until_stopped(self) -> None:
         await self._stop.wait()
-
-    async def _hear(self, connection: Connection) -> None:
-        """What earlier bridges of this machine have left at the broker, so that it can be cleared."""
-        async for topic, payload in connection.messages(self._retained.filters):
-            if self._retained.find(topic, payload):
-                self._changed.set()
 
     async def _keep(self, connection: Connection) -> None:
         """Have the broker retain what holds, and forget what does not."""

@@ -137,6 +137,10 @@ class Broker:
     def address(self) -> str:
         return f"127.0.0.1:{self.port}"
 
+    def said(self) -> str:
+        """Its log: who connects, subscribes, publishes."""
+        return self._log.read_text()
+
     def kill(self) -> None:
         """Without a word."""
         self.process.kill()

@@ -275,7 +275,7 @@ def test_templates_make_of_an_event_what_home_assistant_expects():
 def test_own_gestures_appear_and_vanish(bridge, broker, listen, fake):
     at = broker()
     listener = listen(at.port, "homeassistant/#")
-    process = started(bridge, at, fake)
+    started(bridge, at, fake)
     trigger = "homeassistant/device_automation/gestured_car/armrest-{}/config"
     event = "homeassistant/event/gestured_car/armrest/config"
     fake.say({"type": "gestures", "gestures": ["one_tap", "wave"]})
@@ -284,19 +284,60 @@ def test_own_gestures_appear_and_vanish(bridge, broker, listen, fake):
     listener.until(trigger.format("wave"), "")
     wait(lambda: json.loads(retained(listen, at, event)[event])["event_types"] == ["one_tap"])
     assert trigger.format("wave") not in retained(listen, at)
-    # forgotten while no bridge runs
-    fake.say({"type": "gestures", "gestures": ["one_tap", "nod"]})
-    listener.until(trigger.format("nod"))
-    process.stop()
-    fake.close()
-    process = started(bridge, at, fake)
-    listener.until(trigger.format("nod"), "")
-    assert trigger.format("one_tap") in retained(listen, at)
-    process.stop()
-    fake.close()
-    process = started(bridge, at, fake, "--no-discovery")
-    listener.until(trigger.format("one_tap"), "")
-    wait(lambda: not [topic for topic in retained(listen, at) if topic.startswith("homeassistant")])
+
+
+def test_what_was_forgotten_while_the_broker_was_away_is_cleared_when_it_is_back():
+    from gestured.bridge.counts import Counts
+    from gestured.bridge.daemon import Daemon
+    from gestured.bridge.retained import Retained
+
+    daemon = Daemon(None, None, Counts("mqtt"))
+    retained = Retained(daemon, "car", "homeassistant", discovers=True)
+    broker: dict[str, str] = {}  # what it retains
+    daemon.take(HELLO | {"gestures": ["one_tap", "nod"]})
+    broker |= retained.changes()
+    retained.forget()
+    daemon.take({"type": "gestures", "gestures": ["one_tap"]})
+    before = set(broker)
+    broker |= retained.changes()
+    (cleared,) = [topic for topic in before if not broker[topic]]
+    assert cleared == "homeassistant/device_automation/gestured_car/armrest-nod/config"
+    assert not list(retained.changes())
+
+
+def test_what_others_retain_is_neither_read_nor_cleared(bridge, broker, listen, fake):
+    """Any integration may write below the discovery prefix, and as much as it likes."""
+    at = broker()
+    theirs = "homeassistant/event/gestured_car/other/config"
+    stranger = listen(at.port, theirs)
+    stranger.client.publish(theirs, b"{}" * 500_000, qos=1, retain=True)
+    stranger.until(theirs)
+    listener = listen(at.port, "gestured/#")
+    started(bridge, at, fake, "--no-discovery")
+    fake.say(gesture(1))
+    listener.events(1)
+    assert retained(listen, at, "homeassistant/#").keys() == {theirs}
+    assert "Received SUBSCRIBE from gestured-car" not in at.said()
+
+
+def test_a_broker_is_told_to_send_no_large_message(bridge, fake):
+    """What is read whole before it can be looked at is bounded by the other side."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(DEADLINE_S)
+        bridge("mqtt", "--broker", f"127.0.0.1:{server.getsockname()[1]}", "--socket", fake.path)
+        with server.accept()[0] as connection:
+            assert b"\x27" + (65536).to_bytes(4, "big") in connection.recv(65536)  # Maximum Packet Size (3.1.2.11.4)
+
+
+def test_a_sensor_that_the_daemon_let_go_gives_its_place_to_another(monkeypatch):
+    from gestured.bridge import daemon
+    from gestured.bridge.counts import Counts
+
+    monkeypatch.setattr(daemon, "MOST_SENSORS", 3)
+    known = daemon.Daemon(None, None, Counts("mqtt"))
+    for n in range(10):
+        known.take(STATUS | {"sensors": {"armrest": "ok", f"invented{n}": "ok"}})
+    assert known.states == {"invented8": "ok", "armrest": "ok", "invented9": "ok"}
 
 
 def test_a_broker_that_is_killed_and_comes_back_gets_what_is_fresh(bridge, broker, listen, fake):
@@ -416,7 +457,7 @@ def test_a_broker_with_tls_that_is_called_without_says_so(bridge, broker, fake, 
 def with_password(folder: Path) -> list[str]:
     (folder / "passwords").write_text("car:secret\n")
     subprocess.run(["mosquitto_passwd", "-U", str(folder / "passwords")], check=True, timeout=60)
-    (folder / "access").write_text("user car\ntopic write gestured/car/#\ntopic readwrite homeassistant/#\n")
+    (folder / "access").write_text("user car\ntopic write gestured/car/#\ntopic write homeassistant/+/gestured_car/#\n")
     for name in ("passwords", "access"):
         (folder / name).chmod(0o644)
     return ["allow_anonymous false", f"password_file {folder}/passwords", f"acl_file {folder}/access", "user root"]
