@@ -72,12 +72,12 @@ class FrontEnd:
         self.rows, self.columns = self.mounting.shape(rows, columns)  # after mounting
         self.conditioner = Conditioner(self.rows, self.columns)
         travel = self.timing.tap_travel * min(rows, columns)
-        self._segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
+        self.segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
         self._cutter = Cutter(self.conditioner, travel)
         self._as_sent = self.mounting == Mounting()
         self.frame: Frame | None = None  # the last one that was taken
         self.look: Look | None = None  # how it was seen; None before the idle sensor is known
-        self._pace = Pace()
+        self.pace = Pace()
         self._below_since: float | None = None  # s, since when the frames lie far below the baseline
 
     @property
@@ -88,32 +88,7 @@ class FrontEnd:
     @property
     def touched(self) -> bool:
         """Whether a contact is going on, given up or not."""
-        return self._segmenter.phase.touched
-
-    @property
-    def pending(self) -> bool:
-        """Whether a contact is going on of which it is open what becomes of it."""
-        return self._segmenter.phase.pending
-
-    @property
-    def let_go(self) -> bool:
-        """Whether the finger of the contact that goes on is off, perhaps for good."""
-        return self._segmenter.phase.let_go
-
-    @property
-    def second(self) -> bool:
-        """Whether the second contact of the segment has begun: the first was a tap."""
-        return self._segmenter.second
-
-    @property
-    def last_touched(self) -> float:
-        """When it was touched last, in s."""
-        return self._segmenter.last_touched
-
-    @property
-    def sure(self) -> float:
-        """Until when no frame is overdue, in s."""
-        return self._pace.sure
+        return self.segmenter.phase.touched
 
     @property
     def baseline(self) -> NDArray[np.float64]:
@@ -133,7 +108,7 @@ class FrontEnd:
     @property
     def interval_s(self) -> float:
         """Seconds from frame to frame as they come, 0 before it is known."""
-        return self._pace.interval_s
+        return self.pace.interval_s
 
     @property
     def rate_hz(self) -> float:
@@ -142,16 +117,7 @@ class FrontEnd:
 
     def levels(self, t: float) -> tuple[str, tuple[float, float]]:
         """The segmenter's phase at `t` s, and the activity (noise units) that is strong then, and not quiet."""
-        return self._segmenter.phase.name, self._segmenter.levels(t)
-
-    @property
-    def on(self) -> float:
-        """Noise units: activity from which there is a contact, if the last one has left nothing behind."""
-        return self._segmenter.on
-
-    def inverted_activity(self, look: Look) -> float:
-        """Noise units: the activity that a frame would have, were its counts inverted."""
-        return self.conditioner.fallen(look)
+        return self.segmenter.phase.name, self.segmenter.levels(t)
 
     def push(self, frame: Frame) -> list[Found]:
         """Take one frame, give all that was found, in order.
@@ -163,7 +129,7 @@ class FrontEnd:
         values = frame.values if self._as_sent else self.mounting.frame(frame.values)
         raw = values.astype(np.float64).reshape(-1)
         found = self._pass(t)
-        conditioner, segmenter, cutter = self.conditioner, self._segmenter, self._cutter
+        conditioner, segmenter, cutter = self.conditioner, self.segmenter, self._cutter
         self.frame, self.look = frame, None
         if not conditioner.ready:
             if conditioner.settle(t, raw):
@@ -199,23 +165,23 @@ class FrontEnd:
 
         Where a frame is overdue before that moment, nothing is decided without it: it may show the finger again.
         """
-        over = self._segmenter.over
-        return over if over is not None and over <= self._pace.sure else None
+        over = self.segmenter.over
+        return over if over is not None and over <= self.pace.sure else None
 
     def wait(self, t: float) -> list[Found]:
         """No frame has come until `t` s: a contact may be over. A later frame finds the same."""
-        until, over = min(t, self._pace.sure), self._segmenter.over
-        return [] if over is None or over > until else self._done(self._segmenter.flush(until, until), t)
+        until, over = min(t, self.pace.sure), self.segmenter.over
+        return [] if over is None or over > until else self._done(self.segmenter.flush(until, until), t)
 
     @property
     def fleeting(self) -> bool:
         """Whether the contact that goes on is so far surely shorter than any finger's."""
-        return self._pace.longest_s(self._segmenter.onset, self.last_touched) < self.timing.glitch_s
+        return self.pace.longest_s(self.segmenter.onset, self.segmenter.last_touched) < self.timing.glitch_s
 
     def so_far(self) -> Segment | None:
         """All that has come of the contact that goes on; None where nothing is left of it without its bad taxels."""
-        segment = self._cutter.so_far(self._segmenter.onset, self.last_touched)
-        return segment if segment.frames.max() >= self._segmenter.off * segment.noise else None
+        segment = self._cutter.so_far(self.segmenter.onset, self.segmenter.last_touched)
+        return segment if segment.frames.max() >= self.segmenter.off * segment.noise else None
 
     def hole(self, segment: Segment, t: float) -> float:
         """The longest time in s in which a finger may have done anything unseen, from before a segment to `t` s."""
@@ -223,15 +189,15 @@ class FrontEnd:
 
     def give_up(self, t: float) -> list[Found]:
         """A contact that goes on has taken too long by another clock than its frames': it is cancelled as held."""
-        return self._done(self._segmenter.give_up(t), t)
+        return self._done(self.segmenter.give_up(t), t)
 
     def flush(self, t: float) -> list[Found]:
         """The stream paused or ended at `t` s: close what is open."""
         found = self.wait(t)
-        segmenter, last = self._segmenter, self._pace.last
+        segmenter, last = self.segmenter, self.pace.last
         if segmenter.phase.touched and last is not None:
             t = min(t, last + self.timing.stale_s)  # it was over then, whenever one asks
-            found += self._done(segmenter.flush(t, self._pace.sure), last)
+            found += self._done(segmenter.flush(t, self.pace.sure), last)
             if segmenter.phase.let_go:
                 found += self._close(segmenter.onset, segmenter.last_touched, t, last)
             elif segmenter.phase.touched:
@@ -248,13 +214,13 @@ class FrontEnd:
     def _pass(self, t: float) -> list[Found]:
         """Time passes until a frame at `t` s: what that alone decides. A frame cannot join what is over."""
         found: list[Found] = []
-        segmenter, step = self._segmenter, self._pace.step(t)
+        segmenter, step = self.segmenter, self.pace.step(t)
         if step > self.timing.stale_s:
             found += self.flush(t)
         elif segmenter.phase.touched:
             found += self.wait(t)
-            found += self._done(segmenter.flush(t, self._pace.sure), t)
-        self._pace.take(t, step, after_silence=step > self.timing.stale_s)
+            found += self._done(segmenter.flush(t, self.pace.sure), t)
+        self.pace.take(t, step, after_silence=step > self.timing.stale_s)
         if not segmenter.phase.touched:
             segmenter.after.fade(t)
         return found
@@ -272,7 +238,7 @@ class FrontEnd:
     def _restart(self, *, keep: bool) -> list[Found]:
         """Start clean. `keep`: the frames that may show the idle sensor as it is now count already."""
         found = self._cancel("restart") if self.touched else []
-        self._segmenter.reset()
+        self.segmenter.reset()
         self.conditioner.baseline.forget(keep=keep)
         self._cutter.clear()
         self._below_since = None
@@ -291,19 +257,19 @@ class FrontEnd:
             else:
                 found += self._close(onset, offset, decided, min(seen, decided))
                 if action is Action.SPLIT:
-                    found.append(Opened(self._segmenter.onset))
+                    found.append(Opened(self.segmenter.onset))
         return found
 
     def _close(self, onset: float, offset: float, t: float, seen: float) -> list[Found]:
         """A segment is over, as decided at `t` s: it is cut, unless it was no finger's."""
-        if self._pace.longest_s(onset, offset) < self.timing.glitch_s:
+        if self.pace.longest_s(onset, offset) < self.timing.glitch_s:
             return [Void("glitch"), Ended(offset)]
         made = self._cutter.cut(onset, offset)
-        if made.peak < self._segmenter.off * made.segment.noise:  # nothing is left without its bad taxels
+        if made.peak < self.segmenter.off * made.segment.noise:  # nothing is left without its bad taxels
             return [Void("stuck"), Ended(offset)]
         return [Cut(made.segment, t, self._cutter.hole(onset, offset, seen)), Ended(offset)]
 
     def _cancel(self, reason: str) -> list[Found]:
         """The contact that goes on has no answer, and ends."""
-        ended = Ended(self.last_touched)
-        return [Void(reason), ended] if self.pending else [ended]  # else it was given up already
+        ended = Ended(self.segmenter.last_touched)
+        return [Void(reason), ended] if self.segmenter.phase.pending else [ended]  # else it was given up already

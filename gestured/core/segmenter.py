@@ -73,36 +73,13 @@ def _given_up(memory: Memory, t: float) -> tuple[float, float]:
     return memory.off, memory.off
 
 
-# --- how long a wait lasts, and what it says once it was quiet for so long
-
-
-class Wait(NamedTuple):
-    """A wait for the finger to come back."""
-
-    lasts: Callable[[Timing], float]  # s of quiet
-    says: Callable[[Memory], Signal]
-
-
-def _release_s(timing: Timing) -> float:
-    return timing.release_s
-
-
-def _tap_gap_s(timing: Timing) -> float:
-    return timing.tap_gap_s
+# --- what a wait says once it was quiet for so long
 
 
 def _released(memory: Memory) -> Signal:
     """The finger is off. After a single tap a second one may come."""
     waits = memory.wait_for_double_tap and memory.first is None and memory.tap_so_far()
     return Signal.TAPPED if waits else Signal.RELEASED
-
-
-def _gap_over(memory: Memory) -> Signal:
-    return Signal.GAP_OVER
-
-
-def _left(memory: Memory) -> Signal:
-    return Signal.RELEASED
 
 
 # --- what is remembered; what that shows is a signal in turn
@@ -173,7 +150,8 @@ class Phase:
 
     name: str
     levels: Callable[[Memory, float], tuple[float, float]]  # s -> activity that is strong, and that is not quiet
-    wait: Wait | None = None  # what time alone decides
+    wait: str = ""  # the name in `Timing` of the seconds of quiet after which time alone decides
+    says: Callable[[Memory], Signal] | None = None  # what that is
     touched: bool = True  # a contact goes on, given up or not
     pending: bool = True  # it is not given up, and what becomes of it is open
     let_go: bool = False  # the finger is off: if the stream ends, what is open may be decided
@@ -186,9 +164,9 @@ class Phase:
 
 IDLE = Phase("IDLE", _untouched, touched=False, pending=False)
 CONTACT = Phase("CONTACT", _touched)
-RELEASING = Phase("RELEASING", _touched, Wait(_release_s, _released), let_go=True)
-GAP = Phase("GAP", _touched, Wait(_tap_gap_s, _gap_over), let_go=True)
-SPENT = Phase("SPENT", _given_up, Wait(_release_s, _left), pending=False)
+RELEASING = Phase("RELEASING", _touched, "release_s", _released, let_go=True)
+GAP = Phase("GAP", _touched, "tap_gap_s", lambda memory: Signal.GAP_OVER, let_go=True)
+SPENT = Phase("SPENT", _given_up, "release_s", lambda memory: Signal.RELEASED, pending=False)
 
 
 class Row(NamedTuple):
@@ -281,7 +259,7 @@ class Segmenter:
     def over(self) -> float | None:
         """When the wait that goes on is over unless the finger comes back, in s; None where none goes on."""
         wait, since = self.phase.wait, self._memory.quiet_since
-        return None if wait is None or since is None else since + wait.lasts(self._memory.timing)
+        return since + float(getattr(self._memory.timing, wait)) if wait and since is not None else None
 
     def flush(self, t: float, sure: float) -> list[Deed]:
         """What the time alone decides until `t` s. Comes before `push`: a late frame cannot join what is over.
@@ -290,8 +268,8 @@ class Segmenter:
         """
         memory = self._memory
         deeds: list[Deed] = []
-        while (wait := self.phase.wait) is not None and (over := self.over) is not None and t >= over:
-            deeds += self._step(wait.says(memory), over if over <= sure else t)
+        while (says := self.phase.says) is not None and (over := self.over) is not None and t >= over:
+            deeds += self._step(says(memory), over if over <= sure else t)
         if self.phase.pending and t - memory.onset >= memory.timing.limit_s:
             deeds += self.give_up(t)
         return deeds

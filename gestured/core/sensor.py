@@ -76,7 +76,7 @@ class Sensor:
         found = front_end.push(frame)
         if found:
             told += self._tell(found)
-        if foresight.asked and front_end.pending:
+        if foresight.asked and front_end.segmenter.phase.pending:
             last = found[-1] if found else None
             preview = foresight.see(front_end, frame.t, last.segment if isinstance(last, Shown) else None)
             told += self._foresee(preview)
@@ -90,7 +90,7 @@ class Sensor:
         off = self._foresight.due(self.front_end)  # that a finger is off shows before a contact is over
         if off is None:
             return self.front_end.due
-        return off if off <= self.front_end.sure else None
+        return off if off <= self.front_end.pace.sure else None
 
     def wait(self, t: float) -> list[Told]:
         """No frame has come until `t` s: a contact may be over; see `FrontEnd.wait`."""
@@ -171,7 +171,7 @@ class Sensor:
 
     def _late(self, t: float) -> list[Told]:
         """What is said before the answer because no frame has come until `t` s."""
-        return self._foresee(self._foresight.wait(self.front_end, min(t, self.front_end.sure)))
+        return self._foresee(self._foresight.wait(self.front_end, min(t, self.front_end.pace.sure)))
 
     def _foresee(self, preview: Preview | None) -> list[Told]:
         """What can be said of a contact that is not over."""

@@ -15,10 +15,9 @@ from gestured.client.holder import bind_failure
 from gestured.control.view.door import Door, at_home
 from gestured.control.view.outbox import Outbox
 from gestured.control.view.source import Source
-from gestured.core.address import Address
+from gestured.core.address import Address, is_sensor
 from gestured.core.errors import GesturedError
 from gestured.core.messages import json_object
-from gestured.core.wire import is_sensor
 
 PAGE = Path(__file__).with_name("page")
 FILES = {

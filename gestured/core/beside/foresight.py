@@ -51,17 +51,17 @@ class Foresight:
 
     def due(self, front_end: FrontEnd) -> float | None:
         """When a finger that has left will have been off for `DRAFT_S`, in s; None where that was shown."""
-        offset = front_end.last_touched
-        return offset + DRAFT_S if self.asked and front_end.let_go and self._left != offset else None
+        offset = front_end.segmenter.last_touched
+        return offset + DRAFT_S if self.asked and front_end.segmenter.phase.let_go and self._left != offset else None
 
     def see(self, front_end: FrontEnd, t: float, shown: Segment | None) -> Preview | None:
         """What a model may look at, with a frame at `t` s in which the front end has `shown` that.
 
         While the finger is down, that is at most 15 times a second, and with every frame at 15 Hz.
         """
-        if front_end.let_go:
-            if t - front_end.last_touched >= DRAFT_S and not front_end.fleeting:
-                self._left = front_end.last_touched
+        if front_end.segmenter.phase.let_go:
+            if t - front_end.segmenter.last_touched >= DRAFT_S and not front_end.fleeting:
+                self._left = front_end.segmenter.last_touched
             return None if shown is None else self._preview(front_end, shown, t, drafted=True)
         if front_end.fleeting:
             return None
@@ -78,13 +78,13 @@ class Foresight:
         due = self.due(front_end)
         if due is None or due > until:
             return None
-        self._left = front_end.last_touched
+        self._left = front_end.segmenter.last_touched
         segment = None if front_end.fleeting else front_end.so_far()
         return None if segment is None else self._preview(front_end, segment, due, drafted=False)
 
     def _preview(self, front_end: FrontEnd, segment: Segment, t: float, *, drafted: bool) -> Preview:
         hole_s = front_end.hole(segment, t)
-        return Preview(segment, t, not front_end.let_go, drafted, front_end.second, hole_s)
+        return Preview(segment, t, not front_end.segmenter.phase.let_go, drafted, front_end.segmenter.second, hole_s)
 
     def wants(self, preview: Preview, certainty: Certainty, gestures: Iterable[str]) -> bool:
         """Whether anything can be said now, of these gestures, if the model is sure enough; else it need not look."""

@@ -54,13 +54,13 @@ class Habits:
         frame, look = front_end.frame, front_end.look
         if frame is None or look is None:
             return
-        if look.burst and (fallen := front_end.inverted_activity(look)) >= front_end.on:
+        if look.burst and (fallen := front_end.conditioner.fallen(look)) >= front_end.segmenter.on:
             if self.paused(frame.t):
                 self.falls += 1
                 self._strongest = 0.0, None
             self._fell, self._falling = frame.t, True
             self._press(frame.values, fallen)
-        if front_end.pending:
+        if front_end.segmenter.phase.pending:
             self._press(frame.values, look.activity)
         elif not front_end.touched and not look.shifted and self.paused(frame.t):
             self._idle = frame.values
