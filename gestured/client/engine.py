@@ -26,7 +26,8 @@ class Engine:
         root = Path(gestured.__file__).parent.parent
         safe = [] if root == Path.cwd() else ["-P"]  # a folder named gestured in the current one is not the package
         command = [sys.executable, *safe, "-m", "gestured.daemon", "--model", model, "--listen", "127.0.0.1:0"]
-        command += ["--socket", str(folder / "events.sock"), "--grid", f"{rows}x{columns}", *more]
+        command += ["--socket", str(folder / "events.sock"), "--grid", f"{rows}x{columns}"]
+        command += ["--own-gestures", str(folder / "own-gestures.json"), *more]  # not the user's: they change answers
         environment = {name: value for name, value in os.environ.items() if not name.startswith("GESTURED_")}
         with self._log.open("wb") as log:
             # A session of its own: Ctrl-C is for us, and we end it in our own time.

@@ -129,7 +129,7 @@ def _opened(source: Playable, model: str | None) -> tuple[Scene, Ladder]:
         ladder = ladder_for(model)
     if model is None and getattr(ladder.model, "sha256", None) != maker.sha256:
         say(f"{ladder.name} is not the file that it was when this was recorded", to=sys.stderr)
-    ladder.own = Own(maker.own)
+    ladder.own = Own(maker.own, ladder.gestures)
     return maker.scene, ladder
 
 

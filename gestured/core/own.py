@@ -27,7 +27,7 @@ MOST_VALUES = 16_384  # of an example
 RATES_HZ = (5.0, 1000.0)  # of an example
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Example:
     """One performance, as a window. Raises ValueError, which names the number, for what no performance can be."""
 

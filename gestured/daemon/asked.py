@@ -1,7 +1,8 @@
-"""What a configuration asks for: its models and the file of own gestures, opened; its destinations; its scene."""
+"""What a configuration asks for: its models, opened; its destinations; its scene."""
 
 import os
 from dataclasses import dataclass
+from pathlib import Path
 
 from gestured.core.errors import ModelError
 from gestured.core.own import is_name
@@ -12,7 +13,6 @@ from gestured.daemon.settings import Settings
 from gestured.daemon.sinks import Output, outputs
 from gestured.model import own_file
 from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, require_gestures
-from gestured.model.own_file import OwnFile
 
 SLIP = 0.8  # of difflib's ratio: a name so near to one of the model's gestures was meant to be that
 
@@ -24,15 +24,13 @@ class Asked:
     settings: Settings
     ladder: Ladder
     outputs: list[Output]
-    own: OwnFile
+    own: Path | None  # the file of the user's own gestures
 
 
 def open_all(settings: Settings, metrics: Metrics, *, insist: bool = False) -> Asked:
-    """Open what may take long: models, names of hosts, and the file of own gestures. Raises as `open_ladder`."""
+    """Open what may take long: models, and names of hosts. Raises as `open_ladder`."""
     ladder = open_ladder(settings, insist=insist)
-    return Asked(
-        settings, ladder, outputs(settings, metrics), own_file.load(own_file.where(settings.own_gestures, os.environ))
-    )
+    return Asked(settings, ladder, outputs(settings, metrics), own_file.where(settings.own_gestures, os.environ))
 
 
 def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:

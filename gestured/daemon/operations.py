@@ -62,7 +62,7 @@ class Operations:
             "emit": Verb(self.emit, {"gesture": LABEL, "sensor": SENSOR}),
             "view": Verb(self.view, {"sensor": NAMED, "raw": RAW}, changes=False),
             "follow": Verb(self.follow, {"sensors": SENSORS, "raw": RAW}, changes=False),
-            "enrol": Verb(self.enrol, {"name": LABEL, "sensor": NAMED, "examples": COUNT}),
+            "enrol": Verb(self.enrol, {"name": LABEL, "sensor": NAMED, "examples": COUNT}, slow=True),
             "gestures": Verb(self.gestures, changes=False),
             "forget": Verb(self.forget, {"name": LABEL}, slow=True),
             "tap": Verb(self.tap),
@@ -134,6 +134,7 @@ class Operations:
 
     async def enrol(self, connection: Connection, name: str, sensor: str, examples: int = 3) -> Reply:
         """Learn a gesture from what is performed on a sensor; a line follows for each example, and one at the end."""
+        await self.own.writable()
         snapshot = self.snapshot()
         _heard(snapshot, sensor)
         _not_yet(connection)

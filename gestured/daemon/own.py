@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from gestured.core.enrolment import Enrolment
 from gestured.core.errors import GesturedError
@@ -13,15 +13,26 @@ from gestured.core.facts import Decided, Fact
 from gestured.core.own import MOST, Examples, is_name
 from gestured.core.prototypes import EXAMPLES
 from gestured.daemon.caller import Connection
+from gestured.daemon.keeper import Change, Keeper
 from gestured.daemon.log import log
 from gestured.daemon.request import Refusal, json_line
 from gestured.model import own_file
 from gestured.model.ladder import Ladder
+from gestured.model.model import Model
 from gestured.model.own import Examiner, Own
-from gestured.model.own_file import OwnFile
+from gestured.model.own_file import OwnFile, OwnFileError
 
 ATTEMPT_S = 120.0  # an enrolment without an attempt for so long gives its place to others
 ANSWERED_TWICE = "refractory"  # such a contact was decided, too
+
+
+class Ready(NamedTuple):
+    """The gestures of a file, ready to be used by a ladder."""
+
+    keeper: Keeper
+    read: OwnFile
+    own: Own
+    unkept: str | None  # why nothing can be written, as far as that was tried
 
 
 class OwnGestures:
@@ -30,29 +41,67 @@ class OwnGestures:
     def __init__(self, changed: Callable[[], None]) -> None:
         """`follow` comes before anything else."""
         self._changed = changed
-        self.gestures: Examples = {}
-        self.path: Path | None = None
-        self.fault: str | None = None  # why nothing can be enrolled
+        self._keeper, self._read = Keeper(None), OwnFile(None, {})
+        self._unkept: str | None = None  # why nothing can be written, as far as that was tried
         self._open: tuple[Enrolment, Connection] | None = None  # what is being learned, and who waits for it
         self._heard = 0.0  # monotonic s, the last attempt
         self._finishing: asyncio.Task[None] | None = None
-        self._writing = asyncio.Lock()
+        self._preparing: asyncio.Task[None] | None = None
+        self.writing = asyncio.Lock()  # held from where the file is read until what was read is used
 
-    def follow(self, ladder: Ladder, read: OwnFile) -> None:
-        """Use what was read of a file, with these models: at the start, and after a reload."""
+    def read(self, path: Path | None, ladder: Ladder) -> Ready:
+        """Read a file, and have the model that answers look at it; any thread may that holds `writing`.
+
+        The start of a daemon locks the file, but makes no folder for it: who enrols nothing has none.
+        """
+        keeper, unkept = self._keeper if path == self._keeper.path else Keeper(path), None
+        if path is not None and path.parent.is_dir():
+            try:
+                keeper.hold()
+            except OwnFileError as error:
+                unkept = str(error)
+        read = own_file.load(path, self._read)
+        return Ready(keeper, read, _compared(read, ladder), unkept)
+
+    def follow(self, ladder: Ladder, ready: Ready) -> None:
+        """Use what was read for these models: at the start, and after a reload."""
         if self._finishing is None:
             self._give_up("the daemon was told to reload; enrol again")
-        self._ladder, (self.path, self.gestures, self.fault) = ladder, read
-        if self.fault is not None:
-            log.error("own gestures", what=self.fault)
-        self._use()
+        if ready.keeper is not self._keeper:
+            self._keeper.close()
+        self._ladder, self._keeper, self._unkept = ladder, ready.keeper, ready.unkept
+        for sentence in filter(None, (ready.read.fault, ready.unkept)):
+            log.error("own gestures", what=sentence)
+        self._use(ready.read, ready.own)
 
-    def _use(self) -> None:
+    def _use(self, read: OwnFile, own: Own) -> None:
         """Compare with these from now on; say where they do not hold apart for the model that answers."""
-        self._ladder.own = Own(self.gestures)
-        bank = self._ladder.own.bank(self._ladder.model) if self.gestures else None
-        for sentence in bank.doubtful if bank else ():
+        self._read, self._ladder.own = read, own
+        own.missing = self._prepare
+        self._warn()
+
+    def _prepare(self, model: Model) -> None:
+        """Another model answers than the one that has looked at the examples: until it has, it knows none of them."""
+        if self._preparing is None or self._preparing.done():
+            self._preparing = asyncio.get_running_loop().create_task(self._make(self._ladder.own, model))
+
+    async def _make(self, own: Own, model: Model) -> None:
+        await asyncio.to_thread(own.make, model)
+        self._warn()
+
+    def _warn(self) -> None:
+        for sentence in self._doubtful():
             log.warning("own gestures", what=sentence, model=self._ladder.active)
+
+    def _doubtful(self) -> list[str]:
+        own, bank = self._ladder.own, self._ladder.own.made(self._ladder.model)
+        hidden = [f"{name} is off, since {self._ladder.name} has a gesture of that name" for name in own.hidden]
+        return [*hidden, *(bank.doubtful if bank else ())]
+
+    @property
+    def gestures(self) -> Examples:
+        """Those that are compared with what is performed."""
+        return self._ladder.own.gestures
 
     @property
     def off(self) -> str | None:
@@ -63,11 +112,11 @@ class OwnGestures:
         """For the status; any thread may ask."""
         held = self._open
         return {
-            "file": None if self.path is None else str(self.path),
-            "fault": self.fault,
+            "file": None if self._keeper.path is None else str(self._keeper.path),
+            "fault": self._read.fault or self._unkept,
             "gestures": {name: len(examples) for name, examples in self.gestures.items()},
             "off": self.off,
-            "doubtful": list(bank.doubtful) if (bank := self._ladder.own.made(self._ladder.model)) else [],
+            "doubtful": self._doubtful(),
             "enrolling": None if held is None or held[1].closed else held[0].name,
         }
 
@@ -76,13 +125,21 @@ class OwnGestures:
         """Whether somebody performs examples now."""
         return self._open is not None
 
+    async def writable(self) -> None:
+        """Whether anything can be enrolled here; raises OwnFileError where not."""
+        async with self.writing:
+            if self._read.fault is not None:
+                raise OwnFileError(self._read.fault)
+            await asyncio.to_thread(self._keeper.hold)
+            self._unkept = None
+
     def begin(self, connection: Connection, name: str, sensor: str, examples: int, in_use: Collection[str]) -> None:
         """Take what is performed on a sensor as examples, and tell the connection of each. Raises Refusal."""
         self.tick()
         if self._open is not None:
             before, _ = self._open
             raise Refusal(f"{before.name!r} is being enrolled on {before.sensor}; one at a time")
-        self._check(name)
+        self._check(name, self._read.gestures)
         if not 1 <= examples <= EXAMPLES:
             raise Refusal(f"expected 1 to {EXAMPLES} examples, found {examples}")
         model = self._ladder.model
@@ -123,19 +180,24 @@ class OwnGestures:
 
     async def forget(self, name: str) -> None:
         """Have a gesture no longer, nor its examples in the file. Raises Refusal or OwnFileError."""
-        async with self._writing:
-            if name not in self.gestures:
-                known = ", ".join(self.gestures) or "none: nothing is enrolled"
+
+        def without(found: Examples) -> Examples:
+            if name not in found and name not in self._read.gestures:
+                known = ", ".join(found) or "none: nothing is enrolled"
                 raise Refusal(f"{name!r} is no gesture of your own, expected one of {known}")
-            await self._keep({other: examples for other, examples in self.gestures.items() if other != name})
+            return {other: examples for other, examples in found.items() if other != name}
+
+        await self._change(without)
 
     async def _finish(self, enrolment: Enrolment, connection: Connection) -> None:
+        def with_it(found: Examples) -> Examples:
+            self._check(enrolment.name, found)  # models and file may be others by now
+            return {**found, enrolment.name: tuple(enrolment.kept)}
+
         try:
             if connection.closed:
                 raise Refusal("its client has gone")
-            async with self._writing:
-                self._check(enrolment.name)  # the models may be others by now
-                await self._keep({**self.gestures, enrolment.name: tuple(enrolment.kept)})
+            await self._change(with_it)
             connection.send(json_line({"enrolled": enrolment.name, "examples": len(enrolment.kept)}))
             log.info("enrolled", gesture=enrolment.name, examples=len(enrolment.kept))
             self._end(connection)
@@ -144,31 +206,23 @@ class OwnGestures:
         finally:
             self._finishing = None
 
-    async def _keep(self, gestures: Examples) -> None:
-        """Write them, and use them, unless a reload has named another file meanwhile."""
-        path = self._file()
-        await asyncio.to_thread(own_file.write, path, gestures, self._ladder.model.sha256)
-        if path == self.path:
-            self.gestures = gestures
-            self._use()
-            self._changed()
+    async def _change(self, change: Change) -> None:
+        """Write the file anew, and use what is in it then."""
+        async with self.writing:
+            ladder = self._ladder
+            read = await asyncio.to_thread(self._keeper.change, self._read, change, ladder.model.sha256)
+            self._use(read, await asyncio.to_thread(_compared, read, ladder))
+        self._changed()
 
-    def _file(self) -> Path:
-        """The file that examples are written to. Raises Refusal where there is none, or it could not be read."""
-        if self.path is None or self.fault is not None:
-            raise Refusal(self.fault or f"there is no file for own gestures: {own_file.REMEDY}")
-        return self.path
-
-    def _check(self, name: str) -> None:
-        """Raises Refusal for a name that cannot be enrolled here and now."""
-        self._file()
+    def _check(self, name: str, gestures: Examples) -> None:
+        """Raises Refusal for a name that cannot be enrolled beside these gestures."""
         if not is_name(name):
             raise Refusal(f"{name!r} is no gesture's name: expected a-z, then a-z, 0-9, _, 32 at most, not `use`")
         if name in self._ladder.gestures:
             raise Refusal(f"{name!r} is a gesture of {self._ladder.name}; choose another name")
-        if name in self.gestures:
+        if name in gestures:
             raise Refusal(f"{name!r} is enrolled already; forget it first (gesturectl forget {name})")
-        if len(self.gestures) >= MOST:
+        if len(gestures) >= MOST:
             raise Refusal(f"{MOST} gestures are enrolled already, which is the most there can be; forget one first")
 
     def _give_up(self, reason: str) -> None:
@@ -182,3 +236,10 @@ class OwnGestures:
     def _end(self, connection: Connection) -> None:
         connection.streams = False
         self._open = None
+
+
+def _compared(read: OwnFile, ladder: Ladder) -> Own:
+    """The gestures of a file as the ladder's model sees them, which takes up to a second."""
+    own = Own(read.gestures, ladder.gestures)
+    own.make(ladder.model)
+    return own

@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 from gestured.client.notify import notify
 from gestured.core.errors import GesturedError
@@ -17,7 +17,7 @@ Loader = Callable[[], Settings]  # reads the configuration
 class Reload:
     """Reads with `load`, opens, and hands all of it to `swap`; frames are served meanwhile."""
 
-    def __init__(self, load: Loader, swap: Callable[[Asked], None], metrics: Metrics) -> None:
+    def __init__(self, load: Loader, swap: Callable[[Asked], Awaitable[None]], metrics: Metrics) -> None:
         self._load, self._swap, self._metrics = load, swap, metrics
         self._lock = asyncio.Lock()
 
@@ -40,7 +40,7 @@ class Reload:
                 self._metrics.reloads.add("refused")
                 return f"a bug: {error!r}" if bug else str(error)
             else:
-                self._swap(asked)
+                await self._swap(asked)
                 self._metrics.reloads.add("done")
                 return None
             finally:

@@ -20,7 +20,7 @@ from gestured.daemon.health import TICK_S, Canary, Pulse, watchdog_period
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.operations import Operations
-from gestured.daemon.own import OwnGestures
+from gestured.daemon.own import OwnGestures, Ready
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.reload import Loader, Reload
 from gestured.daemon.shift import Shift
@@ -55,7 +55,7 @@ class Service:
         for name in settings.sensors:
             self._metrics.sensor_label(name)  # those in the file are named first
         self._own = OwnGestures(self._own_changed)
-        self._own.follow(ladder, asked.own)
+        self._own.follow(ladder, self._own.read(asked.own, ladder))
         self._hub = Hub(scene_of(settings, ladder), ladder)
         self._taps = Taps(settings.flight_recorder << 20)
         self._clients = EventServer(
@@ -208,8 +208,12 @@ class Service:
             self._http.close()
         log.info("ended")
 
-    def _swap(self, asked: Asked) -> None:
-        """Go on with what a reload has opened."""
+    async def _swap(self, asked: Asked) -> None:
+        """Go on with what a reload has opened; what is forgotten or enrolled meanwhile waits until that is used."""
+        async with self._own.writing:
+            self._go_on(asked, await asyncio.to_thread(self._own.read, asked.own, asked.ladder))
+
+    def _go_on(self, asked: Asked, own: Ready) -> None:
         settings, ladder = asked.settings, asked.ladder
         logging.configure(settings.log_level)
         self._settings, self._ladder = settings, ladder
@@ -217,7 +221,7 @@ class Service:
             log.warning("this setting changes at a restart only", key=key)
         self._desk.shift = Shift.of(ladder.model)
         before = self._gestures()
-        self._own.follow(ladder, asked.own)
+        self._own.follow(ladder, own)
         self._desk.take(self._hub.change(scene_of(settings, ladder), ladder, time.monotonic()))
         if self._gestures() != before:
             self._clients.tell(messages.gestures_json(self._gestures()))

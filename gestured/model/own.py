@@ -1,7 +1,8 @@
 """Gestures of the user's own, as each model sees them: their examples embedded by it, and compared with a segment."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,16 +24,38 @@ class Bank:
     doubtful: tuple[str, ...]  # sentences: which gestures this model cannot tell apart
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """What one model makes of a segment."""
+
+    place: Array  # (K,)
+    taken: tuple[str, float] | None  # its own gesture that it is, and how surely, where the user's could not take it
+
+    @classmethod
+    def of(cls, model: Model, space: Space, segment: Segment) -> "Placed":
+        """Raises ModelError where the model fails, or the segment is not finite."""
+        scores, where = model.classify(segment), place(model, space, segment)
+        sure = scores.confidence >= scores.threshold and space.claimed(where)
+        return cls(where, (model.gestures[int(scores.values.argmax())], scores.confidence) if sure else None)
+
+
+# What was found out about an example, as long as both the model and the example are in use. It takes some runs each.
+_placed: WeakKeyDictionary[Model, WeakKeyDictionary[Example, Placed]] = WeakKeyDictionary()
+
+
 class Own:
     """A list of gestures, and what each model that has answered makes of it."""
 
-    def __init__(self, gestures: Examples) -> None:
-        self.gestures = dict(gestures)
-        self._banks: dict[str, Bank | None] = {}  # by the model's sha256
+    def __init__(self, gestures: Examples, known: Collection[str] = ()) -> None:
+        """`known` are the models' gestures: one of the user's own that is called the same is off."""
+        self.gestures = {name: examples for name, examples in gestures.items() if name not in known}
+        self.hidden = tuple(name for name in gestures if name in known)
+        self.missing: Callable[[Model], None] = self.make  # called in the midst of an answer of a model without a bank
+        self._banks: WeakKeyDictionary[Model, Bank | None] = WeakKeyDictionary()
 
     def match(self, model: Model, segment: Segment) -> Match | None:
         """The nearest of them; None where the model has no embedding, or fails: its own answer is none the worse."""
-        bank = self.bank(model)
+        bank = self._bank(model)
         if bank is None:
             return None
         try:
@@ -40,34 +63,48 @@ class Own:
         except ModelError:
             return None
 
-    def bank(self, model: Model) -> Bank | None:
-        """The prototypes of a model, made when it is first asked; None for one that has no embedding."""
-        if model.space is None:
-            return None
-        if model.sha256 not in self._banks:
+    def nearest_to(self, model: Model, example: Example) -> Match | None:
+        """The same for an example. Raises ModelError."""
+        bank = self._bank(model)
+        return None if bank is None else nearest(bank.space, bank.prototypes, placed(model, bank.space, example).place)
+
+    def make(self, model: Model) -> None:
+        """Make the prototypes of a model; any thread may. It takes up to a second for each model and list."""
+        bank: Bank | None = None
+        if model.space is not None:
             try:
-                self._banks[model.sha256] = self._made(model, model.space)
+                bank = self._made(model, model.space)
             except ModelError:
-                self._banks[model.sha256] = None
-        return self._banks[model.sha256]
+                pass  # where it fails it has none
+        self._banks[model] = bank
 
     def made(self, model: Model) -> Bank | None:
-        """The prototypes of a model that was asked already; any thread may look."""
-        return self._banks.get(model.sha256)
+        """The prototypes of a model, where they are made; any thread may look."""
+        return self._banks.get(model)
+
+    def _bank(self, model: Model) -> Bank | None:
+        if model.space is not None and self.gestures and model not in self._banks:
+            self.missing(model)
+        return self._banks.get(model)
 
     def _made(self, model: Model, space: Space) -> Bank:
-        places = {name: places_of(model, space, examples) for name, examples in self.gestures.items()}
+        looked = {name: [placed(model, space, one) for one in examples] for name, examples in self.gestures.items()}
+        places = {name: np.stack([one.place for one in found]) for name, found in looked.items()}
         prototypes = {name: Prototype.of(space, found) for name, found in places.items()}
         doubtful = [f"{one} may be taken for {other}" for one, other in clashes(prototypes, places)]
-        for name, examples in self.gestures.items():
-            taken = (taken_for(model, space, one.segment(), model.gestures) for one in examples)
-            doubtful += sorted({f"{name} may be taken for the model's {found[0]}" for found in taken if found})
+        for name, found in looked.items():
+            taken = {one.taken[0] for one in found if one.taken}
+            doubtful += sorted(f"{name} may be taken for the model's {gesture}" for gesture in taken)
         return Bank(space, prototypes, tuple(doubtful))
 
 
-def places_of(model: Model, space: Space, examples: Sequence[Example]) -> Array:
-    """(n, K) places of examples. Raises ModelError where the model fails."""
-    return np.stack([place(model, space, one.segment()) for one in examples])
+def placed(model: Model, space: Space, example: Example) -> Placed:
+    """What a model makes of an example, found out once. Raises ModelError where the model fails."""
+    known = _placed.setdefault(model, WeakKeyDictionary())
+    found = known.get(example)
+    if found is None:
+        found = known[example] = Placed.of(model, space, example.segment())
+    return found
 
 
 def place(model: Model, space: Space, segment: Segment) -> Array:
@@ -80,15 +117,6 @@ def place(model: Model, space: Space, segment: Segment) -> Array:
         return space.place(model.embed(window[np.newaxis], RUN_S)[0].astype(np.float64))
     except ValueError as error:
         raise ModelError(f"{model.name}: {error}") from error
-
-
-def taken_for(model: Model, space: Space, segment: Segment, in_use: Collection[str]) -> tuple[str, float] | None:
-    """The model's gesture that it takes a segment for, and how surely, where the user's own could not take it."""
-    scores = model.classify(segment)
-    best = model.gestures[int(scores.values.argmax())]
-    if scores.confidence < scores.threshold or best not in in_use:
-        return None
-    return (best, scores.confidence) if space.claimed(place(model, space, segment)) else None
 
 
 class Examiner:
@@ -104,15 +132,14 @@ class Examiner:
 
     def same_as(self, example: Example) -> str | None:
         """The gesture that there is already, and how near."""
-        segment = example.segment()
-        taken = taken_for(self._model, self._space, segment, self._in_use)
-        if taken is not None:
+        taken = placed(self._model, self._space, example).taken
+        if taken is not None and taken[0] in self._in_use:
             return f"{taken[0]} ({taken[1]:.2f})"
-        match = self._own.match(self._model, segment)
+        match = self._own.nearest_to(self._model, example)
         return None if match is None or match.confidence < NEAR else f"{match.name} ({match.confidence:.2f})"
 
     def unlike(self, example: Example, kept: Sequence[Example]) -> str | None:
         """How near it is to those that were kept, where that is not near enough."""
-        prototype = Prototype.of(self._space, places_of(self._model, self._space, kept))
-        confidence = prototype.confidence(place(self._model, self._space, example.segment()))
+        near, *others = (placed(self._model, self._space, one).place for one in (example, *kept))
+        confidence = Prototype.of(self._space, np.stack(others)).confidence(near)
         return None if confidence >= NEAR else f"{confidence:.2f}, expected {NEAR:.2f}"

@@ -1,6 +1,8 @@
 """The file of the user's own gestures, the one file that the daemon writes: JSON, mode 0600, all of it or nothing."""
 
+import hashlib
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +15,8 @@ FORMAT = 1
 MAX_BYTES = 8 << 20  # the longest examples of as many gestures as there may be take some 5 MiB
 MOST_MARKS = 4096  # brackets and commas; as many examples as there may be take some 1,100
 NAME = "own-gestures.json"
-REMEDY = "set own_gestures = FILE (--own-gestures FILE), or start it with systemd's StateDirectory="
+REMEDY = "set own_gestures = FILE (--own-gestures FILE)"
+NO_FILE = f"there is no file for own gestures, since there is no home: {REMEDY}"
 
 
 class OwnFileError(GesturedError):
@@ -25,54 +28,83 @@ class OwnFile(NamedTuple):
 
     path: Path | None
     gestures: Examples
-    fault: str | None  # why it cannot be read: the model's gestures go on without it
+    fault: str | None = None  # why it cannot be read: the model's gestures go on without it
+    sha256: str = ""  # of its bytes; empty where there is none
 
 
 def where(chosen: Path | None, environ: Mapping[str, str]) -> Path | None:
-    """The file that was set, else the one in systemd's state directory, else None."""
+    """The file that was set, else the one in the state directory of systemd, of the session, of the home, else None."""
     if chosen is not None:
         return chosen
-    directory = environ.get("STATE_DIRECTORY")
-    return Path(directory.split(":")[0]) / NAME if directory else None
+    if directory := environ.get("STATE_DIRECTORY"):
+        return Path(directory.split(":")[0]) / NAME
+    if not os.path.isabs(state := environ.get("XDG_STATE_HOME", "")):
+        home = environ.get("HOME", "")
+        state = os.path.join(home, ".local/state") if os.path.isabs(home) else ""
+    return Path(state, "gestured", NAME) if state else None
 
 
-def load(path: Path | None) -> OwnFile:
-    """Read the file; there are no gestures where there is none, or where it cannot be read."""
-    try:
-        return OwnFile(path, _read(path), None)
-    except OwnFileError as error:
-        return OwnFile(path, {}, str(error))
-
-
-def _read(path: Path | None) -> Examples:
+def unwritable(path: Path | None) -> str | None:
+    """Why this user could not put a file there, as far as can be seen; folders that are missing would be made."""
     if path is None:
-        return {}
+        return NO_FILE
+    folder = next(folder for folder in path.absolute().parents if os.path.exists(folder))
+    if not folder.is_dir():
+        return f"{path}: cannot be written: {folder} is no folder"
+    return None if os.access(folder, os.W_OK | os.X_OK) else f"{path}: cannot be written: no right to write in {folder}"
+
+
+def load(path: Path | None, known: OwnFile | None = None) -> OwnFile:
+    """Read the file; there are no gestures where there is none, or where it cannot be read.
+
+    Where it is what is `known` of it already, that is what is given, with the same examples.
+    """
+    try:
+        data = _read(path)
+        if data is None:
+            return OwnFile(path, {})
+        sha256 = hashlib.sha256(data).hexdigest()
+        if known is not None and (known.path, known.sha256) == (path, sha256):
+            return known
+        return OwnFile(path, _parse(data), None, sha256)
+    except (OwnFileError, ValueError, RecursionError) as error:
+        words = error if isinstance(error, OwnFileError) else f"{path}: is no file of own gestures: {error}"
+        return OwnFile(path, {}, str(words))
+
+
+def _read(path: Path | None) -> bytes | None:
+    """Its bytes, None where there is no file."""
+    if path is None:
+        return None
     try:
         with open_regular(path) as file:
             data = file.read(MAX_BYTES + 1)
     except FileNotFoundError:
-        return {}
+        return None
     except OSError as error:
         raise OwnFileError(f"{path}: cannot be read: {error.strerror or error}") from error
     if len(data) > MAX_BYTES:
         raise OwnFileError(f"{path}: expected at most {MAX_BYTES} bytes")
-    try:
-        # What reads JSON lets no other thread run before its end, and millions of empty lists fit into the bytes.
-        if sum(map(data.count, (b"[", b"{", b","))) > MOST_MARKS:
-            raise ValueError(f"expected at most {MOST_MARKS} brackets and commas")
-        told = json.loads(data)
-        if not isinstance(told, dict) or told.get("format") != FORMAT:
-            raise ValueError(f"expected a JSON object with format {FORMAT}")
-        return from_dict(told.get("gestures"))
-    except (ValueError, RecursionError) as error:
-        raise OwnFileError(f"{path}: is no file of own gestures: {error}") from error
+    return data
 
 
-def write(path: Path, gestures: Examples, sha256: str) -> None:
+def _parse(data: bytes) -> Examples:
+    # What reads JSON lets no other thread run before its end, and millions of empty lists fit into the bytes.
+    if sum(map(data.count, (b"[", b"{", b","))) > MOST_MARKS:
+        raise ValueError(f"expected at most {MOST_MARKS} brackets and commas")
+    told = json.loads(data)
+    if not isinstance(told, dict) or told.get("format") != FORMAT:
+        raise ValueError(f"expected a JSON object with format {FORMAT}")
+    return from_dict(told.get("gestures"))
+
+
+def write(path: Path, gestures: Examples, model: str) -> OwnFile:
     """Put them there, with the digest of the model that they were enrolled with. Raises OwnFileError."""
-    told = {"format": FORMAT, "model": sha256, "gestures": to_dict(gestures)}
+    told = {"format": FORMAT, "model": model, "gestures": to_dict(gestures)}
+    data = json.dumps(told, indent=1, allow_nan=False).encode() + b"\n"
     try:
         with atomic_write(path, PRIVATE) as file:
-            file.write(json.dumps(told, indent=1, allow_nan=False).encode() + b"\n")
+            file.write(data)
     except OSError as error:
         raise OwnFileError(f"{path}: cannot be written: {error.strerror}; nothing has changed") from error
+    return OwnFile(path, gestures, None, hashlib.sha256(data).hexdigest())

@@ -1,6 +1,7 @@
 """Files: written at once or not at all, and opened without trusting what stands at a path."""
 
 import errno
+import glob
 import os
 import secrets
 import stat
@@ -11,6 +12,8 @@ from typing import BinaryIO
 
 PRIVATE = 0o600  # whatever is about people: how somebody touches things is personal data
 PUBLIC = 0o644  # what anybody may read, as far as the umask lets them: models, figures, caches of simulated people
+
+NAME_BYTES = 8  # chance in the name of a file that is not complete yet
 
 
 def create(path: Path, mode: int = PRIVATE) -> BinaryIO:
@@ -29,7 +32,7 @@ def atomic_write(path: Path, mode: int = PRIVATE, *, durable: bool = True) -> It
     It is written beside `path` under a name that nobody can foresee. What is `durable` survives a power cut once
     this returns; what can be made again, as a cache, need not. Raises OSError.
     """
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(NAME_BYTES)}")
     file = create(temporary, mode)
     try:
         with file:
@@ -44,6 +47,13 @@ def atomic_write(path: Path, mode: int = PRIVATE, *, durable: bool = True) -> It
         raise
     if durable:
         _sync_folder(path.parent)
+
+
+def delete_leftovers(path: Path) -> None:
+    """Delete what writers of `path` that were killed have left beside it; nobody may be writing it now."""
+    with suppress(OSError):
+        for left in path.parent.glob(f".{glob.escape(path.name)}.{'[0-9a-f]' * (2 * NAME_BYTES)}"):
+            left.unlink()
 
 
 def _sync_folder(folder: Path) -> None:

@@ -1,8 +1,10 @@
 """Gestures of the user's own: enrolled, recognised, forgotten, by a real daemon that a simulated hand plays to."""
 
 import asyncio
+import dataclasses
 import json
 import socket
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,7 +16,8 @@ from gestured.client.lines import Refused
 from gestured.core.own import Example
 from gestured.daemon.own import OwnGestures
 from gestured.model import own_file
-from gestured.model.ladder import ladder_for
+from gestured.model.ladder import Ladder, ladder_for
+from gestured.model.model import Model
 from tests.daemon import tiny_model
 from tests.daemon.harness import Client, Daemon, Frame, Hand, Sensor, lines_of
 from tests.small_model import WINDOW, segment
@@ -231,11 +234,43 @@ def test_the_file_is_private_and_outlives_the_daemon_until_it_is_forgotten(begin
         ask(daemon, "forget", name="slash")
 
 
-def test_without_a_file_enrolling_is_refused_with_the_remedy(begin: Begin) -> None:
-    daemon = begin(env={"STATE_DIRECTORY": ""})
+def test_without_a_home_enrolling_is_refused_with_the_remedy(begin: Begin) -> None:
+    daemon = begin(env={"STATE_DIRECTORY": "", "XDG_STATE_HOME": "", "HOME": ""})
     ready(daemon)
     with pytest.raises(Refused, match="--own-gestures FILE"):
         Enrolment(daemon, "slash")
+
+
+def test_a_daemon_that_is_told_nothing_keeps_them_in_the_home(begin: Begin, tmp_path: Path) -> None:
+    daemon = begin(env={"STATE_DIRECTORY": "", "HOME": str(tmp_path)})
+    sensor = ready(daemon)
+    assert not (tmp_path / ".local").exists()
+    enrol(daemon, sensor)
+    assert (tmp_path / ".local/state/gestured/own-gestures.json").stat().st_mode & 0o777 == 0o600
+
+
+def test_of_two_daemons_with_one_file_the_first_writes_it(begin: Begin, tmp_path: Path) -> None:
+    first = begin()
+    sensor = ready(first)
+    enrol(first, sensor)
+    second = begin("--socket", tmp_path / "second.sock")
+    other = ready(second)
+    client = second.client().subscribe("gesture", "unknown", "cancelled")
+    assert answer(client, other, other.slash)["gesture"] == "slash"
+    for verb, more in (("enrol", {"name": "cut", "sensor": "armrest"}), ("forget", {"name": "slash"})):
+        with pytest.raises(Refused, match=rf"another gestured \(pid {first.process.pid}\) writes it"):
+            ask(second, verb, **more)
+    assert f"pid {first.process.pid}" in ask(second, "gestures")["own"]["fault"]
+    ask(first, "forget", name="slash")
+    assert first.stop() == 0
+    enrolment = Enrolment(second, "cut", examples=1)
+    other.backslash()
+    assert enrolment.line()["kept"] is True
+    assert enrolment.line()["enrolled"] == "cut"
+    assert own_file.load(tmp_path / "own-gestures.json").gestures.keys() == {"cut"}
+    assert ask(second, "gestures")["own"] | {"file": ""} == {
+        "file": "", "fault": None, "gestures": {"cut": 1}, "off": None, "doubtful": [], "enrolling": None,
+    }  # fmt: skip
 
 
 def test_a_broken_file_is_said_left_alone_and_the_models_gestures_go_on(begin: Begin, tmp_path: Path) -> None:
@@ -254,13 +289,24 @@ def test_a_broken_file_is_said_left_alone_and_the_models_gestures_go_on(begin: B
 
 def test_where_it_cannot_be_written_nothing_changes(begin: Begin) -> None:
     daemon = begin("--own-gestures", "/proc/own-gestures.json")
-    sensor = ready(daemon)
-    enrolment = Enrolment(daemon, "slash", examples=1)
-    sensor.slash()
-    assert enrolment.line()["kept"] is True
-    line = enrolment.line()
-    assert (line["given_up"], "/proc/own-gestures.json: cannot be written" in line["reason"]) == ("slash", True)
-    assert ask(daemon, "gestures")["own"]["gestures"] == {}
+    ready(daemon)
+    with pytest.raises(Refused, match=r"/proc/own-gestures\.json: cannot be written"):
+        Enrolment(daemon, "slash", examples=1)
+    own = ask(daemon, "gestures")["own"]
+    assert ("cannot be written" in own["fault"], own["gestures"]) == (True, {})
+
+
+def test_a_file_that_was_planted_names_no_gesture_of_the_model_twice(
+    begin: Begin, tmp_path: Path, example: Example
+) -> None:
+    own_file.write(tmp_path / "own-gestures.json", {"swipe_left": (example,), "slash": (example,)}, "")
+    daemon = begin()
+    assert daemon.client().hello["gestures"] == [*tiny_model.GESTURES, "slash"]
+    own = ask(daemon, "gestures")["own"]
+    assert own["gestures"] == {"slash": 1}
+    assert "swipe_left is off, since tiny has a gesture of that name" in own["doubtful"]
+    assert ask(daemon, "forget", name="swipe_left")["forgotten"] == "swipe_left"
+    assert own_file.load(tmp_path / "own-gestures.json").gestures.keys() == {"slash"}
 
 
 def test_another_model_takes_the_examples_over_or_says_that_they_are_off(
@@ -327,23 +373,86 @@ def test_a_client_that_enrols_without_end_leaves_room_for_others(begin: Begin) -
     assert enrolment.line()["kept"] is True
 
 
-def test_what_is_written_while_a_reload_names_another_file_leaves_that_file_alone(
-    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.fixture
+def example() -> Example:
+    found = Example.of(segment(), WINDOW)
+    assert found is not None
+    return found
+
+
+@pytest.fixture
+def followed(model: Path) -> tuple[OwnGestures, Ladder]:
+    """Own gestures that no daemon has; each test tells them their file."""
+    return OwnGestures(lambda: None), ladder_for(model)
+
+
+def test_what_is_forgotten_during_a_reload_does_not_come_back(
+    followed: tuple[OwnGestures, Ladder], tmp_path: Path, example: Example
 ) -> None:
-    example = Example.of(segment(), WINDOW)
-    assert example is not None
+    own, ladder = followed
     one, other = tmp_path / "one.json", tmp_path / "other.json"
     own_file.write(one, {"slash": (example,), "cut": (example,)}, "")
-    own_file.write(other, {"wave": (example,)}, "")
-    ladder, own = ladder_for(model), OwnGestures(lambda: None)
-    own.follow(ladder, own_file.load(one))
-    write = own_file.write
+    own_file.write(other, {"slash": (example,), "wave": (example,)}, "")
+    own.follow(ladder, own.read(one, ladder))
 
-    def reload_meanwhile(path: Path, *what: Any) -> None:
-        write(path, *what)
-        own.follow(ladder, own_file.load(other))
+    async def forget_while(path: Path) -> None:
+        async with own.writing:  # as a reload does
+            found = await asyncio.to_thread(own.read, path, ladder)
+            forgetting = asyncio.create_task(own.forget("slash"))
+            await asyncio.wait({forgetting}, timeout=0.2)  # as far as it comes
+            own.follow(ladder, found)
+        await forgetting
 
-    monkeypatch.setattr(own_file, "write", reload_meanwhile)
-    asyncio.run(own.forget("slash"))
-    assert own_file.load(one).gestures.keys() == {"cut"}
-    assert own.gestures.keys() == {"wave"} == own_file.load(other).gestures.keys()
+    async def reload_twice() -> None:
+        await forget_while(one)
+        assert own.gestures.keys() == {"cut"} == own_file.load(one).gestures.keys()
+        await forget_while(other)  # which the reload names: it is the one that slash is forgotten in
+        assert own.gestures.keys() == {"wave"} == own_file.load(other).gestures.keys()
+
+    asyncio.run(reload_twice())
+
+
+def test_a_model_looks_at_each_example_once_and_not_in_the_loop(
+    followed: tuple[OwnGestures, Ladder], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, ladder = followed
+    looked: list[threading.Thread] = []
+    embed = Model.embed
+    monkeypatch.setattr(Model, "embed", lambda *what: (looked.append(threading.current_thread()), embed(*what))[1])
+    examples = [one for frames in range(4, 9) if (one := Example.of(segment(frames), WINDOW))]
+    path = tmp_path / "own.json"
+    own_file.write(path, {f"g{k}": (one,) for k, one in enumerate(examples)}, "")
+    own.follow(ladder, own.read(path, ladder))
+    assert len(looked) == len(examples)
+    for name in ("g0", "g1"):
+        asyncio.run(own.forget(name))
+    own.follow(ladder, own.read(path, ladder))
+    assert len(looked) == len(examples)
+    own_file.write(path, {"new": (dataclasses.replace(examples[0]),)}, "")
+
+    async def reload() -> None:
+        own.follow(ladder, await asyncio.to_thread(own.read, path, ladder))
+
+    asyncio.run(reload())
+    assert len(looked) == len(examples) + 1
+    assert looked[-1] is not threading.main_thread()
+
+
+def test_a_fallback_that_comes_to_answer_looks_at_the_examples_beside_the_loop(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, example: Example
+) -> None:
+    below = tiny_model.make(tmp_path / "below.onnx", version="2", own=tiny_model.own())
+    ladder, own = ladder_for(model, [below]), OwnGestures(lambda: None)
+    own_file.write(tmp_path / "own.json", {"slash": (example,)}, "")
+    own.follow(ladder, own.read(tmp_path / "own.json", ladder))
+    assert ladder.classify(example.segment()).own is not None
+    monkeypatch.setattr(ladder.model, "classify", None)  # it fails from now on
+
+    async def fall() -> None:
+        first = ladder.classify(example.segment())
+        assert (first.model, first.own) == ("below", None)
+        while ladder.own.made(ladder.model) is None:
+            await asyncio.sleep(0.01)
+        assert ladder.classify(example.segment()).own is not None
+
+    asyncio.run(fall())

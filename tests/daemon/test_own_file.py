@@ -1,16 +1,30 @@
 """The file of the user's own gestures: what of it is read, and who writes it."""
 
+import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from gestured.core.own import MOST, MOST_VALUES, Example
 from gestured.core.prototypes import EXAMPLES
+from gestured.daemon.keeper import Keeper
 from gestured.model import own_file
+from gestured.model.own_file import OwnFile, OwnFileError
 
-
-def example(frames: int = 4) -> Example:
-    return Example(np.zeros((frames, 9, 9), np.float16), 15.0, 0, 3, 0.1)
+EXAMPLE = Example(np.zeros((4, 9, 9), np.float16), 15.0, 0, 3, 0.1)
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from gestured.daemon.keeper import Keeper
+from gestured.model.own_file import OwnFile
+os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+path = Path(sys.argv[1])
+Keeper(path).change(OwnFile(path, {}), lambda found: {}, "")
+"""
 
 
 def test_the_largest_file_that_can_be_enrolled_is_read_again(tmp_path: Path) -> None:
@@ -28,3 +42,49 @@ def test_millions_of_empty_lists_are_not_handed_to_the_reader_of_json(tmp_path: 
     fault = own_file.load(path).fault
     assert fault is not None
     assert "expected at most 4096 brackets and commas" in fault
+
+
+def test_what_a_killed_writer_has_left_is_gone_with_the_next_start_and_the_next_write(tmp_path: Path) -> None:
+    path = tmp_path / "own.json"
+    own_file.write(path, {"slash": (EXAMPLE,)}, "")
+    kept = {"own.json", ".own.json.lock", ".own.json.swp"}
+    (tmp_path / ".own.json.swp").touch()  # somebody else's
+    killed = subprocess.run([sys.executable, "-c", KILLED, path], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    left = set(os.listdir(tmp_path)) - kept
+    assert len(left) == 1
+    keeper = Keeper(path)
+    keeper.hold()
+    assert set(os.listdir(tmp_path)) == kept
+    (tmp_path / left.pop()).touch()
+    keeper.change(OwnFile(path, {}), lambda found: {}, "")
+    assert set(os.listdir(tmp_path)) == kept
+
+
+def test_what_somebody_else_has_changed_meanwhile_is_read_before_it_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "own.json"
+    keeper = Keeper(path)
+    known = keeper.change(OwnFile(path, {}), lambda found: {**found, "slash": (EXAMPLE,)}, "")
+    assert keeper.change(known, lambda found: found, "").gestures["slash"] == (EXAMPLE,)  # it is not read anew
+    own_file.write(path, {"slash": (EXAMPLE,), "wave": (EXAMPLE,)}, "")
+    known = keeper.change(known, lambda found: {**found, "cut": (EXAMPLE,)}, "")
+    assert known.gestures.keys() == {"slash", "wave", "cut"} == own_file.load(path).gestures.keys()
+    path.write_text("no JSON")
+    with pytest.raises(OwnFileError, match="is no file of own gestures"):
+        keeper.change(known, lambda found: {}, "")
+    assert path.read_text() == "no JSON"
+
+
+@pytest.mark.parametrize(
+    ("environ", "expected"),
+    [
+        ({"STATE_DIRECTORY": "/s:/t", "XDG_STATE_HOME": "/x", "HOME": "/h"}, "/s/own-gestures.json"),
+        ({"XDG_STATE_HOME": "/x", "HOME": "/h"}, "/x/gestured/own-gestures.json"),
+        ({"XDG_STATE_HOME": "x", "HOME": "/h"}, "/h/.local/state/gestured/own-gestures.json"),
+        ({"XDG_STATE_HOME": "", "HOME": "h"}, None),
+        ({}, None),
+    ],
+)
+def test_where_it_is_unless_somebody_says_it(environ: dict[str, str], expected: str | None) -> None:
+    assert own_file.where(None, environ) == (expected and Path(expected))
+    assert own_file.where(Path("mine.json"), environ) == Path("mine.json")

@@ -19,7 +19,7 @@ from gestured.core.prototypes import EXAMPLES, Array, Prototype, Space, nearest
 from gestured.lab.dataset import cuts
 from gestured.model.model import Model
 from gestured.model.opening import open_model
-from gestured.model.own import place, taken_for
+from gestured.model.own import Placed
 from tests.foreign import GESTURES, LEVELS, NON_GESTURES
 from tests.foreign.hands import Performance, draw_person, perform
 from tests.foreign.sensors import draw_sensor, record
@@ -59,9 +59,9 @@ def done(model: Model, seed: int, level: str) -> Iterator[Seen]:
         for _ in range(TRIALS if kind in PERFORMED else OTHER_TRIALS):
             for segment in segments(perform(kind, rng, person), sensor, rng)[:1]:
                 scores = model.classify(segment)
-                taken = taken_for(model, model.space, segment, model.gestures) is not None
+                placed = Placed.of(model, model.space, segment)
                 known = scores.confidence >= scores.threshold
-                yield Seen(kind, place(model, model.space, segment), known, taken)
+                yield Seen(kind, placed.place, known, placed.taken is not None)
 
 
 def taken(space: Space, prototypes: dict[str, Prototype], chosen: list[Seen]) -> Array:

@@ -1,0 +1,72 @@
+"""Who writes the file of the user's own gestures: the first daemon that locks it, and that one alone."""
+
+import fcntl
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+from gestured.core.own import Examples
+from gestured.model import own_file
+from gestured.model.own_file import OwnFile, OwnFileError
+from gestured.record.files import PRIVATE, delete_leftovers
+
+Change = Callable[[Examples], Examples]
+PID_DIGITS = 10
+
+
+class Keeper:
+    """One path, and the lock beside it from the first success of `hold` on; one thread at a time may use it.
+
+    The lock is a file of its own, since each write puts another file into the place of the one that is kept.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+        self._lock: BinaryIO | None = None
+
+    def hold(self) -> None:
+        """Be the one that writes it. Raises OwnFileError, which names the daemon that is, or says what is wrong."""
+        if self._lock is not None:
+            return
+        if self.path is None:
+            raise OwnFileError(own_file.NO_FILE)
+        try:
+            self.path.parent.mkdir(0o700, parents=True, exist_ok=True)
+            flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+            lock = open(os.open(self.path.with_name(f".{self.path.name}.lock"), flags, PRIVATE), "r+b", buffering=0)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise OwnFileError(self._theirs(lock.read(PID_DIGITS))) from None
+            lock.truncate(0)
+            lock.write(str(os.getpid()).encode())
+        except OSError as error:
+            raise OwnFileError(f"{self.path}: cannot be written: {error.strerror}; {own_file.REMEDY}") from error
+        self._lock = lock
+        delete_leftovers(self.path)
+
+    def change(self, known: OwnFile, change: Change, model: str) -> OwnFile:
+        """Write what `change` makes of the gestures that are in the file now; `known` is what was read of it last.
+
+        `model` is the digest of the model that answers. Raises OwnFileError, or what `change` raises.
+        """
+        self.hold()
+        assert self.path is not None
+        delete_leftovers(self.path)
+        found = own_file.load(self.path, known)
+        if found.fault is not None:
+            raise OwnFileError(found.fault)
+        return own_file.write(self.path, change(found.gestures), model)
+
+    def _theirs(self, pid: bytes) -> str:
+        who = f"gestured (pid {int(pid)})" if pid.isdigit() else "gestured"
+        return (
+            f"{self.path}: another {who} writes it; enrol and forget there, or give this one a file of its own "
+            "(--own-gestures FILE)"
+        )
+
+    def close(self) -> None:
+        """Leave it to others."""
+        if self._lock is not None:
+            self._lock.close()
