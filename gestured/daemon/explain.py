@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 
 from gestured import __version__
 from gestured.client.address import control_beside, default_socket
+from gestured.core.errors import SettingsError
 from gestured.core.scene import DOUBLE_TAP
 from gestured.core.timing import Timing
 from gestured.daemon.asked import open_ladder
@@ -13,6 +14,7 @@ from gestured.daemon.clients import CLIENTS
 from gestured.daemon.settings import TABLES, Settings
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
+from gestured.model import own_file
 from gestured.model.ladder import Ladder, gestures_in_use
 
 
@@ -40,6 +42,8 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
         f"gestures {', '.join(used)}",
         "numpy, onnxruntime (one thread), uvloop, pydantic, structlog",
     ]
+    own, not_own = _own(settings)
+    loads += own
     if settings.metrics:
         loads.append("prometheus_client, and a thread that answers HTTP")
     if settings.publish:
@@ -92,13 +96,29 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
         "listens to": listens,
         "publishes on": publishes,
         "computes per frame": [*computes, *_early(ladder)],
-        "leaves out": [*leaves, *_not_early(settings, ladder)],
+        "leaves out": [*leaves, *not_own, *_not_early(settings, ladder)],
         "set by": list(_keys(settings, sources)) or ["nothing, all defaults"],
     }
     lines = [f"gestured {__version__}"]
     for title, items in parts.items():
         lines += ["", f"{title}:", *(f"  {item}" for item in items)]
     return "\n".join(lines)
+
+
+def _own(settings: Settings) -> tuple[list[str], list[str]]:
+    """Which own gestures are loaded, and why none can be enrolled. Raises SettingsError for a path that cannot be."""
+    own = own_file.load(own_file.where(settings.own_gestures, os.environ))
+    if own.fault and settings.own_gestures:
+        raise SettingsError(f"own_gestures: {own.fault}")
+    if own.fault or own.path is None:
+        return [], [f"enrolling: {own.fault or own_file.NO_FILE}"]
+    # Folders that are missing are made when something is enrolled.
+    folder = next(folder for folder in own.path.absolute().parents if os.path.exists(folder))
+    may = os.access(folder, os.W_OK | os.X_OK)
+    return (
+        [f"own gestures {', '.join(own.gestures) or '(none yet)'}, in {own.path}"],
+        [] if may else [f"enrolling: this account has no right to write in {folder}"],
+    )
 
 
 def _keys(settings: Settings, sources: Mapping[str, str]) -> Iterator[str]:

@@ -141,7 +141,8 @@ class Settings(Part):
     own_gestures: Path | None = Field(
         default=None,
         description="file in which the daemon keeps gestures of your own; by default "
-        "$STATE_DIRECTORY/own-gestures.json; without either, none can be enrolled",
+        "$STATE_DIRECTORY/own-gestures.json, else $XDG_STATE_HOME/gestured/own-gestures.json, "
+        "else ~/.local/state/gestured/own-gestures.json",
     )
     log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="how much is logged")
     sensors: dict[SensorNameField, SensorSettings] = Field(

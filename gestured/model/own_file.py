@@ -44,16 +44,6 @@ def where(chosen: Path | None, environ: Mapping[str, str]) -> Path | None:
     return Path(state, "gestured", NAME) if state else None
 
 
-def unwritable(path: Path | None) -> str | None:
-    """Why this user could not put a file there, as far as can be seen; folders that are missing would be made."""
-    if path is None:
-        return NO_FILE
-    folder = next(folder for folder in path.absolute().parents if os.path.exists(folder))
-    if not folder.is_dir():
-        return f"{path}: cannot be written: {folder} is no folder"
-    return None if os.access(folder, os.W_OK | os.X_OK) else f"{path}: cannot be written: no right to write in {folder}"
-
-
 def load(path: Path | None, known: OwnFile | None = None) -> OwnFile:
     """Read the file; there are no gestures where there is none, or where it cannot be read.
 

@@ -1,14 +1,18 @@
-"""The waits that `--explain` names are those of the front end."""
+"""What `--explain` says: the waits of the front end, the file of own gestures."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gestured.core.errors import SettingsError
 from gestured.core.frames import Frame
 from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.own import Example
 from gestured.core.timing import Timing
 from gestured.daemon.explain import explain
+from gestured.model import own_file
 from gestured.model.shipped import shipped
 from tests.daemon.parts import settings_of
 
@@ -39,3 +43,30 @@ def test_a_tap_is_answered_when_explain_says(tap_gap_s: float) -> None:
     text = explain(*settings_of("--tap-gap-s", tap_gap_s))
     (said,) = re.findall(r"at 15 Hz .* a tap ([0-9.]+) s after it", text)
     assert [waited(tap_gap_s, seed) for seed in range(12)] == [pytest.approx(float(said), abs=3 * JITTER_S)] * 12
+
+
+def test_the_file_of_own_gestures_is_said_and_one_that_cannot_be_is_refused(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def explained(*flags: object) -> str:
+        return explain(*settings_of("--model", model, *flags))
+
+    path = tmp_path / "missing" / "own.json"
+    assert f"own gestures (none yet), in {path}" in explained("--own-gestures", path)
+    monkeypatch.setenv("STATE_DIRECTORY", str(tmp_path))
+    assert f"own gestures (none yet), in {tmp_path}/own-gestures.json" in explained()
+    example = Example(np.zeros((4, 9, 9), np.float16), 15.0, 0, 3, 0.1)
+    own_file.write(tmp_path / "own-gestures.json", {"knock": (example,)}, "")
+    assert "own gestures knock, in" in explained()
+    (tmp_path / "own-gestures.json").write_text("no JSON")
+    assert "enrolling: " in explained()
+    for wrong, words in (
+        (tmp_path, "cannot be read: Is a directory"),
+        (model / "own.json", "cannot be read: Not a directory"),
+        (tmp_path / "own-gestures.json", "is no file of own gestures"),
+    ):
+        with pytest.raises(SettingsError, match=f"own_gestures: {wrong}: {words}"):
+            explained("--own-gestures", wrong)
+    for name in ("STATE_DIRECTORY", "XDG_STATE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    assert "enrolling: there is no file for own gestures, since there is no home" in explained()
