@@ -3,7 +3,7 @@
 # Two environments: .venv holds the runtime alone (what a vehicle gets), .venv-dev what tests and training need.
 # A stamp in each says that it is complete, so that the second run asks pip for nothing and works offline.
 
-.PHONY: help demo test golden lint bench lab hostile fuzz soak install uninstall system-test clean
+.PHONY: help demo bridges test golden lint bench lab hostile fuzz soak install uninstall system-test clean
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
 MAKEFLAGS += --no-builtin-rules
@@ -26,8 +26,16 @@ help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 10
 
 # At a terminal the demo is a job of its own, so that Ctrl-C is for it and not for make.
+# A copy of gestured in the environment, as `pip install .` leaves one, would not show what is edited here.
 demo: .venv/.runtime  ## recognise simulated gestures with the real daemon: SECONDS=20 MODEL=lstm SPEED=fast ARGS="--seed 7"
+	@.venv/bin/python -I -c 'import os, sys, gestured; \
+		sys.exit(not os.path.samefile(gestured.__path__[0], "gestured"))' 2>/dev/null || { \
+		echo "the environment holds a copy of gestured; it is linked to this folder again"; \
+		$(MAKE) -s --no-print-directory -B .venv/.runtime; }
 	@[ ! -t 0 ] || set -m; .venv/bin/gesturectl demo --seconds "$(SECONDS)" --model "$(MODEL)" $(if $(SPEED),--speed "$(SPEED)") $(ARGS)
+
+bridges: .venv/.bridges  ## what gestured-bridge needs for MQTT, Zenoh and serial sensors, into .venv
+	@.venv/bin/gestured-bridge --help
 
 test: .venv-dev/.dev  ## run the tests: ARGS="tests/core -k tap"
 	@$(MAKE) -s --no-print-directory .venv-dev/.lab || echo "note: without the lab's packages its tests are skipped" >&2
@@ -108,6 +116,10 @@ endef
 .venv/.runtime: pyproject.toml
 	$(call venv,.venv)
 	$(call install,.venv,the runtime,-e .)
+	@touch $@
+
+.venv/.bridges: .venv/.runtime
+	$(call install,.venv,the bridges,-e '.[mqtt$(,)zenoh$(,)serial]')
 	@touch $@
 
 .venv-dev/.dev: pyproject.toml

@@ -29,7 +29,7 @@ def need(module: str, package: str, extra: str) -> None:
     try:
         importlib.import_module(module)
     except ImportError:
-        raise BridgeError(f"this bridge needs the package {package}: pip install 'gestured[{extra}]'") from None
+        raise BridgeError(f"this bridge needs the package {package}: pip install 'gestured[{extra}]', or make bridges") from None
 
 
 def add_filters(parser: argparse.ArgumentParser) -> None:
