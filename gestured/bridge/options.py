@@ -29,7 +29,8 @@ def need(module: str, package: str, extra: str) -> None:
     try:
         importlib.import_module(module)
     except ImportError:
-        raise BridgeError(f"this bridge needs the package {package}: pip install 'gestured[{extra}]', or make bridges") from None
+        remedy = f"pip install 'gestured[{extra}]', or make bridges"
+        raise BridgeError(f"this bridge needs the package {package}: {remedy}") from None
 
 
 def add_filters(parser: argparse.ArgumentParser) -> None:

@@ -49,8 +49,31 @@ def test_the_zenoh_consumer(bridge, daemon: Daemon):
     site = test_zenoh.Site()
     try:
         test_zenoh.begin(bridge, site, daemon).ready()
-        code = consumer("import zenoh").replace("tcp/192.168.7.2:7447", site.endpoint)
+        code = consumer("declare_subscriber").replace("tcp/192.168.7.2:7447", site.endpoint)
         assert first_line(code, daemon) == "armrest swipe_left\n"
+    finally:
+        site.close()
+
+
+def test_the_zenoh_sender(bridge, fake, udp):
+    pytest.importorskip("zenoh", reason="the bridge to Zenoh needs the extra [zenoh]")
+    from tests.bridge import test_zenoh
+    from tests.bridge.test_serial import Out
+
+    site = test_zenoh.Site()
+    try:
+        to = f"127.0.0.1:{udp.getsockname()[1]}"
+        process = bridge(
+            "zenoh", "--connect", site.endpoint, "--site", "car7", "--socket", fake.path, "--frames", "--to", to
+        )
+        fake.accept()
+        process.ready()
+        code = consumer("declare_publisher").replace("tcp/192.168.7.2:7447", site.endpoint)
+        with subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}) as sender:
+            out = Out(udp)
+            first, second = out.next(), out.next()
+            sender.kill()
+        assert (first.values == 20.0).all() and second.counter == first.counter + 1
     finally:
         site.close()
 
