@@ -14,6 +14,7 @@ PACKAGE = ROOT / "gestured"
 CORE_MAY = {"numpy", "dataclasses", "enum", "math", "struct", "json", "base64", "typing", "collections", "ipaddress"}
 LAYERS = {"core": 0, "daemon": 2, "control": 2, "bridge": 2, "lab": 2}  # everything else is between them
 LAB_ONLY = {"torch", "sklearn", "onnx", "joblib", "scipy"}
+OUTSIDE = {"experiments", "tests", "benchmarks"}  # they use the package, never the other way round
 ONLY_IN = {
     "onnxruntime": {"gestured/model/session.py"},
     "mcap": {
@@ -66,6 +67,8 @@ def faults(path: Path) -> list[str]:
                 found.append(f"{where}: {room} must not import {name}")
         elif room == "core" and top not in CORE_MAY:
             found.append(f"{where}: core must not import {name}")
+        if top in OUTSIDE:
+            found.append(f"{where}: the package must not import {name}")
         if room != "lab" and top in LAB_ONLY:
             found.append(f"{where}: only the lab imports {name}")
         if room != "lab" and top in ONLY_IN and where not in ONLY_IN[top]:
@@ -125,6 +128,7 @@ def test_no_two_modules_know_each_other() -> None:
         ("bridge/x.py", "from gestured.control import cli"),
         ("daemon/x.py", "from gestured.bridge import mqtt"),
         ("control/x.py", "import zenoh"),
+        ("lab/x.py", "from experiments import foreign"),
     ],
 )
 def test_the_rule_notices(where: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -131,8 +131,8 @@ def parser() -> argparse.ArgumentParser:
                        "run time again, from the study.json or operating-points.json of an earlier run")  # fmt: skip
     study.add_argument("--readme", type=Path, metavar="FILE", help="with --draw: a README whose table below the "
                        "picture is renewed")  # fmt: skip
-    study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: "
-                       "another generator's (python -m tests.foreign.recordings) or another sensor's")  # fmt: skip
+    study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: of "
+                       "another generator (python -m experiments.foreign.recordings) or another sensor")  # fmt: skip
     study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")
     study.add_argument(
         "--seed", type=int, default=0, help="of splits and training: same seed, same numbers (default: 0)"

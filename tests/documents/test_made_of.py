@@ -12,7 +12,7 @@ from tests.documents.blocks import ROOT, documents
 
 # The tables that speak of the shipped models, and the beginning of the command that makes them.
 GENERATED = {
-    "README.md": ("gestured-lab evaluate", "python -m tests.foreign.judge"),
+    "README.md": ("gestured-lab evaluate", "python -m experiments.foreign.judge"),
     "docs/performance.md": ("make bench",),
     "docs/limits-and-choices.md": ("gestured-lab taps",),
     "docs/numerics.md": ("gestured-lab stability",),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.foreign import GESTURES, GRIDS, NON_GESTURES, other_grids, session, take
+from experiments.foreign import GESTURES, GRIDS, NON_GESTURES, other_grids, session, take
 
 
 def _path(recording: dict[str, Any]) -> NDArray[np.float64]:

@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments.foreign import GESTURES, NON_GESTURES, take
+from experiments.foreign.judge import Outcome, Take, judge, main, summary, visible
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.frames import Segment
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
-from tests.foreign import GESTURES, NON_GESTURES, take
-from tests.foreign.judge import Outcome, Take, judge, main, summary, visible
 
 SEEDS = range(9000, 9006)  # of each kind; `judge` counts from 0 unless told
 BOUNDS = {  # least right, most wrong of the gestures, least rejected of the others

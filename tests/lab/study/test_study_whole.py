@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments.foreign.recordings import recordings
 from gestured.lab import cli
 from gestured.lab.dataset import TRIALS
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
 from gestured.record.arrays import write
-from tests.foreign.recordings import recordings
 
 SECTIONS = (
     "about", "machine", "data", "methods", "cells", "copies", "tuning", "choices", "run_time", "calibration",

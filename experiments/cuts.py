@@ -1,7 +1,7 @@
-"""How the front end's cuts compare with cuts at the true marks: `python -m tests.cuts`.
+"""How the front end's cuts compare with cuts at the true marks: `python -m experiments.cuts`.
 
-    python -m tests.cuts --level nominal hard faint --sessions 100
-    python -m tests.cuts --foreign --level nominal hard --sessions 100
+    python -m experiments.cuts --level nominal hard faint --sessions 100
+    python -m experiments.cuts --foreign --level nominal hard --sessions 100
 
 Short sessions of one person each on one sensor each, of this project's simulator or of the independent one (which
 judges: nothing is tuned on it). Each gesture is named twice: as the front end cuts it, and as it would be cut by
@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments import foreign
 from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
 from gestured.core.scene import Scene
@@ -29,7 +30,6 @@ from gestured.core.sensor import Sensor
 from gestured.lab.dataset import Truth, truths
 from gestured.model.opening import open_model
 from gestured.simulator import Participant, SimulatedSensor, any_sensor, generator, session
-from tests import foreign
 
 SESSION_S = 20.0
 NON_GESTURE_SHARE = 0.25

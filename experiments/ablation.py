@@ -1,6 +1,6 @@
 """What each kind of simulated take brings: networks that learned without it, beside one that learned from all.
 
-    python -m tests.lab.ablation --cache .cache/lab
+    python -m experiments.ablation --cache .cache/lab
 
 Each is taught by as many takes of the wide stream in as many steps, a third of the takes and half of the epochs of the
 shipped models, and calibrated without that kind as well. People whom none has met judge: on takes of that kind, and on

@@ -1,8 +1,8 @@
 """How much of a gap `gestured-lab adapt` closes on a kind of sensor that simulation left out altogether.
 
-    python -m tests.lab.adapt.kinds --cache .cache/lab
+    python -m experiments.kinds --cache .cache/lab
 
-The base learned and was calibrated without that kind (`tests.lab.ablation`, whose networks are taken from the cache).
+The base learned and was calibrated without that kind (`experiments.ablation`, whose networks are taken from the cache).
 It is adapted to some sensors of the kind, each with the gestures of one to six people, and judged on other people's on
 the same sensor; so is the network that learned from all kinds.
 """
@@ -14,6 +14,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from experiments.ablation import KINDS, network
+from experiments.curve import Said, of_people, table
 from gestured.lab.adapt.adaptation import settled
 from gestured.lab.adapt.learning import Course
 from gestured.lab.adapt.material import Own
@@ -32,8 +34,6 @@ from gestured.simulator import (
     gesture_take,
     wide_plan,
 )
-from tests.lab.ablation import KINDS, network
-from tests.lab.adapt.curve import Said, of_people, table
 
 CHOSEN = ("sensors like touchscreens", "touches of at most 25 times the noise")  # the two that are most of the takes
 SENSORS = 3  # of each kind

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.foreign.hands import Array, Pad, Performance, Rng
+from experiments.foreign.hands import Array, Pad, Performance, Rng
 
 
 @dataclass(frozen=True, slots=True)

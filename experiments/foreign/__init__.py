@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tests.foreign.hands import GESTURES, LEVELS, NON_GESTURES, draw_person, perform
-from tests.foreign.sensors import draw_sensor, record
+from experiments.foreign.hands import GESTURES, LEVELS, NON_GESTURES, draw_person, perform
+from experiments.foreign.sensors import draw_sensor, record
 
 __all__ = ["GESTURES", "GRIDS", "LEVELS", "NON_GESTURES", "other_grids", "session", "take"]
 

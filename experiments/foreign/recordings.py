@@ -1,6 +1,6 @@
 """Gestures of the second generator as a file of recordings, for `gestured-lab study --foreign FILE`.
 
-    python -m tests.foreign.recordings foreign.npz --n 20 --level nominal
+    python -m experiments.foreign.recordings foreign.npz --n 20 --level nominal
 
 Each take is another person at another sensor. What nobody can recognise is left out, as `judge` leaves it out.
 """
@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.foreign import GESTURES, LEVELS, take
+from experiments.foreign.judge import visible
 from gestured.record.arrays import write
 from gestured.record.recordings import Recordings
-from tests.foreign import GESTURES, LEVELS, take
-from tests.foreign.judge import visible
 
 
 def recordings(count: int, level: str = "nominal", first: int = 0) -> Recordings:

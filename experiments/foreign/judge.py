@@ -1,10 +1,10 @@
 """Judge models, or the front end alone, on the independent generator.
 
-    python -m tests.foreign.judge --n 20 --level nominal hard --readme README.md
-    python -m tests.foreign.judge --model cnn_lstm --n 40 --level nominal hard
-    python -m tests.foreign.judge --front-end --n 40
-    python -m tests.foreign.judge --model cnn_lstm --grids --sessions 5 --json
-    python -m tests.foreign.judge --model cnn_lstm --provisional --sessions 10
+    python -m experiments.foreign.judge --n 20 --level nominal hard --readme README.md
+    python -m experiments.foreign.judge --model cnn_lstm --n 40 --level nominal hard
+    python -m experiments.foreign.judge --front-end --n 40
+    python -m experiments.foreign.judge --model cnn_lstm --grids --sessions 5 --json
+    python -m experiments.foreign.judge --model cnn_lstm --provisional --sessions 10
 
 Without --model or --front-end all shipped models are judged, a row for each; --readme puts the table into a README, and
 each model's rows into its card. A take's outcome is one of: `missed` (no segment), `cancelled:REASON`, `split` (more
@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from experiments.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
 from gestured.core.events import Cancelled, Gesture, Onset, Unknown
 from gestured.core.facts import events_of
 from gestured.core.frames import Frame, Segment
@@ -32,7 +33,6 @@ from gestured.lab.dataset import Truth
 from gestured.lab.made_of import made_of, renew
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
-from tests.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
 
 SEEN = 4.0  # times the noise
 SESSION_S = 120.0
@@ -42,8 +42,8 @@ HEAD = (
     "|---|---|---|---|---|---|---|---|",
 )
 OF_A_CARD = (
-    "The hardest honest figure: people and sensors of a second simulator (`tests/foreign`), written independently of "
-    "the first, from",
+    "The hardest honest figure: people and sensors of a second simulator (`experiments/foreign`), written "
+    "independently of the first, from",
     "which no model learns. Sensors are as good as the nominal one, or much worse (hard).",
 )
 
@@ -239,7 +239,7 @@ def show_shipped(args: argparse.Namespace) -> None:
     """Print the table of all shipped models; put it where --readme wants it."""
     results = {name: judged(name, args)[0] for name in shipped()}
     rows = {name: [row(name, level, found) for level, found in result.items()] for name, result in results.items()}
-    command = f"python -m tests.foreign.judge --n {args.n} --level {' '.join(args.level)}"
+    command = f"python -m experiments.foreign.judge --n {args.n} --level {' '.join(args.level)}"
     above = [made_of(command, shipped().values()), "", *HEAD]
     table = [*above, *(line for lines in rows.values() for line in lines)]
     print(json.dumps(results, indent=1) if args.json else "\n".join(table))
@@ -408,7 +408,7 @@ def main() -> None:
         print(json.dumps({"takes": result, "sessions": long}, indent=1))
         return
     if args.model in shipped():
-        print(made_of("python -m tests.foreign.judge", [shipped()[args.model]]))
+        print(made_of("python -m experiments.foreign.judge", [shipped()[args.model]]))
     _show(result, args.front_end)
     for found in long:
         print(f"\n== sessions, {found['level']}: {found['gestures']} gestures", end="")

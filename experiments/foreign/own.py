@@ -1,6 +1,6 @@
 """Judge gestures of one's own on the independent generator: the same person, kinds that no model has learned from it.
 
-    python -m tests.foreign.own --model cnn_lstm --people 10
+    python -m experiments.foreign.own --model cnn_lstm --people 10
 
 A kind is performed as that generator does it, which is any way at all (a zigzag in any direction): a person who repeats
 himself is easier. So this is reported, not promised; and recall by kind, after as many examples each, says which kinds
@@ -13,6 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.foreign import GESTURES, LEVELS, NON_GESTURES
+from experiments.foreign.hands import Performance, draw_person, perform
+from experiments.foreign.sensors import draw_sensor, record
 from gestured.core.classifier import NEAR
 from gestured.core.frames import Segment
 from gestured.core.prototypes import EXAMPLES, Array, Prototype, Space, nearest
@@ -20,9 +23,6 @@ from gestured.lab.dataset import cuts
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.own import Placed
-from tests.foreign import GESTURES, LEVELS, NON_GESTURES
-from tests.foreign.hands import Performance, draw_person, perform
-from tests.foreign.sensors import draw_sensor, record
 
 PERFORMED = (
     "long_press", "scribble", "zigzag", "pinch", "two_finger_tap", "check_mark", "two_finger_sideways",
