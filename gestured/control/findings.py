@@ -32,7 +32,7 @@ DROPS = {  # why, and what to do
     "not_allowed": "came from a source that is not under allow",
     "second_source": "came from a second sender for one sensor's name (gesturectl sniff): give each its own name",
     "too_many_sensors": "were of more sensors than max_sensors: look for a sender that changes its name",
-    "flood": "were more than the daemon can take: their source is held to half a megabyte a second",
+    "flood": "were more than the daemon can take: each sender is held to its share of the time",
     "not_osc": "were not OSC: something else is sent to this port",
     "not_finite": "held NaN or infinity: look at the sensor's firmware",
 }

@@ -50,56 +50,56 @@ class Stamper:
         self._counter: int | None = None
         self._late: tuple[int, int] = (0, 0)  # counter of the last late frame, and how many came in a row
 
-    def at(self, t: float) -> float:
-        """The stream's time at the arrival time `t` s, for `flush`: the last stamp plus what passed since."""
-        return t if self._last is None else self._last + max(0.0, t - self._arrived)
+    def at(self, arrived: float) -> float:
+        """The stream's time when frames that `arrived` then (s) were felt: the last stamp plus what passed since."""
+        return arrived if self._last is None else self._last + max(0.0, arrived - self._arrived)
 
     def when(self, t: float) -> float:
-        """The arrival time at which the stream's time is `t` s: the other way round."""
+        """The arrival time in s at which the stream's time is `t` s: the other way round."""
         return t if self._last is None else self._arrived + (t - self._last)
 
-    def stamp(self, arrivals: Sequence[Arrival], t: float, *, missed: bool = False) -> list[Stamp]:
-        """One stamp for each of this sensor's frames that were waiting at the arrival time `t` s.
+    def stamp(self, arrivals: Sequence[Arrival], arrived: float, *, missed: bool = False) -> list[Stamp]:
+        """One stamp for each of this sensor's frames that were waiting when they `arrived`, in s.
 
         `missed`: packets may have been lost on this machine just before. A counter tells how many were this
         sensor's; without one, what fits into the pause counts as lost.
         """
         if len(arrivals) == 1 and not missed and not self._by_tag:
-            return [self._alone(arrivals[0].counter, t)]
+            return [self._alone(arrivals[0].counter, arrived)]
         before, usual = self._last, self._typical() if missed else math.nan
         stamps: list[Stamp] = []
         run: list[tuple[int, int]] = []  # frames with one time: index, periods since the frame before
         for i, arrival in enumerate(arrivals):
-            pause = 0.0 if run else t - self._arrived
+            pause = 0.0 if run else arrived - self._arrived
             steps, dropped, restarted = self._count(arrival.counter, pause)
             stamps.append(Stamp(math.nan, max(0, steps - 1), dropped, restarted, False))
             if dropped:
                 continue
             if self._by_tag and run and arrival.timetag != arrivals[run[-1][0]].timetag:
-                self._place(arrivals, stamps, run, t)
+                self._place(arrivals, stamps, run, arrived)
                 run = []
             run.append((i, steps))
         if run:
-            self._place(arrivals, stamps, run, t)
+            self._place(arrivals, stamps, run, arrived)
         if missed and before is not None and arrivals[0].counter is None:
             stamps[0] = stamps[0]._replace(lost=max(0, round((stamps[0].t - before) / usual) - 1))
         return stamps
 
-    def _alone(self, counter: int | None, t: float) -> Stamp:
+    def _alone(self, counter: int | None, arrived: float) -> Stamp:
         """The stamp of a frame that arrived by itself, by arrival: the same as among others, at half the price."""
         steps, dropped, restarted = ONE
         if counter is not None or self._counter is not None:
-            steps, dropped, restarted = self._count(counter, t - self._arrived)
+            steps, dropped, restarted = self._count(counter, arrived - self._arrived)
             if dropped:
                 return Stamp(math.nan, 0, dropped, False, False)
-        at = t
+        t = arrived
         if self._last is not None:
             if t > self._last:
                 self._intervals.append((t - self._last) / steps)
-            if at < self._last + self.MIN_STEP_S:
-                at = self._last + self.MIN_STEP_S
-        self._last, self._arrived, self._tag = at, t, None
-        return _new(Stamp, (at, max(0, steps - 1), "", restarted, False))
+            if t < self._last + self.MIN_STEP_S:
+                t = self._last + self.MIN_STEP_S
+        self._last, self._arrived, self._tag = t, arrived, None
+        return _new(Stamp, (t, max(0, steps - 1), "", restarted, False))
 
     def _count(self, counter: int | None, pause: float) -> Counted:
         """(periods since the frame before, why it is dropped, whether the sensor restarted)."""
@@ -120,23 +120,25 @@ class Stamper:
         self._late = (0, 0)
         return 1, "", True
 
-    def _place(self, arrivals: Sequence[Arrival], stamps: list[Stamp], run: list[tuple[int, int]], t: float) -> None:
+    def _place(
+        self, arrivals: Sequence[Arrival], stamps: list[Stamp], run: list[tuple[int, int]], arrived: float
+    ) -> None:
         """Stamp frames that share one time."""
         tag = arrivals[run[-1][0]].timetag
         total = sum(steps for _, steps in run)
         implausible = False
         if self._last is None:
-            end, spacing = t, self._typical()
+            end, spacing = arrived, self._typical()
             implausible = self._by_tag and tag is None
         else:
-            step = t - self._arrived
+            step = arrived - self._arrived
             if self._by_tag:
                 by_tag = tag - self._tag if tag is not None and self._tag is not None else 0.0
-                if 0 < by_tag <= self.MAX_STEP_S and self._last + by_tag <= t + self.AHEAD_S:
+                if 0 < by_tag <= self.MAX_STEP_S and self._last + by_tag <= arrived + self.AHEAD_S:
                     step = by_tag
                 else:
                     implausible = tag is None or self._tag is not None
-            end = self._last + step if self._by_tag else t
+            end = self._last + step if self._by_tag else arrived
             share = (end - self._last) / total
             spacing = min(self._typical(), share) if len(run) > 1 else share
             if share > 0:
@@ -144,12 +146,12 @@ class Stamper:
         last = self._last
         for i, steps in run:
             total -= steps
-            at = end - total * spacing
-            if last is not None and at < last + self.MIN_STEP_S:
-                at = last + self.MIN_STEP_S
-            last = at
-            stamps[i] = Stamp(at, stamps[i].lost, "", stamps[i].restarted, implausible)
-        self._last, self._arrived, self._tag = last, t, tag
+            t = end - total * spacing
+            if last is not None and t < last + self.MIN_STEP_S:
+                t = last + self.MIN_STEP_S
+            last = t
+            stamps[i] = Stamp(t, stamps[i].lost, "", stamps[i].restarted, implausible)
+        self._last, self._arrived, self._tag = last, arrived, tag
 
     def _typical(self) -> float:
         """Seconds between two frames: the median, since a late frame must not count."""

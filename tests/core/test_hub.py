@@ -291,3 +291,20 @@ def test_who_pauses_still_owns_a_sensor_until_it_is_forgotten() -> None:
 def test_a_frame_that_says_nothing_is_cheap() -> None:
     """Counted in calls, which do not depend on the machine: an idle frame of a scene with nothing but a model."""
     assert statistics.median_low(idle_calls()) <= 35
+
+
+@pytest.mark.parametrize("clock", ["arrival", "sensor"])
+def test_after_a_fault_in_its_stamps_a_contact_ends_by_the_streams_clock(
+    clock: Literal["arrival", "sensor"], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A recording that is sent at ten times its speed: its own clock is far ahead of the hub's."""
+    hub, hand, found = Hub(replace(SCENE, clock=clock), Sure()), Hand(), list[object]()
+    frames = [*hand.idle(2.0), *hand.swipe("left")[:5]]
+    for n, frame in enumerate(frames):
+        packet = encoding.bundle([floats("/arm/pressure", frame, 0)], 1.7e9 + n / 15)
+        found += hub.receive([(packet, FIRST)], n / (15 if clock == "arrival" else 150))
+    (onset,) = [fact for fact in found if isinstance(fact, Onset)]
+    monkeypatch.setattr("gestured.core.stamping.Stamper.stamp", lambda *_, **__: 1 / 0)
+    facts = hub.receive([(packet, FIRST)], len(frames) / (15 if clock == "arrival" else 150))
+    (release,) = [fact for fact in facts if isinstance(fact, Release)]
+    assert onset.onset < release.offset < onset.onset + 1.0
