@@ -17,12 +17,7 @@ LAB_ONLY = {"torch", "sklearn", "onnx", "joblib", "scipy"}
 OUTSIDE = {"experiments", "tests", "benchmarks"}  # they use the package, never the other way round
 ONLY_IN = {
     "onnxruntime": {"gestured/model/session.py"},
-    "mcap": {
-        "gestured/record/mcap.py",
-        "gestured/record/tape_reader.py",
-        "gestured/record/tape_writer.py",
-        "gestured/record/ros2.py",
-    },
+    "mcap": {"gestured/record/mcap.py", "gestured/record/tape_reader.py", "gestured/record/tape_writer.py"},
     "pythonosc": {"gestured/client/osc_out.py"},
     "prometheus_client": {"gestured/daemon/exposition.py", "gestured/bridge/counts.py"},
     "aiomqtt": {"gestured/bridge/broker.py"},

@@ -1,4 +1,4 @@
-"""`gesturectl export`: a recording as frames, in the form that NumPy reads, or ROS 2."""
+"""`gesturectl export`: a recording as frames, in the form that NumPy reads."""
 
 import argparse
 from pathlib import Path
@@ -10,9 +10,7 @@ from gestured.client.program import Commands
 from gestured.client.say import tell
 from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame
-from gestured.core.scene import Scene
 from gestured.record import arrays as recording
-from gestured.record import ros2
 from gestured.record.recordings import Recordings
 from gestured.record.replay import frames_used, opened
 from gestured.record.tape import Tape
@@ -24,25 +22,20 @@ def add(commands: Commands) -> None:
     """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "export",
-        help="write a recording as .npz, or for ROS 2",
+        help="write a recording as .npz",
         description="Write the frames of a recording as .npz, one session a sensor, with the gestures that the\n"
-        "daemon recognised as its events. Sensors of one file have one grid. With --ros2 as MCAP instead,\n"
-        "which rosbag2 plays and viewers of ROS 2 draw: sensor_msgs/Image and std_msgs/String.",
-        epilog="examples:\n  gesturectl export drive.mcap drive.npz --sensor armrest\n"
-        "  gesturectl export drive.mcap for-ros.mcap --ros2",
+        "daemon recognised as its events. Sensors of one file have one grid.",
+        epilog="example:\n  gesturectl export drive.mcap drive.npz --sensor armrest",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="what gesturectl record or flag wrote")
-    parser.add_argument("out", type=Path, metavar="OUT", help="the .npz (or with --ros2 the .mcap) to write")
+    parser.add_argument("out", type=Path, metavar="OUT", help="the .npz to write")
     parser.add_argument("--sensor", metavar="NAME", help="only this sensor")
-    parser.add_argument("--ros2", action="store_true", help="write MCAP for ROS 2")
     parser.add_argument("--json", action="store_true", help="print what was written as JSON")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Decode, stamp and write."""
-    if args.ros2:
-        return _run_ros2(args)
     names, made = sessions_of(args.file, args.sensor)
     recording.write(args.out, made)
     summary = {"file": str(args.out), "sessions": names, "frames": len(made.frames)}
@@ -51,32 +44,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _run_ros2(args: argparse.Namespace) -> int:
-    """Write MCAP with ROS 2's messages; each sensor keeps its own grid."""
-    if args.out.exists() and args.out.samefile(args.file):
-        raise RecordingError(f"{args.out}: is the recording itself: name another file")
-    found, known = opened(args.file)
-    sessions = _sessions(args.file, found, known.scene, args.sensor)
-    events = [event for event in found.events if event["type"] == "gesture" and event["sensor"] in sessions]
-    ros2.write(args.out, sessions, events)
-    frames = sum(map(len, sessions.values()))
-    summary = {"file": str(args.out), "sessions": list(sessions), "frames": frames, "events": len(events)}
-    tell(args.json, summary, f"{args.out}: {frames} frames of {', '.join(sessions)}, {len(events)} gestures, for ROS 2")
-    return 0
-
-
-def _sessions(path: Path, found: Tape, scene: Scene, sensor: str | None) -> dict[str, list[Frame]]:
-    """Sensor -> its frames, of all sensors or the one. Raises RecordingError where there are none."""
-    sessions = {name: used for name, used in frames_used(found, scene).items() if sensor in (None, name)}
-    if not sessions:
-        raise RecordingError(f"{path}: holds no frame of {sensor or 'any sensor'}")
-    return sessions
-
-
 def sessions_of(path: Path, sensor: str | None = None) -> tuple[list[str], Recordings]:
     """The sensors of a tape, or the one, and a session of each. Raises RecordingError."""
     found, known = opened(path)
-    sessions = _sessions(path, found, known.scene, sensor)
+    sessions = {name: used for name, used in frames_used(found, known.scene).items() if sensor in (None, name)}
+    if not sessions:
+        raise RecordingError(f"{path}: holds no frame of {sensor or 'any sensor'}")
     grids = {name: each[0].values.shape for name, each in sessions.items()}
     if len(set(grids.values())) > 1:
         said = ", ".join(f"{name} {rows}x{columns}" for name, (rows, columns) in grids.items())

@@ -5,8 +5,6 @@ the channel's metadata), `/gestured/events` the lines of the event stream (JSON,
 the daemon read it, in nanoseconds since the epoch; packets of one read have one time. The metadata record `scene` says
 with which model and settings. So a tape replays through the same code to the same events.
 
-For the eye of others `gesturectl export --ros2` makes a file with pictures (ros2.py).
-
 A tape is written once, never changed, and is good up to its last whole chunk, wherever writing was cut off.
 """
 

@@ -4,7 +4,6 @@ import json
 import os
 import socket
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -203,50 +202,3 @@ def test_differences_match_contacts_by_sensor_and_onset() -> None:
     assert Difference(a, unsure).names == (a.name, a.name) and Difference(None, a).names == ("nothing", a.name)
     assert differences([], [a]) == [Difference(None, a)]
     assert Difference(a, None).words().startswith("- ") and "arm: one_tap 0.900" in Difference(a, None).words()
-
-
-def test_an_export_for_ros_2_is_read_by_a_library_that_knows_nothing_of_ours(recorded, run, daemon, tmp_path) -> None:
-    rosbags = pytest.importorskip("rosbags.rosbag2", reason="the package rosbags checks what is written for ROS 2")
-    from rosbags.typesys import Stores, get_typestore
-
-    sent = []
-    original = Sensor.packet
-
-    def packet(self, frame):
-        sent.append(frame)
-        return original(self, frame)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Sensor, "packet", packet)
-        path, _ = recorded(gestures(daemon, "ros", "left", "tap"))
-    out = tmp_path / "ros.mcap"
-    status, said, err = run("export", path, out, "--ros2", "--sensor", "ros", "--json")
-    assert (status, err) == (0, "")
-    assert json.loads(said) == {"file": str(out), "sessions": ["ros"], "frames": len(sent), "events": 2}
-    types = get_typestore(Stores.ROS2_HUMBLE)
-    known = {event["gesture"]: event for event in tape_reader.read(path).events if event["type"] == "gesture"}
-    images, texts, times = [], [], []
-    with rosbags.Reader(out) as reader:
-        assert {(c.topic, c.msgtype) for c in reader.connections} == {
-            ("/ros/pressure", "sensor_msgs/msg/Image"),
-            ("/ros/gesture", "std_msgs/msg/String"),
-        }
-        for connection in reader.connections:  # the definitions are ROS 2's own
-            text, digest = types.generate_msgdef(connection.msgtype, ros_version=2)
-            assert connection.msgdef.data.split() == text.split() or connection.digest == digest
-        for connection, t_ns, data in reader.messages():
-            message: Any = types.deserialize_cdr(data, connection.msgtype)
-            times.append(t_ns)
-            if connection.topic == "/ros/gesture":
-                texts.append(json.loads(message.data))
-            else:
-                assert (message.encoding, message.is_bigendian, message.step) == ("32FC1", 0, 36)
-                assert message.header.frame_id == "ros"
-                assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == t_ns
-                images.append(message.data.view("<f4").reshape(message.height, message.width))
-    assert np.array_equal(images, sent)
-    assert [text["gesture"] for text in texts] == ["swipe_left", "one_tap"]
-    assert all(text == known[text["gesture"]] for text in texts)
-    assert times == sorted(times)
-    status, _, err = run("export", path, path, "--ros2")
-    assert status == 1 and "is the recording itself" in err
