@@ -97,7 +97,7 @@ class Service:
             models=Models.of(self._ladder, self._desk.shift, self._publisher.models_failed),
             gestures=self._hub.scene.gestures,
             own=self._own.report(),
-            sensors=self._hub.readings(self._receiver.served(now)),
+            sensors=self._hub.readings(now - self._receiver.behind_s),
             recent=self._publisher.recent(),
             clients=self._clients.count,
             backlog_bytes=self._clients.backlog,

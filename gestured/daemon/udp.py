@@ -60,7 +60,7 @@ class Receiver:
         self._empty = empty  # s, when the socket was last seen empty
         self._drops = 0  # packets that the kernel had dropped then
         self._dropping = -FLOOD_S  # s, when it began to
-        self._behind_s = 0.0  # for so long the oldest packet waits that was read and not yet served
+        self.behind_s = 0.0  # for so long the oldest packet waits that was read and not yet served
         self._looked = 0.0  # s, when we last looked whether something waits
         self._found = 0  # packets, then
         self._sparse = False  # whether the last ones came after a pause
@@ -75,7 +75,7 @@ class Receiver:
 
         What was read and waits counts, and what is still in the socket, behind the packets of others, does as well.
         """
-        return min(now - self._behind_s, self._empty)
+        return min(now - self.behind_s, self._empty)
 
     def close(self) -> None:
         """Stop reading; the socket stays its owner's."""
@@ -128,7 +128,7 @@ class Receiver:
         if self._backlog:
             self._work(now)
         self._mute(now, self._muted.over(now))
-        self._behind_s = self._backlog.age(now)
+        self.behind_s = self._backlog.age(now)
         if self._backlog or full:
             self._again = self._loop.call_soon(self.read)
 
