@@ -75,7 +75,7 @@ def examine(path: Path) -> Iterator[Finding]:
         yield Finding("bad", str(error), JOIN)
         return
     except (Unreachable, Refused, Stranger) as error:
-        others = running(UNIX_SOCKETS)
+        others = running(UNIX_SOCKETS) if isinstance(error, Unreachable) else []
         if others and path not in others:
             yield _elsewhere(path, others)
             return

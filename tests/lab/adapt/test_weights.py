@@ -46,6 +46,9 @@ def changed(base: Path, path: Path, change: str) -> Path:
                 if name == "net.head.bias":
                     node.input[k] = "renamed"
         weight.CopyFrom(numpy_helper.from_array(numpy_helper.to_array(weight), "renamed"))
+    kept = [one for one in proto.metadata_props if one.key != "digest"]
+    del proto.metadata_props[:]
+    proto.metadata_props.extend(kept)
     onnx.save(proto, str(path))
     return path
 
