@@ -137,21 +137,27 @@ def test_the_first_steps_in_the_readme_lead_to_a_gesture(tmp_path: Path):
             process.communicate(timeout=30)
 
 
-def test_the_first_screen_quotes_the_tables():
-    readme, performance = ((ROOT / name).read_text() for name in ("README.md", "docs/performance.md"))
-    screen = readme.partition("## Two commands")[0]
+def test_the_readme_quotes_the_tables():
+    readme, figures, performance = (
+        (ROOT / name).read_text() for name in ("README.md", "docs/figures.md", "docs/performance.md")
+    )
+    screen = readme.partition("## What it is")[0]
 
     def cells(text: str, begins: str) -> list[str]:
         line = next(line for line in text.splitlines() if line.startswith(f"| {begins}"))
-        return [cell.strip() for cell in line.strip("|").split("|")]
+        return [cell.partition(" (")[0] for cell in line.strip("| ").split(" | ")]  # no intervals
 
-    for begins in ("`cnn_lstm.onnx`, simulated, nominal", "`cnn_lstm.onnx`, real, taps and swipes"):
-        _, count, _, right, wrong, *_ = (cell.partition(" (")[0] for cell in cells(readme, begins))  # no intervals
-        assert all(figure in screen for figure in (f"{right}", f"{wrong}", f" {count} ")), (begins, count, right, wrong)
+    quoted = re.findall(r"^\| ((?:simulated|another generator|real), .+?) \|", readme, re.MULTILINE)
+    assert len(quoted) == 5
+    for field in quoted:
+        _, count, _, right, wrong, lost, _, rejected = cells(figures, f"`cnn_lstm.onnx`, {field} ")
+        assert cells(readme, f"{field} ")[1:] == [count, right, wrong, lost, rejected]
+    _, count, _, right, wrong, *_ = cells(figures, "`cnn_lstm.onnx`, real, taps and swipes")
+    assert f"{right} of {count} taps" in screen and f"{wrong} were wrong" in screen
+    missed, false = re.findall(r"(\S+) missed\.\s+There were (\d\.\d+) false events a minute", figures)[0]
+    assert f"{60 * float(false):.0f} an hour, with {missed} of" in screen
     for begins in ("answer decided to event received (p50)", "start to ready"):
-        assert cells(performance, begins)[1] in screen, begins
-    assert f"{float(cells(performance, 'resident memory, one sensor')[1].split()[0]):.0f} MiB" in screen
-    (false,) = re.findall(r"(\d\.\d+) false events a minute", readme)
-    assert f"{60 * float(false):.0f} an hour" in screen
+        assert cells(performance, begins)[1] in readme, begins
+    assert f"{float(cells(performance, 'resident memory, one sensor')[1].split()[0]):.0f} MiB" in readme
     (felt,) = [line for line in explain(Settings(), {}).splitlines() if "is answered" in line]
     assert all(f"{seconds} after" in screen for seconds in re.findall(r"(\S+ s) after", felt))

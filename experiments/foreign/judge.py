@@ -1,12 +1,12 @@
 """Judge models, or the front end alone, on the independent generator.
 
-    python -m experiments.foreign.judge --n 20 --level nominal hard --readme README.md
+    python -m experiments.foreign.judge --n 20 --level nominal hard --document docs/figures.md
     python -m experiments.foreign.judge --model cnn_lstm --n 40 --level nominal hard
     python -m experiments.foreign.judge --front-end --n 40
     python -m experiments.foreign.judge --model cnn_lstm --grids --sessions 5 --json
     python -m experiments.foreign.judge --model cnn_lstm --provisional --sessions 10
 
-Without --model or --front-end all shipped models are judged, a row for each; --readme puts the table into a README, and
+Without --model or --front-end all shipped models are judged, a row for each; --document puts the table into a page, and
 each model's rows into its card. A take's outcome is one of: `missed` (no segment), `cancelled:REASON`, `split` (more
 than one segment or event), or its one segment's label. Takes that nobody can recognise (see `visible`) are counted as
 `unseen` and left out.
@@ -236,15 +236,15 @@ def row(model: str, level: str, found: dict[str, Any]) -> str:
 
 
 def show_shipped(args: argparse.Namespace) -> None:
-    """Print the table of all shipped models; put it where --readme wants it."""
+    """Print the table of all shipped models; put it where --document wants it."""
     results = {name: judged(name, args)[0] for name in shipped()}
     rows = {name: [row(name, level, found) for level, found in result.items()] for name, result in results.items()}
     command = f"python -m experiments.foreign.judge --n {args.n} --level {' '.join(args.level)}"
     above = [made_of(command, shipped().values()), "", *HEAD]
     table = [*above, *(line for lines in rows.values() for line in lines)]
     print(json.dumps(results, indent=1) if args.json else "\n".join(table))
-    if args.readme:
-        renew(args.readme, "judged", table)
+    if args.document:
+        renew(args.document, "judged", table)
         for name, path in shipped().items():
             renew(path.with_suffix(".md"), "judged", [*OF_A_CARD, "", *above, *rows[name]])
 
@@ -371,7 +371,7 @@ def main() -> None:
     what.add_argument("--model", help="a shipped model's name or a path; its figures kind by kind")
     what.add_argument("--front-end", action="store_true", help="segmentation alone; needs no model")
     what.add_argument(
-        "--readme", type=Path, help="a README whose table is renewed, and the shipped models' cards with it"
+        "--document", type=Path, help="a page whose table is renewed, and the shipped models' cards with it"
     )
     parser.add_argument("--n", type=int, default=40, help="takes of each kind and level (%(default)s)")
     parser.add_argument("--first", type=int, default=0, help="first seed (%(default)s)")

@@ -32,17 +32,17 @@ def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: Tr
         (folder / f"{name}.md").write_text(_card(folder / f"{name}.onnx", name, found, plan))
 
 
-def write_block(readme: Path, folder: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
-    """Renew the tables of a folder's models in a README; GesturedError where their marks are missing.
+def write_block(document: Path, folder: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
+    """Renew the tables of a folder's models in a document; GesturedError where their marks are missing.
 
     The one of kinds that nobody taught stays where it was not measured.
     """
     files = [*(folder / f"{name}.onnx" for name in figures), folder / NAME]
     rows = [row for name, found in figures.items() for row in _rows(found, f"`{name}.onnx`, ")]
-    renew(readme, "figures", [made_of("gestured-lab evaluate --readme README.md", files), "", *HEAD, *rows])
+    renew(document, "figures", [made_of("gestured-lab evaluate --document docs/figures.md", files), "", *HEAD, *rows])
     if "whole_left_out" in figures["cnn_lstm"]:
-        origin = made_of("gestured-lab evaluate --whole --readme README.md", files)
-        renew(readme, "unseen", [origin, "", *_unseen(figures["cnn_lstm"])])
+        origin = made_of("gestured-lab evaluate --whole --document docs/figures.md", files)
+        renew(document, "unseen", [origin, "", *_unseen(figures["cnn_lstm"])])
 
 
 HEAD = (

@@ -99,7 +99,12 @@ def parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--whole", action="store_true", help="also train networks that lack a group of kinds of "
                           "non-gestures (as long as training takes), and say how many they reject")  # fmt: skip
     evaluate.add_argument("--curve", action="store_true", help="also print right, wrong and accepted by threshold")
-    evaluate.add_argument("--readme", type=Path, help="a document whose tables of figures are written anew")
+    evaluate.add_argument(
+        "--document",
+        type=Path,
+        metavar="FILE",
+        help="a page whose tables of figures are written anew, such as docs/figures.md",
+    )
     evaluate.add_argument("--recordings", **mine, help="the recordings with which the models were trained")
     add_data(evaluate)
     online = add("online", "start a daemon, send it continuous simulated sessions over UDP, and score its events",
@@ -129,8 +134,8 @@ def parser() -> argparse.ArgumentParser:
     study.add_argument("--seeds", type=int, default=3, help="seeds of each figure of the main tables (default: 3)")
     study.add_argument("--draw", type=Path, metavar="FILE", help="compute nothing: draw the picture of error against "
                        "run time again, from the study.json or operating-points.json of an earlier run")  # fmt: skip
-    study.add_argument("--readme", type=Path, metavar="FILE", help="with --draw: a README whose table below the "
-                       "picture is renewed")  # fmt: skip
+    study.add_argument("--document", type=Path, metavar="FILE", help="with --draw: a page whose table of choices "
+                       "is written anew, such as docs/figures.md")  # fmt: skip
     study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: of "
                        "another generator (python -m experiments.foreign.recordings) or another sensor")  # fmt: skip
     study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")

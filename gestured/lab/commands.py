@@ -47,7 +47,7 @@ def train_models(args: argparse.Namespace) -> int:
         path = args.out / f"{name}.onnx"
         if open_file(path).embeds:
             teach(path, args.cache, own.QUICK_PEOPLE if args.quick else own.PEOPLE, args.jobs)
-    args.models, args.readme, args.curve, args.networks, args.field = args.out, None, False, False, False
+    args.models, args.document, args.curve, args.networks, args.field = args.out, None, False, False, False
     args.whole = False
     return evaluate_models(args)
 
@@ -87,10 +87,10 @@ def evaluate_models(args: argparse.Namespace) -> int:
 
 
 def _keep(figures: dict[str, dict[str, Any]], plan: TrainingPlan, args: argparse.Namespace) -> None:
-    """Write the figures into the manifest, the cards and a README, and print them where they are wanted as JSON."""
+    """Write the figures into the manifest, the cards and a document, and print them where they are wanted as JSON."""
     write_manifest(args.models, figures)
     write_cards(args.models, figures, plan)
-    if args.readme:
-        write_block(args.readme, args.models, figures)
+    if args.document:
+        write_block(args.document, args.models, figures)
     if args.json:
         print(json.dumps(figures, indent=2))

@@ -12,7 +12,7 @@ from tests.documents.blocks import ROOT, documents
 
 # The tables that speak of the shipped models, and the beginning of the command that makes them.
 GENERATED = {
-    "README.md": ("gestured-lab evaluate", "python -m experiments.foreign.judge"),
+    "docs/figures.md": ("gestured-lab evaluate", "python -m experiments.foreign.judge"),
     "docs/performance.md": ("make bench",),
     "docs/limits-and-choices.md": ("gestured-lab taps",),
     "docs/numerics.md": ("gestured-lab stability",),
@@ -60,13 +60,13 @@ def test_what_was_renewed_between_marks_is_kept(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(shipped()))
-def test_a_card_has_the_figures_on_another_generators_people_that_the_readme_has(name: str) -> None:
+def test_a_card_has_the_figures_on_another_generators_people_that_the_document_has(name: str) -> None:
     row = f"| `{name}.onnx`, another generator"
-    card, readme = (
+    card, figures = (
         [line for line in path.read_text().splitlines() if line.startswith(row)]
-        for path in (shipped()[name].with_suffix(".md"), ROOT / "README.md")
+        for path in (shipped()[name].with_suffix(".md"), ROOT / "docs" / "figures.md")
     )
-    assert card == readme and len(card) == 2
+    assert card == figures and len(card) == 2
 
 
 def test_a_changed_file_is_told_unless_the_document_says_so(tmp_path: Path) -> None:

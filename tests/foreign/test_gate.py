@@ -83,18 +83,18 @@ def test_a_model_that_is_worse_does_not_pass(level: str) -> None:
     assert not good, words
 
 
-def test_the_table_of_a_readme_and_of_the_cards_is_renewed(
+def test_the_table_of_a_document_and_of_the_cards_is_renewed(
     shelf: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    documents = [Path("README.md"), *(path.with_suffix(".md") for path in shipped().values())]
+    documents = [Path("figures.md"), *(path.with_suffix(".md") for path in shipped().values())]
     for document in documents:
         document.write_text("before\n<!-- judged: begin -->\nold\n<!-- judged: end -->\nafter\n")
-    monkeypatch.setattr(sys, "argv", "judge --n 1 --kinds one_tap palm --level nominal --readme README.md".split())
+    monkeypatch.setattr(sys, "argv", "judge --n 1 --kinds one_tap palm --level nominal --document figures.md".split())
     main()
     printed = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| `")]
     assert [line.split("`")[1] for line in printed] == [f"{name}.onnx" for name in shipped()]
-    readme, *cards = (document.read_text().splitlines() for document in documents)
-    assert [line for line in readme if line.startswith("| `")] == printed
+    document, *cards = (document.read_text().splitlines() for document in documents)
+    assert [line for line in document if line.startswith("| `")] == printed
     assert [line for card in cards for line in card if line.startswith("| `")] == printed
-    for lines in (readme, *cards):
+    for lines in (document, *cards):
         assert (lines[0], lines[-1]) == ("before", "after") and "old" not in lines

@@ -192,13 +192,13 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     for step in ("pretrain", "finetune"):
         monkeypatch.setattr(train, step, lambda *_: pytest.fail("what is done is not done again"))
     capsys.readouterr()
-    readme = tmp_path / "README.md"
-    readme.write_text("".join(f"<!-- {n}: begin -->\n<!-- {n}: end -->\n" for n in ("figures", "unseen")))
-    assert main(["evaluate", "--models", str(out), *arguments, "--whole", "--readme", str(readme), "--json"]) == 0
+    page = tmp_path / "figures.md"
+    page.write_text("".join(f"<!-- {n}: begin -->\n<!-- {n}: end -->\n" for n in ("figures", "unseen")))
+    assert main(["evaluate", "--models", str(out), *arguments, "--whole", "--document", str(page), "--json"]) == 0
     text = capsys.readouterr().out
     figures = json.loads(text[text.index("\n{\n") :])
     assert figures["cnn_lstm"]["whole_left_out"] == apart
-    for document in (readme, out / "cnn_lstm.md"):
+    for document in (page, out / "cnn_lstm.md"):
         assert f"| {apart['whole']['rejected']:.3f} (" in document.read_text()
         assert ", ".join(apart["kinds"]) in document.read_text()
     assert figures.keys() == set(LADDER)

@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
         kept = renewed(_kept(args.draw))
         path = write_picture(kept, args.out)
         below = [made_of("gestured-lab study", [path, path.with_suffix(".json")]), "", *table(kept)]
-        if args.readme:
-            renew(args.readme, "choice", below)
+        if args.document:
+            renew(args.document, "choice", below)
         print("\n".join([str(path), *below]))
         return 0
     if args.seeds < 1:

@@ -53,12 +53,12 @@ def test_real_figures_of_the_models_that_ship_are_the_manifests(tmp_path: Path) 
     assert found["error_low"] < found["error"] < found["error_high"]
 
 
-def test_the_table_below_it_is_put_into_a_readme_and_only_there(tmp_path: Path) -> None:
-    study, kept, readme = made_study(), tmp_path / "study.json", tmp_path / "README.md"
+def test_the_table_below_it_is_put_into_a_document_and_only_there(tmp_path: Path) -> None:
+    study, kept, page = made_study(), tmp_path / "study.json", tmp_path / "figures.md"
     kept.write_text(json.dumps(study))
-    readme.write_text("before\n<!-- choice: begin -->\nold\n<!-- choice: end -->\nafter\n")
-    assert cli.main(["study", "--draw", str(kept), "--out", str(tmp_path), "--readme", str(readme)]) == 0
-    first, *block, last = readme.read_text().splitlines()
+    page.write_text("before\n<!-- choice: begin -->\nold\n<!-- choice: end -->\nafter\n")
+    assert cli.main(["study", "--draw", str(kept), "--out", str(tmp_path), "--document", str(page)]) == 0
+    first, *block, last = page.read_text().splitlines()
     assert (first, last) == ("before", "after") and "old" not in block
     ships = next(line for line in block if line.startswith("| CNN-LSTM, ships |"))
     (row,) = [r for r in study["run_time"] if (r["method"], r["settings"]) == ("cnn_lstm", "shipped")]
@@ -71,11 +71,11 @@ def test_the_table_below_it_is_put_into_a_readme_and_only_there(tmp_path: Path) 
 
 
 def test_a_document_without_marks_is_left_alone(tmp_path: Path) -> None:
-    readme = tmp_path / "README.md"
-    readme.write_text("no marks\n")
+    page = tmp_path / "figures.md"
+    page.write_text("no marks\n")
     with pytest.raises(GesturedError, match="choice: begin"):
-        renew(readme, "choice", ["new"])
-    assert readme.read_text() == "no marks\n"
+        renew(page, "choice", ["new"])
+    assert page.read_text() == "no marks\n"
 
 
 def test_what_is_no_study_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

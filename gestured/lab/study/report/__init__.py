@@ -1,1 +1,1 @@
-"""The report: study.json as one self-contained HTML page and as Markdown (page.py), and the picture of the README."""
+"""The report: study.json as a self-contained page and as Markdown (page.py); the picture of error against run time."""
