@@ -17,6 +17,22 @@ HELLO = {
     "gestures": ["one_tap"],
     "sensors": {"armrest": 3},
 }
+GESTURE = {
+    "type": "gesture",
+    "sensor": "armrest",
+    "id": 4,
+    "gesture": "swipe_left",
+    "confidence": 0.98,
+    "sequence": 4,
+    "onset": 1000.0,
+    "offset": 1000.5,
+    "decided": 1000.625,
+    "frames": 8,
+    "lost": 0,
+    "model": "cnn_lstm",
+    "degraded": False,
+    "scores": {"swipe_left": 0.98},
+}
 
 
 def free_address(kind: int = socket.SOCK_DGRAM) -> Address:

@@ -37,6 +37,12 @@ class Counts:
         """Tell whoever reads the log."""
         say(f"gestured-bridge {self.bridge}: {words}", to=sys.stderr)
 
+    def wrong(self, words: str) -> None:
+        """Count a line that no daemon says, and say the first."""
+        if ("events", "wrong") not in self.values:
+            self.say(words)
+        self.add("events", "wrong")
+
     def connected(self, side: str, is_there: bool, words: str) -> None:
         """Whether a side is there now; said where it changes."""
         key = ("connected", side)

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from gestured.bridge.counts import Counts
-from gestured.client.fields import wrong_field
 from gestured.client.subscriber import Subscriber
 from gestured.core.address import is_sensor
 from gestured.core.messages import quoted
@@ -22,16 +21,14 @@ Line = Mapping[str, Any]
 def follow(subscriber: Subscriber, counts: Counts) -> Iterator[Line]:
     """Each line of a daemon, its hello among them, and GONE where it went; until the subscriber is closed.
 
-    The subscriber has a timeout of NOTICE_S. What no daemon says is passed over and counted, and said the first time.
+    The subscriber has a timeout of NOTICE_S. A line with a name that cannot stand in a topic is passed over.
     """
     connected = False
     while True:
         try:
             for _, line in subscriber.lines():
-                if words := wrong_field(line) or _wrong_name(line):
-                    if ("events", "wrong") not in counts.values:
-                        counts.say(f"a line of the daemon is passed over: {words}")
-                    counts.add("events", "wrong")
+                if words := _wrong_name(line):
+                    counts.wrong(f"a line of the daemon is passed over: {words}")
                     continue
                 connected = connected or line["type"] == "hello"
                 yield line

@@ -63,7 +63,7 @@ async def _main(args: argparse.Namespace) -> None:
     counts = Counts("mqtt")
     bridge = Mqtt(args, counts)
     counts.serve(args.metrics)
-    source = subscriber(args, NOTICE_S)
+    source = subscriber(args, NOTICE_S, counts.wrong)
     loop = asyncio.get_running_loop()
     loop.set_exception_handler(_pass_over_closed)
     failed: list[GesturedError] = []

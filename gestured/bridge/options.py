@@ -93,8 +93,11 @@ def peer_address(text: str, port: int) -> Address:
     return host_port(text if text.rpartition(":")[2].isdigit() and text.count(":") != 0 else f"{text}:{port}")
 
 
-def subscriber(args: argparse.Namespace, timeout: float) -> Subscriber:
-    """The subscription that was asked for, and how the sensors are. Next raises TimeoutError after `timeout` s."""
+def subscriber(args: argparse.Namespace, timeout: float, wrong: Callable[[str], None]) -> Subscriber:
+    """The subscription that was asked for, and how the sensors are. Next raises TimeoutError after `timeout` s.
+
+    `wrong` is given a sentence about each line that no daemon says.
+    """
     types = [*args.types, *({STATUS} - set(args.types))]
     path = args.socket or find_socket(os.environ)
-    return Subscriber(path, types=types, sensors=args.sensors, gestures=args.gestures, timeout=timeout)
+    return Subscriber(path, types=types, sensors=args.sensors, gestures=args.gestures, timeout=timeout, say=wrong)

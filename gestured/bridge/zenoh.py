@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     need("zenoh", "eclipse-zenoh", "zenoh")
     counts = Counts("zenoh")
     bridge = Zenoh(args, counts)
-    source = subscriber(args, NOTICE_S)
+    source = subscriber(args, NOTICE_S, counts.wrong)
     on_stop(source.close)
     try:
         counts.serve(args.metrics)

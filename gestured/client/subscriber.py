@@ -1,12 +1,13 @@
 """A subscriber: the events of a daemon, or of several, across their restarts."""
 
 import json
+import logging
 import math
 import selectors
 import socket
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from os import PathLike
@@ -14,12 +15,15 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Self
 
-from gestured.client.lines import Forbidden, Lines, Unreachable, Unsubscribed, parsed
+from gestured.client.fields import wrong_field
+from gestured.client.lines import Forbidden, Lines, Refused, Unreachable, Unsubscribed, parsed
 from gestured.client.stream import GREETING_S, SILENT, check_hello
 from gestured.core.errors import GesturedError
 
 FIRST_S, LONGEST_S = 0.1, 2.0  # from one attempt to connect to the next: doubled each time, a restart takes a second
 CHUNK = 65536  # bytes read at a time
+LINE_BYTES = 4 << 20  # of the longest line; a hello with all sensors that a daemon keeps has an eighth of that
+LOG = logging.getLogger("gestured")
 
 
 class Subscriber:
@@ -27,12 +31,13 @@ class Subscriber:
 
     It connects when it is first iterated, and again by itself whenever a daemon goes and returns. A `lost` line is
     given as an event, a `hello` is not: `hello` is that of the daemon whose event was given last, `path` its socket.
-    Its `instance` changes, and `sequence` counts anew, when the daemon has started again.
+    Its `instance` changes, and `sequence` counts anew, when the daemon has started again. A line in which a field is
+    missing or of another type than the protocol says is passed over, and said.
 
     One thread iterates; any may `close` it, which ends the iteration.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - keywords, each a choice of its own
         self,
         *paths: str | PathLike[str],
         types: Sequence[str] | None = None,
@@ -40,8 +45,11 @@ class Subscriber:
         gestures: Sequence[str] | None = None,
         timeout: float | None = None,
         reconnect: bool = True,
+        say: Callable[[str], None] = LOG.warning,
     ) -> None:
         """`paths` are event sockets; the filters are those of the protocol, None is its default.
+
+        `say` is given a sentence about each line that is passed over.
 
         Iterating raises TimeoutError after `timeout` seconds without an event, and may then go on. It raises Refused
         where a daemon refuses the subscription or is none, Stranger where the socket is served by an account that is
@@ -57,7 +65,7 @@ class Subscriber:
         # A text is passed on: what the daemon says of it is clearer than what it would say of its letters.
         given = {key: v if isinstance(v, str) else list(v) for key, v in wanted.items() if v is not None}
         self._request = json.dumps({"subscribe": given}).encode() + b"\n" if given else b""
-        self._timeout, self._reconnect = timeout, reconnect
+        self._timeout, self._reconnect, self._say = timeout, reconnect, say
         self._unread: deque[tuple[_Source, bytes]] = deque()
         self._selector = selectors.DefaultSelector()
         self._wake, self._woken = socket.socketpair()
@@ -163,11 +171,18 @@ class Subscriber:
         if not data:
             self._gone(source, Unreachable(f"the daemon on {source.path} closed the connection"))
             return
-        *lines, source.begun = (source.begun + data).split(b"\n")
-        self._unread.extend((source, line) for line in lines)
+        *lines, rest = data.split(b"\n")
+        for line in lines:
+            self._unread.append((source, bytes(source.begun) + line))
+            source.begun.clear()
+        source.begun += rest  # in place: what has come of a line is never copied for the next piece
+        if len(source.begun) > LINE_BYTES:
+            raise Refused(
+                f"{source.path} sent a line of more than {LINE_BYTES >> 20} MiB: it is not served by gestured"
+            )
 
     def _read(self, source: "_Source", line: bytes) -> tuple[str, dict[str, Any]] | None:
-        """What a line says; None where it only says that there is no place for us now."""
+        """What a line says; None where it is passed over, or says only that there is no place for us now."""
         message = parsed(line, source.path)
         text = line.decode()
         if message.get("type") == "error":
@@ -179,6 +194,9 @@ class Subscriber:
         if not source.hello:
             check_hello(text, message, source.path)
             source.hello, source.due, source.wait_s = message, math.inf, FIRST_S
+        elif words := wrong_field(message):
+            self._say(f"a line of the daemon on {source.path} is passed over: {words}")
+            return None
         self.hello, self.path = source.hello, source.path
         return text, message
 
@@ -189,7 +207,8 @@ class Subscriber:
         if source.lines is not None:
             self._selector.unregister(source.lines.socket)
             source.lines.close()
-        source.lines, source.hello, source.begun = None, {}, b""
+        source.lines, source.hello = None, {}
+        source.begun.clear()
         source.due = time.monotonic() + source.wait_s
         source.wait_s = min(2.0 * source.wait_s, LONGEST_S)
 
@@ -201,6 +220,6 @@ class _Source:
     path: Path
     lines: Lines | None = None
     hello: dict[str, Any] = field(default_factory=dict)  # of this connection; empty until it came
-    begun: bytes = b""  # of a line whose end has not come yet
+    begun: bytearray = field(default_factory=bytearray)  # of a line whose end has not come yet
     due: float = 0.0  # monotonic s: when to call it, or by when it must have said hello
     wait_s: float = FIRST_S  # after the next failure

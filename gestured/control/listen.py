@@ -51,7 +51,11 @@ def _listen(args: argparse.Namespace) -> int:
     wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture}
     left = args.count
     early: dict[str, dict[str, Any]] = {}  # for `readable`
-    with Subscriber(path, **wanted, reconnect=args.reconnect) as subscriber:
+
+    def passed_over(words: str) -> None:
+        say(f"gesturectl: {words}", to=sys.stderr)
+
+    with Subscriber(path, **wanted, reconnect=args.reconnect, say=passed_over) as subscriber:
         for line, event in subscriber.lines():
             kind = event.get("type")
             if args.json:

@@ -8,23 +8,8 @@ import pytest
 
 from gestured.client.lines import Unreachable
 from gestured.client.stream import Stream
+from tests.sockets import GESTURE
 
-GESTURE = {
-    "type": "gesture",
-    "sensor": "armrest",
-    "id": 4,
-    "gesture": "swipe_left",
-    "confidence": 0.98,
-    "sequence": 4,
-    "onset": 1000.0,
-    "offset": 1000.5,
-    "decided": 1000.625,
-    "frames": 8,
-    "lost": 0,
-    "model": "cnn_lstm",
-    "degraded": False,
-    "scores": {"swipe_left": 0.98},
-}
 STATUS = {"type": "status", "model": "m", "time": 1.0}
 UNKNOWN = {key: value for key, value in GESTURE.items() if key not in ("gesture", "sequence")} | {"type": "unknown"}
 
@@ -100,7 +85,7 @@ def test_what_was_said_before_is_told_with_the_answer(start, fake, early, answer
 
 
 def test_json_repeats_the_daemons_lines_to_the_letter(start, fake):
-    line = b'{"type":"gesture",  "id":4, "new_key":[1.50]}\n'
+    line = b'{"type":"onset",  "sensor":"armrest", "id":4, "onset":1.50, "new_key":[1.50]}\n'
     process = start("listen", "--socket", fake.path, "--json", "--count", 1)
     fake.accept()
     fake.say(line)
@@ -157,6 +142,18 @@ def test_something_else_on_the_socket_is_one_sentence(start, fake):
     _, err = process.communicate(timeout=30)
     assert process.returncode == 1
     assert err.count(b"\n") == 1 and str(fake.path) in err.decode()
+
+
+def test_a_line_that_no_daemon_says_is_one_sentence_and_the_next_is_printed(start, fake):
+    process = start("listen", "--socket", fake.path, "--count", 1)
+    fake.accept()
+    fake.say(GESTURE | {"decided": "soon"}, {"type": ["gesture"]}, {"type": "lost"}, GESTURE)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert out.decode().count("swipe_left") == out.count(b"\n") == 1
+    _, *said = err.decode().splitlines()  # the first says whom it listens to
+    wrong = ('decided "soon": expected a number', 'type ["gesture"]: expected a text', "count is missing")
+    assert [words in line for words, line in zip(wrong, said, strict=True)] == [True] * 3
 
 
 def test_ctrl_c_ends_without_a_word(start, fake):

@@ -5,7 +5,7 @@ import signal
 import socket
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,9 +18,7 @@ from gestured.client.subscriber import LONGEST_S, Subscriber
 from gestured.core.errors import GesturedError
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
-from tests.sockets import HELLO, PATIENCE_S, FakeDaemon
-
-GESTURE = {"type": "gesture", "sensor": "armrest", "gesture": "one_tap", "sequence": 4}
+from tests.sockets import GESTURE, HELLO, PATIENCE_S, FakeDaemon
 
 
 @contextmanager
@@ -119,6 +117,27 @@ def test_a_pause_is_told_and_loses_nothing(fake: FakeDaemon):
             except TimeoutError:
                 pass
         assert events == [GESTURE]
+
+
+def test_a_line_that_no_daemon_says_is_passed_over_and_said(fake: FakeDaemon):
+    said: list[str] = []
+    with Subscriber(fake.path, say=said.append) as subscriber:
+        assert asked(fake, subscriber, GESTURE | {"confidence": "high"}, {"type": "gesture"}, GESTURE) == GESTURE
+    assert len(said) == 2 and 'confidence "high": expected a number' in said[0] and str(fake.path) in said[0]
+
+
+def test_a_line_without_end_is_refused_before_it_fills_the_memory(fake: FakeDaemon):
+    def serve() -> None:
+        fake.accept()
+        with suppress(BrokenPipeError, ConnectionResetError):
+            while True:
+                fake.say(b" " * 65536)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    with pytest.raises(Refused, match=f"{fake.path} sent a line of more than"):
+        next(Subscriber(fake.path))
+    thread.join()
 
 
 def test_close_in_another_thread_ends_the_iteration(fake: FakeDaemon):
