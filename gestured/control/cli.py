@@ -13,7 +13,6 @@ SUBCOMMANDS = (
     ("status", "add", ("status",)),
     ("listen", "add", ("listen",)),
     ("view", "add", ("view",)),
-    ("watch", "add", ("watch",)),
     ("doctor", "add", ("doctor",)),
     ("sniff", "add", ("sniff",)),
     ("operate", "add_reload", ("reload",)),

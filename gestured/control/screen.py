@@ -64,7 +64,6 @@ class Felt:
         self._full = 0.0  # counts; the scale is fixed, and grows with what is seen
         self._path: deque[tuple[float, float]] = deque(maxlen=PATH)
         self._t: float | None = None
-        self.said: deque[str] = deque(maxlen=6)  # answers, the last one last
 
     def lines(self, view: dict[str, Any]) -> list[str]:
         """The picture with its words."""
@@ -86,8 +85,6 @@ class Felt:
             f"activity  {'█' * round(BAR * loud):<{BAR}} {view['activity']:5.1f}",
             f"          a contact from {view['on']:.1f} on, over below {view['off']:.1f}",
             f"scale     0 to {self._full:g} counts, {len(view['bad'])} bad taxels",
-            "",
-            *(shown(line, 36) for line in self.said),
         ]
         picture = moving(values, list(self._path), self._full, self._colour)
         words += [""] * (len(picture) - len(words))

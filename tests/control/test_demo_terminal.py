@@ -1,19 +1,16 @@
-"""The finger as it moves, at a terminal: gesturectl watch, and the demo."""
+"""The demo at a terminal: the finger as it moves."""
 
 import os
 import pty
 import re
 import select
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 
-from gestured.client.control import Control
-from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
+from tests.daemon.harness import DEADLINE_S
 
 ARROWS = set("→↘↓↙←↖↑↗")
 
@@ -67,48 +64,6 @@ def pictures(said: str) -> list[list[str]]:
     return [re.sub("\x1b\\[[0-9;?]*[a-zA-Z]", "", part).splitlines() for part in parts]
 
 
-def test_a_sensor_is_drawn_as_it_is_touched(terminal, daemon: Daemon) -> None:
-    sensor = Sensor(daemon, "drawn").begin()
-    client = daemon.client().subscribe("gesture", sensors=["drawn"])
-    sensor.perform("left")
-    client.events("gesture", "drawn")
-    watch = terminal("watch", "drawn", "--control", daemon.ready["control"])
-    watch.until("phase     idle")
-    for frame in sensor.hand.swipe("right"):
-        sensor.send([frame])
-        watch.said = ""
-        watch.until("phase     contact")
-    watch.until("→")
-    for picture in pictures(watch.said)[:-1]:
-        assert len(picture) <= 23 and all(len(line) <= 79 for line in picture)
-    sensor.send(sensor.hand.idle(1.0))
-    watch.until("swipe_right  0.")
-    watch.process.send_signal(signal.SIGINT)
-    watch.until("\x1b[?25h")
-    assert watch.process.wait(DEADLINE_S) == 0
-
-
-def test_a_sensor_that_falls_silent_and_a_daemon_that_ends_are_told(terminal, serve) -> None:
-    daemon = serve()
-    Sensor(daemon, "drawn").begin()
-    with Control(Path(daemon.ready["control"])) as control:
-        while "drawn" not in control.ask("status")["sensors"]:
-            pass
-    watch = terminal("watch", "drawn", "--control", daemon.ready["control"])
-    watch.until("drawn  stale")
-    daemon.stop()
-    watch.until("closed the connection")
-    assert watch.process.wait(DEADLINE_S) == 1
-
-
-def test_without_a_terminal_or_a_sensor_it_says_what_to_do(run, terminal, daemon: Daemon) -> None:
-    status, out, err = run("watch", "drawn", "--control", daemon.ready["control"])
-    assert (status, out) == (1, "") and "gesturectl listen" in err
-    watch = terminal("watch", "nobody", "--control", daemon.ready["control"])
-    assert "no sensor 'nobody'" in watch.until("expected one of")
-    assert watch.process.wait(DEADLINE_S) == 1
-
-
 @pytest.mark.e2e
 def test_the_demo_begins_with_a_circle_that_is_drawn_and_ends_with_what_comes_next(terminal, shallow) -> None:
     demo = terminal("demo", "--seconds", 8, "--speed", "normal", TMPDIR=str(shallow))
@@ -116,6 +71,8 @@ def test_the_demo_begins_with_a_circle_that_is_drawn_and_ends_with_what_comes_ne
     assert re.search(r"http://127\.0\.0\.1:\d+/#", said)
     seen = {sign for sign in said if sign in ARROWS}
     assert len(seen) >= 5  # it goes round
+    drawn = [picture for picture in pictures(said) if picture and picture[0].startswith("demo  ")]
+    assert drawn and all(len(picture) <= 23 and max(map(len, picture)) <= 79 for picture in drawn[:-1])
     end = demo.until("gesturectl simulate")
     assert "gestured --" in end and "percentile" not in end and re.search(r"gestures +[1-9]: ", end)
     assert demo.process.wait(DEADLINE_S) == 0
