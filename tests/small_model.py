@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gestured.core.features import feature_names
 from gestured.core.frames import Segment
 from gestured.core.window import Window
+from gestured.model.features import feature_names
 from gestured.model.file import SelfTest
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=0.1, tail_s=0.1, floor=4.0)

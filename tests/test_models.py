@@ -17,9 +17,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.core.errors import ModelError
-from gestured.core.features import touch_pattern
 from gestured.model import file as model_file
 from gestured.model import process as model_process
+from gestured.model.features import touch_pattern
 from gestured.model.model import Model
 from gestured.model.opening import check, open_model
 from gestured.model.session import Session

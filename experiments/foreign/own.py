@@ -18,11 +18,12 @@ from experiments.foreign.hands import Performance, draw_person, perform
 from experiments.foreign.sensors import draw_sensor, record
 from gestured.core.classifier import NEAR
 from gestured.core.frames import Segment
-from gestured.core.prototypes import EXAMPLES, Array, Prototype, Space, nearest
+from gestured.core.own import EXAMPLES
 from gestured.lab.dataset import cuts
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.own import Placed
+from gestured.model.prototypes import Array, Prototype, Space, nearest
 
 PERFORMED = (
     "long_press", "scribble", "zigzag", "pinch", "two_finger_tap", "check_mark", "two_finger_sideways",

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from gestured.core.address import SIDES
 from gestured.core.frames import Segment
-from gestured.core.prototypes import EXAMPLES
 from gestured.core.window import LEAST_PEAK, Window
 
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 LONGEST_NAME = 32  # characters
 RESERVED = ("use", "unknown", "none")  # of the configuration, of answers, and of recordings
 MOST = 20  # gestures
+EXAMPLES = 5  # of one gesture, at most
 MOST_FRAMES = 200  # of an example; the longest contact takes some 80 at 15 Hz
 MOST_S = 8.0  # of an example; a contact is given up after five seconds, and quiet frames stand around it
 MOST_VALUES = 16_384  # of an example

@@ -6,20 +6,19 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gestured.core.enrolment import Enrolment
 from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled
 from gestured.core.facts import Decided, Fact
-from gestured.core.own import MOST, Examples, is_name
-from gestured.core.prototypes import EXAMPLES
+from gestured.core.own import EXAMPLES, MOST, Examples, is_name
 from gestured.daemon.caller import Connection
 from gestured.daemon.keeper import Change, Keeper
 from gestured.daemon.log import log
 from gestured.daemon.request import Refusal, json_line
 from gestured.model import own_file
+from gestured.model.enrolment import Enrolment, Examiner
 from gestured.model.ladder import Ladder
 from gestured.model.model import Model
-from gestured.model.own import Examiner, Own
+from gestured.model.own import Own
 from gestured.model.own_file import OwnFile, OwnFileError
 
 ATTEMPT_S = 120.0  # an enrolment without an attempt for so long gives its place to others

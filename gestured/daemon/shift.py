@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from gestured.core.facts import Decided
-from gestured.core.features import MEASURES, measures
 from gestured.core.frames import Segment
 from gestured.core.window import Window
+from gestured.model.features import MEASURES, measures
 from gestured.model.model import Model
 
 LAST = 100  # gestures

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.features import ACTIVE
 from gestured.lab.decide import Answers, confidence
 from gestured.lab.prefixes import floors
 from gestured.lab.samples import Samples, packed
+from gestured.model.features import ACTIVE
 
 CONFIRMED = 0.97  # share of the events that the answer must confirm, in every stretch
 DOUBT = 0.1  # probability that a threshold is let through although it does not

@@ -9,7 +9,7 @@ In a batch that is padded, `lengths` (B,) are the true numbers of frames; withou
 import torch
 from torch import Tensor, nn
 
-from gestured.core.features import ACTIVE
+from gestured.model.features import ACTIVE
 
 HIDDEN = 160  # units of each hidden layer of the perceptron
 SCALE = 3.0  # windows are mostly zeros: without it the first layers hardly move

@@ -8,8 +8,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from gestured.core.features import ACTIVE
 from gestured.lab.samples import OF_EACH, WINDOW, Samples, packed
+from gestured.model.features import ACTIVE
 
 
 def askable(samples: Samples) -> NDArray[np.bool_]:

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.features import touch_pattern
 from gestured.core.frames import Segment
 from gestured.core.window import Window
+from gestured.model.features import touch_pattern
 
 # How every model sees a segment.
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)

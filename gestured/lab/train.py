@@ -20,7 +20,6 @@ from sklearn.ensemble import RandomForestClassifier
 from torch import Tensor, nn
 
 import gestured
-from gestured.core.features import MEASURES, feature_names, measures
 from gestured.lab.adapt.material import own_recordings
 from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import OTHER_TRIALS, TRIALS, recorded, simulated
@@ -34,6 +33,7 @@ from gestured.lab.manifest import write_manifest
 from gestured.lab.nets import Judged, Opinion
 from gestured.lab.recordings.origin import origins
 from gestured.lab.samples import WINDOW, Samples, join
+from gestured.model.features import MEASURES, feature_names, measures
 from gestured.record.arrays import read
 from gestured.simulator import GESTURES, NONE, wide
 

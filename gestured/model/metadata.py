@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from gestured.core.certainty import Certainty
-from gestured.core.features import feature_names
-from gestured.core.prototypes import Space
 from gestured.core.window import Window
+from gestured.model.features import feature_names
 from gestured.model.file import SelfTest
+from gestured.model.prototypes import Space
 
 MAX_TEXT = 2 << 20  # characters of one value; the longest is the self-test, some thousands
 MAX_ITEMS = 50_000  # of the lists and objects in one value; each costs a hundred times as much memory as text

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
-from gestured.core.features import touch_pattern
 from gestured.core.frames import Segment
+from gestured.model.features import touch_pattern
 from gestured.model.file import check_alone, has_digest
 from gestured.model.metadata import Metadata
 from gestured.model.session import Session

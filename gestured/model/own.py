@@ -1,18 +1,18 @@
 """Gestures of the user's own, as each model sees them: their examples embedded by it, and compared with a segment."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.classifier import NEAR, Match
+from gestured.core.classifier import Match
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
 from gestured.core.own import Example, Examples
-from gestured.core.prototypes import Array, Prototype, Space, clashes, nearest
 from gestured.model.model import RUN_S, Model
+from gestured.model.prototypes import Array, Prototype, Space, clashes, nearest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,29 +117,3 @@ def place(model: Model, space: Space, segment: Segment) -> Array:
         return space.place(model.embed(window[np.newaxis], RUN_S)[0].astype(np.float64))
     except ValueError as error:
         raise ModelError(f"{model.name}: {error}") from error
-
-
-class Examiner:
-    """A model that judges the examples of an enrolment; implements `Judge`."""
-
-    def __init__(self, model: Model, space: Space, own: Own, in_use: Collection[str]) -> None:
-        """`own` are the gestures that there are already, `in_use` the model's."""
-        self._model, self._space, self._own, self._in_use = model, space, own, in_use
-
-    def example(self, segment: Segment) -> Example | None:
-        """A segment as it is kept; None for one that is too long."""
-        return Example.of(segment, self._model.metadata.window)
-
-    def same_as(self, example: Example) -> str | None:
-        """The gesture that there is already, and how near."""
-        taken = placed(self._model, self._space, example).taken
-        if taken is not None and taken[0] in self._in_use:
-            return f"{taken[0]} ({taken[1]:.2f})"
-        match = self._own.nearest_to(self._model, example)
-        return None if match is None or match.confidence < NEAR else f"{match.name} ({match.confidence:.2f})"
-
-    def unlike(self, example: Example, kept: Sequence[Example]) -> str | None:
-        """How near it is to those that were kept, where that is not near enough."""
-        near, *others = (placed(self._model, self._space, one).place for one in (example, *kept))
-        confidence = Prototype.of(self._space, np.stack(others)).confidence(near)
-        return None if confidence >= NEAR else f"{confidence:.2f}, expected {NEAR:.2f}"

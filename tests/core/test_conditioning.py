@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gestured.core.activity import BLOB, BLOB_GAIN, COMMON, Activity
-from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Void
 from gestured.core.mounting import Mounting
 from gestured.core.window import Window
+from gestured.model.features import touch_pattern
 from tests.scenario import contacts
 
 Array = NDArray[np.float64]

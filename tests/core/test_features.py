@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.core.features import PRESSED, feature_names, touch_pattern
+from gestured.model.features import PRESSED, feature_names, touch_pattern
 
 sizes = st.tuples(st.integers(1, 20), st.integers(2, 12), st.integers(2, 12))
 seeds = st.integers(0, 2**16)

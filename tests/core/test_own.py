@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gestured.core.classifier import NEAR
-from gestured.core.enrolment import Enrolment
 from gestured.core.events import Cancelled
 from gestured.core.frames import Segment
-from gestured.core.own import Example, from_dict, is_name, to_dict
-from gestured.core.prototypes import EXAMPLES, Prototype, Space, clashes, nearest
+from gestured.core.own import EXAMPLES, Example, from_dict, is_name, to_dict
+from gestured.model.enrolment import Enrolment
+from gestured.model.prototypes import Prototype, Space, clashes, nearest
 from tests.small_model import WINDOW, segment
 
 RNG = np.random.default_rng(3)

@@ -15,13 +15,13 @@ from gestured.core.beside.reading import STATES, Reading, Vitals, faulty
 from gestured.core.classifier import Scores
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.facts import Decided
-from gestured.core.features import MEASURES
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
 from gestured.core.window import Window
 from gestured.daemon.exposition import exposition
 from gestured.daemon.metrics import NAMED_SENSORS, Metrics
 from gestured.daemon.shift import LAST, LEAST_GESTURES, Shift, measured
+from gestured.model.features import MEASURES
 from tests.daemon.harness import Daemon, Hand, Sensor
 from tests.daemon.parts import SNAPSHOT, Parts
 

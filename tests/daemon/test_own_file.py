@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gestured.core.own import MOST, MOST_VALUES, Example
-from gestured.core.prototypes import EXAMPLES
+from gestured.core.own import EXAMPLES, MOST, MOST_VALUES, Example
 from gestured.daemon.keeper import Keeper
 from gestured.model import own_file
 from gestured.model.own_file import OwnFile, OwnFileError

@@ -21,7 +21,7 @@ PROVISIONAL = '{"in_a_row": 1, "elapsed_s": [0.0, 0.1], "thresholds": [null, 0.9
 
 def own() -> str:
     """The metadata `own` of this model: as if it had been learned that movements spread by 0.1, and durations by 1."""
-    from gestured.core.prototypes import Space
+    from gestured.model.prototypes import Space
 
     far = 100.0  # where nothing is performed: what it cannot see
     places = np.full((len(GESTURES), 3), far)

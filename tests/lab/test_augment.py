@@ -7,10 +7,10 @@ import pytest
 import torch
 from torch import Tensor
 
-from gestured.core.features import ACTIVE
 from gestured.lab.augment import symmetry_table, turned, varied
 from gestured.lab.dataset import from_take
 from gestured.lab.fit import CLASSES
+from gestured.model.features import ACTIVE
 from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
 from tests.lab.made import direction, direction_of, gestures
 

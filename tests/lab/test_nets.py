@@ -5,10 +5,10 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from gestured.core.features import ACTIVE
 from gestured.lab.fit import NETS, build
 from gestured.lab.nets import CnnLstm, Decision, Judged, Lstm
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features
+from gestured.model.features import ACTIVE
 from tests.lab.made import gestures
 
 MADE = gestures()

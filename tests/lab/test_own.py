@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gestured.core.errors import ModelError
-from gestured.core.prototypes import EXAMPLES, Prototype
+from gestured.core.own import EXAMPLES
 from gestured.lab.own import command
 from gestured.lab.own.learn import Seen, figures, learn, played_through
 from gestured.lab.own.play import PLAN, REPETITIONS, repeated
@@ -14,6 +14,7 @@ from gestured.lab.own.signs import JUDGED, LEARNED, SIGNS, sign
 from gestured.lab.own.warping import distances, series
 from gestured.lab.samples import Sample, Samples, collect
 from gestured.model.model import Model
+from gestured.model.prototypes import Prototype
 from gestured.simulator import GESTURES, Participant, generator
 from tests.daemon import tiny_model
 

@@ -9,7 +9,6 @@ from typing import Any
 import onnx
 
 from gestured.core.errors import ModelError
-from gestured.core.prototypes import Space
 from gestured.lab.manifest import NAME, measured, write_manifest
 from gestured.lab.own.learn import Figures, Seen, figures, learn, played_through
 from gestured.lab.own.play import played
@@ -17,6 +16,7 @@ from gestured.lab.own.signs import JUDGED
 from gestured.lab.own.warping import recalls
 from gestured.model.file import read_bytes, sealed
 from gestured.model.model import Model
+from gestured.model.prototypes import Space
 from gestured.record.files import PUBLIC, atomic_write
 
 AT_MOST = 0.02  # of other non-gestures, at which warping is compared

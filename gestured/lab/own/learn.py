@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.linear_model import LogisticRegression
 
-from gestured.core.prototypes import EXAMPLES, Array, Prototype, Space
+from gestured.core.own import EXAMPLES
 from gestured.lab.own.play import PLAN, REPETITIONS
 from gestured.lab.own.signs import SIGNS
 from gestured.lab.samples import Samples
 from gestured.model.model import Model
+from gestured.model.prototypes import Array, Prototype, Space
 
 ACCEPTED = (
     0.015  # of other non-gestures that a threshold lets through in simulation: less than the 0.02 that is promised

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.features import ACTIVE
-from gestured.core.prototypes import EXAMPLES
+from gestured.core.own import EXAMPLES
 from gestured.lab.own.learn import Seen
 from gestured.lab.own.play import REPETITIONS
 from gestured.lab.samples import Samples
+from gestured.model.features import ACTIVE
 
 Array = NDArray[np.float64]
 FLOOR = 0.12  # of the peak: below it a taxel counts for nothing

@@ -15,7 +15,6 @@ from onnx import TensorProto, numpy_helper
 from onnx.reference import ReferenceEvaluator
 from onnx.reference.op_run import OpRun
 
-from gestured.core.features import touch_pattern
 from gestured.lab.adapt.weights import base_of
 from gestured.lab.decide import Answers
 from gestured.lab.early import published
@@ -24,6 +23,7 @@ from gestured.lab.samples import WINDOW
 from gestured.lab.stability.segments import segment_cases
 from gestured.lab.study.onnx_form import Graph, quantised
 from gestured.lab.table import Table, Value
+from gestured.model.features import touch_pattern
 from gestured.model.model import Model
 from gestured.model.shipped import shipped
 

@@ -13,7 +13,6 @@ import numpy as np
 from gestured.core.classifier import Classifier
 from gestured.core.events import Event, Gesture, Onset
 from gestured.core.facts import events_of
-from gestured.core.features import touch_pattern
 from gestured.core.frames import Frame, Segment
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
@@ -24,6 +23,7 @@ from gestured.lab.stability.path import events, fault, labels
 from gestured.lab.stability.segments import broken_segments, segment_cases
 from gestured.lab.stability.streams import Case, streams
 from gestured.lab.table import Table, Value
+from gestured.model.features import touch_pattern
 from gestured.model.model import Model
 
 WINDOWS = (

@@ -10,8 +10,8 @@ a fast one leave the same picture. A taxel is pressed from a fifth of the gestur
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.features import PRESSED
 from gestured.lab.samples import WINDOW
+from gestured.model.features import PRESSED
 
 WHOLE = 0.0  # the decay takes as long as the gesture
 

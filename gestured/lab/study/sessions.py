@@ -14,7 +14,6 @@ import torch
 from torch import Tensor, nn
 
 import gestured
-from gestured.core.features import feature_names
 from gestured.lab.export import Facts, export_forest, export_net
 from gestured.lab.nets import last_active
 from gestured.lab.online import play, takes, tallied
@@ -27,6 +26,7 @@ from gestured.lab.study.plan import Plan
 from gestured.lab.study.runners import SHIPPED
 from gestured.lab.study.training import Net
 from gestured.lab.study.views import Values
+from gestured.model.features import feature_names
 from gestured.simulator import GESTURES, Take
 
 FIRST_PERSON = 900  # the cohort's are 0 to 33

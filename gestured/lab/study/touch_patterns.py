@@ -2,7 +2,7 @@
 
 Mean pressure over taxels and time; the maximum over both; variability, the mean absolute difference of successive
 frames over all taxels; the mean of each row and of each column; the largest and the mean contact area of a frame; the
-duration. The daemon's own set (`gestured.core.features`) takes standard deviations in the place of that variability,
+duration. The daemon's own set (`gestured.model.features`) takes standard deviations in the place of that variability,
 the mean of the frames' maxima in the place of the maximum, and has the maxima and the variability of rows and columns.
 
 Left open by the paper: from which pressure on a taxel is in contact. Ours is `PRESSED` of the gesture's peak. Frames
@@ -12,8 +12,8 @@ without contact count for nothing, so padding changes nothing.
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.features import PRESSED
 from gestured.lab.samples import WINDOW
+from gestured.model.features import PRESSED
 
 
 def paper_features(window: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.features import touch_pattern
 from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.study.motion_history import motion_history
 from gestured.lab.study.touch_patterns import paper_features
 from gestured.lab.study.training import Images, Windows
 from gestured.lab.study.trajectory_boosting import trajectory_matrix, trajectory_row
 from gestured.lab.study.wavelets import spatio_temporal
+from gestured.model.features import touch_pattern
 
 Values = Mapping[str, Any]  # hyperparameters
 Rows = NDArray[np.float32]

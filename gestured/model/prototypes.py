@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.classifier import NEAR, Match
+from gestured.core.own import EXAMPLES
 
-EXAMPLES = 5  # of one gesture, at most
 DIMENSIONS = 512  # of a space or an embedding, at most
 SUREST = 40.0  # log odds that a confidence tells: beyond them it is 0 or 1 in any case, and `exp` would overflow
 

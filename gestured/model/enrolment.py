@@ -1,34 +1,48 @@
 """An enrolment: somebody performs a new gesture a few times, and each example is judged at once."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
+from gestured.core.classifier import NEAR
 from gestured.core.cutter import bearable_s
 from gestured.core.events import Cancelled
 from gestured.core.frames import Segment
 from gestured.core.own import Example
+from gestured.model.model import Model
+from gestured.model.own import Own, placed
+from gestured.model.prototypes import Prototype, Space
 
 SHORTEST_S = 0.15  # of an example: what is shorter is a tap, whatever was meant
 FEWEST = 3  # touched frames: fewer show no movement
 
 
-class Judge(Protocol):
-    """A model that can compare examples; each method gives None where there is nothing to say against one."""
+class Examiner:
+    """A model that judges the examples of an enrolment: None where there is nothing to say against one."""
+
+    def __init__(self, model: Model, space: Space, own: Own, in_use: Collection[str]) -> None:
+        """`own` are the gestures that there are already, `in_use` the model's."""
+        self._model, self._space, self._own, self._in_use = model, space, own, in_use
 
     def example(self, segment: Segment) -> Example | None:
-        """A segment as it is kept; None for one that is too long."""
-        ...
+        """A segment as it is kept; None for one that is too long, or not finite."""
+        return Example.of(segment, self._model.metadata.window)
 
     def same_as(self, example: Example) -> str | None:
-        """The gesture that there is already, and how near, in words."""
-        ...
+        """The gesture that there is already, and how near."""
+        taken = placed(self._model, self._space, example).taken
+        if taken is not None and taken[0] in self._in_use:
+            return f"{taken[0]} ({taken[1]:.2f})"
+        match = self._own.nearest_to(self._model, example)
+        return None if match is None or match.confidence < NEAR else f"{match.name} ({match.confidence:.2f})"
 
     def unlike(self, example: Example, kept: Sequence[Example]) -> str | None:
-        """How near it is to those that were kept, in words."""
-        ...
+        """How near it is to those that were kept, where that is not near enough."""
+        near, *others = (placed(self._model, self._space, one).place for one in (example, *kept))
+        confidence = Prototype.of(self._space, np.stack(others)).confidence(near)
+        return None if confidence >= NEAR else f"{confidence:.2f}, expected {NEAR:.2f}"
 
 
 @dataclass
@@ -38,7 +52,7 @@ class Enrolment:
     name: str
     sensor: str
     wanted: int
-    judge: Judge
+    judge: Examiner
     kept: list[Example] = field(default_factory=list)
 
     @property
