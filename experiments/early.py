@@ -1,6 +1,8 @@
 """How early and how rightly a model speaks: provisional events over whole sessions, held against what was performed.
 
-`gestured-lab early`. Nothing is cut by hand: frames go through the recogniser as in the daemon, and a tap is the
+    python -m experiments.early --model cnn_lstm --minutes 20
+
+Nothing is cut by hand: frames go through the recogniser as in the daemon, and a tap is the
 beginning of a double tap, a scribble begins as a swipe.
 """
 
@@ -11,17 +13,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gestured.core.classifier import Classifier
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
-from gestured.core.facts import events_of
-from gestured.core.frames import Frame
-from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
-from gestured.core.sensor import Sensor
+from gestured.core.scene import DOUBLE_TAP, ONE_TAP
 from gestured.lab.dataset import Truth, truths
 from gestured.lab.online import NON_GESTURE_SHARE, SESSION_S
 from gestured.lab.progress import progress
+from gestured.lab.study.said import heard
 from gestured.model.opening import open_model
 from gestured.simulator import NONE, Participant, SimulatedSensor, Take, any_sensor, generator, session
 
@@ -118,14 +116,6 @@ def _median(values: Sequence[float]) -> float | None:
     return round(float(np.median(values)), 3) if values else None
 
 
-def heard(times: NDArray[np.float64], frames: NDArray[np.generic], classifier: Classifier) -> list[Event]:
-    """The events of a session, (N,) s and (N, R, C) counts, provisional ones among them."""
-    sensor = Sensor("lab", Scene(classifier.gestures, frames.shape[1:]), classifier)
-    sensor.foresee(asked=True)
-    found = [one for t, values in zip(times, frames, strict=True) for one in sensor.push(Frame(float(t), values))]
-    return events_of([*found, *sensor.flush(float(times[-1]) + 5.0)])
-
-
 def takes(which: str, count: int, seed: int) -> Iterator[Take]:
     """Sessions of one new participant each."""
     for n in range(count):
@@ -136,8 +126,14 @@ def takes(which: str, count: int, seed: int) -> Iterator[Take]:
         yield session(Participant(person), sensor, rng, SESSION_S, share)
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run `gestured-lab early`: print its table."""
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--model", default="cnn_lstm", help="the model that is asked (%(default)s)")
+    parser.add_argument("--minutes", type=float, default=20, help="minutes of sessions of each kind (%(default)s)")
+    parser.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (%(default)s)")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    args = parser.parse_args()
     model = open_model(args.model)
     count = max(round(args.minutes * 60 / SESSION_S), 1)
     figures: dict[str, Any] = {"model": args.model}
@@ -150,7 +146,6 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(figures, indent=2))
     else:
         print(table({which: figures[which] for which in SETS}))
-    return 0
 
 
 HEAD = ("gestures", "right", "wrong", "moved", "early", "events", "confirmed", "moved_median_s", "tap_median_s",
@@ -166,3 +161,7 @@ def table(sets: dict[str, dict[str, Any]]) -> str:
             f"{which:<14}" + "".join(f"{cell:>{len(name) + 2}}" for name, cell in zip(HEAD, cells, strict=True))
         )
     return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,6 +1,8 @@
-"""Which network: each alone and with its second opinion, on the same data, with rejection, error against run time."""
+"""Which network: each alone and with its second opinion, on the same data, with rejection, error against run time.
 
-import json
+python -m experiments.networks --cache .cache/lab
+"""
+
 import tempfile
 import time
 from pathlib import Path
@@ -10,15 +12,14 @@ import numpy as np
 from torch import Tensor, nn
 
 import gestured
+from experiments.trained import options, trained
 from gestured.lab.decide import decided, fit_decision, threshold
 from gestured.lab.evaluate import Evaluation, outcome
 from gestured.lab.export import Facts, export_net
-from gestured.lab.field import table
 from gestured.lab.fit import logits, targets
-from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Decision, Judged, Opinion
 from gestured.lab.samples import WINDOW
-from gestured.lab.train import Calibrated, Trained, TrainingData, TrainingPlan, calibration_set, judged, learn
+from gestured.lab.train import Trained, TrainingData, TrainingPlan, calibration_set, learn
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.simulator import GESTURES
@@ -57,13 +58,14 @@ def cold_ms(model: Model) -> float:
     return 1e3 * median(took)
 
 
-def compare(trained: Trained, calibrated: Calibrated, data: TrainingData, plan: TrainingPlan, cache: Path) -> None:
+def compare(plan: TrainingPlan, data: TrainingData, found: Trained, cache: Path) -> None:
     """Print a row for each network and test set, with wrong and lost together and the time of a cold run.
 
     Candidates that no shipped model is made of are trained on the same data, in the same way.
     """
+    calibrated = calibration_set(found, data, plan)
     candidates = learn(plan, data, cache, CANDIDATES)
-    nets = nn.ModuleDict({**trained.nets, **candidates.nets})
+    nets = nn.ModuleDict({**found.nets, **candidates.nets})
     said = calibrated.logits | calibration_set(candidates, data, plan).logits
     tests = {test: (logits(nets, samples), targets(samples)) for test, samples in data.tests.items()}
     print(f"{Evaluation.HEAD}{'error':>8}{'cold ms':>9}", flush=True)
@@ -80,20 +82,16 @@ def compare(trained: Trained, calibrated: Calibrated, data: TrainingData, plan: 
             path = Path(folder) / "candidate.onnx"
             export_net(module, path, facts)
             took = cold_ms(open_model(path))
-        for test, (found, labels) in tests.items():
-            result = outcome(decided(decision, found[first], found[second]), labels, least, data.performed[test])
+        for test, (answers, labels) in tests.items():
+            result = outcome(decided(decision, answers[first], answers[second]), labels, least, data.performed[test])
             print(f"{result.row(f'{title}, {test}')}{result.wrong + result.lost:>8.3f}{took:>9.2f}", flush=True)
 
 
-def compare_rules(trained: Trained, calibrated: Calibrated, data: TrainingData, plan: TrainingPlan, path: Path) -> None:
-    """Print how early and how rightly each rule of `field` decides on the test sets, with the network in `path`."""
-    name = path.stem
-    module, _, _ = judged(trained, name, calibrated)
-    rule = json.loads(open_model(path).properties["provisional"])
-    teach = Foretold.of([(trained.nets, data.calibrate)]).contacts(name, module.decision)
-    print(f"{'rule':<40}{'earliness':>10}{'accuracy':>10}{'harmonic mean':>15}", flush=True)
-    for test, samples in data.tests.items():
-        contacts = Foretold.of([(trained.nets, samples)]).contacts(name, module.decision)
-        for title, row in table(teach, contacts, rule, GESTURES).items():
-            cells = f"{row['earliness']:>10.3f}{row['accuracy']:>10.3f}{row['harmonic_mean']:>15.3f}"
-            print(f"{f'{title}, {test}':<40}{cells}", flush=True)
+def main() -> None:
+    """The command line."""
+    args = options(__doc__).parse_args()
+    compare(*trained(args), args.cache)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,4 +1,7 @@
-"""What it costs and what it saves to wait for a second tap: simulated taps, read with one wait after the other."""
+"""What it costs and what it saves to wait for a second tap: simulated taps, read with one wait after the other.
+
+python -m experiments.taps --people 20
+"""
 
 import argparse
 import json
@@ -78,15 +81,21 @@ def figures(model: str, people: int, seed: int) -> list[dict[str, Any]]:
     return rows
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run `gestured-lab taps`: print its table."""
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--model", default="cnn_lstm", help="a path, or a shipped model's name (%(default)s)")
+    parser.add_argument("--people", type=int, default=20, help="participants, two minutes of taps each (%(default)s)")
+    parser.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (%(default)s)")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    args = parser.parse_args()
     rows = figures(args.model, args.people, args.seed)
     if args.json:
         print(json.dumps(rows, indent=2))
-        return 0
+        return
     name = shipped_name(args.model)
     if name is not None:
-        print(made_of("gestured-lab taps", [shipped()[name]]))
+        print(made_of("python -m experiments.taps", [shipped()[name]]))
     print("| `tap_gap_s` | double taps right | read as two taps | single taps right | a single tap's answer after |")
     print("|---|---|---|---|---|")
     for row in rows:
@@ -95,4 +104,7 @@ def run(args: argparse.Namespace) -> int:
             f"| {row['tap_gap_s']:.2f} s | {row['double_taps_right']:.3f} | {row['double_taps_read_as_taps']:.3f} "
             f"| {row['taps_right']:.3f} | {'-' if after is None else f'{after:.2f} s'} |"
         )
-    return 0
+
+
+if __name__ == "__main__":
+    main()

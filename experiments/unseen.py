@@ -1,6 +1,13 @@
-"""Non-gestures of kinds that nobody taught: how many are rejected where heads alone, or whole networks, lack them."""
+"""Non-gestures of kinds that nobody taught: how many are rejected where heads alone, or whole networks, lack them.
 
-from collections.abc import Sequence
+    python -m experiments.unseen --cache .cache/lab --document docs/figures.md
+    python -m experiments.unseen --cache .cache/lab --whole --document docs/figures.md
+
+With --whole networks are trained without a group of kinds, which takes as long as a training. With --document its
+table and that of the network's card are written anew.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -8,11 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.heads import Heads
+from experiments.trained import options, trained
 from gestured.lab.augment import symmetry_table
+from gestured.lab.cards import with_interval
 from gestured.lab.decide import Answers, confidence, decided
 from gestured.lab.evaluate import Evaluation, model_answers, outcome
 from gestured.lab.fit import CLASSES, logits, targets
-from gestured.lab.heads import Heads
+from gestured.lab.made_of import made_of, renew
 from gestured.lab.samples import Samples
 from gestured.lab.study.bootstrap import interval
 from gestured.lab.train import Trained, TrainingData, TrainingPlan, calibration_set, judged, learn
@@ -150,3 +160,56 @@ def _answers(trained: Trained, data: TrainingData, plan: TrainingPlan, classes: 
         answers = decided(module.decision, of[NAME], of["trajectory"])
         found.append(Said(test, answers, samples, calibration["threshold"], classes))
     return found
+
+
+TAUGHT = {
+    "known": "nothing: the model that ships",
+    "heads": "heads and calibration; the network below the heads has learned them",
+    "whole": "everything: network, second opinion, heads and calibration",
+}
+
+
+def lines_of(heads: Mapping[str, Any], whole: Mapping[str, Any] | None) -> list[str]:
+    """Lines about non-gestures of kinds that were not learned: by the heads, and by the whole network."""
+    lines = [
+        "Non-gestures of kinds that heads and calibration had not seen, while the network below the heads had (three",
+        f"groups of kinds in turn, {heads['count']} simulated segments): "
+        f"{with_interval(heads['rejected'], heads)} rejected.",
+    ]
+    if whole is None:
+        return lines
+    tests = list(whole["whole"]["simulated"])
+    lines += [
+        "", f"One group of kinds ({', '.join(whole['kinds'])}) was then left out of everything: networks were trained "
+        "from nothing without them, by the plan of those that ship, and calibrated without them. The share that is "
+        f"rejected is of {whole['whole']['count']} simulated segments of these kinds; right and wrong are of all "
+        "gestures:", "",
+        f"| these kinds were left out of | rejected | {' | '.join(f'{t}: right | wrong' for t in tests)} |",
+        f"|---|---|{'---|' * 2 * len(tests)}",
+    ]  # fmt: skip
+    for how, words in TAUGHT.items():
+        sets = [whole[how]["simulated"][test] for test in tests]
+        shares = " | ".join(with_interval(one[n], one["intervals"][n]) for one in sets for n in ("right", "wrong"))
+        lines.append(f"| {words} | {with_interval(whole[how]['rejected'], whole[how])} | {shares} |")
+    return lines
+
+
+def main() -> None:
+    """The command line."""
+    parser = options(__doc__)
+    parser.add_argument("--whole", action="store_true", help="also train networks that lack a group of kinds")
+    parser.add_argument("--document", type=Path, help="one whose table is written anew, and the card's")
+    args = parser.parse_args()
+    plan, data, found = trained(args)
+    path = args.models / f"{NAME}.onnx"
+    heads = held_out_kinds(found, data, plan)
+    whole = whole_left_out(found, data, plan, args.cache, path) if args.whole else None
+    if args.document:
+        command = "python -m experiments.unseen" + " --whole" * args.whole
+        lines = [made_of(command, [path]), ""]
+        for document in (args.document, path.with_suffix(".md")):
+            renew(document, "unseen", [*lines, *lines_of(heads, whole)])
+
+
+if __name__ == "__main__":
+    main()

@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from experiments.early import Ahead, table
 from experiments.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
 from gestured.core.events import Cancelled, Gesture, Onset, Unknown
 from gestured.core.facts import events_of
@@ -28,9 +29,9 @@ from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd, Void
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
-from gestured.lab.ahead import Ahead, heard, table
 from gestured.lab.dataset import Truth
 from gestured.lab.made_of import made_of, renew
+from gestured.lab.study.said import heard
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 

@@ -33,18 +33,13 @@ def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: Tr
 
 
 def write_block(document: Path, folder: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
-    """Renew the tables of a folder's models in a document; GesturedError where their marks are missing.
-
-    The one of kinds that nobody taught stays where it was not measured.
-    """
+    """Renew the table of a folder's models in a document; GesturedError where its marks are missing."""
     files = [*(folder / f"{name}.onnx" for name in figures), folder / NAME]
     rows = [row for name, found in figures.items() for row in _rows(found, f"`{name}.onnx`, ")]
     renew(document, "figures", [made_of("gestured-lab evaluate --document docs/figures.md", files), "", *HEAD, *rows])
-    if "whole_left_out" in figures["cnn_lstm"]:
-        origin = made_of("gestured-lab evaluate --whole --document docs/figures.md", files)
-        renew(document, "unseen", [origin, "", *_unseen(figures["cnn_lstm"])])
 
 
+MEASURED_APART = ("unseen", "judged")  # parts of a card between marks, which experiments write
 HEAD = (
     "| set | gestures | right\\* | right | wrong | lost | non-gestures | rejected |",
     "|---|---|---|---|---|---|---|---|",
@@ -55,7 +50,7 @@ def _card(path: Path, name: str, found: Mapping[str, Any], plan: TrainingPlan) -
     model = open_model(path)
     real = bool(said(path))
     table = "\n".join([*HEAD, *_rows(found)])
-    extra = "".join(f"\n{line}" for line in ["", *_unseen(found)]) if "held_out_kinds" in found else ""
+    others = "\n\n".join(kept(path.with_suffix(".md"), part) for part in MEASURED_APART)
     return f"""# {name}
 
 {WHAT[name]}
@@ -84,9 +79,9 @@ nominal 9 x 9 sensor, *wide* other people on randomised sensors of every quality
 each subject judged by networks that have not seen them (three folds). Shares of the gestures that were performed; *right\\** is
 before rejection, *lost* is unknown or never cut out; *rejected* is of the non-gestures. In brackets: 95 % intervals over people.
 
-{table}{extra}
+{table}
 
-{kept(path.with_suffix(".md"), "judged")}
+{others}
 
 ## Limits
 
@@ -103,42 +98,12 @@ def _rows(found: Mapping[str, Any], before: str = "") -> list[str]:
 
 def _row(title: str, values: Mapping[str, Any]) -> str:
     ends = values["intervals"]
-    shares = " | ".join(_with_interval(values[n], ends[n]) for n in ("right", "wrong", "lost"))
-    rejected = _with_interval(values["rejected"], ends["rejected"]) if values["others"] else "-"
+    shares = " | ".join(with_interval(values[n], ends[n]) for n in ("right", "wrong", "lost"))
+    rejected = with_interval(values["rejected"], ends["rejected"]) if values["others"] else "-"
     before = f"{values['right_before']:.3f}"
     return f"| {title} | {values['gestures']} | {before} | {shares} | {values['others']} | {rejected} |"
 
 
-def _with_interval(share: float, ends: Mapping[str, float]) -> str:
+def with_interval(share: float, ends: Mapping[str, float]) -> str:
+    """A share and, in brackets, where its interval begins and ends."""
     return f"{share:.3f} ({ends['low']:.3f}–{ends['high']:.3f})"
-
-
-TAUGHT = {
-    "known": "nothing: the model that ships",
-    "heads": "heads and calibration; the network below the heads has learned them",
-    "whole": "everything: network, second opinion, heads and calibration",
-}
-
-
-def _unseen(found: Mapping[str, Any]) -> list[str]:
-    """Lines about non-gestures of kinds that were not learned: by the heads, and by the whole network."""
-    heads, whole = found["held_out_kinds"], found.get("whole_left_out")
-    lines = [
-        "Non-gestures of kinds that heads and calibration had not seen, while the network below the heads had (three groups of",
-        f"kinds in turn, {heads['count']} simulated segments): {_with_interval(heads['rejected'], heads)} rejected.",
-    ]
-    if whole is None:
-        return lines
-    tests = list(whole["whole"]["simulated"])
-    lines += [
-        "", f"One group of kinds ({', '.join(whole['kinds'])}) was then left out of everything: networks were trained from "
-        "nothing without them, by the plan of those that ship, and calibrated without them. The share that is rejected is of "
-        f"{whole['whole']['count']} simulated segments of these kinds; right and wrong are of all gestures:", "",
-        f"| these kinds were left out of | rejected | {' | '.join(f'{t}: right | wrong' for t in tests)} |",
-        f"|---|---|{'---|' * 2 * len(tests)}",
-    ]  # fmt: skip
-    for how, words in TAUGHT.items():
-        sets = [whole[how]["simulated"][test] for test in tests]
-        shares = " | ".join(_with_interval(one[n], one["intervals"][n]) for one in sets for n in ("right", "wrong"))
-        lines.append(f"| {words} | {_with_interval(whole[how]['rejected'], whole[how])} | {shares} |")
-    return lines

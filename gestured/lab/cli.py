@@ -21,9 +21,7 @@ PROGRAMS = {
     "train": "gestured.lab.commands",
     "evaluate": "gestured.lab.commands",
     "adapt": "gestured.lab.adapt.command",
-    "early": "gestured.lab.ahead",
     "online": "gestured.lab.online",
-    "taps": "gestured.lab.taps",
     "own": "gestured.lab.own.command",
     "stability": "gestured.lab.stability.command",
     "study": "gestured.lab.study.study",
@@ -92,12 +90,6 @@ def parser() -> argparse.ArgumentParser:
                    "writes cards and manifest",
                    "gestured-lab evaluate --models models")  # fmt: skip
     evaluate.add_argument("--models", type=Path, default=MODELS, help=f"folder of the models (default: {MODELS})")
-    evaluate.add_argument(
-        "--networks", action="store_true", help="also compare each network alone and with its second opinion"
-    )
-    evaluate.add_argument("--field", action="store_true", help="also compare rules for deciding early")
-    evaluate.add_argument("--whole", action="store_true", help="also train networks that lack a group of kinds of "
-                          "non-gestures (as long as training takes), and say how many they reject")  # fmt: skip
     evaluate.add_argument("--curve", action="store_true", help="also print right, wrong and accepted by threshold")
     evaluate.add_argument(
         "--document",
@@ -114,16 +106,6 @@ def parser() -> argparse.ArgumentParser:
     online.add_argument("--idle-minutes", type=float, default=5, help="minutes of an untouched sensor (default: 5)")
     online.add_argument("--speed", type=float, default=100, help="times real time (default: 100)")
     online.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (default: 900)")
-    taps = add("taps", "print what each wait for a second tap costs in double taps and saves in time, simulated",
-               "gestured-lab taps --people 20")  # fmt: skip
-    taps.add_argument("--model", default="cnn_lstm", help="a path, or a shipped model's name (default: cnn_lstm)")
-    taps.add_argument("--people", type=int, default=20, help="participants, two minutes of taps of each (default: 20)")
-    taps.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (default: 900)")
-    early = add("early", "play simulated sessions, and print how early and how rightly a model names gestures",
-                "gestured-lab early --model cnn_lstm --minutes 20")  # fmt: skip
-    early.add_argument("--model", default="cnn_lstm", help="the model that is asked (default: cnn_lstm)")
-    early.add_argument("--minutes", type=float, default=20, help="minutes of sessions of each kind (default: 20)")
-    early.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (default: 900)")
     stability = add("stability", "measure filters, extreme inputs through the whole path, and models by their answers",
                     "gestured-lab stability --quick")  # fmt: skip
     stability.add_argument("--quick", action="store_true", help="some seconds instead of some minutes")
@@ -146,7 +128,6 @@ def parser() -> argparse.ArgumentParser:
     own = add("own", "learn what a model needs for gestures of your own, and write it into its file; "
               "prints what enrolment is worth", "gestured-lab own models/cnn_lstm.onnx")  # fmt: skip
     own.add_argument("models", type=Path, nargs="+", metavar="MODEL", help="an .onnx file that has an embedding")
-    own.add_argument("--compare", action="store_true", help="also judge dynamic time warping")
     add_work(own)
     add_recordings(add)
     return top

@@ -10,12 +10,10 @@ import torch
 
 from gestured.lab.cards import write_block, write_cards
 from gestured.lab.evaluate import Evaluation, print_curve, real_figures, simulated_figures
-from gestured.lab.manifest import measured, write_manifest
-from gestured.lab.networks import compare, compare_rules
+from gestured.lab.manifest import write_manifest
 from gestured.lab.own import command as own
 from gestured.lab.own.command import open_file, teach
 from gestured.lab.train import TrainingPlan, calibration_set, learn, load_data, train
-from gestured.lab.unseen import held_out_kinds, whole_left_out
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
 
@@ -47,8 +45,7 @@ def train_models(args: argparse.Namespace) -> int:
         path = args.out / f"{name}.onnx"
         if open_file(path).embeds:
             teach(path, args.cache, own.QUICK_PEOPLE if args.quick else own.PEOPLE, args.jobs)
-    args.models, args.document, args.curve, args.networks, args.field = args.out, None, False, False, False
-    args.whole = False
+    args.models, args.document, args.curve = args.out, None, False
     return evaluate_models(args)
 
 
@@ -68,20 +65,8 @@ def evaluate_models(args: argparse.Namespace) -> int:
             print_curve(name, path, data)
     trained = learn(plan, data, args.cache)
     calibrated = calibration_set(trained, data, plan)
-    if args.networks:
-        compare(trained, calibrated, data, plan, args.cache)
-    if args.field:
-        compare_rules(trained, calibrated, data, plan, paths["cnn_lstm"])
     for name, found in real_figures(trained, calibrated, data).items():
         figures[name]["real"] = found
-    figures["cnn_lstm"]["held_out_kinds"] = held_out_kinds(trained, data, plan)
-    path = paths["cnn_lstm"]
-    if args.whole:
-        whole = whole_left_out(trained, data, plan, args.cache, path)
-    else:  # an earlier run's, which took as long as a training, while the file is the same
-        whole = measured(path).get("whole_left_out", {})
-    if whole:
-        figures["cnn_lstm"]["whole_left_out"] = whole
     _keep(figures, plan, args)
     return 0
 

@@ -12,8 +12,7 @@ from torch import Tensor, nn
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP
 from gestured.lab.decide import Answers, decided
 from gestured.lab.early import Asked, at_release, calibrated, published, tap_threshold
-from gestured.lab.field import Contacts
-from gestured.lab.fit import logits, targets
+from gestured.lab.fit import logits
 from gestured.lab.nets import Decision
 from gestured.lab.prefixes import prefixes
 from gestured.lab.samples import WINDOW, Samples, join
@@ -60,20 +59,6 @@ class Foretold:
         together = join([samples for _, samples in parts])
         contacts = np.concatenate(contact), np.concatenate(since), np.concatenate(second)
         return cls(together, _joined(whole), _joined(released), _joined(early), *contacts)
-
-    def contacts(self, name: str, decision: Decision) -> Contacts:
-        """The gestures that are no taps, as a network with its decision sees them."""
-        labels = targets(self.samples)
-        chosen = (labels >= 0) & (labels < len(GESTURES)) & ~np.isin(self.samples.labels, (ONE_TAP, DOUBLE_TAP))
-        of = chosen[self.contact]
-        scores = _said(self.prefixes, name, decision)[0][of]
-        whole = _said(self.whole, name, decision)[0][chosen]
-        place = np.cumsum(chosen) - 1
-        asked = Asked(
-            place[self.contact[of]], self.since[of] / WINDOW.rate_hz, scores.argmax(axis=1),
-            scores.max(axis=1).astype(np.float64), whole.argmax(axis=1), self.samples.people[chosen],
-        )  # fmt: skip
-        return Contacts(asked, scores, labels[chosen])
 
     def rule(self, name: str, decision: Decision, least: float) -> dict[str, Any]:
         """The metadata `provisional` of a network with its decision, that publishes from `least` on."""

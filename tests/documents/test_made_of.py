@@ -14,7 +14,7 @@ from tests.documents.blocks import ROOT, documents
 GENERATED = {
     "docs/figures.md": ("gestured-lab evaluate", "python -m experiments.foreign.judge"),
     "docs/performance.md": ("make bench",),
-    "docs/limits-and-choices.md": ("gestured-lab taps",),
+    "docs/limits-and-choices.md": ("python -m experiments.taps",),
     "docs/numerics.md": ("gestured-lab stability",),
     "docs/reliability.md": ("python -m tests.hostile.damage",),
     "docs/study.md": ("gestured-lab study",),

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
+from experiments.early import Ahead
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, Release, Unknown
-from gestured.lab.ahead import Ahead
 from gestured.lab.dataset import Truth
 
 

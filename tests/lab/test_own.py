@@ -11,7 +11,6 @@ from gestured.lab.own import command
 from gestured.lab.own.learn import Seen, figures, learn, played_through
 from gestured.lab.own.play import PLAN, REPETITIONS, repeated
 from gestured.lab.own.signs import JUDGED, LEARNED, SIGNS, sign
-from gestured.lab.own.warping import distances, series
 from gestured.lab.samples import Sample, Samples, collect
 from gestured.model.model import Model
 from gestured.model.prototypes import Prototype
@@ -109,14 +108,3 @@ def test_a_model_without_an_embedding_is_refused(tmp_path: Path) -> None:
     path = tiny_model.make(tmp_path / "tiny.onnx")
     with pytest.raises(ModelError, match="has no output 'embedding'"):
         command.teach(path, tmp_path, 1, 1)
-
-
-def test_warping_knows_the_same_way_at_another_speed() -> None:
-    rng = np.random.default_rng(2)
-    one, same, other = (series(window(rng, angle).astype(np.float32)) for angle in (0.5, 0.5, 2.5))
-    slower = np.repeat(one, 2, axis=0)
-    assert distances(one, [one])[0] == 0
-    assert distances(one, [slower])[0] == 0
-    near, far = distances(one, [same, other])
-    assert near < far / 3
-    assert distances(one, [same, slower])[0] == pytest.approx(near)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import torch
 
+from experiments.unseen import GROUPS, Said, group_of, rejected, untaught, without_kinds
 from gestured.lab.augment import symmetry_table, turned
 from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
 from gestured.lab.fit import CLASSES, targets
 from gestured.lab.samples import Samples, collect
 from gestured.lab.train import TrainingData
-from gestured.lab.unseen import GROUPS, Said, group_of, rejected, untaught, without_kinds
 from gestured.simulator import GESTURES, NONE
 
 

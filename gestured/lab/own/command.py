@@ -13,13 +13,11 @@ from gestured.lab.manifest import NAME, measured, write_manifest
 from gestured.lab.own.learn import Figures, Seen, figures, learn, played_through
 from gestured.lab.own.play import played
 from gestured.lab.own.signs import JUDGED
-from gestured.lab.own.warping import recalls
 from gestured.model.file import read_bytes, sealed
 from gestured.model.model import Model
 from gestured.model.prototypes import Space
 from gestured.record.files import PUBLIC, atomic_write
 
-AT_MOST = 0.02  # of other non-gestures, at which warping is compared
 PEOPLE, JUDGES = 20, 12  # people to learn from, and others to judge by
 QUICK_PEOPLE = 3
 
@@ -36,12 +34,6 @@ def run(args: argparse.Namespace) -> int:
         told[str(path)] = {"prototypes": [asdict(one) for one in found]}
         if not args.json:
             print(table(path.stem, found), flush=True)
-        if args.compare:
-            warped = recalls(samples, seen, JUDGED, AT_MOST)
-            told[str(path)]["warping"] = warped
-            if not args.json:
-                ours = ", ".join(f"{recall:.3f}" for recall in warped.values())
-                print(f"dynamic time warping, {AT_MOST:g} accepted: recall {ours}", flush=True)
     if args.json:
         print(json.dumps(told, indent=2))
     return 0

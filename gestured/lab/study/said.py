@@ -8,9 +8,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gestured.core.events import Gesture, Provisional
-from gestured.lab.ahead import heard
+from gestured.core.classifier import Classifier
+from gestured.core.events import Event, Gesture, Provisional
+from gestured.core.facts import events_of
+from gestured.core.frames import Frame
+from gestured.core.scene import Scene
+from gestured.core.sensor import Sensor
 from gestured.lab.online import takes
 from gestured.lab.study.bootstrap import interval
 from gestured.model.model import Model
@@ -37,6 +42,14 @@ def said(model: Model, minutes: float) -> list[dict[str, Any]]:
         {"group": group, "kind": kind, **_row(found[group, kind])}
         for group in GROUPS for kind in ("provisional", "final") if (group, kind) in found
     ]  # fmt: skip
+
+
+def heard(times: NDArray[np.float64], frames: NDArray[np.generic], classifier: Classifier) -> list[Event]:
+    """The events of a session, (N,) s and (N, R, C) counts, provisional ones among them."""
+    sensor = Sensor("lab", Scene(classifier.gestures, frames.shape[1:]), classifier)
+    sensor.foresee(asked=True)
+    found = [one for t, values in zip(times, frames, strict=True) for one in sensor.push(Frame(float(t), values))]
+    return events_of([*found, *sensor.flush(float(times[-1]) + 5.0)])
 
 
 def _row(answers: list[tuple[float, bool, int]]) -> dict[str, Any]:

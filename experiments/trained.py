@@ -1,0 +1,30 @@
+"""What programs about trained networks begin with: data and networks of `gestured-lab train`, from its cache."""
+
+import argparse
+from pathlib import Path
+
+import torch
+
+from gestured.lab.cli import CACHE, MODELS
+from gestured.lab.train import Trained, TrainingData, TrainingPlan, learn, load_data
+
+
+def options(text: str | None) -> argparse.ArgumentParser:
+    """The options that say which training it was."""
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--models", type=Path, default=MODELS, help="folder of the models (%(default)s)")
+    parser.add_argument("--cache", type=Path, default=CACHE, help="where finished steps are kept (%(default)s)")
+    parser.add_argument("--real", type=Path, metavar="FOLDER", help="of real recordings, as docs/training.md has it")
+    parser.add_argument("--recordings", type=Path, nargs="+", default=[], metavar="FILE", help="that taught them, too")
+    parser.add_argument("--jobs", type=int, default=2, help="processes and threads (%(default)s)")
+    parser.add_argument("--quick", action="store_true", help="a small run to try it")
+    return parser
+
+
+def trained(args: argparse.Namespace) -> tuple[TrainingPlan, TrainingData, Trained]:
+    """The plan, its data and its networks."""
+    torch.set_num_threads(args.jobs)
+    plan = TrainingPlan.quick() if args.quick else TrainingPlan()
+    args.cache.mkdir(parents=True, exist_ok=True)
+    data = load_data(plan, args.cache, args.real, args.jobs, args.recordings)
+    return plan, data, learn(plan, data, args.cache)
