@@ -13,6 +13,7 @@ from typing import Any
 
 from gestured.core.certainty import Certainty
 from gestured.core.window import Window
+from gestured.model.certainty import certainty
 from gestured.model.features import feature_names
 from gestured.model.file import SelfTest
 from gestured.model.prototypes import Space
@@ -70,7 +71,7 @@ class Metadata:
         provisional = own = None
         if "provisional" in properties:
             with _naming("provisional"):
-                provisional = Certainty.from_json(properties["provisional"], gestures)
+                provisional = certainty(properties["provisional"], gestures)
         if "own" in properties:
             told = _json(properties["own"], "own", dict)
             with _naming("own"):

@@ -21,6 +21,7 @@ from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
+from gestured.model.certainty import certainty
 from gestured.model.ladder import RETRY_S, SLOW_RUNS, Ladder
 from gestured.model.model import Model
 from tests.daemon.harness import Hand, floats
@@ -490,11 +491,11 @@ GOOD: dict[str, Any] = {
 
 
 def test_thresholds_by_elapsed_time_and_gesture() -> None:
-    found = Certainty.from_json(json.dumps(GOOD), GESTURES)
+    found = certainty(json.dumps(GOOD), GESTURES)
     assert [found.needed("right", t) for t in (0.0, 0.19, 0.2, 0.49, 0.5, 9.0)] == [0.98, 0.98, None, None, 0.9, 0.9]
     assert [found.needed("left", t) for t in (0.0, 0.3, 0.7)] == [None, 0.9, 0.8]
     assert (found.in_a_row, found.tap) == (2, 0.9)
-    without = Certainty.from_json(json.dumps({k: v for k, v in GOOD.items() if k != "gestures"} | {"tap": None}), ())
+    without = certainty(json.dumps({k: v for k, v in GOOD.items() if k != "gestures"} | {"tap": None}), ())
     assert without.needed("left", 0.1) == 0.98 and without.tap is None
 
 
@@ -522,16 +523,16 @@ BAD: list[tuple[Any, str]] = [
 @pytest.mark.parametrize(("found", "says"), BAD)
 def test_metadata_that_do_not_fit_are_refused(found: Any, says: str) -> None:
     with pytest.raises(ValueError, match=says):
-        Certainty.from_json(json.dumps(found), GESTURES)
+        certainty(json.dumps(found), GESTURES)
 
 
 @pytest.mark.parametrize("text", ["", "x", "NaN", "[" * 5000, '{"in_a_row":2'])
 def test_what_is_no_json_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="expected a JSON object"):
-        Certainty.from_json(text, GESTURES)
+        certainty(text, GESTURES)
 
 
 def test_nan_is_no_threshold() -> None:
     text = json.dumps(GOOD | {"tap": math.nan})
     with pytest.raises(ValueError, match="tap"):
-        Certainty.from_json(text, GESTURES)
+        certainty(text, GESTURES)
