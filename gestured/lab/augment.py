@@ -7,20 +7,28 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+# Each gesture stands in both, even if it keeps its name: what is missing would be taught its mirror image as itself.
 TURN = {  # a quarter turn clockwise, as seen
+    "one_tap": "one_tap", "double_tap": "double_tap",
     "swipe_up": "swipe_right", "swipe_right": "swipe_down", "swipe_down": "swipe_left", "swipe_left": "swipe_up",
+    "circle_clockwise": "circle_clockwise", "circle_counter_clockwise": "circle_counter_clockwise",
     "swipe_up_two_fingers": "two_finger_swipe_right", "two_finger_swipe_right": "swipe_down_two_fingers",
     "swipe_down_two_fingers": "two_finger_swipe_left", "two_finger_swipe_left": "swipe_up_two_fingers",
 }  # fmt: skip
 MIRROR = {  # left to right
-    "swipe_right": "swipe_left", "swipe_left": "swipe_right",
+    "one_tap": "one_tap", "double_tap": "double_tap",
+    "swipe_up": "swipe_up", "swipe_right": "swipe_left", "swipe_down": "swipe_down", "swipe_left": "swipe_right",
     "circle_clockwise": "circle_counter_clockwise", "circle_counter_clockwise": "circle_clockwise",
-    "two_finger_swipe_right": "two_finger_swipe_left", "two_finger_swipe_left": "two_finger_swipe_right",
+    "swipe_up_two_fingers": "swipe_up_two_fingers", "two_finger_swipe_right": "two_finger_swipe_left",
+    "swipe_down_two_fingers": "swipe_down_two_fingers", "two_finger_swipe_left": "two_finger_swipe_right",
 }  # fmt: skip
 
 
 def symmetry_table(classes: list[str]) -> Tensor:
-    """(8, K): what class each class becomes under mirroring (index + 4) and quarter turns clockwise (index % 4)."""
+    """(8, K): what class each class becomes under mirroring (index + 4) and quarter turns clockwise (index % 4).
+
+    A class that is no gesture keeps its name where TURN and MIRROR do not say what it becomes.
+    """
     place = {name: i for i, name in enumerate(classes)}
     table = np.zeros((8, len(classes)), dtype=np.int64)
     for symmetry in range(8):

@@ -7,11 +7,11 @@ import pytest
 import torch
 from torch import Tensor
 
-from gestured.lab.augment import symmetry_table, turned, varied
+from gestured.lab.augment import MIRROR, TURN, symmetry_table, turned, varied
 from gestured.lab.dataset import from_take
 from gestured.lab.fit import CLASSES
 from gestured.model.features import ACTIVE
-from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
+from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
 from tests.lab.made import direction, direction_of, gestures
 
 TABLE = symmetry_table(CLASSES)
@@ -24,6 +24,12 @@ def after(label: str, symmetry: int) -> str:
 
 def turn(frames: np.ndarray, symmetry: int) -> np.ndarray:
     return turned(torch.from_numpy(np.asarray(frames, np.float32))[None], symmetry)[0].numpy()
+
+
+@pytest.mark.parametrize("gesture", GESTURES)
+def test_what_becomes_of_each_gesture_is_said(gesture: str) -> None:
+    assert gesture in TURN, f"TURN in gestured/lab/augment.py does not say what {gesture} is after a quarter turn"
+    assert gesture in MIRROR, f"MIRROR in gestured/lab/augment.py does not say what {gesture} is in a mirror"
 
 
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
