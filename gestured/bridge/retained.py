@@ -23,7 +23,7 @@ class Retained:
     def changes(self) -> Iterator[tuple[str, str]]:
         """(topic, payload) of what the broker has to learn, an empty payload where it has to forget.
 
-        What was given counts as learned when the next is asked for.
+        A pair counts as learned by the broker as soon as the generator is asked for the next pair.
         """
         wanted = self._wanted()
         for topic, payload in wanted.items():

@@ -68,7 +68,10 @@ class Counts:
 
 
 def counted(played: Played, threshold: float, gesture: str | None = None) -> Counts:
-    """At one threshold; of one gesture alone, where it is named: its own that were missed, and what was called so."""
+    """Count the answers that are right, wrong, missed or false at one threshold.
+
+    With `gesture`, performances of that gesture can be right or missed, and answers that name it wrong or false.
+    """
     answered: dict[int, bool] = {}  # performed -> whether rightly
     wrong = false = 0
     for said in played.said:

@@ -125,7 +125,7 @@ class Cutter:
     def hole(self, onset: float, offset: float, until: float) -> float:
         """The longest time in s in which a finger may have done anything unseen, from before the onset to `until` s.
 
-        Infinite where nobody saw it come. Of a sensor that says no more nobody knows, and that counts for nothing.
+        It is infinite where the finger's arrival was not seen. A sensor that sends nothing more has no last hole.
         """
         last, longest = self._settled, 0.0
         for new in (*(kept.new for kept in self._kept), until):

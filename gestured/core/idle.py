@@ -80,7 +80,7 @@ class Noise:
         self.sigma: Array = np.ones(taxels)  # counts, each taxel's standard deviation
         self.level = 1.0  # counts, the median taxel's
         self.step = 0.0  # counts, one quantisation step: below it noise cannot be known
-        self.lively = False  # whether no frame of the idle sensor was the one before again
+        self.lively = False  # whether no frame of the idle sensor repeated the one before it
         self._reviewed = 0.0  # s, when it was last looked at
         self._smallest = 0.0  # counts, the smallest change of a sensor that stood still when it was learned; else 0
         self._shown: Array = np.zeros(taxels)  # the last raw counts of such a sensor
@@ -93,7 +93,10 @@ class Noise:
         self._set(sigma)
 
     def learns_step(self, raw: Array) -> bool:
-        """Whether (N,) counts of a sensor that has stood still so far tell its step anew, and with it its noise."""
+        """Learn the quantisation step, and with it the noise, from (N,) counts of a sensor that stood still so far.
+
+        True if these counts change by less than the smallest step known until now.
+        """
         if not self._smallest > 0:
             return False
         moved = raw != self._shown

@@ -40,7 +40,7 @@ class Stuck:
         self._blameless = False
 
     def judge(self, seen: Inspection) -> bool:
-        """A contact is over: a taxel that stood still under pressure, twice, is stuck. Whether others are, now."""
+        """A contact is over: a taxel that stood still under pressure twice is stuck. True if the stuck ones changed."""
         if self._blameless and not seen.any_suspect:
             return False
         self._strikes[seen.suspect] += 1

@@ -19,9 +19,9 @@ from gestured.core.frames import Touch
 from gestured.core.osc import Argument, Layouts, Message
 
 MAX_TOUCHES = 3
-# By bytes of a value; a quotient that is none of them is no size of a blob.
+# How the values of a blob are encoded, by its bytes for each taxel; a blob of any other size is refused.
 _BLOBS: dict[float, np.dtype[Any]] = {4: np.dtype(">f4"), 2: np.dtype(">u2"), 1: np.dtype(">u1")}
-_MAX_ROUTES = 4096  # one or two for each sensor; fewer than there are sensors would be as good as none
+_MAX_ROUTES = 4096  # addresses that are remembered; a sensor has one or two, so 2000 sensors have room
 _MAX_PENDING = 256
 
 

@@ -18,7 +18,7 @@ def exposition(metrics: Metrics, snapshot: Snapshot) -> bytes:
     return generate_latest(registry)
 
 
-# Of each sensor; of several that share a label: the worst of them, and all bad taxels.
+# Figures of each sensor. Sensors that share a label show one figure: the worst of theirs, or the sum of bad taxels.
 _OF_SENSORS: tuple[tuple[str, str, Callable[[Iterable[float]], float], Callable[[Reading], float]], ...] = (
     ("gestured_sensor_rate_hertz", "Frames a second", min, lambda r: r.rate_hz),
     ("gestured_sensor_jitter_seconds", "Interarrival jitter of packets", max, lambda r: r.jitter_s),

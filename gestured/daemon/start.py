@@ -77,18 +77,19 @@ async def _run(settings: Settings, load: Loader) -> None:
 
 
 def _abort(how: int) -> None:
-    """Block or unblock, in this thread, the signal with which systemd ends a hang.
+    """Block or unblock, in this thread, SIGABRT, with which systemd ends a daemon that hangs.
 
-    It is for the loop's thread: taken by another one, a process that was stopped, and is woken to be ended, would read
-    what waits in its sockets first, and that is the next start's.
+    Only the loop's thread may take this signal. systemd wakes a stopped process to end it; if another thread took the
+    signal, the loop would first read the packets in its sockets, which are meant for the daemon that starts next.
     """
     signal.pthread_sigmask(how, [signal.SIGABRT])
 
 
 def _when(number: signal.Signals, act: Callable[[], object]) -> None:
-    """Act on a signal. Not by the loop's own means: those give a signal its default action, which is death, as they go.
+    """Call `act` on a signal.
 
-    A signal that comes in that moment may find a thread that does not block it, and there are some.
+    The event loop's own handlers are not used. A loop that closes gives its signals their default action, so that a
+    signal at that moment would kill the process; blocking it would not help, since other threads do not block it.
     """
     signal.signal(number, lambda *_: act())
 

@@ -15,7 +15,7 @@ from gestured.core.front_end import DRAFT_S, FrontEnd
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP
 
 PREVIEW_S = 0.0666  # from one preview to the next: 15 a second, a little less than 1/15 because times are rounded
-EACH_FRAME_S = 0.0635  # a sensor this slow is shown with each frame: at 15 Hz its rate is known to some per cent
+EACH_FRAME_S = 0.0635  # s from frame to frame, from which on each frame is shown: 5 % below 1/15, as rates vary
 
 Answer = TypeVar("Answer", bound=Gesture | Unknown | Cancelled)
 

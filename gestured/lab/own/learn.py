@@ -66,7 +66,8 @@ def learn(seen: Seen) -> Space:
     """The space, its thresholds, slope and margin."""
     everybody = np.ones(len(seen.labels), bool)
     space = _without_thresholds(seen, everybody)
-    # Signs are what the network has not learned, as the user's own gestures are: other kinds look easier than they are.
+    # The thresholds come from signs alone. The network has not learned signs, just as it has not learned what a user
+    # enrols; kinds that it has learned would seem easier to tell apart than a user's gestures are.
     trials = [trial for trial in played_through(seen) if trial.fits and trial.kind in SIGNS]
     by_count = [[trial for trial in trials if trial.examples == count] for count in range(1, EXAMPLES + 1)]
     thresholds = tuple(
