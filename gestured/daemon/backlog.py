@@ -1,5 +1,6 @@
 """Packets that wait for their turn, and who is served when more comes than can be done."""
 
+import math
 from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
@@ -48,13 +49,15 @@ class Backlog:
         self._cost: dict[Sender, float] = {}  # s of work a byte
         self._credit: dict[Sender, tuple[float, float]] = {}  # s of work, and `_equal` then
         self._equal = 0.0  # s of work that each owner could have had so far, all turns together
+        self._turns = 0.0  # s of turns that have passed since a packet was served that costs more than one
 
     def __bool__(self) -> bool:
         return bool(self._waiting)
 
-    def age(self, now: float) -> float:
-        """How long the oldest has been waiting, in s; 0 where nothing waits."""
-        return max(0.0, now - self._waiting[0].arrival) if self._waiting else 0.0
+    @property
+    def oldest(self) -> float:
+        """When what has waited longest arrived, in s; infinite where nothing waits."""
+        return self._waiting[0].arrival if self._waiting else math.inf
 
     def add(self, datagrams: list[Datagram], now: float) -> None:
         """Let these wait, in the order of their arrival."""
@@ -95,10 +98,11 @@ class Backlog:
         self._bytes -= size
         return found
 
-    def share(self, seconds: float, now: float) -> tuple[list[Datagram], dict[Sender, int]]:
-        """In a flood: what is to be served in a turn of so many seconds, and how many packets of whom were dropped.
+    def share(self, seconds: float, now: float) -> tuple[list[Datagram], dict[Sender, list[bytes]]]:
+        """In a flood: what is to be served in a turn of so many seconds, and which packets of whom were dropped.
 
-        Nothing waits after it.
+        Nothing waits after it. A packet that costs more than a turn is served once so many turns have passed, since
+        while it is worked on, the kernel's buffer fills.
         """
         by_sender: dict[Sender, list[Datagram]] = {}
         for datagram in self._waiting:
@@ -112,13 +116,14 @@ class Backlog:
         shares |= fair({key: need for key, need in needs.items() if key not in owners}, seconds - spent)
         before = self._equal
         self._equal += min((shares[key] for key in owners), default=OWNERS_SHARE * seconds)
+        self._turns = min(self._turns + seconds, CREDIT_S)
         served: list[Datagram] = []
-        dropped: dict[Sender, int] = {}
+        dropped: dict[Sender, list[bytes]] = {}
         for key in sorted(by_sender, key=needs.__getitem__):
-            kept = self._newest(key, by_sender[key], shares[key], before)
+            kept = self._newest(key, by_sender[key], shares[key], before, seconds)
             served += kept
-            if len(kept) < len(by_sender[key]):
-                dropped[key] = len(by_sender[key]) - len(kept)
+            if left := by_sender[key][: len(by_sender[key]) - len(kept)]:
+                dropped[key] = [datagram.packet for datagram in left]
         if dropped:
             self.flood(now + FLOOD_S)
         return served, dropped
@@ -139,7 +144,9 @@ class Backlog:
         guess = len(datagram.packet) * self._cost.get(self.sender(datagram.source), FIRST_GUESS)
         return min(guess, CREDIT_S)  # so that anybody is served in the end
 
-    def _newest(self, key: Sender, datagrams: list[Datagram], share: float, before: float) -> list[Datagram]:
+    def _newest(
+        self, key: Sender, datagrams: list[Datagram], share: float, before: float, seconds: float
+    ) -> list[Datagram]:
         credit, equal = self._credit.get(key, (CREDIT_S, before))
         if isinstance(key, tuple):
             credit += before - equal  # turns in which it sent nothing; a stranger that pauses has earned nothing
@@ -147,9 +154,11 @@ class Backlog:
         kept: list[Datagram] = []
         for datagram in reversed(datagrams):
             cost = self._guess(datagram)
-            if cost > credit:
+            if cost > credit or (cost > seconds and cost > self._turns):
                 break
             credit -= cost
+            if cost > seconds:
+                self._turns -= cost
             kept.append(datagram)
         if len(self._credit) < REMEMBERED_SENDERS or key in self._credit:
             self._credit[key] = credit, self._equal

@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 from gestured.core.owner import Source
 
-TOO_MANY = 100  # packets dropped within a second after which their sender is muted
+TOO_MUCH = 64 << 10  # bytes that are dropped of a sender within a second, after which it is muted
+HEADER_BYTES = 512  # that a packet takes in the kernel's buffer beside its own
 FIRST_S = 1.0  # how long a sender is muted at first; each further time lasts twice as long as the one before
 LONGEST_S = 8.0  # how long a sender is muted at most: whoever has mended his flood is heard soon
 SO_ATTACH_FILTER, SO_DETACH_FILTER = 26, 27  # Linux; not in Python's socket module
@@ -32,19 +33,19 @@ class Muted:
     def __init__(self) -> None:
         self._until: dict[Sender, tuple[float, float]] = {}  # s, and for how long
         self._next = math.inf  # s, when the first of them is to be heard again
-        self._dropped: dict[Sender, int] = {}  # packets, since
+        self._dropped: dict[Sender, int] = {}  # bytes in the kernel's buffer, since
         self._since = 0.0  # s
 
-    def blame(self, dropped: Mapping[Sender, int], now: float) -> list[Sender]:
-        """So many packets of these senders had to be dropped: who is muted for it from now on."""
+    def blame(self, dropped: Mapping[Sender, Collection[bytes]], now: float) -> list[Sender]:
+        """These packets had to be dropped, by their senders: who is muted for it from now on."""
         if now - self._since > 1.0:
             self._dropped, self._since = {}, now
         found: list[Sender] = []
-        for sender, count in dropped.items():
-            count += self._dropped.get(sender, 0)
-            self._dropped[sender] = count
+        for sender, packets in dropped.items():
+            size = self._dropped.get(sender, 0) + sum(map(len, packets)) + HEADER_BYTES * len(packets)
+            self._dropped[sender] = size
             until, before = self._until.get(sender, (0.0, 0.0))
-            if count >= TOO_MANY and now >= until:
+            if size >= TOO_MUCH and now >= until:
                 again = now < until + 2 * LONGEST_S
                 length = min(LONGEST_S, 2 * before) if again and before else FIRST_S
                 self._until[sender] = now + length, length

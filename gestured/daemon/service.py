@@ -158,7 +158,7 @@ class Service:
             self._pulse.woke(time.monotonic() - due)
             self._receiver.read()
             now = time.monotonic()
-            self._desk.take(self._hub.tick(self._receiver.served(now)))
+            self._desk.take(self._hub.tick(self._receiver.served))
             if now >= status_at:
                 status_at = max(status_at + STATUS_S, now)  # on time, but not all at once after a stall
                 self._every_second(now)

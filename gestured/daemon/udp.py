@@ -57,10 +57,13 @@ class Receiver:
         self._backlog = Backlog(lambda source: source in hub.owners)
         self._muted = Muted()
         _, self._wall = self._clocks()  # s, from the monotonic clock to the one that the kernel stamps with
-        self._empty = empty  # s, when the socket was last seen empty
+        self._empty = empty  # s: what arrived until then was read
+        # s: what arrived until then was served. Time must not decide beyond it: a sensor whose packets wait, read or
+        # in the socket behind those of others, is not silent.
+        self.served = empty
+        self.behind_s = 0.0  # by which that was behind the clock at the last read
         self._drops = 0  # packets that the kernel had dropped then
         self._dropping = -FLOOD_S  # s, when it began to
-        self.behind_s = 0.0  # for so long the oldest packet waits that was read and not yet served
         self._looked = 0.0  # s, when we last looked whether something waits
         self._found = 0  # packets, then
         self._sparse = False  # whether the last ones came after a pause
@@ -69,13 +72,6 @@ class Receiver:
         self._due = math.inf  # s, when time alone will decide something
         self._alarm: asyncio.Handle | None = None
         self._loop.add_reader(sock, self._wake)
-
-    def served(self, now: float) -> float:
-        """The time until which everything that arrived was served: a sensor whose packets wait is not silent.
-
-        What was read and waits counts, and what is still in the socket, behind the packets of others, does as well.
-        """
-        return min(now - self.behind_s, self._empty)
 
     def close(self) -> None:
         """Stop reading; the socket stays its owner's."""
@@ -101,7 +97,7 @@ class Receiver:
         """Serve everything that waits, within reason: the end is near."""
         end = self._clock() + DRAIN_S
         self.read()
-        while self._backlog and self._clock() < end:
+        while self._again is not None and self._clock() < end:
             self.read()
 
     def read(self) -> None:
@@ -115,11 +111,14 @@ class Receiver:
         if abs(wall - self._wall) > STEP_S:
             found = [(packet, b"", source) for packet, _, source in found]
         self._found = len(found)
-        much = len(found) > FEW and sum(len(packet) for packet, _, _ in found) > GROUP_BYTES
+        much = len(found) > 1 and sum(len(packet) for packet, _, _ in found) > GROUP_BYTES
         late = bool(found) and now - self._arrival(found[0][1], now) >= TOGETHER_S
         if found and (full or much or late or self._backlog or self._backlog.flooded(now)):
-            self._backlog.add(self._datagrams(found, now), now)
+            datagrams = self._datagrams(found, now)
+            self._backlog.add(datagrams, now)
             self._count_drops(now)
+            if found[-1][1]:
+                self._empty = datagrams[-1].arrival  # the kernel gives packets in the order in which they came
         elif found:
             self._serve([(packet, source) for packet, _, source in found], now)
         if not full:
@@ -128,7 +127,8 @@ class Receiver:
         if self._backlog:
             self._work(now)
         self._mute(now, self._muted.over(now))
-        self.behind_s = self._backlog.age(now)
+        self.served = min(self._empty, self._backlog.oldest)
+        self.behind_s = now - self.served
         if self._backlog or full:
             self._again = self._loop.call_soon(self.read)
 
@@ -147,12 +147,11 @@ class Receiver:
             for _ in range(BATCH):
                 packet, ancillary, _, source = receive(PACKET_BYTES, ANCILLARY_BYTES)
                 found.append((packet, ancillary[0][2] if ancillary else b"", source))
-            return found, True
         except (BlockingIOError, InterruptedError):
-            pass
+            return found, False
         except (OSError, MemoryError) as error:  # the network's complaint about something else; the socket goes on
             self._desk.drop("socket_error", error=str(error))
-        return found, False
+        return found, True
 
     def _arrival(self, stamp: bytes, now: float) -> float:
         """When a packet came, in s of the monotonic clock: after the socket was empty, and not after `now`."""
@@ -188,15 +187,14 @@ class Receiver:
         for n, datagram in enumerate(served):
             if before > start + TURN_S:
                 for left in served[n:]:
-                    sender = self._backlog.sender(left.source)
-                    dropped[sender] = dropped.get(sender, 0) + 1
+                    dropped.setdefault(self._backlog.sender(left.source), []).append(left.packet)
                 break
             self._serve([(datagram.packet, datagram.source)], datagram.arrival)
             after = time.thread_time()
             self._backlog.took(datagram, after - before)
             before = after
         if dropped:
-            self._desk.drop("flood", count=sum(dropped.values()))
+            self._desk.drop("flood", count=sum(map(len, dropped.values())))
             self._hub.missed()
             if blamed := self._muted.blame(dropped, now):
                 self._desk.muted(blamed)
@@ -234,7 +232,7 @@ class Receiver:
             self._alarm = self._loop.call_soon(self._wait)
         else:
             self.read()
-            self._desk.take(self._hub.wait(self.served(self._clock())))
+            self._desk.take(self._hub.wait(self.served))
             self._due = math.inf
             self._expect()
 

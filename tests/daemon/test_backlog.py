@@ -82,7 +82,7 @@ def flood(
         now += 0.002
         waiting.add([Datagram(now, FRAME, source) for source, count in senders.items() for _ in range(count)], now)
         found, dropped = waiting.share(seconds, now)
-        assert len(found) + sum(dropped.values()) == sum(senders.values()) and not waiting
+        assert len(found) + sum(map(len, dropped.values())) == sum(senders.values()) and not waiting
         for datagram in found:
             waiting.took(datagram, cost)
             served[datagram.source] += 1

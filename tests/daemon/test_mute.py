@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from gestured.daemon.mute import FIRST_S, LONGEST_S, TOO_MANY, Muted, Rule, mute
+from gestured.daemon.mute import FIRST_S, HEADER_BYTES, LONGEST_S, TOO_MUCH, Muted, Rule, mute
 
 
 class Wire:
@@ -86,13 +86,14 @@ def test_more_rules_than_the_kernel_takes_are_cut_off(wire: Wire) -> None:
 
 
 HOST, OWNER = "10.0.0.1", ("10.0.0.1", 5)
+NEARLY, ENOUGH = [bytes(TOO_MUCH - 2 * HEADER_BYTES)], [b""]  # too much only together
 
 
 def test_who_floods_is_muted_for_longer_each_time_but_never_for_good() -> None:
     muted, now, lengths = Muted(), 0.0, []
     for _ in range(6):
-        assert muted.blame({HOST: TOO_MANY - 1}, now) == []
-        assert muted.blame({HOST: 1}, now) == [HOST] and muted.blame({HOST: 500}, now) == []
+        assert muted.blame({HOST: NEARLY}, now) == []
+        assert muted.blame({HOST: ENOUGH}, now) == [HOST] and muted.blame({HOST: 9 * NEARLY}, now) == []
         start = now
         assert muted.rules(now, [OWNER]) == [Rule(*OWNER, True), Rule(HOST, None, False)]
         while not muted.over(now):
@@ -102,13 +103,13 @@ def test_who_floods_is_muted_for_longer_each_time_but_never_for_good() -> None:
         now += 1.5
     assert lengths == [FIRST_S, 2 * FIRST_S, 4 * FIRST_S, LONGEST_S, LONGEST_S, LONGEST_S]
     now += 3 * LONGEST_S
-    assert muted.over(now) == [] and muted.blame({HOST: TOO_MANY}, now) == [HOST]
+    assert muted.over(now) == [] and muted.blame({HOST: NEARLY + ENOUGH}, now) == [HOST]
     assert muted.over(now + FIRST_S) == [HOST]  # what was long ago is forgotten
 
 
 def test_an_owner_that_floods_is_muted_alone() -> None:
     muted = Muted()
-    muted.blame({OWNER: TOO_MANY, HOST: TOO_MANY}, 1.0)
+    muted.blame({OWNER: NEARLY + ENOUGH, HOST: [b""] * (TOO_MUCH // HEADER_BYTES)}, 1.0)
     assert muted.rules(1.0, [OWNER, (HOST, 6), ("10.0.0.2", 5)]) == [
         Rule(*OWNER, False), Rule(HOST, 6, True), Rule(HOST, None, False),
     ]  # fmt: skip

@@ -114,7 +114,7 @@ class Bench:
             while backlog:
                 group = backlog.group()
                 facts += hub.receive([(datagram.packet, datagram.source) for datagram in group], group[-1].arrival)
-                facts += hub.tick(now - backlog.age(now))
+                facts += hub.tick(min(now, backlog.oldest))
         facts += hub.flush(now)
         return [json.loads(messages.to_json(fact, 0.0)) for fact in facts if isinstance(fact, Event)]
 

@@ -11,7 +11,7 @@ import numpy as np
 from gestured.core.address import Address
 from tests import encoding
 
-BURST = 50  # packets at a time; fifty microseconds of work
+PAUSE_S = 0.001  # between two looks at the clock, so that packets come as evenly as they can
 OWNERS = 58  # names, and so sensors, of the kinds "owners" and "claims"
 CALM_S = 1.0  # for which they are sensors like any other, so that they own their names
 
@@ -51,9 +51,9 @@ def main() -> int:
         start = time.monotonic()
         while (passed := time.monotonic() - start) < args.seconds:
             if sent > passed * args.rate:
-                time.sleep(BURST / args.rate)
+                time.sleep(PAUSE_S)
                 continue
-            for _ in range(min(BURST, max(1, int(args.rate / 100)))):
+            for _ in range(max(1, int(args.rate * PAUSE_S))):
                 socks[sent % len(socks)].send(what[sent % len(what)])
                 sent += 1
     print(f"{args.kind}: {sent / args.seconds:.0f} packets/s", flush=True)
