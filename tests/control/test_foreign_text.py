@@ -24,10 +24,9 @@ from gestured.core.wire import Addresses
 from gestured.record import arrays as recording
 from gestured.record import tape_reader, tape_writer
 from tests.control.conftest import ROOT, gestures
-from tests.control.test_listen import GESTURE
 from tests.daemon.harness import Hand, floats
 from tests.small_recording import example, save, session
-from tests.sockets import HELLO, FakeDaemon
+from tests.sockets import GESTURE, HELLO, FakeDaemon
 
 # Sets the title, clears the screen, turns the writing around, begins new lines, ends the string.
 HOSTILE = '\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp.exe\u2028new\nline\r\x7f\x00"x'

@@ -93,8 +93,8 @@ def test_the_table_of_a_document_and_of_the_cards_is_renewed(
     main()
     printed = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| `")]
     assert [line.split("`")[1] for line in printed] == [f"{name}.onnx" for name in shipped()]
-    document, *cards = (document.read_text().splitlines() for document in documents)
-    assert [line for line in document if line.startswith("| `")] == printed
+    page, *cards = (document.read_text().splitlines() for document in documents)
+    assert [line for line in page if line.startswith("| `")] == printed
     assert [line for card in cards for line in card if line.startswith("| `")] == printed
-    for lines in (document, *cards):
+    for lines in (page, *cards):
         assert (lines[0], lines[-1]) == ("before", "after") and "old" not in lines
