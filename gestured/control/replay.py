@@ -2,23 +2,19 @@
 
 import argparse
 import json
-import os
 import sys
-import time
 from collections import Counter
 from collections.abc import Iterable
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from gestured.client.address import find_socket
 from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json, tell
 from gestured.client.values import host_port
 from gestured.control.diff import Answer, Knew, Line, Recorded
 from gestured.control.labelled import Labelled
 from gestured.control.listen import readable
-from gestured.control.sending import Hearing, retimed, send
+from gestured.control.sending import send
 from gestured.core import messages
 from gestured.core.address import is_sensor
 from gestured.core.errors import GesturedError, RecordingError
@@ -26,7 +22,7 @@ from gestured.core.scene import Scene
 from gestured.model.ladder import Ladder, ladder_for
 from gestured.model.own import Own
 from gestured.model.shipped import shipped
-from gestured.record.replay import Maker, Mute, Replay
+from gestured.record.replay import Maker, Replay
 
 DEFAULT_MODEL = "cnn_lstm"  # for a file that names none
 Playable = Recorded | Labelled
@@ -45,19 +41,12 @@ def add(commands: Commands) -> None:
         'At another speed than 1 the daemon must run with clock = "sensor" (gestured --clock sensor): by the\n'
         "time of arrival all would be too fast.",
         epilog="examples:\n  gesturectl replay drive.mcap --diff --model candidate.onnx\n"
-        "  gesturectl replay drive.mcap --to 127.0.0.1:9000 --diff\n"
-        "  gesturectl replay 07.npz --to 127.0.0.1:9000 --speed 10 --diff",
+        "  gesturectl replay 07.npz --to 127.0.0.1:9000 --speed 10",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="what gesturectl record or flag wrote, or an .npz")
     parser.add_argument("--to", type=host_port, metavar="HOST:PORT", help="send it to the daemon that listens there")
     parser.add_argument("--diff", action="store_true", help="compare with the recorded events, or the labels")
     parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="with --to: so many times as fast")
-    parser.add_argument(
-        "--socket",
-        type=Path,
-        metavar="PATH",
-        help="with --to and --diff: that daemon's event socket (default: its own)",
-    )
     parser.add_argument(
         "--model",
         metavar="MODEL",
@@ -81,8 +70,6 @@ def run(args: argparse.Namespace) -> int:
         raise RecordingError(f"{args.file}: holds no packets")
     if args.to is None:
         return _here(args, source)
-    if args.diff:
-        return _there(args, source)
     _send(args, source)
     return 0
 
@@ -92,8 +79,10 @@ def _check(args: argparse.Namespace) -> None:
         raise GesturedError(f"--speed {args.speed:g}: expected more than 0, at most 1000")
     if not is_sensor(args.sensor):
         raise GesturedError(f"--sensor {args.sensor!r}: expected 1 to 64 of A-Z a-z 0-9 _ -")
-    if args.to is None and (args.speed != 1 or args.socket is not None):
-        raise GesturedError("--speed and --socket are for a daemon: name it with --to HOST:PORT")
+    if args.to is None and args.speed != 1:
+        raise GesturedError("--speed is for a daemon: name it with --to HOST:PORT")
+    if args.to is not None and args.diff:
+        raise GesturedError("--diff compares a replay here, without --to; gesturectl listen prints what a daemon says")
     if args.to is not None and args.provisional:
         raise GesturedError("--provisional is for a replay here; listen --types provisional asks a daemon for them")
     if args.to is not None and args.model is not None:
@@ -144,30 +133,12 @@ def _recorded_models(path: Path, maker: Maker) -> list[Path]:
     return [shipped()[name] for name in names]
 
 
-def _there(args: argparse.Namespace, source: Playable) -> int:
-    """To a daemon, whose events are compared."""
-    # Which gestures there are is the daemon's business.
-    scene = source.scene(("none",)) if isinstance(source, Labelled) else source.maker.scene
-    rehearsal = Replay(source.tape, scene, Mute(scene.gestures))  # when sensors are known, and contacts begin
-    for _ in rehearsal.events():
-        pass
-    with closing(Hearing(args.socket or find_socket(os.environ), frozenset(rehearsal.played))) as hearing:
-        sent = _send(args, source)
-        heard = hearing.all(time.time())
-    status = _compare(args, source, retimed(heard, sent, source.tape, rehearsal), _knew(rehearsal))
-    if status and args.speed != 1:
-        say(f'at --speed {args.speed:g} that daemon must run with clock = "sensor"; does it?', to=sys.stderr)
-    return status
-
-
-def _send(args: argparse.Namespace, source: Playable) -> list[float]:
-    """When each packet was sent. Raises GesturedError where nobody listens."""
-    sent, unheard = send(source.tape, args.to, args.speed)
-    where = str(args.to)
+def _send(args: argparse.Namespace, source: Playable) -> None:
+    """To a daemon. Raises GesturedError where nobody listens."""
+    unheard, count = send(source.tape, args.to, args.speed), len(source.tape.packets)
     if unheard:
-        raise GesturedError(f"nobody listened on {where} for {unheard} of {len(sent)} packets")
-    say(f"sent {len(sent)} packets to {where}", to=sys.stderr)
-    return sent
+        raise GesturedError(f"nobody listened on {args.to} for {unheard} of {count} packets")
+    say(f"sent {count} packets to {args.to}", to=sys.stderr)
 
 
 def _knew(replay: Replay) -> Knew:

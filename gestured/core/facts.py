@@ -33,7 +33,6 @@ class Taken(NamedTuple):
     """A frame that was used; told of only where the scene asks for `frames`."""
 
     sensor: str
-    arrived: float  # s
     frame: Frame  # stamped, as it was sent
     new: bool  # the sensor came, or restarted: what was learned of it before does not hold
     ready: bool  # whether the idle sensor is known, this frame included

@@ -230,7 +230,7 @@ class Sensor:
                 continue
             taken += 1
             if self._scene.frames:
-                facts.append(Taken(self.name, now, frame, self._fresh, self.front_end.ready))
+                facts.append(Taken(self.name, frame, self._fresh, self.front_end.ready))
             self._fresh = False
             if told:
                 self._add(told, now, facts)

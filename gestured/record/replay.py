@@ -10,7 +10,7 @@ from typing import Any
 
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.errors import ModelError, RecordingError
-from gestured.core.events import Event, Onset
+from gestured.core.events import Event
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
 from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
@@ -75,16 +75,13 @@ class Mute(Classifier):
 
 @dataclass
 class Played:
-    """What a replay has seen of one sensor; times in s since the tape's first packet."""
+    """When a replay's sensor was known; times in s since the tape's first packet."""
 
-    stamps: list[tuple[float, float]] = field(default_factory=list)  # when a frame arrived, and when it was felt
-    onsets: list[float] = field(default_factory=list)
     _learned: list[tuple[float, float]] = field(default_factory=list)  # since when it was new, and from when on known
 
     def see(self, taken: Taken) -> None:
         """Remember one more frame that was used."""
         t = taken.frame.t
-        self.stamps.append((taken.arrived, t))
         if taken.new:
             self._learned.append((t, math.inf))
         if taken.ready and self._learned[-1][1] == math.inf:
@@ -145,6 +142,4 @@ class Replay:
                 raise fact.error  # here nobody depends on the other sensors
             if isinstance(fact, Taken):
                 self.played.setdefault(fact.sensor, Played()).see(fact)
-            elif isinstance(fact, Onset):
-                self.played[fact.sensor].onsets.append(fact.onset)
             yield fact

@@ -1,4 +1,4 @@
-"""`gesturectl replay`: to a daemon and here, held against what was recorded or labelled."""
+"""`gesturectl replay`: sent to a daemon, or here and held against what was recorded or labelled."""
 
 import json
 import signal
@@ -21,11 +21,6 @@ from tests.sockets import free_address
 LEAD_S = 1.6  # untouched; 24 frames
 
 
-def to(daemon: Daemon) -> tuple[str, ...]:
-    """The flags with which replay finds a daemon."""
-    return "--to", daemon.ready["listen"], "--socket", str(daemon.socket)
-
-
 @pytest.fixture
 def replay(capsys: pytest.CaptureFixture[str]):
     """`gesturectl replay`: exit status, standard output, standard error."""
@@ -37,30 +32,21 @@ def replay(capsys: pytest.CaptureFixture[str]):
     return run
 
 
-def mixed_up() -> tuple[str, ...]:
-    """The gestures of a model to which a tap is a swipe, and the other way round."""
-    names = list(tiny_model.GESTURES)
-    names[0], names[5] = names[5], names[0]
-    return tuple(names)
-
-
 def said(out: str) -> list[str]:
     """Sign and answer of each line of differences."""
     return [line[0] + line.rpartition(": ")[2].split()[0] for line in out.splitlines()]
 
 
-def test_what_a_daemon_answers_is_compared_with_what_was_recorded(
-    recorded, replay, daemon: Daemon, serve, tmp_path: Path
-) -> None:
+def test_a_daemon_to_which_it_is_sent_answers_as_the_recorded_one_did(recorded, replay, daemon: Daemon, serve) -> None:
     path, _ = recorded(gestures(daemon, "cmp", "left", "tap", "up"))
-    same = to(serve("--clock", "sensor"))
+    other = serve("--clock", "sensor")
+    client = other.client().subscribe("gesture", "status")
     for _ in range(2):  # the second time it knows the sensor, whose clock is far ahead
-        status, out, err = replay(path, *same, "--speed", 50, "--diff")
-        assert (status, out) == (0, "") and "3 recorded answers, 0 differences" in err
-    model = tiny_model.make(tmp_path / "other.onnx", gestures=mixed_up())
-    other = to(serve("--clock", "sensor", model=model))
-    status, out, err = replay(path, *other, "--speed", 50, "--diff")
-    assert status == 1 and said(out) == ["-swipe_left", "+one_tap", "-one_tap", "+swipe_left"]
+        status, out, err = replay(path, "--to", other.ready["listen"], "--speed", 50)
+        assert (status, out) == (0, "") and err.startswith("sent ")
+        answers = client.events("gesture", "cmp", 3)
+        assert [event["gesture"] for event in answers] == ["swipe_left", "one_tap", "swipe_up"]
+        client.until(lambda line: line.get("sensors", {}).get("cmp") == "stale")  # free for another source
 
 
 def labelled(path: Path, *performed: tuple[str, list[Frame]], lead_s: float = LEAD_S) -> Path:
@@ -95,14 +81,12 @@ def wrongly(tmp_path: Path) -> Path:
     )
 
 
-def test_labels_are_compared_here_and_at_a_daemon(replay, serve, wrongly: Path, tmp_path: Path) -> None:
+def test_labels_are_compared_with_what_a_model_says_of_their_recordings(replay, wrongly: Path, tmp_path: Path) -> None:
     model = tiny_model.make(tmp_path / "tiny.onnx")
-    there = (*to(serve("--clock", "sensor")), "--speed", 50)
-    for way in (("--model", model), there):
-        status, out, err = replay(wrongly, *way, "--diff")
-        assert (status, said(out)) == (1, ["-swipe_up", "+swipe_down", "-none", "+swipe_right"]), err
-        assert "3 labels, 2 differences" in err
-        assert [line.split()[1:5] for line in out.splitlines()][:2] == [["101.600", "s", "recording", "1:"]] * 2
+    status, out, err = replay(wrongly, "--model", model, "--diff")
+    assert (status, said(out)) == (1, ["-swipe_up", "+swipe_down", "-none", "+swipe_right"]), err
+    assert "3 labels, 2 differences" in err
+    assert [line.split()[1:5] for line in out.splitlines()][:2] == [["101.600", "s", "recording", "1:"]] * 2
     status, out, _ = replay(wrongly, "--model", model, "--diff", "--json")
     assert [json.loads(line)["recorded"]["sensor"] for line in out.splitlines()] == ["recording 1", "recording 2"]
     status, out, _ = replay(wrongly, "--model", model, "--sensor", "arm", "--json")
@@ -111,13 +95,12 @@ def test_labels_are_compared_here_and_at_a_daemon(replay, serve, wrongly: Path, 
     assert [e["gesture"] for e in events if e["type"] == "gesture"] == ["swipe_left", "swipe_down", "swipe_right"]
 
 
-def test_by_the_time_of_arrival_a_daemon_says_the_same_in_real_time(replay, serve, tmp_path: Path) -> None:
+def test_by_the_time_of_arrival_a_daemon_answers_what_is_sent_at_its_own_pace(replay, serve, tmp_path: Path) -> None:
     path = labelled(tmp_path / "a.npz", ("swipe_left", Hand().swipe("left")))
-    there = to(serve("--clock", "arrival"))
-    status, out, err = replay(path, *there, "--diff")
-    assert (status, out) == (0, "") and "1 labels, 0 differences" in err
-    status, out, err = replay(path, *there, "--diff", "--speed", 100)
-    assert status == 1 and 'must run with clock = "sensor"' in err
+    there = serve("--clock", "arrival")
+    client = there.client().subscribe("gesture")
+    assert replay(path, "--to", there.ready["listen"])[0] == 0
+    assert client.events("gesture", "recording")[0]["gesture"] == "swipe_left"
 
 
 def test_what_is_touched_before_the_sensor_can_be_known_is_not_compared(replay, tmp_path: Path) -> None:
@@ -126,7 +109,7 @@ def test_what_is_touched_before_the_sensor_can_be_known_is_not_compared(replay, 
     assert (status, out) == (0, "") and "0 labels, 2 before the sensor was known, 0 differences" in err
 
 
-def test_a_session_with_a_long_pause_is_compared_event_by_event(replay, serve, tmp_path: Path) -> None:
+def test_a_session_with_a_long_pause_is_compared_event_by_event(replay, tmp_path: Path) -> None:
     hand = Hand()
     parts = [hand.idle(2.0) + hand.swipe("left") + hand.idle(1.5), hand.idle(1.0) + hand.swipe("up") + hand.idle(1.0)]
     times = [np.arange(len(parts[0])) / RATE_HZ, 60.0 + np.arange(len(parts[1])) / RATE_HZ]
@@ -145,35 +128,20 @@ def test_a_session_with_a_long_pause_is_compared_event_by_event(replay, serve, t
     )
     path = tmp_path / "session.npz"
     recording.write(path, made)
-    status, out, err = replay(path, *to(serve("--clock", "sensor")), "--speed", 200, "--diff")
+    status, out, err = replay(path, "--model", tiny_model.make(tmp_path / "tiny.onnx"), "--diff")
     assert (status, out) == (0, "") and "2 labels, 0 differences" in err
 
 
-def test_a_daemon_that_cannot_be_compared_with_is_one_sentence(replay, serve, daemon: Daemon, wrongly: Path) -> None:
-    for way in ((), ("--socket", daemon.socket, "--diff")):
-        status, _, err = replay(wrongly, "--to", free_address(), "--speed", 1000, *way)
-        assert status == 1 and "nobody listened" in err
-    there = to(serve("--clock", "sensor"))[:2]
-    status, _, err = replay(wrongly, *there, "--speed", 100, "--socket", daemon.socket, "--diff")
-    assert status == 1 and f"{daemon.socket} took no frame of recording" in err
-    status, _, err = replay(wrongly, *there, "--socket", daemon.folder / "none.sock", "--diff")
-    assert status == 1 and "No such file" in err
-
-
-def test_a_sensor_that_is_there_already_is_left_alone(replay, daemon: Daemon, wrongly: Path, monkeypatch) -> None:
-    monkeypatch.setattr("gestured.control.sending.STATUS_TIMEOUT_S", 1.5)
-    Sensor(daemon, "live").begin()
-    daemon.client().subscribe("status").until(lambda line: line.get("sensors", {}).get("live") == "ok")
-    flags = ["--to", daemon.ready["listen"], "--socket", str(daemon.socket), "--diff", "--sensor", "live"]
-    status, _, err = replay(wrongly, *flags)
-    assert status == 1 and "live: is being sent to that daemon already" in err
+def test_where_nobody_listens_is_one_sentence(replay, wrongly: Path) -> None:
+    status, _, err = replay(wrongly, "--to", free_address(), "--speed", 1000)
+    assert status == 1 and "nobody listened" in err and err.count("\n") == 1
 
 
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
         (("--speed", "2"), "--to HOST:PORT"),
-        (("--socket", "x.sock"), "--to HOST:PORT"),
+        (("--to", "127.0.0.1:1", "--diff"), "--diff compares a replay here"),
         (("--to", "127.0.0.1:1", "--model", "lstm"), "the daemon of --to has its own"),
         (("--to", "127.0.0.1:1", "--speed", "0"), "--speed 0"),
         (("--sensor", "a/b"), "--sensor 'a/b'"),
