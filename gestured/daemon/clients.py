@@ -4,7 +4,6 @@ A line is encoded once and sent at once to each client that wants it; what its s
 """
 
 import asyncio
-import errno
 import select
 import socket
 import time
@@ -16,14 +15,14 @@ from gestured.core.events import Event
 from gestured.core.messages import Subscription
 from gestured.daemon.audience import Audience
 from gestured.daemon.client import Client
-from gestured.daemon.log import Throttle, log
+from gestured.daemon.log import Throttle
 from gestured.daemon.metrics import Metrics
+from gestured.daemon.sockets import AGAIN_S, reason_of
 
 CLIENTS = 1024  # connections at a time; each costs a descriptor, and at most BACKLOG_BYTES of memory
 STALLED_S = 30.0  # a client that takes nothing for this long is cut off
 LINES = 16  # lines of all clients that are answered before the loop looks after its frames again
 ACCEPTED = 64  # connections that are accepted before the loop looks after its frames again
-AGAIN_S = 1.0  # the pause before the next connection is accepted where there was no descriptor for one
 DRAINED_S = 0.01  # at the end, the pause between two looks at what still waits
 
 
@@ -153,7 +152,7 @@ class EventServer:
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
             except OSError as error:  # out of descriptors: the socket stays readable, so do not come back at once
-                log.error("cannot accept a client", reason=errno.errorcode.get(error.errno or 0, str(error)))
+                self._throttle.warn("cannot accept a client", reason_of(error))
                 self.loop.remove_reader(self._listener)
                 self.loop.call_later(AGAIN_S, self.loop.add_reader, self._listener, self._accept)
                 return

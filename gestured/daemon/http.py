@@ -10,11 +10,13 @@ import json
 import socket
 import threading
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from gestured.daemon.exposition import exposition
+from gestured.daemon.log import Throttle
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.snapshot import Snapshot
-from gestured.daemon.sockets import AddressError
+from gestured.daemon.sockets import AGAIN_S, AddressError, reason_of
 
 DEADLINE_S = 5.0
 REQUEST_BYTES = 8192
@@ -60,6 +62,7 @@ class HttpThread:
 
     def __init__(self, sock: socket.socket, routes: dict[str, Callable[[], Response]]) -> None:
         self._sock, self._routes = sock, routes
+        self._throttle = Throttle()
         self._open: dict[asyncio.StreamWriter, None] = {}  # oldest first
         self._started = threading.Event()
         self._failed: OSError | None = None
@@ -86,10 +89,24 @@ class HttpThread:
 
     async def _main(self) -> None:
         self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
-        server = await asyncio.start_server(self._serve, sock=self._sock, limit=REQUEST_BYTES)
+        accepting = asyncio.create_task(self._accept())
         self._started.set()
         await self._stop.wait()
-        server.close()
+        accepting.cancel()
+        self._sock.close()
+
+    async def _accept(self) -> None:
+        """Take connections. asyncio's own server tries again a hundred times at once where it has no descriptor."""
+        while True:
+            try:
+                sock, _ = await self._loop.sock_accept(self._sock)
+                reader = asyncio.StreamReader(REQUEST_BYTES)
+                await self._loop.connect_accepted_socket(
+                    partial(asyncio.StreamReaderProtocol, reader, self._serve), sock
+                )
+            except OSError as error:
+                self._throttle.warn("cannot accept a connection to metrics", reason_of(error))
+                await asyncio.sleep(AGAIN_S)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._open) >= HTTP_CONNECTIONS:

@@ -15,6 +15,7 @@ from gestured.core.errors import GesturedError
 
 RECEIVE_BYTES = 4 << 20  # twenty times the usual default: what a sensor sends while the loop stands still
 BACKLOG = 1024  # a thousand clients may come back at once after a restart
+AGAIN_S = 1.0  # the pause before the next connection is accepted where there was no descriptor for one
 SO_RCVBUFFORCE = 33  # Linux; these three are not in Python's socket module
 SO_TIMESTAMPNS = 35
 SO_MEMINFO = 55  # nine numbers, the last of which counts drops
@@ -65,6 +66,11 @@ def stamp_arrivals(sock: socket.socket) -> None:
 def kernel_drops(sock: socket.socket) -> int:
     """How many datagrams the kernel has dropped because the socket's buffer was full."""
     return int.from_bytes(sock.getsockopt(socket.SOL_SOCKET, SO_MEMINFO, 36)[32:], sys.byteorder)
+
+
+def reason_of(error: OSError) -> str:
+    """The name of what went wrong, such as EMFILE."""
+    return errno.errorcode.get(error.errno or 0, str(error))
 
 
 def bind_tcp(address: Address) -> socket.socket:

@@ -25,7 +25,7 @@ from gestured.daemon.health import Pulse
 from gestured.daemon.http import HttpThread, as_json
 from gestured.daemon.merge import load_settings
 from gestured.daemon.settings import FLAGS, Settings
-from gestured.daemon.sockets import AddressError, bind_udp
+from gestured.daemon.sockets import AGAIN_S, AddressError, bind_udp
 from gestured.daemon.udp import Receiver
 from tests.daemon import harness
 from tests.daemon.harness import DEADLINE_S, Hand
@@ -309,6 +309,39 @@ def test_a_request_has_so_much_time_in_all_however_it_trickles(web, monkeypatch)
     with sock, pytest.raises(OSError):
         while True:
             sock.sendall(b"x")
+
+
+class Exhausted(socket.socket):
+    """A listener of a process that has no descriptor left, as long as it is `full`."""
+
+    full = True
+
+    def __init__(self) -> None:
+        with socket.create_server(("127.0.0.1", 0)) as sock:
+            super().__init__(fileno=sock.detach())
+        self.setblocking(False)
+        self.refused = 0  # times
+
+    def accept(self):
+        if self.full:
+            self.refused += 1
+            raise OSError(errno.EMFILE, "Too many open files")
+        return super().accept()
+
+
+def test_where_no_descriptor_is_left_http_tries_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
+    pauses: list[float] = []
+    sock = Exhausted()
+
+    async def sleep(seconds: float) -> None:
+        pauses.append(seconds)
+        sock.full = len(pauses) < 3
+
+    monkeypatch.setattr(asyncio, "sleep", sleep)
+    thread = HttpThread(sock, {"/ok": lambda: as_json(200, {"fine": True})})
+    assert ask(sock.getsockname(), b"GET /ok HTTP/1.1\r\n\r\n").startswith(b"HTTP/1.1 200")
+    assert pauses == [AGAIN_S] * 3 == [AGAIN_S] * sock.refused
+    thread.close()
 
 
 def test_http_that_cannot_start_says_so_instead_of_waiting(monkeypatch) -> None:
