@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     ((_, take),) = takes(args, args.seconds, first="circle_clockwise")
     rows, columns = args.grid
     show = Show(take, args.model, args.json)
-    with Engine(args.model, rows, columns) as engine:
+    with Engine(args.model, rows, columns, "--flight-recorder", "4") as engine:  # the page can flag
         try:
             with (
                 Control(Path(engine.ready["control"])) as control,

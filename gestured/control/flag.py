@@ -1,7 +1,7 @@
 """`gesturectl flag`: "that was wrong" - what the flight recorder holds, kept as a recording."""
 
 import argparse
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -60,13 +60,8 @@ def flag(control: Control, path: Path, note: str) -> Keeper:
             yield line
         raise Unreachable(f"the daemon closed the connection; {path} is not complete")
 
-    return flag_lines(scene, lines(), path, note)
-
-
-def flag_lines(scene: Mapping[str, Any], lines: Iterable[Mapping[str, Any]], path: Path, note: str) -> Keeper:
-    """Write the lines of a tap as a recording with a note."""
-    with Writer(path, dict(scene) | {"note": note}, LIMIT_BYTES) as tape:
+    with Writer(path, scene | {"note": note}, LIMIT_BYTES) as tape:
         keeper = Keeper(tape, scene)
-        for line in lines:
+        for line in lines():
             keeper.keep(line)
     return keeper

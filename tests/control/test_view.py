@@ -87,9 +87,9 @@ class Stream:
 
 @pytest.fixture
 def real(serve, tmp_path: Path) -> Daemon:
-    """A daemon that the test alone looks at, without a flight recorder."""
+    """A daemon that the test alone looks at, with a flight recorder."""
     model = tiny_model.make(tmp_path / "tiny.onnx", provisional=tiny_model.PROVISIONAL)
-    return serve("--clock", "sensor", "--stale-s", 30, model=model)
+    return serve("--clock", "sensor", "--stale-s", 30, "--flight-recorder", 4, model=model)
 
 
 @pytest.fixture
@@ -200,6 +200,15 @@ def test_what_changes_anything_needs_the_header(view: Page, real: Daemon) -> Non
     assert view.ask("/else", "POST", {}, **mine)[0] == 404
     for sent in ([], {"sensor": 1}, {"note": "x" * BODY_BYTES}, b"[" * 4000):
         assert view.ask("/flag", "POST", sent, **mine)[0] == 400
+
+
+def test_without_a_flight_recorder_flag_says_what_keeps_packets(start, serve, tmp_path: Path) -> None:
+    viewer = start("view", "--control", serve().ready["control"], "--listen", "127.0.0.1:0", "--folder", tmp_path)
+    page = Page(viewer.stdout.readline().decode())
+    page.come_in()
+    status, _, body = page.ask("/flag", "POST", {"note": "a tap"}, Origin=f"http://{page.address}")
+    assert status == 409 and "--flight-recorder" in json.loads(body)["error"]
+    assert list(tmp_path.glob("flag-*")) == []
 
 
 @pytest.mark.parametrize("listen", ["0.0.0.0:0", "192.0.2.1:9109", "[::]:0"])
@@ -509,7 +518,6 @@ def fake_control(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
         sensor = {"state": name, "rate_hz": 15.0, "jitter_s": 0.0, "lost": 0, "bad_taxels": 0, "source": "a:1"}
         status = {
             "type": "state", "version": name, "state": "ok", "sensors": {name: sensor},
-            "flight_recorder": {"limit_bytes": 1},
             "model": {"active": name, "gestures": [name]},
         }  # fmt: skip
 
