@@ -20,7 +20,6 @@ ONLY_IN = {
     "mcap": {"gestured/record/mcap.py", "gestured/record/tape_reader.py", "gestured/record/tape_writer.py"},
     "pythonosc": {"gestured/client/osc_out.py"},
     "prometheus_client": {"gestured/daemon/exposition.py", "gestured/bridge/counts.py"},
-    "aiomqtt": {"gestured/bridge/broker.py"},
     "paho": {"gestured/bridge/broker.py"},
     "zenoh": {"gestured/bridge/zenoh_session.py"},
     "serial": {"gestured/bridge/serial.py"},

@@ -26,7 +26,6 @@ EXTRAS = (
     "pytest",
     "hypothesis",
     "setuptools",
-    "aiomqtt",
     "paho",
     "zenoh",
     "serial",

@@ -1,23 +1,17 @@
-"""An MQTT broker, reached and spoken to; and in words why it is not. Nothing else here imports the MQTT library."""
+"""An MQTT broker: where it is, who we are to it, and in words why it is not there. Nothing else imports the library."""
 
 import argparse
-import logging
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+import os
+import ssl
+from pathlib import Path
 from typing import Any
 
-from gestured.bridge.login import credentials, tls_context
 from gestured.bridge.options import BridgeError, peer_address
-from gestured.core.address import Address
 
 PLAIN_PORT, TLS_PORT = 1883, 8883  # registered with IANA
-EXPIRY_S = 1  # how long a broker keeps an event for a subscriber: as OLD_S says, which MQTT counts in whole seconds
-BROKER_S = 5.0  # s that the broker may take for any answer
-LAST_S = 1.0  # for its answer to our good-bye; without it, it publishes our last will
+BROKER_S = 5.0  # s that the broker may take to answer a call
 KEEPALIVE_S = 5  # a broker that vanished without a word is noticed, and ours declared dead, after one and a half
 MOST_BYTES = 65_536  # of a packet from the broker, which is told so; we subscribe to nothing, so that all are small
-QUIET = logging.Logger("mqtt", logging.CRITICAL)  # how the connection is, the bridge says in its own words
-UNNAMED = 128  # the reason code that the library gives where the broker named none
 _LOGIN = "set MQTT_USER and MQTT_PASSWORD, or --credentials FILE, as the broker knows them"
 # Reason codes of MQTT 5 (docs.oasis-open.org/mqtt/mqtt/v5.0, 2.4) after which waiting is no help.
 REFUSALS = {
@@ -28,15 +22,7 @@ REFUSALS = {
     138: "we are banned: ask whoever runs it",
     142: "another bridge has the same name, {host}: give each its own with --host",
 }
-
-
-class Lost(Exception):
-    """The broker cannot be reached, or went; the text says why. It may come back."""
-
-
-def topic_of(host: str, *parts: str) -> str:
-    """A topic of this machine's at any broker, such as gestured/HOST/SENSOR/TYPE."""
-    return "/".join(("gestured", host, *parts))
+CLOSED, SILENT = 128, 141  # the codes that the library gives where the broker named none, or said nothing for too long
 
 
 class Broker:
@@ -44,145 +30,103 @@ class Broker:
 
     def __init__(self, args: argparse.Namespace, host: str) -> None:
         """`host` is this machine's name in topics. Raises BridgeError for what cannot be."""
-        self.address = _address(args.broker, args.tls)
-        self.host = host
+        try:
+            self.address = peer_address(args.broker, TLS_PORT if args.tls else PLAIN_PORT)
+        except argparse.ArgumentTypeError as error:
+            raise BridgeError(f"--broker {error}") from None
+        self._host, self._prefix = host, args.discovery
         self._user, self._password = credentials(args.credentials)
         self._tls = tls_context(args)
-        self._prefix = args.discovery
 
-    @asynccontextmanager
-    async def connected(self, will: str) -> AsyncIterator["Connection"]:
-        """A connection while it lasts; where we vanish without a good-bye, the broker says `offline` at `will`.
+    def client(self, will: str) -> Any:
+        """A client for one connection; where we vanish without a good-bye, the broker says `offline` at `will`."""
+        from paho.mqtt.client import Client, MQTTv5
+        from paho.mqtt.enums import CallbackAPIVersion
 
-        Raises Lost when it ends or cannot be, BridgeError where waiting does not help.
-        """
-        import aiomqtt
+        # The name is the same after a kill, so that an old last will comes before us.
+        name = f"gestured-{self._host}"
+        client = Client(CallbackAPIVersion.VERSION2, name, protocol=MQTTv5, reconnect_on_failure=False)
+        client.connect_timeout = BROKER_S
+        client.username_pw_set(self._user, self._password)
+        client.will_set(will, "offline", qos=1, retain=True)
+        if self._tls is not None:
+            client.tls_set_context(self._tls)
+        return client
 
-        client = self._client(will)
-        connection = Connection(client, self)
-        try:
-            async with client:
-                yield connection
-        except (aiomqtt.MqttError, ExceptionGroup) as error:
-            connection.check()
-            raise Lost(self._why(_cause(error))) from None
+    def call(self, client: Any) -> None:
+        """Connect, and have a thread of the library's serve the connection. Raises OSError."""
+        most = properties("CONNECT", MaximumPacketSize=MOST_BYTES)
+        client.connect(self.address.host, self.address.port, KEEPALIVE_S, clean_start=True, properties=most)
+        client.loop_start()
 
-    def refusal(self, reason_code: object) -> BridgeError:
-        """What is to be said where the broker does not take what we publish."""
-        return BridgeError(
-            f"the broker {self.address} does not let us publish ({reason_code}): allow this user to write "
-            f"gestured/{self.host}/# and {self._prefix}/+/gestured_{self.host}/# in its access list"
-        )
-
-    def _client(self, will: str) -> Any:
-        import aiomqtt
-
-        class Client(aiomqtt.Client):
-            """A client that does not pass over a broker's refusal to take a message."""
-
-            refused: object = None
-
-            def _on_publish(self, *args: Any) -> None:
-                reason_code = args[3]
-                if reason_code.is_failure:
-                    self.refused = reason_code
-                super()._on_publish(*args)
-
-        return Client(
-            self.address.host,
-            self.address.port,
-            username=self._user,
-            password=self._password,
-            identifier=f"gestured-{self.host}",  # the same after a kill, so that an old last will comes before us
-            protocol=aiomqtt.ProtocolVersion.V5,
-            will=aiomqtt.Will(will, "offline", qos=1, retain=True),
-            timeout=BROKER_S,
-            keepalive=KEEPALIVE_S,
-            clean_start=True,
-            properties=_properties("CONNECT", MaximumPacketSize=MOST_BYTES),
-            tls_context=self._tls,
-            logger=QUIET,
-        )
-
-    def _why(self, error: BaseException) -> str:
-        """The error that ended a connection, in words. Raises BridgeError where waiting does not help."""
-        said = str(error)
+    def why(self, error: Any) -> str:
+        """The OSError or reason code that ended a connection, in words. BridgeError where waiting does not help."""
+        said, code = str(error), getattr(error, "value", 0)
         if "CERTIFICATE_VERIFY_FAILED" in said:
             wrong = said.partition("verify failed: ")[2].partition(" (_ssl")[0] or said
             raise BridgeError(
                 f"the certificate of the broker {self.address} is not to be trusted: {wrong}: name its authority with "
                 "--ca FILE, and the broker as its certificate does"
             )
-        code = getattr(getattr(error, "rc", None), "value", 0)
         if code in REFUSALS:
-            raise BridgeError(f"the broker {self.address} refuses us: {REFUSALS[code].format(host=self.host)}")
-        if "timed out" in said:
+            raise BridgeError(f"the broker {self.address} refuses us: {REFUSALS[code].format(host=self._host)}")
+        if code == SILENT or "timed out" in said:
             return "it does not answer as an MQTT broker does (is it one with TLS: --tls?)"
-        if code == UNNAMED:
-            return "it closed the connection"
-        return said
+        return "it closed the connection" if code == CLOSED else said
+
+    def refusal(self, code: object) -> BridgeError:
+        """What is to be said where the broker does not take what we publish."""
+        return BridgeError(
+            f"the broker {self.address} does not let us publish ({code}): allow this user to write "
+            f"gestured/{self._host}/# and {self._prefix}/+/gestured_{self._host}/# in its access list"
+        )
 
 
-class Connection:
-    """A broker that is there. All is sent with QoS 1, so that it may come twice but is not lost on the way."""
-
-    def __init__(self, client: Any, broker: Broker) -> None:
-        self._client, self._broker = client, broker
-        self._fresh = _properties("PUBLISH", MessageExpiryInterval=EXPIRY_S)
-
-    async def event(self, topic: str, payload: bytes) -> None:
-        """Publish something that is soon old, and wait until the broker has it. Errors as `retain`."""
-        await self._client.publish(topic, payload, qos=1, properties=self._fresh)
-        self.check()
-
-    async def retain(self, topic: str, payload: str) -> None:
-        """Have the broker keep something for all who come later; an empty text makes it forget.
-
-        Raises the library's error where the connection ends, BridgeError where the broker does not want it.
-        """
-        await self._client.publish(topic, payload.encode(), qos=1, retain=True)
-        self.check()
-
-    async def leave(self, topic: str) -> None:
-        """Say `offline`, our last word."""
-        await self._client.publish(topic, "offline", qos=1, retain=True, timeout=LAST_S)
-
-    async def lost(self) -> None:
-        """Until the connection ends, which raises the library's error."""
-        async for _ in self._client.messages:
-            pass  # nothing was subscribed to
-
-    def check(self) -> None:
-        """Raise BridgeError where the broker has refused to take something."""
-        if self._client.refused is not None:
-            raise self._broker.refusal(self._client.refused)
+def topic_of(host: str, *parts: str) -> str:
+    """A topic of this machine's at any broker, such as gestured/HOST/SENSOR/TYPE."""
+    return "/".join(("gestured", host, *parts))
 
 
-def _properties(packet: str, **values: int) -> Any:
-    """Properties of a kind of packet of MQTT 5."""
+def properties(packet: str, **values: int) -> Any:
+    """Properties of a kind of packet of MQTT 5, such as CONNECT."""
     from paho.mqtt.packettypes import PacketTypes
     from paho.mqtt.properties import Properties
 
-    properties = Properties(getattr(PacketTypes, packet))  # type: ignore[no-untyped-call]
+    found = Properties(getattr(PacketTypes, packet))  # type: ignore[no-untyped-call]
     for name, value in values.items():
-        setattr(properties, name, value)
-    return properties
+        setattr(found, name, value)
+    return found
 
 
-def _cause(error: BaseException) -> BaseException:
-    """What ended the connection; what is none of the library's errors is raised as it is."""
-    import aiomqtt
-
-    while isinstance(error, BaseExceptionGroup):
-        error = error.exceptions[0]
-    if not isinstance(error, aiomqtt.MqttError):
-        raise error
-    return error.__cause__ or error
-
-
-def _address(text: str, tls: bool) -> Address:
-    """HOST or HOST:PORT. Raises BridgeError."""
+def credentials(path: Path | None) -> tuple[str | None, str | None]:
+    """User and password, from the file or else from the environment. Raises BridgeError."""
+    if path is None:
+        return os.environ.get("MQTT_USER"), os.environ.get("MQTT_PASSWORD")
     try:
-        return peer_address(text, TLS_PORT if tls else PLAIN_PORT)
-    except argparse.ArgumentTypeError as error:
-        raise BridgeError(f"--broker {error}") from None
+        with path.open() as file:
+            if os.fstat(file.fileno()).st_mode & 0o007:
+                raise BridgeError(f"--credentials {path}: everybody can read it: chmod o= {path}")
+            user, colon, password = file.readline(4096).rstrip("\n").partition(":")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BridgeError(f"--credentials {path}: {getattr(error, 'strerror', 'is no text')}") from None
+    if not user or not colon:
+        raise BridgeError(f"--credentials {path}: expected one line, USER:PASSWORD")
+    return user, password
+
+
+def tls_context(args: argparse.Namespace) -> ssl.SSLContext | None:
+    """How to encrypt; None for a plain connection. Raises BridgeError."""
+    if not args.tls:
+        if args.ca or args.cert:
+            raise BridgeError("--ca and --cert are for encrypted connections: add --tls")
+        return None
+    for flag, path in (("--ca", args.ca), ("--cert", args.cert)):
+        if path is not None and not os.access(path, os.R_OK):
+            raise BridgeError(f"{flag} {path}: there is no such file that we may read")
+    try:
+        context = ssl.create_default_context(cafile=args.ca)
+        if args.cert:
+            context.load_cert_chain(args.cert)
+    except ssl.SSLError as error:
+        raise BridgeError(f"--ca or --cert: {error.reason or error}: expected certificates in PEM form") from None
+    return context

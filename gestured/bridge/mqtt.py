@@ -11,20 +11,15 @@ the broker keeps none longer for a subscriber. The gap in `sequence` says what w
 """
 
 import argparse
-import asyncio
-import errno
-import signal
 import threading
 from pathlib import Path
-from typing import Any
 
 from gestured.bridge.broker import PLAIN_PORT, TLS_PORT
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import NOTICE_S, follow
 from gestured.bridge.mqtt_session import Mqtt
-from gestured.bridge.options import add_filters, add_metrics, need, subscriber
+from gestured.bridge.options import add_filters, add_metrics, need, on_stop, subscriber
 from gestured.client.program import Commands
-from gestured.core.errors import GesturedError
 
 
 def add(commands: Commands) -> None:
@@ -54,43 +49,17 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Mirror events until SIGTERM or Ctrl-C."""
-    need("aiomqtt", "aiomqtt", "mqtt")
-    asyncio.run(_main(args))
-    return 0
-
-
-async def _main(args: argparse.Namespace) -> None:
+    need("paho.mqtt.client", "paho-mqtt", "mqtt")
     counts = Counts("mqtt")
     bridge = Mqtt(args, counts)
     counts.serve(args.metrics)
     source = subscriber(args, NOTICE_S, counts.wrong)
-    loop = asyncio.get_running_loop()
-    loop.set_exception_handler(_pass_over_closed)
-    failed: list[GesturedError] = []
-
-    def hear() -> None:
-        try:
-            for line in follow(source, counts):
-                loop.call_soon_threadsafe(bridge.take, line)
-        except GesturedError as error:  # a subscription that is refused, for one
-            failed.append(error)
-            loop.call_soon_threadsafe(bridge.stop)
-
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, bridge.stop)
-    thread = threading.Thread(target=hear, name="daemon", daemon=True)
-    thread.start()
+    on_stop(bridge.stop)
+    hears = threading.Thread(target=bridge.hear, args=(follow(source, counts),), name="daemon", daemon=True)
+    hears.start()
     try:
-        await bridge.work()
+        bridge.work()
     finally:
         source.close()
-        thread.join()
-    if failed:
-        raise failed[0]
-
-
-def _pass_over_closed(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """The library asks the loop to watch a socket a moment after that was closed; all else is a bug, and is said."""
-    error = context.get("exception")
-    if not (isinstance(error, OSError) and error.errno == errno.EBADF):
-        loop.default_exception_handler(context)
+        hears.join()
+    return 0

@@ -1,104 +1,190 @@
 """What the bridge to MQTT does while it runs: one daemon's events, and what is known of it, at one broker."""
 
 import argparse
-import asyncio
+import queue
+import threading
 import time
-from collections.abc import Coroutine
-from contextlib import suppress
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
-from gestured.bridge.broker import Broker, Connection, Lost, topic_of
+from gestured.bridge.broker import Broker, properties, topic_of
 from gestured.bridge.counts import Counts
-from gestured.bridge.daemon import GONE, Daemon, Line
+from gestured.bridge.daemon import GONE, OLD_S, Daemon, Line
 from gestured.bridge.options import STATUS, host_name
-from gestured.bridge.outbox import Outbox, Outgoing
 from gestured.bridge.retained import Retained
+from gestured.core.errors import GesturedError
 
-AGAIN_S = 0.1  # until a task that goes on although it was cancelled is cancelled again
+EXPIRY_S = 1  # how long a broker keeps an event for a subscriber: as OLD_S says, which MQTT counts in whole seconds
 FIRST_S, LONGEST_S = 0.25, 2.0  # from one attempt to the next: doubled each time, a broker that is back is found soon
+LAST_S = 1.0  # for the broker's answer to our good-bye; without it, it publishes our last will
+WAITING_EVENTS = 1000  # events that are kept for the broker; more than a second of the busiest daemon
+IN_FLIGHT = 18  # events whose acknowledgement is awaited at a time; mosquitto takes 20 messages
 
 
-async def first_of(*coroutines: Coroutine[Any, Any, None]) -> None:
-    """Run them until one ends or raises, which ends the others.
+@dataclass(frozen=True, slots=True)
+class Outgoing:
+    """An event that the broker shall have."""
 
-    Cancelled as often as it takes: asyncio.wait_for of Python 3.11 swallows a cancellation that comes with its result.
-    """
-    tasks = [asyncio.ensure_future(coroutine) for coroutine in coroutines]
-    done, left = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    while left:
-        for task in left:
-            task.cancel()
-        ended, left = await asyncio.wait(left, timeout=AGAIN_S)
-        done |= ended
-    errors = [error for task in tasks if not task.cancelled() and (error := task.exception())]
-    if errors:
-        raise errors[0]
+    decided: float  # monotonic s
+    topic: str
+    payload: bytes
 
 
 class Mqtt:
-    """A session with one broker, across its disappearances and the daemon's."""
+    """A session with one broker, across its disappearances and the daemon's.
+
+    All of it happens in the thread that calls `work`: whatever another thread learns, it puts into the inbox.
+    """
 
     def __init__(self, args: argparse.Namespace, counts: Counts) -> None:
         """Raises BridgeError for what cannot be."""
         self._host = host_name(args.host)
         self._broker = Broker(args, self._host)
+        self._availability = topic_of(self._host, "availability")
         self._counts = counts
         self._daemon = Daemon(args.sensors, args.gestures, counts)
-        self._outbox = Outbox(counts)
         self._retained = Retained(self._daemon, self._host, args.discovery, discovers=not args.no_discovery)
-        self._stop = asyncio.Event()
-        self._changed = asyncio.Event()  # what the broker should retain may be something else now
-
-    def take(self, line: Line) -> None:
-        """One line of `follow`."""
-        self._daemon.take(line)
-        if "sensor" in line:  # an event: the daemon knows what was asked for, and which answers belong to it
-            decided = time.monotonic() - self._daemon.age(line, time.time())
-            topic = topic_of(self._host, line["sensor"], line["type"])
-            self._outbox.put(Outgoing(decided, topic, self._daemon.payload(line)))
-        if line["type"] in ("hello", "gestures", STATUS, GONE):
-            self._changed.set()
+        self._inbox: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()  # a signal handler may put into it
+        self._stopping = False
+        self._client: Any = None  # of this connection, from the call on; None while there is none
+        self._connected = False
+        self._wait_s, self._due = FIRST_S, 0.0  # monotonic s: when the broker is called next
+        self._waiting: deque[Outgoing] = deque()  # events for the broker, in order
+        self._sent: dict[int, Outgoing] = {}  # message's number -> event that it has not acknowledged
+        self._changed = False  # what the broker should retain may be something else now
+        self._changes: Iterator[tuple[str, str]] = iter(())
+        self._change = 0  # number of the one that it has not acknowledged
+        self._farewell = 0  # number of our last word
 
     def stop(self) -> None:
         """Say good-bye, and let `work` end."""
-        self._stop.set()
+        self._inbox.put(partial(setattr, self, "_stopping", True))
 
-    async def work(self) -> None:
-        """Be connected, and connect again; until it is stopped. Raises BridgeError where waiting does not help."""
-        wait_s = FIRST_S
-        availability = topic_of(self._host, "availability")
-        while not self._stop.is_set():
+    def hear(self, lines: Iterator[Line]) -> None:
+        """Take each line of `follow`; in a thread of its own."""
+        try:
+            for line in lines:
+                self._inbox.put(partial(self._take, line))
+        except GesturedError as error:  # a subscription that is refused, for one
+            self._inbox.put(partial(self._fail, error))
+
+    def work(self) -> None:
+        """Be connected, and connect again; until it is stopped. Raises GesturedError where waiting does not help."""
+        while not self._stopping:
+            if self._client is None and time.monotonic() >= self._due:
+                self._call()
+            self._serve(None if self._client is not None else self._due)
+        end = time.monotonic() + LAST_S
+        if self._connected:
+            self._farewell = self._publish(self._availability, "offline", retain=True)
+        while self._connected and time.monotonic() < end:
+            self._serve(end)
+
+    def _serve(self, until: float | None) -> None:
+        """Do what the next message of the inbox says; nothing where none comes until then (monotonic s)."""
+        try:
+            self._inbox.get(timeout=None if until is None else max(until - time.monotonic(), 0.0))()
+        except queue.Empty:
+            pass
+
+    def _fail(self, error: GesturedError) -> None:
+        raise error
+
+    def _take(self, line: Line) -> None:
+        """One line of the daemon."""
+        self._daemon.take(line)
+        if "sensor" in line:  # an event: the daemon knows what was asked for, and which answers belong to it
+            if len(self._waiting) >= WAITING_EVENTS:
+                self._waiting.popleft()
+                self._counts.add("events", "overflow")
+            decided = time.monotonic() - self._daemon.age(line, time.time())
+            topic = topic_of(self._host, line["sensor"], line["type"])
+            self._waiting.append(Outgoing(decided, topic, self._daemon.payload(line)))
+        self._changed |= line["type"] in ("hello", "gestures", STATUS, GONE)
+        self._send()
+
+    def _call(self) -> None:
+        """Call the broker, in a thread of its own: a name that is not known may take its time."""
+        client = self._client = self._broker.client(self._availability)
+
+        def told(what: Callable[[Any, Any], None], argument: int) -> Callable[..., None]:
+            return lambda *arguments: self._inbox.put(partial(what, client, arguments[argument]))
+
+        def call() -> None:
             try:
-                async with self._broker.connected(availability) as connection:
-                    wait_s = FIRST_S
-                    await self._serve(connection)
-                    await connection.leave(availability)
-            except Lost as error:
-                words = f"broker {self._broker.address} is not there: {error}; trying again"
-                self._counts.connected("broker", False, words)
-                with suppress(TimeoutError):
-                    await asyncio.wait_for(self._stop.wait(), wait_s)
-                wait_s = min(2 * wait_s, LONGEST_S)
+                self._broker.call(client)
+            except OSError as error:
+                self._inbox.put(partial(self._gone, client, error))
 
-    async def _serve(self, connection: Connection) -> None:
-        """All that one connection is for, until we are stopped."""
-        self._retained.forget()
-        self._outbox.again()
-        self._changed.set()
+        client.on_connect = told(self._there, 3)
+        client.on_disconnect = told(self._gone, 3)
+        client.on_publish = lambda _, __, number, code, ___: self._inbox.put(partial(self._taken, client, number, code))
+        threading.Thread(target=call, name="broker", daemon=True).start()
+
+    def _there(self, client: Any, code: Any) -> None:
+        """The broker has answered our call."""
+        if code.is_failure:
+            self._gone(client, code)
+            return
+        self._connected, self._wait_s = True, FIRST_S
         self._counts.connected("broker", True, f"broker {self._broker.address} is there")
-        await first_of(
-            self._keep(connection), self._outbox.send(connection.event), self._until_stopped(), connection.lost()
-        )
+        self._retained.forget()
+        self._changed, self._changes, self._change = True, iter(()), 0
+        self._waiting.extendleft(reversed(self._sent.values()))  # what it has not acknowledged, before all else
+        self._sent.clear()
+        self._send()
 
-    async def _until_stopped(self) -> None:
-        await self._stop.wait()
+    def _gone(self, client: Any, error: Any) -> None:
+        """A connection has ended, or could not be."""
+        if client is not self._client:
+            return
+        self._client, self._connected = None, False
+        if not self._stopping:
+            words = f"broker {self._broker.address} is not there: {self._broker.why(error)}; trying again"
+            self._counts.connected("broker", False, words)
+            self._due = time.monotonic() + self._wait_s
+            self._wait_s = min(2 * self._wait_s, LONGEST_S)
 
-    async def _keep(self, connection: Connection) -> None:
-        """Have the broker retain what holds, and forget what does not."""
-        while True:
-            await self._changed.wait()
-            self._changed.clear()
-            for topic, payload in self._retained.changes():
-                await connection.retain(topic, payload)
-            if self._daemon.hello:
-                self._counts.ready(broker=str(self._broker.address), host=self._host)
+    def _taken(self, client: Any, number: int, code: Any) -> None:
+        """The broker has answered a message."""
+        if client is not self._client:
+            return
+        if code.is_failure:
+            raise self._broker.refusal(code)
+        if number == self._farewell:
+            client.disconnect()
+        elif number == self._change:
+            self._change = 0
+        elif self._sent.pop(number, None) is not None:
+            self._counts.add("events", "sent")
+        self._send()
+
+    def _send(self) -> None:
+        """Publish what waits, as far as the broker keeps up."""
+        if not self._connected or self._stopping:
+            return
+        while self._waiting and len(self._sent) < IN_FLIGHT:
+            event = self._waiting.popleft()
+            if time.monotonic() - event.decided > OLD_S:
+                self._counts.add("events", "old")
+                continue
+            fresh = properties("PUBLISH", MessageExpiryInterval=EXPIRY_S)
+            self._sent[self._publish(event.topic, event.payload, properties=fresh)] = event
+        while not self._change:
+            change = next(self._changes, None)
+            if change is not None:
+                self._change = self._publish(*change, retain=True)
+            elif self._changed:
+                self._changed, self._changes = False, self._retained.changes()
+            else:
+                break
+        if not self._change and self._daemon.hello:
+            self._counts.ready(broker=str(self._broker.address), host=self._host)
+
+    def _publish(self, topic: str, payload: str | bytes, **options: Any) -> int:
+        """Have a message sent; returns its number. With QoS 1 it may come twice, but is not lost on the way."""
+        number: int = self._client.publish(topic, payload, qos=1, **options).mid
+        return number

@@ -122,7 +122,7 @@ def _versions() -> Finding:
     from importlib.metadata import PackageNotFoundError, version
 
     names = []
-    for package in ("numpy", "onnxruntime", "uvloop", "pydantic", "mcap", "aiomqtt", "eclipse-zenoh", "pyserial"):
+    for package in ("numpy", "onnxruntime", "uvloop", "pydantic", "mcap", "paho-mqtt", "eclipse-zenoh", "pyserial"):
         try:
             names.append(f"{package} {version(package)}")
         except PackageNotFoundError:

@@ -35,7 +35,7 @@ def first_line(code: str, daemon: Daemon) -> str:
 
 
 def test_the_mqtt_consumer(bridge, broker, daemon: Daemon):
-    pytest.importorskip("aiomqtt", reason="the bridge to MQTT needs the extra [mqtt]")
+    pytest.importorskip("paho.mqtt.client", reason="the bridge to MQTT needs the extra [mqtt]")
     at = broker()
     begin(bridge, at, daemon).ready()
     code = consumer("paho.mqtt").replace("192.168.7.2", "127.0.0.1").replace("1883", str(at.port))

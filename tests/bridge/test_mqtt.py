@@ -18,7 +18,6 @@ from tests.daemon.harness import DEADLINE_S, Daemon
 from tests.sockets import HELLO, FakeDaemon, free_address
 
 paho = pytest.importorskip("paho.mqtt.client", reason="the bridge to MQTT needs the extra [mqtt]")
-pytest.importorskip("aiomqtt", reason="the bridge to MQTT needs the extra [mqtt]")
 
 STATUS = {"type": "status", "state": "ok", "sensors": {"armrest": "ok"}, "model": "m", "time": 1.0}
 
@@ -261,7 +260,7 @@ def test_discovery_holds_what_home_assistant_takes(bridge, broker, listen, fake)
 def test_templates_make_of_an_event_what_home_assistant_expects():
     """With its template engine, and its filter `tojson`."""
     jinja2 = pytest.importorskip("jinja2", reason="the extra [lab] brings the template engine")
-    from gestured.bridge.homeassistant import discovery
+    from gestured.bridge.retained import discovery
 
     found = dict(discovery("homeassistant", "car", "1", "armrest", ["one_tap"]))
     value = gesture(7) | {"instance": "i"}
