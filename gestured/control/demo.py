@@ -18,13 +18,13 @@ from gestured.client.lines import Refused, read_ahead
 from gestured.client.picture import trace
 from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json
-from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form, Sensor
 from gestured.client.stream import Stream
 from gestured.control.play import add_arguments, frames, takes
 from gestured.control.screen import Felt, Screen, in_colour
 from gestured.control.show import as_dict, block, in_words
 from gestured.core.errors import GesturedError
+from gestured.record.judge import Outcome, Performed, Tally
 from gestured.simulator import Take
 
 DEMO_SENSOR = "demo"

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form
 from gestured.control.diff import STOPWATCH_S, Answer, Difference, Knew, Line, Verdict
 from gestured.core.address import Address
@@ -14,6 +13,7 @@ from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
 from gestured.record import arrays as recording
 from gestured.record.check import SESSION
+from gestured.record.judge import Outcome, Performed, Tally
 from gestured.record.tape import Packet, Tape
 
 BETWEEN_RECORDINGS_S = 3.0  # a pause in which every contact of the recording before is answered

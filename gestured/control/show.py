@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from gestured.client.picture import draw
 from gestured.client.say import shown
-from gestured.client.score import NONE, Outcome, Performed
+from gestured.record.judge import NONE, Outcome, Performed
 
 VERDICT_COLOURS = {"right": 32, "rejected": 32, "wrong": 31, "false": 31, "missed": 33}
 BOLD, DIM = 1, 2

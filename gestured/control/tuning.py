@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from gestured.client.score import NONE, TOLERANCE_S, Performed
+from gestured.record.judge import NONE, TOLERANCE_S, Performed
 
 THRESHOLDS = tuple(round(0.05 * k, 2) for k in range(1, 20))
 ENOUGH = 20  # performances of a gesture before anything is proposed for it alone

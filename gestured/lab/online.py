@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from gestured.client.engine import Engine
-from gestured.client.score import Outcome, Performed, Tally
 from gestured.client.sensor import Form, Sensor
 from gestured.client.stream import Stream
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
 from gestured.lab.progress import progress
+from gestured.record.judge import Outcome, Performed, Tally
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 
 SESSION_S = 120.0

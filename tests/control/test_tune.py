@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.client.score import Performed
 from gestured.control.cli import main
 from gestured.control.tuning import THRESHOLDS, Counts, Played, counted, for_each, proposed
 from gestured.record.arrays import write
+from gestured.record.judge import Performed
 from gestured.simulator import GESTURES
 from tests.lab.adapt.recorded import whole_session
 

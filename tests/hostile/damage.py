@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 
-from gestured.client.score import Performed, Tally
 from gestured.client.sensor import Form
 from gestured.core import messages
 from gestured.core.events import Event
@@ -35,6 +34,7 @@ from gestured.daemon.merge import load_settings
 from gestured.lab.made_of import made_of
 from gestured.model.ladder import ladder_for
 from gestured.model.shipped import shipped
+from gestured.record.judge import Performed, Tally
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 from tests.hostile.faults import FAULTS, Fault, Stall
 from tests.hostile.grammar import violations

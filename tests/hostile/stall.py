@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gestured.client.score import Performed, Tally
+from gestured.record.judge import Performed, Tally
 from tests.daemon.harness import Client, Daemon, Frame, Hand, Sensor, floats
 from tests.hostile.grammar import TYPES, violations
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.client.score import LEAST, MISSED_AFTER_S, NONE, Performed, Tally
+from gestured.record.judge import LEAST, MISSED_AFTER_S, NONE, Performed, Tally
 
 
 def gesture(name: str, onset: float, offset: float) -> dict[str, object]:
