@@ -67,14 +67,12 @@ class Daemon:
             case "hello":
                 self.hello, self.version = line, line["version"]
                 self._gestures(line["gestures"])
-                for name in line["sensors"]:
-                    self._state(name, self.states.get(name, "no_data"))
+                self._heard({name: self.states.get(name, "no_data") for name in line["sensors"]})
                 self._counts.connected("daemon", True, "daemon is there")
             case "gestures":
                 self._gestures(line["gestures"])
             case "status":
-                for name, state in line["sensors"].items():
-                    self._state(name, state)
+                self._heard(line["sensors"])
             case "gone":
                 self.hello = {}
                 self._counts.connected("daemon", False, "daemon went")
@@ -99,13 +97,12 @@ class Daemon:
         told = {**event, "instance": self.hello.get("instance")}
         return json.dumps(told, separators=(",", ":")).encode()
 
-    def _state(self, name: str, state: str) -> None:
-        if self._wanted_sensors is not None and name not in self._wanted_sensors:
-            return
-        self.states.pop(name, None)
-        self.states[name] = state
-        if len(self.states) > MOST_SENSORS:
-            del self.states[next(iter(self.states))]
+    def _heard(self, heard: Mapping[str, str]) -> None:
+        """How sensors are. The dict is a new one each time: another thread may read the old one."""
+        wanted = self._wanted_sensors
+        new = {name: state for name, state in heard.items() if wanted is None or name in wanted}
+        states = {name: state for name, state in self.states.items() if name not in new} | new
+        self.states = dict(list(states.items())[-MOST_SENSORS:])
 
     def _gestures(self, known: Sequence[str]) -> None:
         wanted = self._wanted_gestures

@@ -339,6 +339,18 @@ def test_a_sensor_that_the_daemon_let_go_gives_its_place_to_another(monkeypatch)
     assert known.states == {"invented8": "ok", "armrest": "ok", "invented9": "ok"}
 
 
+def test_what_is_known_of_sensors_does_not_change_under_who_reads_it():
+    """Zenoh asks for it from a thread of its own."""
+    from gestured.bridge.counts import Counts
+    from gestured.bridge.daemon import Daemon
+
+    known = Daemon(None, None, Counts("zenoh"))
+    known.take(STATUS)
+    read = known.states
+    known.take(STATUS | {"sensors": {"armrest": "stale", "seat": "ok"}})
+    assert read == STATUS["sensors"] and known.states == {"armrest": "stale", "seat": "ok"}
+
+
 def test_a_broker_that_is_killed_and_comes_back_gets_what_is_fresh(bridge, broker, listen, fake):
     at = broker()
     process = begin(bridge, at, fake, "--metrics", "127.0.0.1:0")
