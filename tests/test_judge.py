@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.record.judge import LEAST, MISSED_AFTER_S, NONE, Performed, Tally
+from gestured.record.judge import LEAST, MISSED_AFTER_S, NONE, Performed, Tally, owners, whose
 
 
 def gesture(name: str, onset: float, offset: float) -> dict[str, object]:
@@ -94,6 +94,12 @@ def test_everything_is_counted_once(performances, events):
     assert counts["right"] + counts["wrong"] + counts["false"] == len(events)
     assert counts["rejected"] <= len(performances) - gestures
     assert len(tally.latencies) == counts["right"] + counts["wrong"]
+
+
+@given(st.lists(st.tuples(labels, spans)), st.lists(spans))
+def test_many_belong_to_whom_each_of_them_belongs(performances, said):
+    acts = sorted((Performed(label, label, *span) for label, span in performances), key=lambda act: act.onset)
+    assert [id(found) for found in owners(said, acts)] == [id(whose(*span, acts)) for span in said]
 
 
 def test_what_was_said_early_is_counted_with_its_lead():

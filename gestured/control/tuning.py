@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from gestured.record.judge import NONE, TOLERANCE_S, Performed
+from gestured.record.judge import NONE, Performed, owners, verdict
 
 THRESHOLDS = tuple(round(0.05 * k, 2) for k in range(1, 20))
 ENOUGH = 20  # performances of a gesture before anything is proposed for it alone
@@ -39,17 +39,10 @@ class Played:
         asked = sorted(performed, key=lambda one: one.onset)
         self.performed += [one for one in asked if one.label != NONE]
         self.others += sum(one.label == NONE for one in asked)
-        waiting: list[Performed] = []
-        ahead = iter([*asked, None])
-        coming = next(ahead)
-        for event in events:
-            onset, offset = float(event["onset"]), float(event["offset"])
-            while coming is not None and coming.onset <= offset + TOLERANCE_S:
-                waiting.append(coming)
-                coming = next(ahead)
-            waiting = [one for one in waiting if one.offset > onset - TOLERANCE_S]
-            best = max(waiting, key=lambda one: min(offset, one.offset) - max(onset, one.onset), default=None)
-            self.said.append(Said(str(event["gesture"]), float(event["confidence"]), best))
+        said = list(events)
+        spans = [(float(event["onset"]), float(event["offset"])) for event in said]
+        for event, performed_then in zip(said, owners(spans, asked), strict=True):
+            self.said.append(Said(str(event["gesture"]), float(event["confidence"]), performed_then))
 
 
 @dataclass(frozen=True)
@@ -77,13 +70,11 @@ def counted(played: Played, threshold: float, gesture: str | None = None) -> Cou
     for said in played.said:
         if said.confidence < threshold:
             continue
-        counts = gesture in (None, said.gesture)
-        performed = said.performed
-        if performed is None or performed.label == NONE or id(performed) in answered:
-            false += counts
-            continue
-        answered[id(performed)] = said.gesture == performed.label
-        wrong += counts and said.gesture != performed.label
+        found = verdict(said.gesture, said.performed, answered=id(said.performed) in answered)
+        if found != "false":
+            answered[id(said.performed)] = found == "right"
+        if gesture in (None, said.gesture):
+            wrong, false = wrong + (found == "wrong"), false + (found == "false")
     own = [one for one in played.performed if gesture in (None, one.label)]
     right = sum(answered.get(id(one), False) for one in own)
     lost = len(own) - right if gesture else sum(id(one) not in answered for one in own)

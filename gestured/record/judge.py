@@ -1,14 +1,71 @@
-"""What was performed beside what was recognised: matching by time, and the tally. Times are epoch seconds."""
+"""Who performed what, and who said what: one rule, one tolerance, and the words for how it went.
 
-from collections.abc import Mapping
+What was said belongs to the performance that it overlaps most in time, if it lies within TOLERANCE_S of it. The first
+gesture that is said of a performance decides: `right` or `wrong`. Another one of the same performance, one of no
+performance, and one of what is no gesture are `false`. A gesture of which none was said is `missed`, also called lost.
+Times are seconds on any clock that both sides share.
+"""
+
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 LEAST = 20  # gestures, of which percentiles say something
 NONE = "none"  # the label of whatever is no gesture
 TOLERANCE_S = 0.3  # clocks, filters and thresholds shift an onset by some frames
 MISSED_AFTER_S = 1.5  # after the end of what was performed; longer than any wait for a second tap
+
+
+class Act(Protocol):
+    """Something that was performed, as any room writes it down."""
+
+    @property
+    def label(self) -> str:
+        """A gesture, or NONE."""
+
+    @property
+    def onset(self) -> float:
+        """When it began, in s."""
+
+    @property
+    def offset(self) -> float:
+        """When it ended, in s."""
+
+
+A = TypeVar("A", bound=Act)
+
+
+def whose(onset: float, offset: float, performed: Iterable[A]) -> A | None:
+    """The performance to which what was said of `onset` to `offset` (s) belongs; None for none."""
+
+    def overlap(act: A) -> float:
+        return min(offset, act.offset) - max(onset, act.onset)
+
+    best = max(performed, key=overlap, default=None)
+    return best if best is not None and overlap(best) > -TOLERANCE_S else None
+
+
+def owners(spans: Sequence[tuple[float, float]], performed: Iterable[A]) -> list[A | None]:
+    """Whose each (onset, offset) in s is, as `whose` has it, where there are too many to look at all."""
+    ahead = deque(sorted(performed, key=lambda act: act.onset))
+    near: list[A] = []
+    found: list[A | None] = [None] * len(spans)
+    for n in sorted(range(len(spans)), key=lambda n: spans[n][0]):
+        onset, offset = spans[n]
+        while ahead and ahead[0].onset < offset + TOLERANCE_S:
+            near.append(ahead.popleft())
+        near = [act for act in near if act.offset > onset - TOLERANCE_S]
+        found[n] = whose(onset, offset, near)
+    return found
+
+
+def verdict(gesture: str, act: Act | None, *, answered: bool) -> str:
+    """How a gesture that was said of `act` went: "right", "wrong" or "false". `answered`: one was said of it before."""
+    if act is None or answered or act.label == NONE:
+        return "false"
+    return "right" if gesture == act.label else "wrong"
 
 
 @dataclass(eq=False)
@@ -60,7 +117,7 @@ class Tally:
         if event["type"] == "provisional":
             self.given, self._early = self.given + 1, event
             return None
-        performed = self._match(event["onset"], event["offset"])
+        performed = whose(event["onset"], event["offset"], self.waiting)
         early = self._early if event.get("provisional") else None
         if early is not None and event["provisional"] == "confirmed":
             self.leads.append(event["offset"] - early["decided"])
@@ -68,15 +125,14 @@ class Tally:
             if performed:
                 performed.unknown = True
             return None
-        if performed is None or performed.answered or performed.label == NONE:
-            if performed:
-                performed.answered = True
-            return self._count(Outcome("false", performed, event, early=early))
-        performed.answered = True
-        verdict = "right" if event["gesture"] == performed.label else "wrong"
+        found = verdict(event["gesture"], performed, answered=performed is not None and performed.answered)
+        if performed is not None:
+            performed.answered = True
+        if performed is None or found == "false":
+            return self._count(Outcome(found, performed, event, early=early))
         latency = arrived - performed.offset
         self.latencies.append(latency)
-        return self._count(Outcome(verdict, performed, event, latency, early))
+        return self._count(Outcome(found, performed, event, latency, early))
 
     def settle(self, now: float) -> list[Outcome]:
         """What nothing can come for any more."""
@@ -95,13 +151,6 @@ class Tally:
             "confirmed": len(self.leads),
             "lead_ms_median": round(1000 * median(self.leads)) if self.leads else None,
         }
-
-    def _match(self, onset: float, offset: float) -> Performed | None:
-        def overlap(performed: Performed) -> float:
-            return min(offset, performed.offset) - max(onset, performed.onset)
-
-        best = max(self.waiting, key=overlap, default=None)
-        return best if best and overlap(best) > -TOLERANCE_S else None
 
     def _count(self, outcome: Outcome) -> Outcome:
         self.counts[outcome.verdict] += 1
