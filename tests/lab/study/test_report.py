@@ -92,7 +92,8 @@ def test_every_cell_of_the_main_tables_stands_in_the_row_of_its_method(page: Pat
 
 def test_all_else_is_told(page: Path, study: Study) -> None:
     cells = {cell for row in read(page.read_text("utf-8")).rows for cell in row}
-    told = [study["machine"]["cpu"], study["data"]["real"]["name"], "neighbours = 7"]
+    assert any(study["data"]["real"]["name"] in cell for cell in cells)
+    told = [study["machine"]["cpu"], "neighbours = 7"]
     told += [row["choice"] for row in study["choices"]] + [about["title"] for about in study["methods"].values()]
     told += ["C = 128, gamma = 0.000488; shift: C = 512, gamma = 0.0001221"]
     told += [f"{row['cold_us']:.0f}" for row in study["run_time"]]
@@ -123,7 +124,7 @@ def test_no_word_of_a_study_becomes_markup(tmp_path: Path, undrawn: None) -> Non
     study = made_study()
     study["data"]["foreign"]["name"] = study["machine"]["cpu"] = study["about"]["command"] = HOSTILE
     reader = read(write_report(study, tmp_path).read_text("utf-8"))
-    assert "script" not in reader.elements and [HOSTILE, "20", "199 cut out of 200 performed"] in reader.rows
+    assert "script" not in reader.elements and ["cpu", HOSTILE] in reader.rows
 
 
 def test_a_program_that_draws_nothing_does_not_load_what_draws() -> None:

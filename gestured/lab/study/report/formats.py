@@ -25,11 +25,6 @@ def interval(row: Mapping[str, Any]) -> str:
     return "" if low is None or high is None else f"{percent(low)}–{percent(high)}"
 
 
-def share(row: Mapping[str, Any] | None) -> str:
-    """A share with its interval: 0.83 (0.81-0.85)."""
-    return NONE if row is None else f"{row['right']:.2f} ({row['low']:.2f}-{row['high']:.2f})"
-
-
 def duration(microseconds: float) -> str:
     """In three digits and the unit that fits them."""
     return EngFormatter("s", sep=THIN)(float(f"{microseconds:.3g}") * 1e-6)

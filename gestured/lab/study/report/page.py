@@ -1,15 +1,13 @@
 """The page and tables.md: a study's figures and tables, in one file each."""
 
 import base64
+import re
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader
+from jinja2 import Environment, PackageLoader, select_autoescape
 
-from gestured.lab.made_of import SHOWN
-
-from . import drawing, figures, picture
+from . import drawing, figures, formats, picture, reading
 from .reading import Study
-from .tables import tables
 
 FIGURES = {  # title -> the part of the study that it needs, and how it is drawn
     "The published figures and ours": ("cells", figures.overview),
@@ -17,6 +15,8 @@ FIGURES = {  # title -> the part of the study that it needs, and how it is drawn
     "Which gesture is taken for which": ("cells", figures.confusion),
     "How sure the methods are": ("calibration", figures.calibration),
 }
+TABLE = re.compile(r"^### (?P<title>.*)\n\n(?:(?P<notes>[^|].*)\n\n)?(?P<lines>(?:^\|.*\n)+)", re.MULTILINE)
+EMPTY = re.compile(r"^### .*\n\n(?:[^|\n].*\n\n)?(?:^\|.*\n){2}(?!\|)\n?", re.MULTILINE)  # a table without a row
 
 
 def write_report(study: Study, out: Path) -> Path:
@@ -24,25 +24,26 @@ def write_report(study: Study, out: Path) -> Path:
 
     `study` is what `gestured-lab study` writes as study.json.
     """
-    found, drawn = tables(study), {}
+    templates = Environment(
+        loader=PackageLoader("gestured.lab.study", "report"), autoescape=select_autoescape(), trim_blocks=True
+    )
+    templates.filters["values"] = formats.values
+    tables = EMPTY.sub("", templates.get_template("tables.md").render(study=study, reading=reading))
+    drawn = {}
     with drawing.styled():
         for title, (part, draw) in FIGURES.items():
             if study[part]:
                 drawn[title] = base64.b64encode(drawing.svg(draw(study), title).encode()).decode()
-    page = Environment(loader=PackageLoader("gestured.lab.study", "report"), autoescape=True, trim_blocks=True)
+    parts = [table.groupdict() | {"rows": _cells(table["lines"])} for table in TABLE.finditer(tables)]
     path = out / "index.html"
-    path.write_text(page.get_template("page.html").render(about=study["about"], figures=drawn, tables=found), "utf-8")
-    (out / "tables.md").write_text("\n".join([_origin(study), "", *map(str, found)]), "utf-8")
+    path.write_text(
+        templates.get_template("page.html").render(about=study["about"], figures=drawn, tables=parts), "utf-8"
+    )
+    (out / "tables.md").write_text(tables, "utf-8")
     return path
 
 
-def _origin(study: Study) -> str:
-    """Of which models the tables speak, and where they were made."""
-    about, machine, data = study["about"], study["machine"], study["data"]["simulated"]
-    models = ", ".join(f"{name}.onnx {digest[:SHOWN]}" for name, digest in about["models"].items())
-    return (
-        f"<!-- made by `{about['command']}` of {models} -->\n"
-        f"`gestured-lab study` on {machine['date']}, {machine['cpu']}, {machine['cores']} cores, "
-        f"{machine['minutes']} minutes. Simulated: {data['name']}, {data['participants']} participants, "
-        f"{data['performed']} gestures performed, {data['cut']} cut out by the front end."
-    )
+def _cells(lines: str) -> list[list[str]]:
+    """The cells of a Markdown table, the heading first."""
+    head, _, *rows = lines.splitlines()
+    return [[cell.strip() for cell in line.strip("|").split(" |")] for line in (head, *rows)]
