@@ -12,9 +12,8 @@ import numpy as np
 from gestured.lab.dataset import cuts
 from gestured.lab.made_of import made_of
 from gestured.lab.samples import WINDOW
-from gestured.lab.stability.coarse import coarse_table
 from gestured.lab.stability.decisions import decisions_table
-from gestured.lab.stability.extremes import month_table, parts_table, whole_path_table
+from gestured.lab.stability.extremes import parts_table, whole_path_table
 from gestured.lab.stability.path import simulated_series
 from gestured.lab.stability.relaxation import filters_table
 from gestured.lab.table import Table
@@ -28,12 +27,9 @@ def all_tables(quick: bool) -> Iterator[Table]:
     models = {name: open_model(name) for name in LADDER}
     yield parts_table(list(models.values()), quick)
     yield whole_path_table(models[LADDER[0]], quick)
-    yield month_table(models[LADDER[0]], 0.1 if quick else 30.0)
-    count = 10 if quick else 60
-    streams = [stream for _, stream in simulated_series(count)]
+    streams = [stream for _, stream in simulated_series(10 if quick else 60)]
     windows = [WINDOW.apply(segment) for stream in streams for segment in cuts(stream.frames, stream.times)]
     yield decisions_table(LADDER, windows, quick)
-    yield coarse_table(models, count)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@ The exact answer of each is y + (x - y) (1 - exp(-dt / tau)) from one frame to t
 """
 
 import math
-import time
 from typing import Any
 
 import mpmath
@@ -69,18 +68,6 @@ def error(filter_: Filter, decade: float | None, dtype: Any, count: int) -> tupl
     return float(np.abs(found.astype(np.float64) - right).max() / max(np.abs(right).max(), 1e-300)), inside
 
 
-def _seconds(filter_: Filter, count: int) -> float:
-    """Seconds of processor time a step, the best of five runs, the code that holds the filter alone."""
-    times = steps(count, 7, -1, filter_.tau_s, even=filter_.even)
-    inputs = np.zeros(count + 1)
-    best = math.inf
-    for _ in range(5):
-        start = time.process_time()
-        filter_.run(times, inputs)
-        best = min(best, time.process_time() - start)
-    return best / count
-
-
 def filters_table(quick: bool) -> Table:
     """Every filter over every decade, in float64 and float32; the last but two columns mix all sizes of steps."""
     count = 32 if quick else 200
@@ -96,18 +83,15 @@ def filters_table(quick: bool) -> Table:
                 found, within = error(filter_, decade, dtype, count)
                 cells.append(found)
                 inside &= within
-            rows.append(
-                (filter_.name, np.dtype(dtype).name, *cells, "yes" if inside else "NO", 1e6 * _seconds(filter_, count))
-            )
+            rows.append((filter_.name, np.dtype(dtype).name, *cells, "yes" if inside else "NO"))
     return Table(
         "Filters: largest error against 50 digits, by dt / tau",
-        ("filter", "state", *(f"1e{d}" for d in DECADES), "mixed", "in range", "us a step"),
+        ("filter", "state", *(f"1e{d}" for d in DECADES), "mixed", "in range"),
         rows,
         (
             "Errors are shares of the largest exact output. `mixed`: steps of 1e-9 to 1e9 tau in disorder,",
-            "repeated times and gaps of a day. `in range`: finite, never below nor above what came in. `us a",
-            "step`: processor time of the code that holds the filter. The noise is looked at every 0.5 s:",
-            f"smaller steps add up. The after-effect ends after {AFTER_S:g} s; remanence below 1e-5 is taken for",
-            "nothing, which is its error at 1 tau.",
+            "repeated times and gaps of a day. `in range`: finite, never below nor above what came in. The noise",
+            f"is looked at every 0.5 s: smaller steps add up. The after-effect ends after {AFTER_S:g} s; remanence",
+            "below 1e-5 is taken for nothing, which is its error at 1 tau.",
         ),
     )

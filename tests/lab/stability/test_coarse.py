@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gestured.lab.stability import coarse
+from experiments import coarse
 from gestured.lab.stability.path import simulated_series
 from gestured.model.opening import open_model
 

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from experiments.month import month_table
 from gestured.core.classifier import Scores
 from gestured.core.events import Cancelled, Onset, Release
 from gestured.core.frames import Segment
-from gestured.lab.stability.extremes import month_table, parts_table, swipes_found, whole_path_table
+from gestured.lab.stability.extremes import parts_table, swipes_found, whole_path_table
 from gestured.lab.stability.made import swipes
 from gestured.lab.stability.path import Series, fault
 from gestured.lab.stability.streams import Case, streams

@@ -1,5 +1,9 @@
-"""Sensors with few counts: a gesture's peak in 2 to 100 steps, through the whole path."""
+"""Sensors with few counts: a gesture's peak in 2 to 100 steps, through the whole path.
 
+python -m experiments.coarse
+"""
+
+import argparse
 from collections.abc import Mapping
 
 import numpy as np
@@ -7,6 +11,8 @@ import numpy as np
 from gestured.core.classifier import Classifier
 from gestured.lab.stability.path import Series, events, labels, simulated_series
 from gestured.lab.table import Table, Value
+from gestured.model.opening import open_model
+from gestured.model.shipped import LADDER
 
 PEAKS = (2, 3, 4, 6, 10, 30, 100)  # counts
 
@@ -43,3 +49,14 @@ def coarse_table(models: Mapping[str, Classifier], count: int) -> Table:
             "other gesture.",
         ),
     )
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--takes", type=int, default=60, help="simulated gestures (%(default)s)")
+    print(coarse_table({name: open_model(name) for name in LADDER}, parser.parse_args().takes))
+
+
+if __name__ == "__main__":
+    main()
