@@ -28,11 +28,9 @@ exit status:
 METAVARS = {
     "model": "MODEL", "fallback": "MODEL", "listen": "HOST:PORT", "publish": "osc://HOST:PORT",
     "socket": "PATH", "control": "PATH", "metrics": "HOST:PORT", "grid": "RxC", "gestures": "A,B",
-    "clock": "arrival|sensor", "stale_s": "SECONDS", "tap_gap_s": "SECONDS", "provisional_taps": "true|false",
-    "publish_provisional": "true|false",
-    "max_sensors": "N", "allow": "CIDR",
-    "flight_recorder": "MIB", "own_gestures": "FILE", "log_level": "LEVEL",
+    "clock": "arrival|sensor", "allow": "CIDR", "flight_recorder": "MIB", "own_gestures": "FILE", "log_level": "LEVEL",
 }  # fmt: skip
+OF_TYPE: dict[object, str] = {bool: "true|false", int: "N", float: "SECONDS"}  # where no key is named above
 
 
 def parser() -> argparse.ArgumentParser:
@@ -54,7 +52,7 @@ def parser() -> argparse.ArgumentParser:
         flags.add_argument(
             "--" + key.replace("_", "-"),
             action="append" if key in REPEATED else "store",
-            metavar=METAVARS[key],
+            metavar=METAVARS.get(key) or OF_TYPE[field.annotation],
             help=text.replace("%", "%%"),
             default=argparse.SUPPRESS,
         )
