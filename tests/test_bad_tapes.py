@@ -10,6 +10,7 @@ import pytest
 from gestured.control.cli import main
 from gestured.record import tape_reader
 from tests.opening import in_bounds, refused
+from tests.sockets import free_address
 
 MIB = 400  # for a file; the bombs below want a gigabyte or more
 MAGIC = b"\x89MCAP0\r\n"
@@ -77,6 +78,18 @@ def events(path: Path, *lines: object) -> Path:
 def test_a_sender_is_known_with_brackets_and_without(tmp_path: Path, written: str) -> None:
     path = write(tmp_path / "a.mcap", channel(1, "/gestured/packets", source=written), message(1, 10**9, b""))
     assert tape_reader.read(path).packets[0].source == ("fd00::7", 5)
+
+
+@pytest.mark.parametrize(
+    ("packet", "said"),
+    [(message(1, 2**64 - 1, b""), "packet 2: expected"), (PACKET, "cannot be sent: Message too long")],
+    ids=["time", "size"],
+)
+def test_a_packet_that_cannot_be_sent_is_one_sentence(tmp_path: Path, capsys, packet: bytes, said: str) -> None:
+    path = write(tmp_path / "a.mcap", CHANNELS, message(1, 10**9, b""), packet)
+    assert main(["replay", str(path), "--to", str(free_address())]) == 1
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and said in err
 
 
 @pytest.mark.parametrize("number", [1, 3], ids=["packets", "pictures"])

@@ -30,6 +30,8 @@ def send(found: Tape, to: Address, speed: float) -> int:
                 senders[packet.source] = socket.socket(family, kind)
                 senders[packet.source].connect(where)
             unheard += sent_after_refusal(senders[packet.source], data)
+    except OSError as error:  # such as a packet that is longer than UDP allows
+        raise GesturedError(f"a packet for {to} cannot be sent: {error.strerror}") from error
     finally:
         for sender in senders.values():
             sender.close()

@@ -13,6 +13,7 @@ from gestured.record.tape import EVENT_SCHEMA, EVENTS, PACKETS, SCENE, Packet, T
 
 ITEM_COSTS = 250  # bytes of memory for a packet or an event, besides what it holds
 EVENT_COSTS = 24  # bytes of memory for a byte of JSON, where it is all empty lists
+LATEST_NS = 1 << 62  # of a packet, since 1970: a day in 2116, which a clock here can wait for
 NOBODY = Address("", 0)  # the source of a channel that holds no packets
 HOST_CHARACTERS = 255  # of a sender's name; the DNS allows no more
 LARGEST_NUMBER = 1e11  # of any number in an event; as seconds since 1970 it is a date that Python can print
@@ -84,6 +85,9 @@ class _Reading:
         topic, source = self._channels[message.channel_id]
         data = message.data
         if topic == PACKETS:
+            if message.log_time > LATEST_NS:
+                place = len(self.packets) + 1
+                raise _Wrong(f"packet {place}: expected a time up to {LATEST_NS} ns, found {message.log_time}")
             budget.keep(ITEM_COSTS + len(data))
             self.packets.append(Packet(message.log_time, source, data))
         elif topic == EVENTS:
