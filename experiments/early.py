@@ -21,9 +21,9 @@ from gestured.lab.online import NON_GESTURE_SHARE, SESSION_S
 from gestured.lab.progress import progress
 from gestured.lab.study.said import heard
 from gestured.model.opening import open_model
+from gestured.record.judge import owners, verdict
 from gestured.simulator import NONE, Participant, SimulatedSensor, Take, any_sensor, generator, session
 
-SLACK_S = 0.2  # an onset may be found so far from the true one
 HARD = 0.9  # hardness of the simulator's hard sensors
 SETS = ("nominal", "hard", "non-gestures")
 
@@ -52,24 +52,19 @@ class Ahead:
         for number, event in said.items():
             counts = self.taps if event.gesture == ONE_TAP else self.confirmed
             counts[ends.get(number) == "confirmed"] += 1
-        used: set[int] = set()
-        for act in acts:
-            if act.label == NONE:
-                continue
-            near = [
-                a for a in answers
-                if a.id not in used and a.onset <= act.offset + SLACK_S and a.offset >= act.onset - SLACK_S
-            ]  # fmt: skip
-            used |= {answer.id for answer in near}
-            self._gesture(act, near, said)
+        performed = list(acts)
+        belongs = owners([(answer.onset, answer.offset) for answer in answers], performed)
+        for act in performed:
+            if act.label != NONE:
+                self._gesture(act, [one for one, of in zip(answers, belongs, strict=True) if of is act], said)
 
     def _gesture(self, act: Truth, near: Sequence[Gesture | Unknown], said: dict[int, Provisional]) -> None:
         """Count one gesture that was performed, by the answers at its time."""
         self.gestures += 1
-        named = [answer for answer in near if isinstance(answer, Gesture)]
-        hit = any(answer.gesture == act.label for answer in named)
-        self.right += hit
-        self.wrong += bool(named) and not hit
+        named = [answer.gesture for answer in near if isinstance(answer, Gesture)]
+        found = verdict(named[0], act, answered=False) if named else "missed"
+        self.right += found == "right"
+        self.wrong += found == "wrong"
         moved = act.label not in (ONE_TAP, DOUBLE_TAP)
         self.moved += moved
         after = []

@@ -3,14 +3,15 @@
 import signal
 import socket
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from gestured.model.shipped import shipped
+from gestured.record.judge import Performed, Tally
 from tests import encoding
 from tests.daemon.harness import Daemon
 
@@ -36,29 +37,27 @@ def test_real_fingers(serve: Callable[..., Daemon]) -> None:
     assert daemon.process.poll() is None
     daemon.signal(signal.SIGTERM)  # what it has still to say, it says before it ends
     events = [event for event in client.rest() if event["type"] == "gesture"]
-    right = wrong = performed = 0
+    performed, verdicts = 0, Counter[str]()
     for number in chosen:
-        heard = [event for event in events if event["sensor"] == f"session-{number}"]
-        for label, onset, offset in truth(sessions, number):
-            if not label.startswith("swipe"):
-                continue
-            performed += 1
-            answers = {e["gesture"] for e in heard if overlap(e, begun[number] + onset, begun[number] + offset)}
-            right += label in answers
-            wrong += bool(answers) and label not in answers
+        acts = truth(sessions, number, begun[number])
+        performed += sum(act.label.startswith("swipe") for act in acts)
+        tally = Tally(acts)
+        for event in events:
+            outcome = tally.hear(event, event["decided"]) if event["sensor"] == f"session-{number}" else None
+            if outcome is not None and outcome.performed is not None and outcome.performed.label.startswith("swipe"):
+                verdicts[outcome.verdict] += 1
+    right, wrong = verdicts["right"], verdicts["wrong"]
     assert performed > 50
     assert right / performed > 0.6, f"{right} of {performed} right"
     assert wrong / performed < 0.2, f"{wrong} of {performed} wrong"
 
 
-def truth(sessions: dict[str, np.ndarray], number: int) -> list[tuple[str, float, float]]:
+def truth(sessions: dict[str, np.ndarray], number: int, begun: float) -> list[Performed]:
+    """What was performed in a session whose time 0 was at `begun` (epoch s)."""
     mine = sessions["event_recording"] == number
     columns = (sessions[name][mine].tolist() for name in ("event_labels", "event_onsets", "event_offsets"))
-    return list(zip(*columns, strict=True))
-
-
-def overlap(event: dict[str, Any], onset: float, offset: float) -> bool:
-    return bool(min(event["offset"], offset) - max(event["onset"], onset) > -0.2)
+    rows = zip(*columns, strict=True)
+    return [Performed(label, label, begun + onset, begun + offset) for label, onset, offset in rows]
 
 
 def frames(daemon: Daemon) -> int:

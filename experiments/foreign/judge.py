@@ -14,10 +14,11 @@ than one segment or event), or its one segment's label. Takes that nobody can re
 
 import argparse
 import json
+import math
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ from gestured.lab.made_of import made_of, renew
 from gestured.lab.study.said import heard
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
+from gestured.record.judge import Performed, Tally
 
 SEEN = 4.0  # times the noise
 SESSION_S = 120.0
@@ -290,52 +292,29 @@ def _show(result: dict[str, Any], front_end: bool) -> None:
 def sessions(source: str, level: str, count: int, first: int) -> dict[str, Any]:
     """Continuous sessions: gestures right and wrong, and events that answer to no gesture."""
     classifier = open_model(source)
-    right = wrong = lost = false = total = 0
+    counts: Counter[str] = Counter()
     errors: Counter[str] = Counter()
     for seed in range(first, first + count):
         recording = session(seed, level, SESSION_S)
-        machine = Sensor("foreign", Scene(classifier.gestures, (9, 9)), classifier)
-        events: list[Any] = []
-        for frame in _frames(recording):
-            events += machine.push(frame)
-        events += machine.flush(SESSION_S + 5.0)
-        found = [e for e in events if isinstance(e, Gesture)]
-        used: set[int] = set()
-        for truth in recording["events"]:
-            hits = [
-                i
-                for i, e in enumerate(found)
-                if i not in used and e.onset <= truth["release"] + 0.35 and e.offset >= truth["onset"] - 0.15
-            ]
-            if truth["label"] == "none":
-                used.update(hits)
-                false += len(hits)
-                errors.update(f"{truth['kind']} -> {found[i].gesture}" for i in hits)
-                continue
-            total += 1
-            used.update(hits)
-            same = [i for i in hits if found[i].gesture == truth["label"]]
-            if same:
-                right += 1
-                false += len(hits) - 1
-            elif hits:
-                wrong += 1
-                false += len(hits) - 1
-                errors[f"{truth['kind']} -> {found[hits[0]].gesture}"] += 1
-            else:
-                lost += 1
-                errors[f"{truth['kind']} lost"] += 1
-        false += len(found) - len(used)
-        errors["event from nothing"] += len(found) - len(used)
-    minutes = count * SESSION_S / 60.0
+        performed = [Performed(e["label"], e["kind"], e["onset"], e["release"]) for e in recording["events"]]
+        tally = Tally(performed)
+        events = heard(recording["times"], recording["frames"], classifier)
+        said = [event for event in events if isinstance(event, Gesture)]
+        outcomes = [tally.hear({"type": "gesture", **asdict(event)}, event.decided) for event in said]
+        for outcome in [*outcomes, *tally.settle(math.inf)]:
+            if outcome is not None and outcome.verdict not in ("right", "rejected"):
+                done = outcome.performed.kind if outcome.performed else "nothing"
+                errors[f"{done} -> {outcome.event['gesture'] if outcome.event else 'missed'}"] += 1
+        counts.update(tally.counts)
+    total = counts["right"] + counts["wrong"] + counts["missed"]
     return {
         "level": level,
         "gestures": total,
-        "right": right / max(total, 1),
-        "wrong": wrong / max(total, 1),
-        "lost": lost / max(total, 1),
-        "false_a_minute": false / minutes,
-        "errors": [(a, c) for a, c in errors.most_common(12) if c],
+        "right": counts["right"] / max(total, 1),
+        "wrong": counts["wrong"] / max(total, 1),
+        "lost": counts["missed"] / max(total, 1),
+        "false_a_minute": counts["false"] / (count * SESSION_S / 60.0),
+        "errors": errors.most_common(12),
     }
 
 

@@ -19,7 +19,8 @@ from gestured.core.sensor import Sensor
 from gestured.lab.online import takes
 from gestured.lab.study.bootstrap import interval
 from gestured.model.model import Model
-from gestured.simulator import GESTURES, Take
+from gestured.record.judge import NONE, Performed, owners
+from gestured.simulator import Take
 
 GROUPS = {
     "taps": ("one_tap", "double_tap"),
@@ -27,7 +28,6 @@ GROUPS = {
     "circles": ("circle_clockwise", "circle_counter_clockwise"),
     "two fingers": ("swipe_up_two_fingers", "swipe_down_two_fingers"),
 }
-SLACK_S = 0.3  # how far an onset may lie beside what was performed and still belong to it
 FIRST_PERSON = 940  # participants from here on: the sessions of `online` have others
 
 
@@ -64,11 +64,10 @@ def _row(answers: list[tuple[float, bool, int]]) -> dict[str, Any]:
 
 def _answers(model: Model, take: Take) -> Iterator[tuple[str, str, float, bool]]:
     """(kind, what was performed, seconds after its last touched frame, wrong or not) of each answer to a gesture."""
-    for event in heard(take.sensor_times, take.frames, model):
-        if not isinstance(event, Gesture | Provisional):
-            continue
-        kind = "final" if isinstance(event, Gesture) else "provisional"
-        for act in take.events:
-            if act.label in GESTURES and act.onset_s - SLACK_S <= event.onset <= act.offset_s + SLACK_S:
-                yield kind, act.label, event.decided - act.offset_s, event.gesture != act.label
-                break
+    events = [e for e in heard(take.sensor_times, take.frames, model) if isinstance(e, Gesture | Provisional)]
+    spans = [(event.onset, event.offset if isinstance(event, Gesture) else event.decided) for event in events]
+    performed = [Performed(act.label, act.kind, act.onset_s, act.offset_s) for act in take.events]
+    for event, act in zip(events, owners(spans, performed), strict=True):
+        if act is not None and act.label != NONE:
+            kind = "final" if isinstance(event, Gesture) else "provisional"
+            yield kind, act.label, event.decided - act.offset, event.gesture != act.label
