@@ -99,7 +99,8 @@ def test_everything_is_counted_once(performances, events):
 @given(st.lists(st.tuples(labels, spans)), st.lists(spans))
 def test_many_belong_to_whom_each_of_them_belongs(performances, said):
     acts = sorted((Performed(label, label, *span) for label, span in performances), key=lambda act: act.onset)
-    assert [id(found) for found in owners(said, acts)] == [id(whose(*span, acts)) for span in said]
+    expected = [id(whose(onset, offset, acts)) for onset, offset in said]
+    assert [id(found) for found in owners(said, acts)] == expected
 
 
 def test_what_was_said_early_is_counted_with_its_lead():
