@@ -46,14 +46,15 @@ def literal(value: object) -> str:
 
 
 def keys(part: type[Part], prefix: str = "", leave_out: tuple[str, ...] = ()) -> list[Key]:
-    """The keys of one table. Raises KeyError for a key that has no default and nothing to show."""
+    """The keys of one table. Raises KeyError for a key that has no default, no `examples` and nothing to show."""
     found = []
     for name, field in part.model_fields.items():
         if name in leave_out:
             continue
         default = field.default
         unset = default is None or default == ()
-        value = SHOWN[prefix + name] if unset else SHOWN.get(prefix + name, default)
+        shown = {prefix + name: field.examples[0]} if field.examples else SHOWN
+        value = shown[prefix + name] if unset else shown.get(prefix + name, default)
         text = field.description or ""
         if not unset and value != default:
             text += f" (default: {literal(default)})"

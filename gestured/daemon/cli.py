@@ -52,7 +52,7 @@ def parser() -> argparse.ArgumentParser:
         flags.add_argument(
             "--" + key.replace("_", "-"),
             action="append" if key in REPEATED else "store",
-            metavar=METAVARS.get(key) or OF_TYPE[field.annotation],
+            metavar=METAVARS.get(key) or OF_TYPE.get(field.annotation, key.upper()),
             help=text.replace("%", "%%"),
             default=argparse.SUPPRESS,
         )
