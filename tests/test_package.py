@@ -193,7 +193,7 @@ def test_the_version_is_the_packages():
 
 BESIDE = """
 import gestured, gestured.model.shipped
-from gestured.core import recognizer
+from gestured.core import sensor
 print(gestured.__file__, gestured.open.__name__)
 print(gestured.model.shipped.shipped()["cnn_lstm"].is_file())
 """

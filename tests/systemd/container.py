@@ -97,7 +97,9 @@ class Container:
         """Run a command inside, as root."""
         enter = ["nsenter", f"--target={self.leader}", "--mount", "--uts", "--ipc", "--net", "--pid", "--root", "--wd"]
         done = subprocess.run([*enter, *command], capture_output=True, text=True, timeout=DEADLINE_S, env=ENVIRONMENT)
-        assert not check or done.returncode == 0, f"{' '.join(command)}: {done.stdout}{done.stderr}"
+        if check and done.returncode != 0:
+            said = subprocess.run([*enter, "journalctl", "-n", "30"], capture_output=True, text=True, env=ENVIRONMENT)
+            raise AssertionError(f"{' '.join(command)}: {done.stdout}{done.stderr}\n{said.stdout}")
         return done
 
     def follow(self, text: str) -> str:
