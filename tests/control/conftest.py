@@ -6,13 +6,15 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import pytest
 
 from gestured.client.control import Control
+from gestured.control.cli import main
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor
 from tests.sockets import free_address
@@ -52,13 +54,25 @@ def start() -> Iterator[Start]:
 
 
 @pytest.fixture
-def run(start: Start) -> Callable[..., tuple[int, str, str]]:
-    """Runs gesturectl to its end: exit status, standard output, standard error."""
+def run(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str, str]]:
+    """Runs gesturectl to its end in this process: exit status, standard output, standard error."""
 
-    def finish(*arguments: object, **more: Any) -> tuple[int, str, str]:
-        process = start(*arguments, **more)
-        out, err = process.communicate(timeout=60)
-        return process.returncode, out.decode(), err.decode()
+    def finish(*arguments: object, env: Mapping[str, str] = {}) -> tuple[int, str, str]:
+        handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        with TemporaryFile("w+") as out, TemporaryFile("w+") as err, monkeypatch.context() as patch:
+            patch.setattr(sys, "stdin", None)
+            patch.setattr(sys, "stdout", out)
+            patch.setattr(sys, "stderr", err)
+            for name, value in env.items():
+                patch.setenv(name, value)
+            try:
+                status = main([*map(str, arguments)])
+            except SystemExit as ended:  # argparse
+                status = ended.code
+            finally:
+                for number, handler in handlers.items():
+                    signal.signal(number, handler)
+            return status, *(file.seek(0) or file.read() for file in (out, err))
 
     return finish
 

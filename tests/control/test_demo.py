@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -39,9 +40,15 @@ def test_a_folder_of_the_same_name_is_not_taken_for_the_program(tmp_path, monkey
         assert engine.ready["type"] == "ready"
 
 
-def test_outcomes_add_up_to_the_summary(run, shallow):
+def ended(process: "subprocess.Popen[bytes]") -> tuple[int, str, str]:
+    """Exit status, standard output and standard error of a process, once it has ended by itself."""
+    out, err = process.communicate(timeout=60)
+    return process.returncode, out.decode(), err.decode()
+
+
+def test_outcomes_add_up_to_the_summary(start, shallow):
     kinds = ("--kinds", "swipe_left,one_tap", "--speed", "normal")
-    status, out, err = run("demo", "--seconds", 9, *kinds, "--json", env={"TMPDIR": str(shallow)})
+    status, out, err = ended(start("demo", "--seconds", 9, *kinds, "--json", env={"TMPDIR": str(shallow)}))
     assert (status, err) == (0, "")
     *outcomes, summary = map(json.loads, out.splitlines())
     assert summary.pop("type") == "summary"
@@ -57,8 +64,9 @@ def test_outcomes_add_up_to_the_summary(run, shallow):
     assert daemons(shallow) == [] and os.listdir(shallow) == []
 
 
-def test_without_a_terminal_no_escape_codes_and_without_block_characters_words(run):
-    status, out, err = run("demo", "--seconds", 6, "--kinds", "swipe_up", env={"PYTHONIOENCODING": "ascii"})
+def test_without_a_terminal_no_escape_codes_and_without_block_characters_words(start):
+    process = start("demo", "--seconds", 6, "--kinds", "swipe_up", env={"PYTHONIOENCODING": "ascii"})
+    status, out, err = ended(process)
     assert (status, err) == (0, "")
     assert "\x1b" not in out
     assert "performed   swipe_up" in out and "Summary" in out
@@ -78,8 +86,8 @@ def test_ended_early_it_still_sums_up_and_leaves_nothing_behind(start, shallow, 
     assert daemons(shallow) == [] and os.listdir(shallow) == []
 
 
-def test_a_model_that_cannot_be_used_is_one_sentence(run, shallow):
-    status, out, err = run("demo", "--model", shallow / "none.onnx", env={"TMPDIR": str(shallow)})
+def test_a_model_that_cannot_be_used_is_one_sentence(start, shallow):
+    status, out, err = ended(start("demo", "--model", shallow / "none.onnx", env={"TMPDIR": str(shallow)}))
     assert (status, out, err.count("\n")) == (1, "", 1)
     assert "none.onnx" in err
     assert os.listdir(shallow) == []
