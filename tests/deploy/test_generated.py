@@ -1,9 +1,6 @@
 """What is made from the programs' own words is up to date, complete, and understood by those who read it."""
 
-import os
-import pty
 import re
-import select
 import shutil
 import subprocess
 import sys
@@ -103,66 +100,3 @@ def test_bash_completes_commands_flags_choices_and_files():
     assert "README.md" in complete("gestured", "--config", "READ")
     assert "README.md" in complete("gesturectl", "replay", "READ")
     assert complete("gesturectl", "simulate", "--speed", "fa") == {"fast"}
-
-
-class Zsh:
-    """An interactive zsh in a terminal, with our completions; a context manager."""
-
-    def __init__(self, folder: Path) -> None:
-        for name, parser in programs.PARSERS.items():
-            (folder / f"_{name}").write_text(completion.completion(parser(), "zsh"))
-        self._terminal, inner = pty.openpty()
-        environment = {"TERM": "dumb", "PATH": os.environ["PATH"], "HOME": str(folder), "PS1": "", "LANG": "C.UTF-8"}
-        self._process = subprocess.Popen(
-            ["zsh", "-f", "-i"], stdin=inner, stdout=inner, stderr=inner, cwd=ROOT, env=environment, process_group=0
-        )
-        os.close(inner)
-        self.said = ""
-        self.type(
-            f"stty -echo; fpath=({folder} $fpath); autoload -Uz compinit; compinit -u -D; echo rea''dy\n", "ready\r"
-        )
-
-    def type(self, keys: str, expected: str) -> None:
-        """Type something, and wait until it is answered."""
-        os.write(self._terminal, keys.encode())
-        begin = len(self.said)
-        while expected not in self.said[begin:]:
-            readable, _, _ = select.select([self._terminal], [], [], 20)
-            assert readable, f"{keys!r}: expected {expected!r}, found {self.said[begin:]!r}"
-            self.said += os.read(self._terminal, 4096).decode(errors="replace")
-
-    def __enter__(self) -> "Zsh":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._process.kill()
-        self._process.wait()
-        os.close(self._terminal)
-
-
-@pytest.mark.skipif(shutil.which("zsh") is None, reason="zsh is not installed")
-def test_zsh_completes_commands_flags_choices_and_files(tmp_path: Path):
-    with Zsh(tmp_path) as zsh:
-        for typed, completed in (
-            ("gesturectl recal", "ibrate"),
-            ("gesturectl listen --rec", "onnect"),
-            ("gesturectl listen --socket /usr/lib/os-rel", "ease"),
-            ("gesturectl simulate --speed fa", "st"),
-            ("gesturectl replay READ", "ME.md"),
-            ("gestured --flight", "-recorder"),
-            ("gestured --config READ", "ME.md"),
-        ):
-            zsh.type(f"{typed}\t", typed + completed)
-            zsh.type("\x15echo ne''xt\n", "next\r")  # a line is thrown away
-    for name in PROGRAMS:
-        assert subprocess.run(["zsh", "-n", tmp_path / f"_{name}"], capture_output=True, text=True).stderr == ""
-
-
-@pytest.mark.skipif(shutil.which("fish") is None, reason="fish is not installed")
-@pytest.mark.parametrize("name", sorted(PROGRAMS))
-def test_fish_takes_the_completion(tmp_path: Path, name: str):
-    path = tmp_path / f"{name}.fish"
-    path.write_text(completion.completion(programs.PARSERS[name](), "fish"))
-    ask = f"source {path}; complete --do-complete '{name} --h'"
-    done = subprocess.run(["fish", "--no-config", "-c", ask], capture_output=True, text=True, timeout=20)
-    assert done.stderr == "" and "--help" in done.stdout
