@@ -20,7 +20,7 @@ FEWEST = 3  # touched frames: fewer show no movement
 
 
 class Examiner:
-    """A model that judges the examples of an enrolment: None where there is nothing to say against one."""
+    """A model that judges the examples of an enrolment: what speaks against one, in words, or None."""
 
     def __init__(self, model: Model, space: Space, own: Own, in_use: Collection[str]) -> None:
         """`own` are the gestures that there are already, `in_use` the model's."""
