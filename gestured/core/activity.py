@@ -16,11 +16,11 @@ Array = NDArray[np.float64]
 COMMON = 4.0  # noise units: the most that is taken off for what all taxels share; a palm must not cancel itself
 BLOB = (0.5, 1.0, 0.5)  # a fingertip over three taxels, in rows and in columns
 BLOB_GAIN = sum(BLOB) ** 2 / sum(b * b for b in BLOB)  # factor by which a level that all taxels share grows in a spot
-PLACE_SHARE = 0.3  # of the highest taxel: what lies below it says nothing of where the finger is
+PLACE_SHARE = 0.3  # of the highest taxel: lower taxels say nothing of where the finger is
 PLACE_NOISE = 3.5  # noise units above which a taxel says where the finger is
 TYPICAL = 0.88  # median activity of an idle frame, in units of sqrt(2 ln N), where noise is normal
-USUAL_AT_MOST = 5.0  # times the typical activity count as a sensor's own restlessness; more is a touch, or a fault
-SURPRISE = 2.0  # times the typical activity: a frame that is stronger counts as so strong, since one must not rule
+USUAL_AT_MOST = 5.0  # the largest `scale`: a sensor that seems more restless than that is touched, or faulty
+SURPRISE = 2.0  # times the typical activity: the most that one idle frame counts, so that none rules the average
 
 
 def rarely(taxels: int) -> float:
@@ -36,8 +36,8 @@ def hardly_ever(taxels: int) -> float:
 class Activity:
     """The activity of a sensor of R x C taxels, and how high it usually is while the sensor is idle.
 
-    Clipping, hum and bursts make idle frames more active than normal noise would. `scale` is by how much: activity is
-    told in what is usual for this sensor.
+    Clipping, hum and bursts make idle frames more active than normal noise would. `scale` is the factor by which
+    the noise units of this sensor are enlarged.
     """
 
     def __init__(self, rows: int, columns: int) -> None:
@@ -83,11 +83,11 @@ class Activity:
         self.scale, self.usual = 1.0, 0.0
 
     def learn(self, scaled: Array) -> None:
-        """See (n, N) deviations of idle frames, in noise units as they are with a `scale` of 1."""
+        """Learn what is usual from (n, N) deviations of idle frames, in noise units with a `scale` of 1."""
         self.usual = float(median(np.array([self.measure(frame)[0] for frame in scaled])))
 
     def follow(self, t: float, since: float, activity: float) -> None:
-        """Follow the sensor, idle from `since` until `t` s and then as active as that."""
+        """Follow a sensor that was idle from `since` to `t` s and has that activity (noise units) at `t`."""
         seen = min(activity, SURPRISE * self._typical) * self.scale
         self.usual += (seen - self.usual) * -math.expm1((since - t) / NOISE_TAU_S)
 

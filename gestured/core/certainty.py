@@ -10,14 +10,14 @@ Needed = tuple[float | None, ...]  # confidences, one for each stretch of elapse
 class Certainty:
     """How sure a model must be of a contact that is not over: confidences by the time since its onset.
 
-    It is part of the model, stored in its metadata as `provisional`.
+    A certainty is part of the model, stored in its metadata as `provisional`.
     """
 
     in_a_row: int  # frames that must be sure enough of the same gesture, one after the other
     elapsed_s: tuple[float, ...]  # where stretches of time begin; the first at 0
-    thresholds: Needed
-    gestures: Mapping[str, Needed] = field(default_factory=dict)  # of single gestures, in place of `thresholds`
-    tap: float | None = None  # of one tap, once the finger has left
+    thresholds: Needed  # of gestures that have none of their own in `gestures`
+    gestures: Mapping[str, Needed] = field(default_factory=dict)  # by gesture: what it needs in place of `thresholds`
+    tap: float | None = None  # confidence that one tap needs once the finger has left; None is never
 
     def needed(self, gesture: str, elapsed_s: float) -> float | None:
         """The confidence that a gesture needs so long after the onset, None where it is never enough."""

@@ -1,4 +1,4 @@
-"""What scores segments: a model, or a ladder of them; and what it says of one."""
+"""The Protocol of whatever scores segments (a model, or a ladder of models), and the scores that it gives."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -28,14 +28,14 @@ class Scores:
     values: NDArray[np.float32]  # (G,) probabilities given that it is one of the gestures, in the classifier's order
     unknown: float  # probability that it is none of them
     model: str
-    degraded: bool = False  # a fallback answered
+    degraded: bool = False  # whether a fallback answered
     threshold: float = 0.5  # confidence from which the model's calibration has it published
     took_s: float = 0.0  # s that the model ran
     own: Match | None = None  # the nearest gesture of the user's own, where there are any
 
     @property
     def confidence(self) -> float:
-        """Of the best gesture."""
+        """The confidence of the best gesture, 0 to 1."""
         return float(self.values.max()) * (1.0 - self.unknown)
 
 
@@ -46,7 +46,7 @@ class Classifier(Protocol):
 
     @property
     def certainty(self) -> Certainty | None:
-        """How sure it must be of contacts that are not over; None where it was not made for them."""
+        """How sure the classifier must be of a contact that is not over; None where it was not made for that."""
         return None
 
     def classify(self, segment: Segment) -> Scores:
@@ -56,6 +56,6 @@ class Classifier(Protocol):
     def preview(self, segment: Segment) -> Scores | None:
         """Score the beginning of a segment, None where that fails: no later answer may depend on it.
 
-        It is asked only where there is a `certainty`.
+        `preview` is called only where there is a `certainty`.
         """
         return None

@@ -7,15 +7,15 @@ from gestured.core.timing import Timing
 
 Place = tuple[float, float]  # (row, column) in taxel pitches
 
-ON_SHARE = 0.20  # of a contact's peak: what is strong in it, and what a new one must exceed while the textile recovers
-RECOVERY_S = 1.0  # the time constant with which the last peak's share fades; as long, a remainder is an after-effect
+ON_SHARE = 0.20  # of a contact's peak: a frame of it is strong from there on, and a new contact must exceed it
+RECOVERY_S = 1.0  # time constant with which the after-effect fades, and for how long a contact is followed by it
 AFTER_S = 8.0  # after so long nothing is left of a contact: a firm finger has faded below the noise
-SPIKE = 4.0  # times the next highest frame: a peak that one frame alone reached counts for so much at most
-FIRM = 8.0  # times the threshold of a contact: what the next highest frame is taken for at least, as a tap may be one
+SPIKE = 4.0  # times the second highest frame: the most that a peak in one frame alone counts
+FIRM = 8.0  # times `on`: the least that the second highest frame counts, since a tap may have a single frame
 
 
 class Stretch:
-    """One stretch of activity."""
+    """When one contact was touched, and where its centroid went."""
 
     __slots__ = ("_box", "began", "touched", "widest")
 
@@ -26,7 +26,7 @@ class Stretch:
         self._box: tuple[float, float, float, float] | None = None  # top, left, bottom, right
 
     def follow(self, place: Place) -> None:
-        """Its centroid is there now."""
+        """The contact's centroid is at `place` now."""
         row, column = place
         top, left, bottom, right = self._box or (row, column, row, column)
         top, left, bottom, right = min(top, row), min(left, column), max(bottom, row), max(right, column)
@@ -45,10 +45,10 @@ class AfterEffect:
         self.clear()
 
     def clear(self) -> None:
-        """There was no contact."""
+        """Begin anew, as if there had been no contact."""
         self.peak = 0.0  # noise units, the highest activity of the contact that goes on, or of the last one
-        self._next = 0.0  # noise units, the next highest: of one frame more
-        self._over = -math.inf  # s, the first frame after that contact; infinite before it
+        self._next = 0.0  # noise units, the activity of that contact's second highest frame
+        self._over = -math.inf  # s, the first frame after that contact; infinite while it goes on
 
     def begin(self) -> None:
         """A contact has begun."""
@@ -93,9 +93,9 @@ class Memory:
     off: float  # noise units: activity below which there is none
     travel: float  # taxel pitches that a tap may move
     wait_for_double_tap: bool
-    after: AfterEffect = field(init=False)  # of the contact that goes on, or of the last one
-    contact: Stretch = field(init=False)  # the one that goes on, or the last one
-    first: Stretch | None = field(init=False)  # of the segment, if `contact` is its second
+    after: AfterEffect = field(init=False)  # the peak of the last contact, and what it leaves behind
+    contact: Stretch = field(init=False)  # the contact that goes on, or the last one
+    first: Stretch | None = field(init=False)  # the segment's first contact, if `contact` is its second
     quiet_since: float | None = field(init=False)  # s, the first quiet frame since the last touched one
 
     def __post_init__(self) -> None:

@@ -19,17 +19,17 @@ from gestured.core.contact import Place
 from gestured.core.frames import Segment
 from gestured.core.taxels import Inspection
 
-LARGEST = float(np.finfo(np.float32).max)  # counts; also what a frame on the wire can hold
+LARGEST = float(np.finfo(np.float32).max)  # counts; the largest that a frame on the wire can hold
 LEAD_S = 0.15  # quiet frames kept before an onset: at 15 Hz two of them
 LEAD_FRAMES = 200  # quiet frames kept at most: LEAD_S at 1000 Hz and more; a sensor's own clock may all but stand still
-HOLE_S = 0.25  # longer without a frame, nobody knows what the finger did meanwhile
-HOLE_FRAMES = 2.5  # of the sensor's own intervals: a slow one may take so many, whatever the seconds
-CLEAR_S = 0.45  # five frames lost in a row at 15 Hz; however clear the path, longer is too long
+HOLE_S = 0.25  # after longer without a frame nobody knows what the finger did meanwhile
+HOLE_FRAMES = 2.5  # intervals of the sensor: a slow sensor's hole may last so many, whatever the seconds
+CLEAR_S = 0.45  # the longest hole that a clear path excuses: five frames lost in a row at 15 Hz
 SIDE = 3  # frames at most on each side of a hole from which its way is taken
 RESTS = 0.5  # taxel pitches: a shorter way has no direction, and a finger that goes no further rests
 STRAIGHT = math.radians(40.0)  # angle up to which the way across the hole goes straight on from the way beside it
-BENT = math.radians(75.0)  # the same angle where both ways bend to the same side, as on a circle
-SLOWEST = 0.75  # times the speed beside the hole: who got less far has turned a corner, or stopped
+BENT = math.radians(75.0)  # angle up to which that holds where both ways bend to the same side, as on a circle
+SLOWEST = 0.75  # times the speed beside the hole: a finger slower than that has turned a corner, or stopped
 
 
 _new = tuple.__new__  # Kept(...) takes twice the time
@@ -41,7 +41,7 @@ class Kept(NamedTuple):
     t: float  # s
     above: NDArray[np.float64]  # (N,) counts above the baseline
     lost: int  # frames, just before this one
-    place: Place | None  # where it is pressed, if it is
+    place: Place | None  # centroid, where the frame is touched
     new: float  # s, since when the sensor has shown just that: a frame that is repeated tells nothing
 
 
@@ -71,9 +71,9 @@ class Cutter:
         self._travel = travel
         self._kept: deque[Kept] = deque()
         self._made: Made | None = None
-        self._settled = -math.inf  # s, the last frame of the quiet second after which the sensor was ready
+        self._settled = -math.inf  # s, the last frame of the second from which the idle sensor was learned
         self._shown = b""  # raw counts of the last frame
-        self._new = 0.0  # s, since when it shows that
+        self._new = 0.0  # s, since when the frames show just these counts
 
     def __len__(self) -> int:
         """How many frames are kept."""
@@ -93,7 +93,7 @@ class Cutter:
         self._kept.clear()
 
     def keep(self, look: Look, lost: int, place: Place | None) -> None:
-        """Take a frame. Of a sensor that stands still when idle, a repeated one is as good as any."""
+        """Take a frame. One that repeats the last is no news, unless the idle sensor repeats its frames, too."""
         t, shown = look.t, look.raw.tobytes()
         if shown != self._shown or not self._conditioner.noise.lively:
             self._new = t
@@ -113,11 +113,11 @@ class Cutter:
         return None if made is before else made.segment
 
     def so_far(self, onset: float, offset: float) -> Segment:
-        """The segment of a contact that is not over; nothing is remembered of it."""
+        """The segment of a contact that is not over; a later `draft` or `cut` does not see it."""
         return self._segment(onset, offset)[0]
 
     def cut(self, onset: float, offset: float) -> Made:
-        """The segment of a contact that is over, after what it says of the taxels."""
+        """The segment of a contact that is over, made after the contact has shown which taxels are stuck."""
         self._conditioner.judge(self._make(onset, offset).inspection)
         made, self._made = self._make(onset, offset), None
         return made
@@ -138,7 +138,7 @@ class Cutter:
     def _clear(self, onset: float, begin: float, end: float, offset: float) -> bool:
         """Whether nothing hides in the hole from `begin` to `end` s of a contact."""
         if any(begin < kept.t < end for kept in self._kept):
-            return False  # the sensor repeated itself, and what the segment shows of that time is not so
+            return False  # the sensor repeated a frame, so the segment shows a finger at rest that may have moved
         seen = [Sight(k.t, k.place) for k in self._kept if k.place is not None and onset <= k.t <= offset]
         before, after = [one for one in seen if one.t <= begin], [one for one in seen if one.t >= end]
         return clear(before, after, self._travel)

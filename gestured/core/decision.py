@@ -11,11 +11,11 @@ from gestured.core.timing import outside
 
 
 class Decision:
-    """Thresholds, gestures in use, and pauses of a scene, for one sensor.
+    """The thresholds, gestures in use and refractory pauses of a scene, for one sensor.
 
-    What falls to gestures that are not in use is not given to those that are left. What is not sure enough, or has a
-    hole in which the finger may have moved unseen, is unknown. A gesture of the user's own may take what the model does
-    not know, and what is much nearer to it than to the model's gestures.
+    What falls to gestures that are not in use is not given to those that are left. A segment of which
+    the model is not sure enough, or with a hole in which the finger may have moved unseen, is unknown. A gesture of the
+    user's own may take what the model does not know, and what is much nearer to it than to the model's gestures.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -49,7 +49,7 @@ class Decision:
         return since < self._refractory.get(gesture, 0.0)
 
     def published(self, gesture: str, segment: Segment) -> None:
-        """A gesture is published: its pause begins."""
+        """Note that a gesture is published: its refractory pause begins."""
         self._last_offset[gesture] = segment.offset
 
 

@@ -1,4 +1,4 @@
-"""What gestured raises on purpose. Anything else that escapes is a bug and crashes loudly."""
+"""What gestured raises on purpose. Any other exception is a bug, and ends every program but the daemon."""
 
 
 class GesturedError(Exception):
@@ -6,9 +6,9 @@ class GesturedError(Exception):
 
 
 class ProtocolError(GesturedError):
-    """A peer sent nonsense: count `reason`, drop the packet, go on.
+    """A peer sent nonsense: whoever catches this counts `reason`, drops the packet and goes on.
 
-    `reason` is a short, fixed word (a metric label), the text says more.
+    `reason` is a short, fixed word (a metric label); the text says what was expected.
     """
 
     def __init__(self, reason: str, text: str = "") -> None:

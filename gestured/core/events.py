@@ -1,4 +1,4 @@
-"""What comes out: small frozen facts in a plain union. Times are seconds on the stream's clock.
+"""The events that are published: frozen values in a plain union. Times are seconds on the stream's clock.
 
 An `id` numbers a sensor's segments: each `Onset` is followed by exactly one `Gesture`, `Unknown` or
 `Cancelled`, and by one `Release`. Where somebody asks, at most one `Provisional` comes between onset and answer; the
@@ -20,7 +20,7 @@ class Onset:
 
 @dataclass(frozen=True, slots=True)
 class Provisional:
-    """What a contact that goes on will most probably be. It is no answer: that comes, and may revoke it."""
+    """The most probable gesture of a contact that goes on. The answer comes later, and confirms or revokes it."""
 
     sensor: str
     id: int
@@ -43,21 +43,21 @@ class Gesture:
     offset: float  # s, last touched frame
     decided: float  # s, when it was decided: the end of the wait after the last touched frame, or later
     frames: int  # touched frames, first to last
-    lost: int
-    model: str
-    degraded: bool
-    scores: Mapping[str, float]  # one per gesture of the model's
+    lost: int  # frames that went missing between them
+    model: str  # the one that answered
+    degraded: bool  # whether a fallback answered
+    scores: Mapping[str, float]  # of each of the model's gestures that is in use
     provisional: str | None = None
     own: bool = False  # whether it is a gesture of the user's own
 
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A segment that is none of the gestures, or not surely enough."""
+    """A segment that is none of the gestures, or of which the model is not sure enough."""
 
     sensor: str
     id: int
-    confidence: float  # of the best gesture
+    confidence: float  # 0..1, of the best gesture; the fields below are those of `Gesture`
     onset: float
     offset: float
     decided: float
@@ -66,7 +66,7 @@ class Unknown:
     model: str
     degraded: bool
     scores: Mapping[str, float]
-    reason: str = "confidence"  # confidence, hole, rate
+    reason: str = "confidence"  # confidence (below the threshold), hole (frames were lost), rate (too slow or too fast)
     provisional: str | None = None
 
 
@@ -82,7 +82,7 @@ class Cancelled:
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """The sensor was let go; the end of an `Onset`, whatever became of it."""
+    """The sensor was let go. It follows each `Onset`, whatever the answer was."""
 
     sensor: str
     id: int
@@ -91,10 +91,10 @@ class Release:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """A sign of life, once a second."""
+    """How the daemon is, once a second as a sign of life."""
 
     state: str  # "ok", "degraded", "no_data"
-    sensors: Mapping[str, str]  # state of each
+    sensors: Mapping[str, str]  # state of each sensor
     model: str
     time: float  # s since the Unix epoch
 

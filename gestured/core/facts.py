@@ -1,4 +1,4 @@
-"""What a hub found: small facts in a plain union, for those who publish, count, compare or keep them."""
+"""The facts that a hub returns: a plain union, for those who publish, count, compare or keep them."""
 
 from collections.abc import Iterable
 from typing import Literal, NamedTuple
@@ -23,18 +23,18 @@ class Arrived(NamedTuple):
 
     sensor: str
     taken: int
-    lost: int  # before them, by the sensor's counter, or by what this machine had no room for
+    lost: int  # frames missing before these: by the sensor's counter, or as this machine had no room for packets
     duplicates: int
     late: int
     implausible: int  # time tags that were replaced by the arrival
 
 
 class Taken(NamedTuple):
-    """A frame that was used; told of only where the scene asks for `frames`."""
+    """A frame that was used. A hub gives these only where its scene asks for `frames`."""
 
     sensor: str
     frame: Frame  # stamped, as it was sent
-    new: bool  # the sensor came, or restarted: what was learned of it before does not hold
+    new: bool  # whether the sensor came or restarted just before, so that what was learned of it does not hold
     ready: bool  # whether the idle sensor is known, this frame included
 
 
@@ -55,9 +55,9 @@ class Changed(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """A bug: an exception where none may be. A sensor's contact has been ended."""
+    """A bug: an exception where none may be. The contact of the sensor in whose path it was has been ended."""
 
-    sensor: str | None
+    sensor: str | None  # None where a packet could not be taken apart
     error: Exception
 
 

@@ -1,4 +1,4 @@
-"""What comes in: frames and touches; and what is cut out of them: segments."""
+"""The values that a front end works on: a frame, its touches, and the segment that is cut out of frames."""
 
 from dataclasses import dataclass
 
@@ -29,16 +29,15 @@ class Frame:
 class Segment:
     """The frames of one gesture: conditioned, at the sensor's own grid and rate.
 
-    `frames[first]` and `frames[last]` are the first and the last touched frame; what stands before and
-    after them is quiet context.
+    The frames before `first` and after `last` are quiet context, which a model's window may take in.
     """
 
     frames: NDArray[np.float32]  # (T, R, C) counts above the baseline
     times: NDArray[np.float64]  # (T,) seconds, strictly increasing
-    first: int
-    last: int
+    first: int  # index of the first touched frame
+    last: int  # index of the last touched frame
     noise: float  # counts, one standard deviation of an idle taxel
-    lost: int = 0
+    lost: int = 0  # frames that went missing between `first` and `last`
 
     @property
     def onset(self) -> float:

@@ -4,8 +4,8 @@ The one path. The daemon, a replay, an export and a recording session differ onl
 what they do with the facts. Nothing here has a socket, a clock, a log or a metric; times are seconds on one clock that
 never goes back, the daemon's monotonic one or a tape's own.
 
-A bug in the path of one sensor is a `Fault`: its contact is ended, and the others go on. That is the one place where
-a bug does not end the program: a daemon in a vehicle that dies of one sensor's odd frame helps nobody.
+A bug in the path of one sensor is a `Fault`: that sensor's contact is ended, and the other sensors go on. It is not
+raised, since a daemon in a vehicle that dies of one sensor's odd frame helps nobody.
 """
 
 import math
@@ -21,10 +21,10 @@ from gestured.core.sensor import Sensor
 from gestured.core.wire import Arrival, Decoder
 
 FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one that sends
-REMEMBERED = 4096  # names of sensors that are not there, whose numbers are known
-HOSTS = 1024  # decisions about who may send that are known
+REMEMBERED = 4096  # sensors that gave up their place, of which the last sequence and id are remembered
+HOSTS = 1024  # hosts of which it is remembered whether they may send
 
-Waiting = dict[str, tuple[Sensor, list[Arrival]]]  # by sensor: its frames among some packets
+Waiting = dict[str, tuple[Sensor, list[Arrival]]]  # by its name: a sensor, and its frames among the packets of one call
 
 
 class Hub:
@@ -35,7 +35,7 @@ class Hub:
         self._sensors: dict[str, Sensor] = {}
         self._numbers: dict[str, tuple[int, int]] = {}  # sequence and id that sensors which are not there have used
         self._missed = 0  # times that this machine had no room for a packet
-        self._told: dict[str, int] = {}  # of each sensor: how many of these times it was told of
+        self._told: dict[str, int] = {}  # by sensor: what `_missed` was when that sensor was last told of it
         self._owners: frozenset[Source] = frozenset()
         self._asked: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
         self._waits: dict[str, Sensor] = {}  # sensors in which a contact may be over before the next frame
@@ -64,7 +64,7 @@ class Hub:
         for packet, source in packets:
             try:
                 self._decode(packet, source, now, waiting, facts)
-            except Exception as error:  # what came before and after it is good
+            except Exception as error:  # the packets before and after this one are good
                 facts.append(Fault(None, error))
         for name, (sensor, arrivals) in waiting.items():
             missed = self._told[name] != self._missed
@@ -101,25 +101,25 @@ class Hub:
         return facts
 
     def flush(self, now: float) -> list[Fact]:
-        """Nothing more will come: what is open is answered or cancelled."""
+        """No packet will come after `now`: open contacts are answered or cancelled."""
         facts: list[Fact] = []
         for sensor in self._sensors.values():
             sensor.end(now, facts)
         return facts
 
     def missed(self) -> None:
-        """This machine had no room for a packet: whose it was shows where the next frame comes after a pause."""
+        """This machine had no room for a packet. Each sensor's next frame shows whether it was one of that sensor's."""
         self._missed += 1
 
     def restart(self, sensors: Sequence[str], now: float) -> list[Fact]:
-        """Learn these sensors anew; their open contacts are cancelled."""
+        """Learn these sensors anew; their open contacts are cancelled. KeyError for one that is not there."""
         facts: list[Fact] = []
         for name in sensors:
             self._sensors[name].restart(now, facts)
         return facts
 
     def change(self, scene: Scene, classifier: Classifier, now: float) -> list[Fact]:
-        """Go on in another scene, with another classifier; what was learned of a sensor stays where it holds."""
+        """Go on in another scene; what was learned of a sensor stays where it holds. ValueError as for a new hub."""
         facts: list[Fact] = []
         self._set(scene, classifier)
         for sensor in self._sensors.values():
@@ -232,7 +232,7 @@ class Hub:
         return False
 
     def _forget(self, sensor: Sensor) -> None:
-        """Take a sensor off the list; what it has numbered is numbered on should it return."""
+        """Give a sensor's place away. Should it return, its sequences and ids go on where they were."""
         del self._sensors[sensor.name], self._told[sensor.name]
         self._waits.pop(sensor.name, None)
         if len(self._numbers) >= REMEMBERED:

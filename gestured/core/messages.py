@@ -41,7 +41,7 @@ def to_json(event: Event, epoch: float, *, test: bool = False) -> bytes:
     for field in fields(event):
         value = getattr(event, field.name)
         if value is False and field.name == "own":
-            continue  # said of the user's own gestures alone
+            continue  # lines of the model's own gestures have no key `own`
         line[field.name] = value + epoch if field.name in _STREAM_TIMES else value
     if test:
         line["test"] = True
@@ -89,7 +89,7 @@ def _line(value: dict[str, Any]) -> bytes:
 
 
 def _plain_value(value: Any) -> Any:
-    """Mappings of any kind, and numpy's numbers."""
+    """What JSON knows in place of a mapping of any kind, or of one of numpy's numbers."""
     return dict(value) if isinstance(value, Mapping) else value.item()
 
 
@@ -98,7 +98,7 @@ _ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False, default=_pla
 
 @dataclass(frozen=True, slots=True)
 class Subscription:
-    """What a client wants to hear; None is no filter."""
+    """Which events a client wants to hear; a filter that is None lets all of them pass."""
 
     types: frozenset[str] = frozenset(("gesture",))
     sensors: frozenset[str] | None = None
@@ -121,7 +121,7 @@ class Subscription:
 def parse_subscription(line: bytes, gestures: Collection[str]) -> Subscription:
     """A client's request, `{"subscribe": {...}}`; raises ProtocolError whose text says what was expected.
 
-    `gestures` are those that there are. A sensor may be named before it comes.
+    `gestures` are those that a client may name. A sensor may be named before it comes.
     """
     if len(line) > MAX_LINE:
         raise _refused(f"a request has at most {MAX_LINE} bytes, found {len(line)}")

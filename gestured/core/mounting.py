@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """How a sensor is mounted: first mirrored left to right, then turned clockwise."""
+    """How a sensor is mounted. A frame is inverted first, then mirrored left to right, then turned clockwise."""
 
     rotate: int = 0  # degrees clockwise: 0, 90, 180, 270
     mirror: bool = False
-    invert: bool = False  # its counts fall under pressure
+    invert: bool = False  # whether the sensor's counts fall under pressure
 
     def __post_init__(self) -> None:
         if self.rotate not in (0, 90, 180, 270):

@@ -31,11 +31,11 @@ _BUNDLE = b"#bundle\0"
 _SCALARS = {"i": "i", "f": "f", "d": "d", "h": "q", "t": "Q"}
 _ARRAYS = {"i": np.dtype(">i4"), "f": np.dtype(">f4")}
 _RUNS = tuple(tag * RUN for tag in _ARRAYS)
-_PLACED = ("", "s", "r", "sr", "b", "sb")  # what has a place in a layout: scalars, a run, a blob that is not empty
+_PLACED = ("", "s", "r", "sr", "b", "sb")  # arguments that have a `Place`: scalars, a run, a blob that is not empty
 LAYOUTS_BYTES = 8 << 20  # for the layouts that are remembered: 8,000 sensors of 9 x 9 floats
 PLACE_BYTES = 600  # that Python takes for a place, its head, address, type tags and scalars not counted
 SCALAR_BYTES = 48  # that Python takes for a scalar in a place
-# The bytes of a packet in which its first head begins, or all of it is: in a bundle with the size before it.
+# Where a packet's first head begins. In a bundle the message's size stands before it. A short head is in it whole.
 ALONE, BUNDLED = slice(32), slice(16, 48)
 
 _TIMETAG = Struct(">II").unpack_from  # seconds and their fraction
@@ -71,17 +71,17 @@ def timetag(data: bytes, at: int, end: int) -> float | None:
 
 
 class Place(NamedTuple):
-    """Where a packet of a known layout has one message: scalars, then a run or a blob; all may be missing."""
+    """Where one message stands in a packet of a known layout: scalars, then a run of numbers or a blob, or none."""
 
-    start: int  # byte
-    head: bytes  # what stands there: address and type tags, padded; in a bundle the size before them
+    start: int  # byte at which the head begins
+    head: bytes  # address and type tags, padded; in a bundle the size before them
     address: str
     types: str
     unpack: Callable[[bytes, int], tuple[Any, ...]] | None  # reads the scalars
-    scalars: int  # byte, where they are
+    scalars: int  # byte at which the scalars begin
     dtype: Any  # of the run; None for a blob
     length: int  # values of the run, or bytes of the blob; 0 for none
-    run: int  # byte, where it is
+    run: int  # byte at which the run or the blob begins
 
 
 _new = tuple.__new__  # Message(...) takes twice the time
@@ -89,14 +89,14 @@ _frombuffer = np.frombuffer
 
 
 class Layouts:
-    """The layouts that are known. They are bounded, because hostile senders invent new ones: when full, all go."""
+    """The layouts that are known. Hostile senders invent new ones, so when their room is full all are forgotten."""
 
     def __init__(self, most_bytes: int = LAYOUTS_BYTES) -> None:
         self._most_bytes = self._room = most_bytes
-        self._known: dict[bytes, tuple[int, list[Place]]] = {}  # a packet's length in bytes, and its messages
+        self._known: dict[bytes, tuple[int, list[Place]]] = {}  # by `_key`: a packet's length, and its messages
 
     def __len__(self) -> int:
-        """How many are known."""
+        """How many layouts are known."""
         return len(self._known)
 
     def read(self, data: bytes, bundled: bool) -> list[Message] | None:
@@ -121,7 +121,7 @@ class Layouts:
         return messages
 
     def remember(self, data: bytes, places: list[Place], bundled: bool) -> None:
-        """A packet has just these messages, in these places, and nothing else is in it."""
+        """Remember the layout of a packet: messages in these places, and nothing else."""
         cost = 0
         for place in places:
             rest = place.length if place.dtype is not None else place.length > 0  # type tags of the run, or the blob
@@ -134,9 +134,9 @@ class Layouts:
 
 
 def _key(begin: bytes) -> bytes:
-    """By what a layout is found: the first address and type tags. What follows them is different in each packet.
+    """The key of a layout: the first address and type tags, without the values after them, which change.
 
-    It is all of `begin` where they do not end there, as those of a frame of floats, which is found without this.
+    Where `begin` ends within the type tags, as in a frame of floats, all of it is the key.
     """
     end = begin.find(b"\0", begin.find(b","))
     return begin if end < 0 else begin[:end]
@@ -146,7 +146,7 @@ def decode(data: bytes, errors: list[ProtocolError] | None = None, layouts: Layo
     """All messages of a packet, bundles flattened, in order.
 
     Raises ProtocolError at the first fault; where `errors` is given, puts faults there instead and keeps
-    every message that is sound. `layouts` remembers how packets are laid out, so that the next ones cost less.
+    every sound message. `layouts` remembers how packets are laid out, so that the next ones cost less.
     """
     if type(data) is not bytes:
         data = bytes(data)  # arrays are views of it: it must not change under their reader
@@ -166,7 +166,7 @@ def decode(data: bytes, errors: list[ProtocolError] | None = None, layouts: Layo
         if errors is None:
             raise
         errors.append(error)
-    if layouts is not None and 0 < len(places) == len(messages) and not errors:  # no string is in it, no inner bundle
+    if layouts is not None and 0 < len(places) == len(messages) and not errors:  # strings, inner bundles have none
         layouts.remember(data, places, bundled)
     return messages
 

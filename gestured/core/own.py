@@ -18,8 +18,8 @@ from gestured.core.window import LEAST_PEAK, Window
 
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 LONGEST_NAME = 32  # characters
-RESERVED = ("use", "unknown", "none")  # of the configuration, of answers, and of recordings
-MOST = 20  # gestures
+RESERVED = ("use", "unknown", "none")  # words that configuration, answers and recordings use
+MOST = 20  # gestures of the user's own
 EXAMPLES = 5  # of one gesture, at most
 MOST_FRAMES = 200  # of an example; the longest contact takes some 80 at 15 Hz
 MOST_S = 8.0  # of an example; a contact is given up after five seconds, and quiet frames stand around it
@@ -33,8 +33,8 @@ class Example:
 
     frames: NDArray[np.float16]  # (T, R, C), 1 at its peak
     rate_hz: float
-    first: int  # the first touched frame,
-    last: int  # and the last
+    first: int  # index of the first touched frame
+    last: int  # index of the last touched frame
     noise: float  # of an idle taxel, one standard deviation, in units of the peak
 
     def __post_init__(self) -> None:
@@ -71,7 +71,7 @@ class Example:
             return None
 
     def segment(self) -> Segment:
-        """The same for a model to look at."""
+        """The example as a segment, which a model can classify."""
         times = np.arange(len(self.frames)) / self.rate_hz
         return Segment(self.frames.astype(np.float32), times, self.first, self.last, self.noise)
 
@@ -80,7 +80,7 @@ Examples = Mapping[str, tuple[Example, ...]]  # by the gesture's name
 
 
 def to_dict(gestures: Examples) -> dict[str, Any]:
-    """Gestures as JSON values."""
+    """Gestures and their examples as JSON values."""
     return {
         name: [
             {
@@ -98,13 +98,13 @@ def to_dict(gestures: Examples) -> dict[str, Any]:
 
 
 def from_dict(told: object) -> Examples:
-    """What `to_dict` gave; ValueError says what is wrong."""
+    """Gestures from what `to_dict` gave; ValueError names the place and says what was expected."""
     if not isinstance(told, dict) or len(told) > MOST:
         raise ValueError(f"gestures: expected an object of at most {MOST} gestures")
     found: dict[str, tuple[Example, ...]] = {}
     for name, examples in told.items():
         if not is_name(name):
-            raise ValueError(f"gestures: {name[:40]!r} is no name of a gesture, expected a-z, 0-9, _ and 32 at most")
+            raise ValueError(f"gestures: {name[:40]!r} is no name of a gesture, expected at most 32 of a-z, 0-9, _")
         if not isinstance(examples, list) or not 1 <= len(examples) <= EXAMPLES:
             raise ValueError(f"gestures.{name}: expected a list of 1 to {EXAMPLES} examples")
         found[name] = tuple(_example(one, f"gestures.{name}[{k}]") for k, one in enumerate(examples))
@@ -112,7 +112,7 @@ def from_dict(told: object) -> Examples:
 
 
 def is_name(name: str) -> bool:
-    """Whether a gesture of the user's own may be called that."""
+    """Whether a gesture of the user's own may have that name."""
     plain = set(name) <= set(LETTERS + "0123456789_") and 0 < len(name) <= LONGEST_NAME
     return plain and name[0] in LETTERS and name not in RESERVED
 

@@ -1,4 +1,4 @@
-"""Everything of a configuration that decides what is recognised: one frozen value.
+"""A scene: all of a configuration that decides what is recognised, as one frozen value.
 
 The daemon makes it from its settings, a replay from a tape. Two hubs with equal scenes, the same classifier and the
 same packets at the same times give the same events, as long as nobody changes, restarts or tests one of them, and both
@@ -17,8 +17,8 @@ from gestured.core.timing import Timing
 from gestured.core.wire import Addresses
 
 ONE_TAP, DOUBLE_TAP = "one_tap", "double_tap"
-TAP_GAP_S = (0.2, 0.6)  # s: shorter no hand taps twice through 15 Hz, longer no two taps belong together
-STALE_S = (0.2, 60.0)  # s: shorter than a pause of a slow sensor, longer than anybody waits
+TAP_GAP_S = (0.2, 0.6)  # least, most: no hand taps twice faster (at 15 Hz), and taps further apart are two
+STALE_S = (0.2, 60.0)  # least, most; a slow sensor may pause for the least, and nobody waits longer than the most
 MOST_SENSORS = 4096
 
 Clock = Literal["arrival", "sensor"]
@@ -27,7 +27,7 @@ Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """How one sensor is built, mounted and clocked; None stands for what holds in general."""
+    """How one sensor is built, mounted and clocked; where a field is None, the scene's own value holds."""
 
     grid: tuple[int, int] | None = None  # rows and columns of its frames, as they are sent
     mounting: Mounting = Mounting()
@@ -36,20 +36,20 @@ class Setup:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What decides. Raises ValueError, which names the field, for what cannot be."""
+    """All that decides. Raises ValueError, which names the field, for a value that cannot be."""
 
     gestures: tuple[str, ...]  # those in use, in the model's order
     grid: tuple[int, int]  # rows and columns of a sensor that has none of its own
-    sensors: Mapping[str, Setup] = field(default_factory=dict)  # those that are named; they have a place for themselves
+    sensors: Mapping[str, Setup] = field(default_factory=dict)  # by name; a place is kept free for each of these
     addresses: Addresses = Addresses()
     clock: Clock = "arrival"
     stale_s: float = 1.0  # of silence, after which a sensor counts as gone
     tap_gap_s: float = Timing().tap_gap_s  # how long a tap waits for a second one
     max_sensors: int = 64
     allow: tuple[Network, ...] = ()  # who may send; anybody where it is empty
-    thresholds: Mapping[str, float] = field(default_factory=dict)  # confidences, where not the model's own holds
-    refractory: Mapping[str, float] = field(default_factory=dict)  # s in which a gesture is not repeated
-    provisional_taps: bool = True  # whether one tap is said, where somebody asks, before a second one may come
+    thresholds: Mapping[str, float] = field(default_factory=dict)  # by gesture: confidences in place of the model's own
+    refractory: Mapping[str, float] = field(default_factory=dict)  # by gesture: s in which it is not published again
+    provisional_taps: bool = True  # whether a tap is said provisionally while a second one may follow
     touches: bool = False  # whether finger positions are kept
     frames: bool = False  # whether the hub tells of each frame that it used
 
@@ -75,7 +75,7 @@ class Scene:
 
     @classmethod
     def from_dict(cls, told: Mapping[str, Any], gestures: tuple[str, ...], grid: tuple[int, int]) -> "Scene":
-        """The scene of a daemon whose settings are `told`, as values or as JSON holds them; others are passed over.
+        """The scene of a daemon whose settings are `told`, as values or as JSON holds them. Other keys are passed over.
 
         `gestures` are those in use, `grid` holds where the settings name none. What is missing has its default.
         Raises ValueError, KeyError, TypeError, AttributeError or OverflowError for what no daemon's settings can be.
@@ -96,7 +96,7 @@ class Scene:
         )
 
     def setup(self, sensor: str) -> Setup:
-        """What is set for a sensor."""
+        """What is set for a sensor; the defaults where it is not named."""
         return self.sensors.get(sensor, Setup())
 
     def grid_of(self, sensor: str) -> tuple[int, int]:
@@ -104,7 +104,7 @@ class Scene:
         return self.setup(sensor).grid or self.grid
 
     def clock_of(self, sensor: str) -> Clock:
-        """What a frame's time is."""
+        """Which clock the times of a sensor's frames come from."""
         return self.setup(sensor).clock or self.clock
 
     @property

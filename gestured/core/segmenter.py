@@ -8,7 +8,7 @@ Activity is the strongest spot of a frame in units of noise. The cases, and what
     swipe        ########..         one segment, decided `release_s` after the finger left
     flicker      ###.####..         one contact: a single quiet frame is shorter than `release_s`
     hold         ############...    after `limit_s` cancelled ("held"); nothing more until it is let go
-    object       ###############    the same; the baseline learns it, then the sensor is idle again
+    object       ###############    cancelled as a hold; the baseline learns it, then the sensor is idle again
     silence      ####     ...       cancelled ("silence") after `stale_s` without a frame
     glitch       |                  shorter than any finger at a fast sensor: cancelled ("glitch")
 
@@ -39,18 +39,18 @@ class Signal(IntEnum):
     STRONG = auto()
     MOVED = auto()  # the second contact is no tap, so it does not belong to the first
     RELEASED = auto()  # quiet for `release_s`
-    TAPPED = auto()  # the same, and the segment is one tap so far
+    TAPPED = auto()  # quiet for `release_s` after one tap, so that a second tap may follow
     GAP_OVER = auto()  # quiet for `tap_gap_s`
     LIMIT = auto()  # `limit_s` after the onset
 
 
 class Action(IntEnum):
-    """What the owner of the frames has to do."""
+    """What the front end has to do."""
 
-    OPEN = auto()
-    CLOSE = auto()
+    OPEN = auto()  # a contact begins
+    CLOSE = auto()  # the segment is over
     SPLIT = auto()  # the first contact is a segment, the second one begins another
-    HELD = auto()  # give the segment up
+    HELD = auto()  # give the contact up: no segment is made of it
     LEFT = auto()  # a given-up contact was let go
 
 
@@ -73,16 +73,16 @@ def _given_up(memory: Memory, t: float) -> tuple[float, float]:
     return memory.off, memory.off
 
 
-# --- what a wait says once it was quiet for so long
+# --- what the end of a wait says
 
 
 def _released(memory: Memory) -> Signal:
-    """The finger is off. After a single tap a second one may come."""
+    """The finger was off for `release_s`; after a single tap a second one may follow."""
     waits = memory.wait_for_double_tap and memory.first is None and memory.tap_so_far()
     return Signal.TAPPED if waits else Signal.RELEASED
 
 
-# --- what is remembered; what that shows is a signal in turn
+# --- what is remembered of a frame; each function may return a signal that follows from it
 
 
 def _begin(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
@@ -93,7 +93,7 @@ def _begin(memory: Memory, t: float, activity: float, place: Place | None) -> Si
 
 
 def _again(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
-    """The second one begins."""
+    """The second contact of a segment begins."""
     memory.first, memory.contact = memory.contact, Stretch(t)
     return _press(memory, t, activity, place)
 
@@ -149,11 +149,11 @@ class Phase:
     """What is true of the sensor, and how frames and waits are read while it is."""
 
     name: str
-    levels: Callable[[Memory, float], tuple[float, float]]  # s -> activity that is strong, and that is not quiet
+    levels: Callable[[Memory, float], tuple[float, float]]  # strong from the first on, quiet below the other
     wait: str = ""  # the name in `Timing` of the seconds of quiet after which time alone decides
-    says: Callable[[Memory], Signal] | None = None  # what that is
+    says: Callable[[Memory], Signal] | None = None  # what the end of that wait says
     touched: bool = True  # a contact goes on, given up or not
-    pending: bool = True  # it is not given up, and what becomes of it is open
+    pending: bool = True  # the contact goes on and may still become a segment
     let_go: bool = False  # the finger is off: if the stream ends, what is open may be decided
 
     def reads(self, memory: Memory, t: float, activity: float) -> Signal:
@@ -215,10 +215,10 @@ class Deed(NamedTuple):
 
 
 class Segmenter:
-    """Activity over time in, deeds out, by the table in `phases`. Knows times and levels, no frames."""
+    """Activity over time in, deeds out, by `TRANSITIONS`. It knows times and levels, but no frames."""
 
     def __init__(self, taxels: int, travel: float, *, wait_for_double_tap: bool = True, timing: Timing | None = None):
-        """`travel`: taxel pitches that a tap may move."""
+        """For a sensor of so many `taxels`; `travel`: taxel pitches that a tap may move."""
         self.on = hardly_ever(taxels)  # noise units: activity from which there is a contact
         self.off = rarely(taxels)  # noise units: activity below which there is none
         self._memory = Memory(timing or Timing(), self.on, self.off, travel, wait_for_double_tap)
@@ -242,7 +242,7 @@ class Segmenter:
 
     @property
     def last_touched(self) -> float:
-        """When it was touched last, in s."""
+        """When the last contact was touched last, in s."""
         return self._memory.contact.touched
 
     def levels(self, t: float) -> tuple[float, float]:
@@ -275,7 +275,7 @@ class Segmenter:
         return deeds
 
     def give_up(self, t: float) -> list[Deed]:
-        """The contact has taken too much of something else than its own time: as if `limit_s` were over."""
+        """End the contact at `t` s as if `limit_s` were over: it has too many frames, or another clock says so."""
         return self._step(Signal.LIMIT, t) if self.phase.pending else []
 
     def _step(self, signal: Signal | None, t: float, activity: float = 0.0, place: Place | None = None) -> list[Deed]:
@@ -289,7 +289,7 @@ class Segmenter:
         return deeds
 
     def _deed(self, action: Action, t: float) -> Deed:
-        """The action, with the segment as it is before anything is remembered of it."""
+        """The deed of an action, with the segment as it is before the frame at `t` s is remembered."""
         memory = self._memory
         if action is Action.OPEN:
             return Deed(action, t, t, t)

@@ -27,27 +27,27 @@ class Stamper:
 
     `clock` "arrival": when they arrived. "sensor": by the increments of the time tags, as long as these go
     forward by at most `MAX_STEP_S`; else by the arrival. Frames of one call that have one time are spaced
-    backwards from it, by the counter or evenly, at the rate seen so far (`PERIOD_S` apart until it is known), and
-    after the frame before. So read all waiting packets before you stamp: a stall then does no harm.
+    backwards from it at the rate seen so far (`PERIOD_S` apart until it is known), by the counter or evenly, and
+    never before the last frame. So read all waiting packets before you stamp: a stall then does no harm.
     """
 
     PERIOD_S = 1 / 15  # between frames at the nominal rate
     MAX_STEP_S = 10.0  # between two time tags; a longer step is not believed
     AHEAD_S = 86_400.0  # a recording may be sent faster than it was felt, but a day ahead of its arrival is no time
-    MIN_STEP_S = 1e-6  # where the clock did not move; a double still tells this after 30 years
+    MIN_STEP_S = 1e-6  # between stamps where the clock stood still; a double tells them apart even after 30 years
     REORDER = 16  # a frame whose counter is further back was not overtaken on its way: the sensor began anew
-    REORDER_S = 0.5  # the same after a longer pause
-    STREAK = 3  # the same for so many late frames in a row, in order
+    REORDER_S = 0.5  # a counter that goes back after a longer pause: the sensor began anew
+    STREAK = 3  # so many late frames in a row whose counters rise by one: the sensor began anew
     RECENT = 15  # intervals of which the usual one is taken: a second of a sensor at 15 Hz
     LEAP = 10_000  # a counter that jumps further has lost nothing, it began anew: ten seconds at 1000 Hz
 
     def __init__(self, clock: Literal["arrival", "sensor"] = "arrival") -> None:
         self._by_tag = clock == "sensor"
         self._intervals: deque[float] = deque(maxlen=self.RECENT)
-        self._last: float | None = None  # the last stamp
-        self._arrived = 0.0  # and the arrival of its frame
-        self._tag: float | None = None
-        self._counter: int | None = None
+        self._last: float | None = None  # s, the last stamp
+        self._arrived = 0.0  # s, the arrival of the frame that was stamped last
+        self._tag: float | None = None  # s, the time tag of that frame
+        self._counter: int | None = None  # of the newest frame
         self._late: tuple[int, int] = (0, 0)  # counter of the last late frame, and how many came in a row
 
     def at(self, arrived: float) -> float:
@@ -55,7 +55,7 @@ class Stamper:
         return arrived if self._last is None else self._last + max(0.0, arrived - self._arrived)
 
     def when(self, t: float) -> float:
-        """The arrival time in s at which the stream's time is `t` s: the other way round."""
+        """The arrival time in s at which the stream's time is `t` s; the inverse of `at`."""
         return t if self._last is None else self._arrived + (t - self._last)
 
     def stamp(self, arrivals: Sequence[Arrival], arrived: float, *, missed: bool = False) -> list[Stamp]:
@@ -123,7 +123,7 @@ class Stamper:
     def _place(
         self, arrivals: Sequence[Arrival], stamps: list[Stamp], run: list[tuple[int, int]], arrived: float
     ) -> None:
-        """Stamp frames that share one time."""
+        """Stamp the frames of `run`, which share one time and `arrived` together (s)."""
         tag = arrivals[run[-1][0]].timetag
         total = sum(steps for _, steps in run)
         implausible = False

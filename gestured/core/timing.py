@@ -12,12 +12,12 @@ SHARE = 0.05  # share of the difference to the last interval that is followed: o
 class Timing:
     """Durations in seconds. At 15 Hz they lie half-way between frames, so that jitter cannot flip a decision."""
 
-    release_s: float = 0.10  # quiet this long: the finger is off
+    release_s: float = 0.10  # quiet for so long, the finger is off
     tap_gap_s: float = 0.50  # a second tap may begin until then (gaps up to 0.4 s, seen through 15 Hz)
     tap_s: float = 0.57  # a tap is at most this long
-    tap_travel: float = 0.15  # and stays within this share of the grid's shorter side
-    limit_s: float = 5.03  # a contact that is no gesture any more
-    limit_frames: int = 6000  # the same at 1000 Hz, where the sensor's own clock may all but stand still
+    tap_travel: float = 0.15  # a tap moves at most this share of the grid's shorter side
+    limit_s: float = 5.03  # a contact that lasts longer is no gesture
+    limit_frames: int = 6000  # a contact of more frames is given up, since a sensor's own clock may all but stand still
     stale_s: float = 1.0  # silence that ends everything
     shift_s: float = 0.25  # frames far below the baseline for so long: the sensor restarted
     glitch_s: float = 0.02  # a contact surely shorter than this is no finger

@@ -12,7 +12,7 @@ from gestured.core.quantiles import median
 
 SAME_RATE = 0.12  # a rate this near to the model's is taken as it is: interpolating jittered times blurs taps
 SLACK = 0.25  # of the model's interval, by which a window is longer: jitter must not decide whether a frame is in
-USED = 0.3  # of the highest: a row or a column of a long sensor that is pressed so much is part of the movement
+USED = 0.3  # of the most pressed row or column of a long sensor: those above it are part of the movement
 RIM = 2.0  # taxel pitches around the movement that are taken in with it, both sides together
 LEAST_PEAK = 1e-37  # counts; its reciprocal is still a number in float32
 
@@ -26,8 +26,8 @@ class Window:
     rate_hz: float
     smooth_frames: int  # running average over so many frames (paper, section on preprocessing); 1 = none
     lead_s: float  # quiet context before the first touched frame
-    tail_s: float  # and after the last one
-    floor: float  # the peak is taken to be at least so many times the sensor's noise
+    tail_s: float  # quiet context after the last touched frame
+    floor: float  # the segment's peak counts as at least so many times the sensor's noise
 
     def to_json(self) -> str:
         """The settings as JSON, for a model's metadata."""
@@ -57,7 +57,7 @@ class Window:
         return cls(**found)
 
     def apply(self, segment: Segment) -> NDArray[np.float32]:
-        """(T, R, C) segment -> (T', rows, columns) float32, 0..1 of the segment's own peak."""
+        """(T, R, C) segment -> (T', rows, columns) float32, from 0 to 1 at the segment's own peak."""
         start, end = self.span(segment)
         frames, times = segment.frames[start:end].astype(np.float64), segment.times[start:end]
         frames = self._regrid(frames, segment)

@@ -1,4 +1,4 @@
-"""What comes in: packets -> the frames that arrived, with their touches.
+"""Packets to the frames that arrived in them, with their touches.
 
 Reasons of the ProtocolErrors here: those of `osc`, `address` (none of ours), `types`, `size` (not the grid of
 the sensor), `not_finite`, `too_many_touches`.
@@ -63,7 +63,7 @@ def _plain(text: str) -> bool:
 
 
 def _rest(a: str, b: str, cut: Callable[[str, str], str]) -> bool:
-    """Whether one ends (or begins) with the other, and what is left could be part of a sensor's name."""
+    """Whether `cut` takes the shorter text off the longer, and leaves what could be part of a sensor's name."""
     short, long = sorted((a, b), key=len)
     rest = cut(long, short)
     return len(rest) == len(long) - len(short) and NAME_LETTERS.issuperset(rest)
@@ -87,14 +87,14 @@ class _Route(NamedTuple):
 
     sensor: str
     grid: tuple[int, int] | None  # None for a trajectory
-    counted: bool
-    fault: tuple[str, str] | None  # reason and text, where it means nothing
+    counted: bool  # whether the frame's counter comes first
+    fault: tuple[str, str] | None  # reason and text of the ProtocolError, where the address or its type tags are wrong
 
 
 class Decoder:
     """Packets in, frames out. `grids` says the grid (R, C) of a sensor, as it is sent.
 
-    Without `keep_touches`, trajectories are passed over at the address.
+    Without `keep_touches`, a trajectory is passed over as soon as its address is known.
     """
 
     def __init__(
@@ -165,7 +165,7 @@ class Decoder:
         return _Route(sensor, None, False, ("types", text))
 
     def _join(self, found: list[tuple[int, str, Arrival | tuple[Touch, ...]]], source: Hashable) -> list[Arrival]:
-        """Give touches to their frames; what is left over waits."""
+        """Give touches to their frames; touches without a frame wait for the next one."""
         together: dict[tuple[int, str], list[int]] = {}
         for i, (bundle, sensor, _) in enumerate(found):
             together.setdefault((bundle, sensor), []).append(i)

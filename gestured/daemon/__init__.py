@@ -1,4 +1,4 @@
-"""The daemon: asyncio around one pure recognizer per sensor. `gestured.daemon.cli:main` starts it."""
+"""The daemon: sockets, files and time around one pure `core.hub.Hub`. `gestured.daemon.cli:main` starts it."""
 
 import os
 

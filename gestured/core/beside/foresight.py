@@ -15,13 +15,13 @@ from gestured.core.front_end import DRAFT_S, FrontEnd
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP
 
 PREVIEW_S = 0.0666  # from one preview to the next: 15 a second, a little less than 1/15 because times are rounded
-EACH_FRAME_S = 0.0635  # s from frame to frame, from which on each frame is shown: 5 % below 1/15, as rates vary
+EACH_FRAME_S = 0.0635  # s between frames, from which on each frame is shown to the model: 5 % below 1/15, as rates vary
 
 Answer = TypeVar("Answer", bound=Gesture | Unknown | Cancelled)
 
 
 class Preview(NamedTuple):
-    """What of a contact that is not over has come so far."""
+    """A contact that is not over, as far as it has come."""
 
     segment: Segment
     t: float  # s, now
@@ -37,11 +37,11 @@ class Foresight:
     def __init__(self, sensor: str, *, taps: bool) -> None:
         """`taps`: whether one tap is said before a second one may come."""
         self._sensor, self.taps = sensor, taps
-        self.asked = False  # whether somebody asks for it
+        self.asked = False  # whether somebody asks for provisional events
         self._id = 0
         self._said: Provisional | None = None
-        self._best = ""  # what the last frames were sure enough of
-        self._row = 0  # how many of them in a row
+        self._best = ""  # the gesture of which the model was sure enough at the last preview
+        self._row = 0  # previews in a row that were sure enough of `_best`
         self._passed_over = 0  # frames since the last preview of a finger that is down
         self._left: float | None = None  # s, the last touched frame of the contact whose end was shown
 
@@ -55,7 +55,7 @@ class Foresight:
         return offset + DRAFT_S if self.asked and front_end.segmenter.phase.let_go and self._left != offset else None
 
     def see(self, front_end: FrontEnd, t: float, shown: Segment | None) -> Preview | None:
-        """What a model may look at, with a frame at `t` s in which the front end has `shown` that.
+        """What a model may look at after a frame at `t` s; `shown` is the segment that the front end showed with it.
 
         While the finger is down, that is at most 15 times a second, and with every frame at 15 Hz.
         """

@@ -8,15 +8,15 @@ from gestured.core.front_end import Cut, Found, FrontEnd, Opened, Void
 Array = NDArray[np.float64]
 Counts = NDArray[np.generic]
 
-ENOUGH = 3  # contacts that must have come before anything is said
-MOSTLY = 3  # times as many contacts that say so as say the contrary
+ENOUGH = 3  # contacts that must speak for it before it is said
+MOSTLY = 3  # times as many contacts must speak for it as against it
 PAUSE_S = 0.3  # counts that fall below the baseline again after so long belong to another contact
 ALIKE = 0.3  # correlation from which neighbours are alike: a fingertip covers more than one taxel
 CLEARLY = 0.1  # how much higher the correlation must be with rows and columns exchanged than as they are
 
 
 class Habits:
-    """What was seen so far of a sensor that sends R x C taxels."""
+    """What the contacts of a sensor of R x C taxels (as sent) say of how it was connected."""
 
     def __init__(self, rows: int, columns: int) -> None:
         self._rows, self._columns = rows, columns
