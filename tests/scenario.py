@@ -14,6 +14,11 @@ One statement a line, in order; `#` begins a comment. A taxel is `ROW,COLUMN` fr
     clear                             the objects are gone
     drift A in D                      the baseline moves by A, evenly, from now on for so long
     dead R,C                          a taxel that shows nothing from now on
+    random R,C BITS                   a taxel that shows anything, of so many bits, from now on
+    rubbish BITS for D                all taxels show anything
+    ramp A to B in D                  all taxels show A counts, then more or less, and B in the end
+    noise N                           the sensor's noise is another one from now on (counts)
+    sound                             no taxel is dead or random any more, and the noise is as it was
     lose N                            the next N frames are lost on their way
     silence for D                     time passes without a frame
     shift B                           the baseline is another one from now on (counts)
@@ -22,6 +27,7 @@ One statement a line, in order; `#` begins a comment. A taxel is `ROW,COLUMN` fr
 
     expect X, X ...                   what came since the last `expect`, in order: onset, cut, release,
                                       cancelled REASON, segment (= onset, cut, release), N segments, nothing
+    forget                            what came since then depends on chance, and is not looked at
     check X, X ...                    how things are: ready, not ready, touched, not touched, lost N, bad N,
                                       lasting D to D (the last segment, first to last touched frame)
 """
@@ -127,7 +133,7 @@ def _point(word: str) -> tuple[float, float]:
 
 
 def _step(number: int, text: str, verb: str, rest: str, sensor: Sensor) -> Step:
-    what, _, duration = rest.rpartition(" in " if verb in ("move", "circle", "drift") else "for ")
+    what, _, duration = rest.rpartition(" in " if verb in ("move", "circle", "drift", "ramp") else "for ")
     seconds = _seconds(duration.split(), sensor) if verb in _TIMED else 0.0
     step = Step(number, text, verb, seconds, words=tuple(rest.split()))
     if verb in ("quiet", "silence"):
@@ -140,16 +146,16 @@ def _step(number: int, text: str, verb: str, rest: str, sensor: Sensor) -> Step:
     if verb == "object":
         (row, column), force = _point(step.words[0]), float(step.words[1])
         return replace(step, fingers=lambda share: [(row, column, force)])
-    if verb == "drift":
-        return replace(step, words=(what,))
+    if verb in ("drift", "ramp", "rubbish"):
+        return replace(step, words=tuple(what.split()))
     if verb in ("expect", "check"):
         return replace(step, words=tuple(part.strip() for part in rest.split(",")))
-    if verb in ("clear", "dead", "lose", "shift", "restart", "end"):
+    if verb in ("clear", "dead", "random", "noise", "sound", "lose", "shift", "restart", "forget", "end"):
         return step
     raise ValueError(f"unknown verb {verb!r}")
 
 
-_TIMED = ("quiet", "silence", "press", "move", "circle", "drift")
+_TIMED = ("quiet", "silence", "press", "move", "circle", "drift", "ramp", "rubbish")
 
 
 def _fingers(parts: list[list[str]], moving: bool) -> Fingers:
@@ -194,7 +200,9 @@ class Player:
         self._baseline = sensor.baseline
         self._rising = (0.0, 0.0, 0.0)  # counts, from when, for how long
         self._lying: list[Finger] = []
+        self._noise = sensor.noise
         self._dead = np.zeros(shape, dtype=bool)
+        self._random: dict[tuple[int, int], int] = {}  # bits
         self._now = 0.0
         self._frame = 0
         self._lose = self._lost = 0
@@ -220,11 +228,23 @@ class Player:
                 self._lose -= 1
                 self._lost += 1
                 continue
-            values = self._values(step.fingers((t - begin) / step.seconds), t)
+            values = self._shown(step, (t - begin) / step.seconds, t)
             late = min(abs(self._rng.normal(0, sensor.jitter)), 0.9 / sensor.rate) if sensor.jitter else 0.0
             yield Frame(self.start + _exact(t + late), values, (), self._lost)
             self._lost = 0
         self._now = end
+
+    def _shown(self, step: Step, share: float, t: float) -> NDArray[np.float64]:
+        """(R, C) counts at `t` s, when that share of the step's time has passed."""
+        values = self._values(step.fingers(share), t)
+        if step.verb == "rubbish":
+            return self._rng.integers(0, 2 ** int(step.words[0]), values.shape).astype(np.float64)
+        if step.verb == "ramp":
+            begin, end = float(step.words[0]), float(step.words[2])
+            return np.rint(begin + share * (end - begin) + self._rng.normal(0, self._noise, values.shape))
+        for at, bits in self._random.items():
+            values[at] = self._rng.integers(0, 2**bits)
+        return values
 
     def _values(self, fingers: list[Finger], t: float) -> NDArray[np.float64]:
         """(R, C) counts at `t` s: whole numbers from 0 on, as sensors send them."""
@@ -236,7 +256,7 @@ class Player:
             pressed = np.maximum(pressed, amplitude * np.exp(-distance / (2 * sensor.width**2)))
         rise, since, lasting = self._rising
         drifted = rise * min(1.0, (t - since) / lasting) if lasting else 0.0
-        noise = self._rng.normal(0, sensor.noise, pressed.shape)
+        noise = self._rng.normal(0, self._noise, pressed.shape)
         shown = self._baseline * self._spread + drifted + self._gain * pressed + noise
         return np.where(self._dead, 0.0, np.maximum(np.rint(shown), 0.0))
 
@@ -251,12 +271,21 @@ class Player:
         elif step.verb == "dead":
             row, column = _point(words[0])
             self._dead[int(row), int(column)] = True
+        elif step.verb == "random":
+            row, column = _point(words[0])
+            self._random[int(row), int(column)] = int(words[1])
+        elif step.verb == "noise":
+            self._noise = float(words[0])
+        elif step.verb == "sound":
+            self._dead[:], self._random, self._noise = False, {}, self.scenario.sensor.noise
         elif step.verb == "lose":
             self._lose = int(words[0])
         elif step.verb in ("shift", "restart"):
             self._baseline = float(words[0])
             if step.verb == "restart":
                 self._note(front_end.reset())
+        elif step.verb == "forget":
+            self.events = []
         elif step.verb == "end":
             self._note(front_end.flush(self.start + _exact(self._now)))
         elif step.verb == "expect":

@@ -52,6 +52,13 @@ class Conditioner:
         """Whether the idle sensor is known, so that a touch can be told from it."""
         return self.baseline.known
 
+    def mistaken(self, t: float, raw: Array) -> bool:
+        """Whether (N,) counts at `t` s show that what was learned was no idle sensor; a stable second replaces it."""
+        if self.baseline.provisional or not self.noise.mistaken(t, raw):
+            return False
+        self.baseline.doubt()
+        return True
+
     def look(self, t: float, raw: Array, after: AfterEffect) -> Look:
         """See (N,) counts at `t` s. By its after-effect textile may still swing below its baseline."""
         if self.noise.learns_step(raw):
@@ -81,6 +88,7 @@ class Conditioner:
         self.noise.learn(t, raw, learned.noise, learned.step, learned.frames, still=learned.still)
         self.taxels.stuck.learn(learned.constant)
         self.taxels.frozen.learn(fine=learned.fine)
+        self.taxels.flickering.learn()
         self.activity.unlearn()
         self._review()
         self.activity.learn((learned.frames - self.baseline.counts) * self._weight)
@@ -94,19 +102,21 @@ class Conditioner:
             self.settle(t, look.raw)
         else:
             baseline.unsettle()
-        if self.taxels.frozen.any:
+        flickering = self.taxels.flickering
+        if flickering.any or self.taxels.frozen.any:
             self._watch(look)
         since = baseline.idle_since(t)
         if since is None:
             return
         self.activity.follow(t, since, look.activity)
         if not look.burst:  # one such reading must not pull the baseline down
-            baseline.follow(t, since, look.above, recovering=recovering)
+            above = np.where(flickering.mask, 0.0, look.above) if flickering.any else look.above
+            baseline.follow(t, since, above, recovering=recovering)
         if self.noise.follow(t, look.above):
             self._review()
 
     def busy(self, look: Look) -> None:
-        """The sensor is touched: the baseline stands still, and taxels that froze under the finger are found."""
+        """The sensor is touched: the baseline stands still, and taxels that freeze or flicker are found."""
         self.baseline.hold()
         self._watch(look)
 
@@ -120,7 +130,9 @@ class Conditioner:
             self._review()
 
     def _watch(self, look: Look) -> None:
-        if self.taxels.frozen.watch(look.t, look.raw, look.above, self.noise.sigma):
+        taxels, noise = self.taxels, self.noise
+        frozen = taxels.frozen.watch(look.t, look.raw, look.above, noise.sigma)
+        if taxels.flickering.watch(look.t, look.above, noise.level, taxels.bad) or frozen:
             self._review()
 
     def _review(self) -> None:

@@ -4,6 +4,7 @@ A front end knows neither its sensor's name nor who asks. Of each contact it giv
 `Void`, and at last `Ended`; and `Shown` where the finger may have left.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -135,6 +136,8 @@ class FrontEnd:
             if conditioner.settle(t, raw):
                 cutter.settled(t)
             return found
+        if t >= conditioner.noise.glance and conditioner.mistaken(t, raw) and segmenter.phase.pending:
+            return found + self._restart(keep=False)
         self.look = look = conditioner.look(t, raw, segmenter.after)
         if look.shifted:
             return found + self._shift(look)
@@ -144,13 +147,8 @@ class FrontEnd:
         deeds = segmenter.push(t, look.activity, place)
         if deeds:
             found += self._done(deeds, t)
-        if segmenter.phase.pending and len(cutter) > self.timing.limit_frames:
-            found += self.give_up(t)
         if segmenter.phase.pending:
-            conditioner.busy(look)
-            if segmenter.phase.let_go and t - segmenter.last_touched >= DRAFT_S and not self.fleeting:
-                segment = cutter.draft(segmenter.onset, segmenter.last_touched)
-                found += [] if segment is None else [Shown(segment)]
+            found += self._pressed(look)
             return found
         cutter.trim(t)
         if segmenter.phase.touched:
@@ -158,6 +156,17 @@ class FrontEnd:
         else:
             conditioner.idle(look, recovering=segmenter.after.recovering(t))
         return found
+
+    def _pressed(self, look: Look) -> Sequence[Found]:
+        """A frame of a contact whose answer is open."""
+        segmenter = self.segmenter
+        if len(self._cutter) > self.timing.limit_frames:
+            return self.give_up(look.t)
+        self.conditioner.busy(look)
+        if not segmenter.phase.let_go or look.t - segmenter.last_touched < DRAFT_S or self.fleeting:
+            return ()
+        segment = self._cutter.draft(segmenter.onset, segmenter.last_touched)
+        return () if segment is None else (Shown(segment),)
 
     @property
     def due(self) -> float | None:
@@ -249,25 +258,37 @@ class FrontEnd:
         found: list[Found] = []
         for action, onset, offset, decided in deeds:
             if action is Action.OPEN:
-                found.append(Opened(onset))
+                found.append(self._open(onset))
             elif action is Action.HELD:
                 found.append(Void("held"))
             elif action is Action.LEFT:
+                self._forget_rubbish()
                 found.append(Ended(offset))
             else:
                 found += self._close(onset, offset, decided, min(seen, decided))
                 if action is Action.SPLIT:
-                    found.append(Opened(self.segmenter.onset))
+                    found.append(self._open(self.segmenter.onset))
         return found
+
+    def _open(self, onset: float) -> Opened:
+        self.conditioner.taxels.flickering.begin(onset)
+        return Opened(onset)
 
     def _close(self, onset: float, offset: float, t: float, seen: float) -> list[Found]:
         """A segment is over, as decided at `t` s: it is cut, unless it was no finger's."""
         if self.pace.longest_s(onset, offset) < self.timing.glitch_s:
             return [Void("glitch"), Ended(offset)]
         made = self._cutter.cut(onset, offset)
-        if made.peak < self.segmenter.off * made.segment.noise:  # nothing is left without its bad taxels
+        nothing = made.peak < self.segmenter.off * made.segment.noise  # is left without its bad taxels
+        if self._forget_rubbish() or nothing:
             return [Void("stuck"), Ended(offset)]
         return [Cut(made.segment, t, self._cutter.hole(onset, offset, seen)), Ended(offset)]
+
+    def _forget_rubbish(self) -> bool:
+        """Whether the contact that is over was rubbish, which leaves no after-effect behind."""
+        if self.conditioner.taxels.flickering.rubbish:
+            self.segmenter.after.clear()
+        return self.conditioner.taxels.flickering.rubbish
 
     def _cancel(self, reason: str) -> list[Found]:
         """The contact that goes on has no answer, and ends."""

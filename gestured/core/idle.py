@@ -19,6 +19,9 @@ NOISE_TAU_S = 30.0  # the time constant with which noise is followed: it changes
 REVIEW_S = 0.5  # the pause between two looks at the noise; they would cost too much at each frame
 UNSEEN_S = 4.0  # the most that one look counts of the time under a contact or in silence
 OUTLIER = 4.0  # times its noise: a taxel that is further off counts as this far, since one outlier must not rule
+QUIETER = 10.0  # times: where frames move so much less than when the noise was learned, that was no idle sensor
+GLANCE_S = 0.19  # the pause between two glances at how much frames move
+GLANCE, GLANCE_REPEATED, GLANCES = 3, 1, 9  # what a quieter glance counts, and one at a repeated frame; how much tells
 LIVELY_FRAMES = 10  # from so many one can tell that a sensor never sends the same frame twice in a row
 
 
@@ -82,8 +85,11 @@ class Noise:
         self.step = 0.0  # counts, one quantisation step: below it noise cannot be known
         self.lively = False  # whether no frame of the idle sensor repeated the one before it
         self._reviewed = 0.0  # s, when it was last looked at
+        self.glance = math.inf  # s, when `mistaken` is to be asked next
+        self._quieter = 0  # what the glances of late say for a noise that was learned from no idle sensor
+        self._learned = 1.0  # counts, the level as it was learned
         self._smallest = 0.0  # counts, the smallest change of a sensor that stood still when it was learned; else 0
-        self._shown: Array = np.zeros(taxels)  # the last raw counts of such a sensor
+        self._shown: Array = np.zeros(taxels)  # the last raw counts, as far as they are needed
 
     def learn(self, t: float, raw: Array, sigma: Array, step: float, frames: Array, *, still: bool) -> None:
         """Begin anew at `t` s with what (n, N) idle `frames` told, the last of them `raw`; `still`: none changed."""
@@ -91,6 +97,28 @@ class Noise:
         self.lively = len(frames) >= LIVELY_FRAMES and bool(np.diff(frames, axis=0).any(axis=1).all())
         self._smallest, self._shown = math.inf if still else 0.0, raw
         self._set(sigma)
+        self._quieter, self._learned = 0, self.level
+        self.glance = t + GLANCE_S if self.level >= QUIETER * step else math.inf  # what moves, moves by a step
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether it was learned from what was no idle sensor, as frames since then show."""
+        return self._quieter >= GLANCES
+
+    def mistaken(self, t: float, raw: Array) -> bool:
+        """Whether (N,) counts at `t` s and those before them show that the noise was learned from no idle sensor.
+
+        A finger moves few taxels, so it may be there meanwhile. A repeated frame says less than another one, since the
+        sensor may have frozen, and nothing where the idle sensor repeats itself.
+        """
+        jumps = np.abs(raw - self._shown)
+        jumps = jumps[jumps > 0]
+        self.glance, self._shown = t + GLANCE_S, raw
+        if jumps.size and QUIETER * median(jumps) >= self._learned:
+            self._quieter = 0
+        elif jumps.size or self.lively:
+            self._quieter += GLANCE if jumps.size else GLANCE_REPEATED
+        return self.doubtful
 
     def learns_step(self, raw: Array) -> bool:
         """Learn the quantisation step, and with it the noise, from (N,) counts of a sensor that stood still so far.

@@ -21,6 +21,8 @@ PATIENCE_S = 5.0  # a sensor that never settles (hum, a hand that never rests) i
 RESTLESS = 5.0  # a taxel that moves more than this many times the sensor's noise was touched, or is bad
 MOVED = 3  # taxels that may move in a stable second, whatever the sensor's size
 MOVED_ONE_IN = 20  # of a large sensor one taxel in so many may move: bad ones must not keep it from settling
+HALVES = 1.4  # times the noise of the quieter half is a second's at most; what is more is the end of a movement
+HALF_CHANGES = 16  # of taxels in half a second, from which its noise can be told
 CONSTANT_ONE_IN = 4  # where more than one taxel in so many stands still, standing still is the sensor's way
 SPIKE = 1000.0  # a frame so many times further off than frames usually jump is a fault of the readout, not idle
 SPIKES_ONE_IN = 8  # frames; where more than one in so many is that far off, they are no single frames
@@ -88,21 +90,37 @@ class Settling:
 
 
 def _learned(stack: Array) -> Learned:
-    """What (n, N) counts show of the sensor, if it was idle."""
+    """What (n, N) counts show of the sensor, if it was idle.
+
+    Differences see noise and not slow movement; means of absolute values, since one outlier must not rule.
+    """
     stack = _without_spikes(stack)
     half = len(stack) // 2
     baseline = median(stack)
     jumps = np.abs(np.diff(stack, axis=0))
-    found = restlessness(stack, baseline, jumps)
+    step = quantum(stack, jumps)
+    clipped = bool(np.count_nonzero((stack == stack.min()).sum(axis=0) >= 2) >= CLIPPED_SHARE * baseline.size)
+    usual = _usual(jumps, clipped=clipped)
+    floor = calm = max(usual, step)  # counts, one standard deviation of the usual taxel, or one step where that is more
+    if jumps[:half].size >= HALF_CHANGES:
+        quieter = min(_usual(part, clipped=clipped) for part in (jumps[:half], jumps[half:]))
+        calm = min(floor, HALVES * max(quieter, step))
+    spread = np.abs(stack - baseline).mean(axis=0) * SIGMA_PER_DEVIATION  # each taxel's standard deviation
     shift = np.abs(median(stack[:half]) - median(stack[half:]))
-    moved = (found.spread > RESTLESS * found.floor) | (shift > RESTLESS * found.floor)
+    moved = np.maximum(spread, shift) > RESTLESS * calm
     constant = np.all(jumps == 0, axis=0)
-    if not found.tells_constants or np.count_nonzero(constant) > constant.size // CONSTANT_ONE_IN:
+    if clipped or usual < step or np.count_nonzero(constant) > constant.size // CONSTANT_ONE_IN:
         constant[:] = False  # a clipped or coarse sensor stands still when idle: that proves nothing
-    return Learned(
-        baseline, found.sigma(len(stack)), constant, int(np.count_nonzero(moved)),
-        found.fine, found.step, not jumps.any(), stack,
-    )  # fmt: skip
+    pooled = (len(stack) * spread**2 + PRIOR_FRAMES * floor**2) / (len(stack) + PRIOR_FRAMES)
+    noise = np.maximum(np.sqrt(pooled), floor / 2)
+    fine = usual >= TREMBLE * step
+    return Learned(baseline, noise, constant, int(np.count_nonzero(moved)), fine, step, not jumps.any(), stack)
+
+
+def _usual(jumps: Array, *, clipped: bool) -> float:
+    """Counts, the standard deviation of the usual taxel by (n, N) absolute changes; 0 where there were none."""
+    rough = jumps.mean(axis=0) / JUMP_PER_SIGMA
+    return quantile(rough[rough > 0], CLIPPED_QUANTILE if clipped else 0.5) if rough.any() else 0.0
 
 
 def _without_spikes(stack: Array) -> Array:
@@ -114,34 +132,6 @@ def _without_spikes(stack: Array) -> Array:
     good = np.abs(stack - median(stack)).max(axis=1) <= SPIKE * max(usual, quantum(stack, jumps))
     spikes = len(stack) - np.count_nonzero(good)
     return stack if not spikes or spikes > max(1, len(stack) // SPIKES_ONE_IN) else stack[good]
-
-
-class Restlessness(NamedTuple):
-    """What (n, N) counts of a sensor that may be idle say of its noise."""
-
-    floor: float  # counts, one standard deviation of the usual taxel, or one step where that is more
-    step: float  # counts, one quantisation step
-    spread: Array  # (N,) counts, one standard deviation of each taxel about its median
-    tells_constants: bool  # whether a taxel that stood still stands out: noise shows, and is not cut off
-    fine: bool  # whether a finger's tremble shows in the last digit
-
-    def sigma(self, frames: int) -> Array:
-        """(N,) counts: each taxel's standard deviation as `frames` tell it, leaning on all taxels together."""
-        pooled = (frames * self.spread**2 + PRIOR_FRAMES * self.floor**2) / (frames + PRIOR_FRAMES)
-        return np.maximum(np.sqrt(pooled), self.floor / 2)
-
-
-def restlessness(stack: Array, baseline: Array, jumps: Array) -> Restlessness:
-    """What (n, N) counts say, with their medians (N,) and their successive absolute differences (n - 1, N).
-
-    Differences see noise and not slow movement; means of absolute values, since one outlier must not rule.
-    """
-    rough = jumps.mean(axis=0) / JUMP_PER_SIGMA
-    clipped = np.count_nonzero((stack == stack.min()).sum(axis=0) >= 2) >= CLIPPED_SHARE * rough.size
-    pooled = quantile(rough[rough > 0], CLIPPED_QUANTILE if clipped else 0.5) if rough.any() else 0.0
-    step = quantum(stack, jumps)
-    spread = np.abs(stack - baseline).mean(axis=0) * SIGMA_PER_DEVIATION
-    return Restlessness(max(pooled, step), step, spread, not (clipped or pooled < step), pooled >= TREMBLE * step)
 
 
 def quantum(stack: Array, jumps: Array) -> float:

@@ -15,6 +15,15 @@ FROZEN_NOISE = 3.0  # times a taxel's own noise: above this a taxel that froze i
 STRIKES = 2  # gestures in which a taxel stood still while its neighbours were pressed, after which it is stuck
 STRUCK_SHARE = 0.4  # of the contact's peak that the neighbours of such a taxel have to reach
 STRUCK_NOISE = 8.0  # times the sensor's noise that they have to reach as well
+TURNS = 5  # times in one contact that a taxel turns round from one frame to the next, as no finger makes it
+TURNS_TOO = 3  # the same, where another taxel flickers: they seldom do alone
+TURN_FRAMES = 15  # without a turn, after which a taxel's turns are counted anew
+TURN_SHARE = 0.15  # of the most that it showed in the contact: smaller jumps are a finger's tremble
+ALONE = 4.0  # times what its neighbours show: a finger presses them as well
+HELD_SHARE = 0.5  # of the highest other taxel, from which one that flickers may have made the contact
+RUBBISH_ONE_IN = 2  # taxels; where more than one in so many flickers, the frames are rubbish ...
+RUBBISH_S = 1.0  # ... if it lasts so long: a burst passes
+STEADY_FRAMES = 30  # without a turn, after which a taxel flickers no more
 NEAR, DIAGONAL = 2.0, 1.0  # weights of a taxel's eight neighbours
 
 
@@ -91,6 +100,62 @@ class Frozen:
         self.any = bool(mask.any())
 
 
+class Flickering:
+    """The taxels that jump up and down from frame to frame while their neighbours do not: no finger does that."""
+
+    def __init__(self, rows: int, columns: int) -> None:
+        self._shape = rows, columns
+        self.mask: Mask = np.zeros(rows * columns, dtype=bool)
+        self.any = False
+        self.rubbish = False  # most taxels have jumped like that in this contact, or what held it: it is no touch
+        self._frames = 0  # that were seen
+        self._turned = np.zeros(rows * columns, dtype=np.int64)  # the frame in which each taxel turned round last
+        self.begin(0.0)
+
+    def begin(self, t: float) -> None:
+        """A contact begins at `t` s. Where taxels flicker, others are watched on."""
+        self._began, self.rubbish = t, False
+        if not self.any:
+            size = self.mask.size
+            self._turns = np.zeros(size, dtype=np.int64)
+            self._peak, self._above, self._jump = np.zeros(size), np.zeros(size), np.zeros(size)
+
+    def learn(self) -> None:
+        """The sensor was learned anew: nothing flickers."""
+        self._set(np.zeros_like(self.mask))
+
+    def watch(self, t: float, above: Array, noise: float, bad: Mask) -> bool:
+        """See (N,) counts above the baseline at `t` s, `noise` being the sensor's; whether others flicker.
+
+        Asked while the sensor is touched, and later as long as a taxel flickers. `bad` taxels held no contact.
+        """
+        jump, before = above - self._above, self._jump
+        back = jump * before
+        self._frames += 1
+        self._above, self._jump = above, jump
+        self._peak = np.maximum(self._peak, above)
+        clear = NOISY * noise
+        if not self.any and back.item(back.argmin()) > -clear * clear:  # most frames end here
+            return False
+        turned = (back < 0) & (np.minimum(np.abs(jump), np.abs(before)) > np.maximum(TURN_SHARE * self._peak, clear))
+        self._turns = np.where(self._frames - self._turned < TURN_FRAMES, self._turns, 0) + turned
+        self._turned[turned] = self._frames
+        mask = self.mask & (self._frames - self._turned < STEADY_FRAMES)
+        often = self._turns >= (TURNS_TOO if self.any else TURNS)
+        if often.any():
+            around = neighbour_mean(self._peak.reshape(self._shape), np.ones(self._shape, dtype=bool)).ravel()
+            mask |= often & (self._peak > ALONE * around)
+            held = self._peak[~bad & mask].max(initial=0.0) > HELD_SHARE * self._peak[~bad & ~mask].max(initial=0.0)
+            most = int(np.count_nonzero(often)) * RUBBISH_ONE_IN > often.size
+            self.rubbish = self.rubbish or bool(held) or (most and t - self._began >= RUBBISH_S)
+        return self._set(mask)
+
+    def _set(self, mask: Mask) -> bool:
+        changed = bool((mask != self.mask).any())
+        self.mask, self.any = mask, bool(mask.any())
+        return changed
+
+
 class Taxels:
     """The bad taxels of a sensor of R x C taxels. They are flat here: (N,) with N = R * C."""
 
@@ -98,12 +163,13 @@ class Taxels:
         self.rows, self.columns = rows, columns
         self.stuck = Stuck(rows * columns)
         self.frozen = Frozen(rows * columns)
+        self.flickering = Flickering(rows, columns)
         self.bad: Mask = np.zeros(rows * columns, dtype=bool)  # replaced, never changed in place
         self.count = 0  # how many taxels are bad
 
     def review(self, sigma: Array, noise: float) -> None:
         """Say which are bad, by each taxel's noise (N,) and the sensor's. Were it all of them, none would be left."""
-        self.bad = self.stuck.mask | self.frozen.mask | (sigma > NOISY * noise)
+        self.bad = self.stuck.mask | self.frozen.mask | self.flickering.mask | (sigma > NOISY * noise)
         if self.bad.all():
             self.bad = np.zeros_like(self.bad)
         self.count = int(np.count_nonzero(self.bad))

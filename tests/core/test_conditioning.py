@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gestured.core.activity import BLOB, BLOB_GAIN, COMMON, Activity
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Void
+from gestured.core.idle import QUIETER
 from gestured.core.mounting import Mounting
 from gestured.core.window import Window
 from gestured.model.features import touch_pattern
@@ -310,6 +311,69 @@ def taps_once(shape: Shape, rate: float, at: tuple[float, float], whole: bool, s
     assert begin <= segment.onset <= segment.offset <= end
     assert segment.offset - segment.onset >= end - begin - 2 / rate - 1e-9
     assert front_end.rate_hz == pytest.approx(rate, rel=0.01)
+
+
+# --- frames that are no sensor's
+
+
+def rubbish(bits: int, seconds: float, shape: Shape, rate: float, seed: int) -> Array:
+    frames: Array = np.random.default_rng(seed).integers(0, 2**bits, (int(seconds * rate), *shape)).astype(np.float64)
+    return frames
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.tuples(st.integers(3, 16), st.integers(3, 16)), st.sampled_from([8.0, 15.0, 60.0, 200.0]),
+    st.sampled_from([8, 12, 16]), st.floats(0.2, 6.0), st.booleans(), seeds,
+)  # fmt: skip
+def test_what_was_learned_from_rubbish_is_found_out_in_three_seconds(
+    shape: Shape, rate: float, bits: int, lasts: float, whole: bool, seed: int
+) -> None:
+    times, frames = stream(shape, [quiet(lasts + 3), tap(shape, rate), quiet(1)], rate=rate, seed=seed)
+    bad = rubbish(bits, lasts, shape, rate, seed)
+    frames[: len(bad)] = bad
+    frames = np.rint(frames) if whole else frames
+    front_end, events = heard(times, frames)
+    follow_rules(events)
+    assert segments(events)[-1].onset == pytest.approx(lasts + 3, abs=1.1 / rate)
+    assert front_end.noise < QUIETER * 2.0 and front_end.bad_taxels == 0
+
+
+def test_after_rubbish_a_sensor_that_stands_still_is_found_out_in_ten_seconds() -> None:
+    times, frames = stream(SHAPE, [quiet(11.2), tap(SHAPE), quiet(1)], level=0.0, noise=0.0)
+    bad = rubbish(16, 1.2, SHAPE, 15.0, 0)
+    frames[: len(bad)] = bad
+    front_end, events = heard(times, frames)
+    assert segments(events)[-1].onset == pytest.approx(11.2, abs=0.1) and front_end.noise <= 1.0
+
+
+@pytest.mark.parametrize("repeats", [15, 2])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sensor_that_repeats_its_frames_keeps_its_noise(repeats: int, seed: int) -> None:
+    """Some, or all for a second each: that is no quieter sensor."""
+    times, frames = stream(SHAPE, [quiet(8), tap(SHAPE), quiet(1)], noise=20.0, seed=seed)
+    again = np.arange(len(times)) // repeats * repeats
+    held = (times > 3) & (times < 7)
+    frames[held] = frames[again][held]
+    front_end, events = heard(times, frames)
+    assert kinds(events) == ONE
+    assert front_end.noise == pytest.approx(20.0, rel=0.4)
+
+
+@pytest.mark.parametrize("rate", [15.0, 30.0, 100.0])
+@pytest.mark.parametrize("gap", [0.2, 0.8])
+def test_a_taxel_that_is_tapped_alone_again_and_again_is_good(rate: float, gap: float) -> None:
+    """Its neighbours show nothing, as on sensors without crosstalk."""
+
+    def poke(share: float) -> Array:
+        pressed = np.zeros(SHAPE)
+        pressed[4, 4] = GAIN
+        return pressed
+
+    times, frames = stream(SHAPE, [quiet(2), *[(0.1, poke), quiet(gap)] * 20, quiet(1)], rate=rate)
+    front_end, events = heard(times, frames)
+    follow_rules(events)
+    assert all(isinstance(event, Opened | Cut | Ended) for event in events) and front_end.bad_taxels == 0
 
 
 # --- faulty taxels

@@ -15,6 +15,7 @@ TESTS = "".join((ROOT / "tests" / "core" / f"test_{name}.py").read_text() for na
 EXPECTED = {
     "clipped", "still", "stuck", "freezes", "noisy", "drifts", "restarted", "shifted", "bursts", "spikes",
     "after-effect", "under a hand", "object", "no number", "repeats",
+    "rubbish", "loud", "jump",
 }  # fmt: skip
 
 
