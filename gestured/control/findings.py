@@ -142,9 +142,11 @@ def _sensors(status: dict[str, Any]) -> Iterator[Finding]:
 def _sensor(name: str, sensor: dict[str, Any]) -> Iterator[Finding]:
     words: dict[str, Callable[[dict[str, Any]], Finding]] = {
         "ok": lambda s: Finding("ok", f"{s['rate_hz']:.1f} Hz from {s['source']}"),
-        "starting": lambda s: Finding("warn", "is being learned", "leave it untouched for a second"),
+        "starting": lambda s: Finding("warn", s.get("reason") or "is being learned", "leave it untouched for a second"),
         "degraded": lambda s: Finding(
-            "warn", f"{s['bad_taxels']} bad taxels are bridged", "look at its lines; gesturectl recalibrate"
+            "warn",
+            s.get("reason") or f"{s['bad_taxels']} bad taxels are bridged",
+            "look at its lines, and at what lies on it; gesturectl recalibrate",
         ),
         "faulty": lambda s: Finding("bad", f"{s['bad_taxels']} bad taxels", "replace it, or look at its connector"),
         "stale": lambda s: Finding(

@@ -134,6 +134,7 @@ def _sensors(sensors: dict[str, dict[str, Any]]) -> Iterator[str]:
     for name, s in list(sensors.items())[:SENSOR_LINES]:
         numbers = f"{s['rate_hz']:6.1f} {1000 * s['jitter_s']:4.0f} ms {s.get('lost', 0):6d} {s['bad_taxels']:4d}"
         touched = "  touched" if s.get("touched") else ""
+        touched += f"  {s['reason']}" if s.get("reason") else ""
         touched += f"  made for {RATES}" if outside(s["rate_hz"]) else ""
         touched += "  rows and columns are exchanged" if s.get("exchanged") else ""
         tail = f"{s['drift']:6.1f} {s.get('gestures', 0):8d}  {s['grid']}{touched}"

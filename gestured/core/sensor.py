@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 from gestured.core.beside.foresight import Foresight, Preview
 from gestured.core.beside.habits import Habits
-from gestured.core.beside.reading import Reading, Vitals, faulty
+from gestured.core.beside.reading import Reading, Vitals
 from gestured.core.beside.view import View, view_of
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.decision import Decision, reason, whole
@@ -289,25 +289,22 @@ class Sensor:
         """Whether the sensor is silent."""
         return now - self.owner.heard > self._scene.stale_s
 
-    def state(self, now: float) -> str:
-        """How the sensor is; see `Reading`."""
-        front_end = self.front_end
+    def condition(self, now: float) -> tuple[str, str]:
+        """How the sensor is, and why; see `Reading`."""
         if self._vitals.intermittent and now - self.owner.heard <= ABSENT_S:
-            return "intermittent"
+            return "intermittent", ""
         if self.stale(now):
-            return "stale"
-        if not front_end.ready:
-            return "starting"
-        if self._habits.inverted:
-            return "inverted"
-        return "faulty" if faulty(front_end) else "degraded" if front_end.bad_taxels else "ok"
+            return "stale", ""
+        return self._vitals.condition(self.front_end, inverted=self._habits.inverted)
 
     def reading(self, now: float) -> Reading:
         """All that is known of the sensor."""
         front_end = self.front_end
+        state, reason = self.condition(now)
         return Reading(
-            self.state(now),
+            state,
             self._scene.grid_of(self.name),
+            reason=reason,
             interval_s=front_end.interval_s,
             jitter_s=self._vitals.jitter_s,
             bad_taxels=front_end.bad_taxels,

@@ -127,6 +127,7 @@ def _rounded(grid: NDArray[Any]) -> list[float]:
 def _sensor(reading: Reading, now: float) -> dict[str, Any]:
     shown = {
         "state": reading.state,
+        "reason": reading.reason,
         "rate_hz": round(reading.rate_hz, 4),
         "jitter_s": round(reading.jitter_s, 4),
         "bad_taxels": reading.bad_taxels,

@@ -173,6 +173,24 @@ def test_doctor_says_what_still_happens_and_when_it_last_did(run, own) -> None:
     assert found.level == "ok" and "2 h 1 min ago" in found.what and not found.remedy
 
 
+def test_a_sensor_that_hears_little_says_why(run, own) -> None:
+    daemon = own("", "--clock", "sensor", "--stale-s", 30)
+    control = ("--control", daemon.ready["control"])
+    sensor = Sensor(daemon, "arm").begin()
+    client = daemon.client().subscribe("status")
+    client.until(lambda line: line["sensors"].get("arm") == "ok")
+    rubbish = np.random.default_rng(0).integers(0, 2**16, (120, 9, 9)).astype(float)
+    sensor.send([*rubbish])
+    end = time.monotonic() + DEADLINE_S
+    while "noise" not in (reason := awaited(daemon, "arm", "ok", "degraded")["reason"]):
+        assert time.monotonic() < end, reason
+    assert reason in run("status", *control)[1]
+    (found,) = of("arm", run("doctor", *control, "--json")[1])
+    assert found["level"] == "warn" and reason in found["what"] and found["remedy"]
+    sensor.send(sensor.hand.idle(3.0))
+    assert awaited(daemon, "arm", "ok")["reason"] == ""
+
+
 @pytest.mark.parametrize("kind", ["lost frames", "kernel drops", "lines", "osc"])
 def test_what_is_over_is_no_finding(own, kind: str) -> None:
     daemon = own("", "--clock", "sensor")

@@ -37,7 +37,7 @@ def played(frames: np.ndarray, mounting: Mounting | None = None) -> Sensor:
 def seen(sensor: Sensor) -> tuple[bool, bool]:
     """Whether its counts fall when it is touched, and whether its rows and columns are exchanged."""
     reading = sensor.reading(0.0)
-    return sensor.state(0.0) == "inverted", reading.exchanged
+    return sensor.condition(0.0)[0] == "inverted", reading.exchanged
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -6,6 +6,7 @@ import socket
 import statistics
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import Literal
 
@@ -273,6 +274,42 @@ def test_another_scene_keeps_what_was_learned_where_it_holds() -> None:
     (fact,) = hub.receive([(b"rubbish!", STRANGER)], t)
     assert isinstance(fact, Dropped) and fact.reason == "not_allowed"
     assert [fact.what for fact in hub.tick(t + 2.0) if isinstance(fact, Changed)] == ["silent"]
+
+
+def test_a_sensor_that_cannot_hear_says_what_it_waits_for() -> None:
+    """Rubbish when it is switched on, noise in the middle, and something that goes on for long."""
+    hand, hub, rng = Hand(), Hub(replace(SCENE, frames=False), Sure()), np.random.default_rng(0)
+    now, said = 0.0, list[tuple[str, str]]()
+
+    def send(frames: list[Frame]) -> list[tuple[str, str]]:
+        nonlocal now
+        said.clear()
+        for frame in frames:
+            now += 1 / 15
+            hub.receive([(floats("/arm/pressure", frame, 0), FIRST)], now)
+            hub.tick(now)
+            (reading,) = hub.readings(now).values()
+            said.append((reading.state, reading.reason))
+        return [one for one, _ in groupby(said)]
+
+    def anything(seconds: float) -> list[Frame]:
+        return [rng.integers(0, 2**16, (9, 9)).astype(float) for _ in range(round(15 * seconds))]
+
+    learning = ("starting", "it is being learned, and waits for a second in which nothing moves on it")
+    fine = ("ok", "")
+    assert send(anything(1.2)) == [learning, fine]  # rubbish that does not change looks like a sensor
+    assert send(hand.idle(3.0)) == [fine, learning, fine]
+    assert [state for state, _ in send(anything(4.0))] == ["ok", "degraded"] and "jump" in said[-1][1]
+    assert send(hand.idle(1.0))[-1] == fine
+    send(anything(10.0))
+    assert said[-1][0] == "degraded" and "times what it was" in said[-1][1]
+    assert send(hand.idle(3.0))[-1] == fine
+    moving = [hand.frame(4.0 + n % 2) for n in range(120)]
+    assert send(moving) == [
+        fine,
+        ("degraded", "it was pressed for 5 s, and waits to be let go, or for a second in which nothing moves"),
+    ]
+    assert send(hand.idle(1.0))[-1] == fine
 
 
 def test_who_pauses_still_owns_a_sensor_until_it_is_forgotten() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gestured.core.beside.reading import STATES, Reading, Vitals, faulty
+from gestured.core.beside.reading import STATES, Reading, Vitals
 from gestured.core.classifier import Scores
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.facts import Decided
@@ -147,7 +147,7 @@ def test_a_sensor_with_more_than_a_quarter_of_bad_taxels_is_faulty(noisy: int, t
         counts[:noisy] += rng.normal(0, 200, noisy)
         front_end.push(Frame(n / 15, counts.reshape(9, 9)))
     assert front_end.bad_taxels == noisy
-    assert faulty(front_end) == too_many
+    assert (Vitals().condition(front_end, inverted=False)[0] == "faulty") == too_many
 
 
 def contacts(model: Path, *, watched: bool) -> list[str]:

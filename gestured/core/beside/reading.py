@@ -15,6 +15,7 @@ SMALLEST = 1e-30  # counts; noise that is nothing divides nothing
 SHORT_S = 5.0  # frames between two silences for no longer than this are no more than some gestures
 STRETCHES = 3  # short stretches in a row after which a sensor is said to send only while it is touched
 FAULTY = 0.25  # share of the taxels: where so many are bad, what is bridged between them is guesswork
+LOUD = 10.0  # times the least noise that the sensor has had: then touches are missed
 WEIGHT = 1 / 16  # weight of the newest interval in the jitter (RFC 3550, 6.4.1)
 
 
@@ -22,9 +23,9 @@ WEIGHT = 1 / 16  # weight of the newest interval in the jitter (RFC 3550, 6.4.1)
 class Reading:
     """One sensor at a moment; all but the state and the grid are 0 or None where it was never heard.
 
-    `state`: "no_data" (in the configuration, never heard), "starting", "ok", "degraded" (taxels are bridged), "faulty"
-    (too many are), "intermittent" (it falls silent between touches), "inverted" (its counts fall when it is touched) or
-    "stale" (heard, but not now).
+    `state`: "no_data" (in the configuration, never heard), "starting", "ok", "degraded" (`reason` says why), "faulty"
+    (too many taxels are bad), "intermittent" (it falls silent between touches), "inverted" (its counts fall when it is
+    touched) or "stale" (heard, but not now).
     """
 
     state: str
@@ -44,6 +45,7 @@ class Reading:
     segments: int = 0  # so far; the last one's id
     first: NDArray[np.float64] | None = None  # (N,) counts: the first baseline that was learned
     baseline: NDArray[np.float64] | None = None  # (N,) counts: today's
+    reason: str = ""  # of "starting" and "degraded", in a sentence: what is wrong, or what the sensor waits for
 
     @property
     def rate_hz(self) -> float:
@@ -65,6 +67,7 @@ class Vitals:
         self.jitter_s = 0.0
         self.interval_s = 0.0  # from frame to frame, as of the last tick; 0 before it is known
         self.first: NDArray[np.float64] | None = None  # (N,) counts
+        self._quietest = np.inf  # counts: the least noise so far
         self._last: float | None = None
         self._began = 0.0  # s, the first frame after the last silence
         self._stretches = 0  # short ones, in a row
@@ -89,10 +92,12 @@ class Vitals:
         self._last = now
 
     def review(self, front_end: FrontEnd) -> None:
-        """Keep the first baseline that was learned, and the interval. Beside the way of a frame, with each tick."""
+        """Keep the first baseline, the least noise and the interval. Beside the way of a frame, with each tick."""
         self.interval_s = front_end.interval_s
         if self.first is None and front_end.ready:
             self.first = front_end.baseline
+        if front_end.conditioner.noise.lively:  # of others the noise is a guess
+            self._quietest = min(self._quietest, front_end.noise)
 
     def silent(self) -> None:
         """The sensor has fallen silent: the next interval says nothing of its jitter."""
@@ -102,9 +107,24 @@ class Vitals:
 
     def restart(self) -> None:
         """The sensor is learned anew."""
-        self.first = None
+        self.first, self._quietest = None, np.inf
 
-
-def faulty(front_end: FrontEnd) -> bool:
-    """Whether too many taxels are bad."""
-    return front_end.bad_taxels > FAULTY * front_end.rows * front_end.columns
+    def condition(self, front_end: FrontEnd, *, inverted: bool) -> tuple[str, str]:
+        """The state of a sensor that is there, and where it is "starting" or "degraded" why: see `Reading`."""
+        conditioner, phase = front_end.conditioner, front_end.segmenter.phase
+        if not conditioner.ready or conditioner.noise.doubtful:
+            return "starting", "it is being learned, and waits for a second in which nothing moves on it"
+        if inverted:
+            return "inverted", ""
+        if front_end.bad_taxels > FAULTY * front_end.rows * front_end.columns:
+            return "faulty", ""
+        if phase.touched and conditioner.taxels.flickering.rubbish:
+            return "degraded", "taxels jump from frame to frame, and it waits until they calm down"
+        if phase.touched and not phase.pending:
+            return "degraded", "it was pressed for 5 s, and waits to be let go, or for a second in which nothing moves"
+        if front_end.noise >= LOUD * self._quietest:
+            louder = front_end.noise / self._quietest
+            return "degraded", f"its noise is {louder:.0f} times what it was, and only stronger touches count"
+        if front_end.bad_taxels:
+            return "degraded", f"bad taxels are bridged: {front_end.bad_taxels}"
+        return "ok", ""
