@@ -62,6 +62,7 @@ lab: .venv-dev/.dev .venv-dev/.lab  ## what training needs (torch), and how to t
 hostile: .venv-dev/.dev .venv-dev/.lab  ## the slow fault tests, what damage does to gestures, a minute of each fuzzer
 	@.venv-dev/bin/python -m pytest -m hostile $(ARGS)
 	@.venv-dev/bin/python -m tests.hostile.damage
+	@.venv-dev/bin/python -m tests.hostile.deaf
 	@$(MAKE) -s --no-print-directory fuzz
 
 fuzz: .venv-dev/.fuzz  ## fuzz the parsers and the model loader, each for: SECONDS=60

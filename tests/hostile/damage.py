@@ -91,8 +91,15 @@ class Bench:
         self._ladder = ladder_for(model, [], slow_s=math.inf)
         self._scene = scene_of(load_settings({"model": model}, {})[0], self._ladder)
 
-    def events(self, arrivals: list[tuple[float, bytes]], stalls: Sequence[Stall] = ()) -> list[dict[str, Any]]:
+    def events(
+        self,
+        arrivals: list[tuple[float, bytes]],
+        stalls: Sequence[Stall] = (),
+        states: list[tuple[float, str]] | None = None,
+    ) -> list[dict[str, Any]]:
         """What the daemon says to (time in s, packet), in order of arrival, as a client's lines.
+
+        `states` is given the time (s) and the state of each sensor at each tick.
 
         In a stall it neither reads nor looks at a clock. After each group of packets that waited, it looks whether a
         sensor has fallen silent: its loop may do so after any of them.
@@ -109,6 +116,8 @@ class Bench:
             while tick < now:
                 if awake(tick) == tick:
                     facts += hub.tick(tick)
+                    if states is not None:
+                        states += [(tick, reading.state) for reading in hub.readings(tick).values()]
                 tick += TICK_S
             backlog.add([Datagram(t, packet, SOURCE) for t, packet in found], now)
             while backlog:
