@@ -308,6 +308,14 @@ def test_it_waits_for_a_daemon_that_starts_again(start, tmp_path: Path) -> None:
         second.stop()
 
 
+@pytest.mark.parametrize("wrong", [{"model": "x"}, {"type": 1}, {"type": "view"}, {"type": "view", "sensor": []}])
+def test_what_no_daemon_says_is_a_sentence_on_the_page(start, fake_control, wrong: dict[str, object]) -> None:
+    process = start("view", "--control", fake_control("mad", **wrong), "--listen", "127.0.0.1:0")
+    stream = Page(process.stdout.readline().decode()).come_in().stream()
+    for _ in range(2):  # and it is asked again
+        assert "something that gestured does not say" in stream.until("gone")[1]["reason"]
+
+
 # In a real browser
 
 
@@ -514,12 +522,12 @@ def fake_control(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
     listener.bind(str(path))
     listener.listen()
 
-    def begin(name: str) -> Path:
+    def begin(name: str, **wrong: object) -> Path:
         sensor = {"state": name, "rate_hz": 15.0, "jitter_s": 0.0, "lost": 0, "bad_taxels": 0, "source": "a:1"}
         status = {
             "type": "state", "version": name, "state": "ok", "sensors": {name: sensor},
             "model": {"active": name, "gestures": [name]},
-        }  # fmt: skip
+        } | wrong  # fmt: skip
 
         def answer(client: socket.socket) -> None:
             with client, client.makefile("rb") as file:

@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from gestured.client.control import Control
+from gestured.client.fields import wrong_field
+from gestured.client.lines import Refused
 from gestured.control.flag import flag, flag_path
 from gestured.control.view.outbox import Outbox
 from gestured.core.errors import GesturedError
@@ -23,7 +25,7 @@ class Source:
         self._open: list[Outbox] = []
         self._changed = threading.Condition()
         self._closed = threading.Event()
-        self._status: dict[str, Any] = {}
+        self._state: dict[str, Any] = {}  # the daemon's, as the page is told it
         self._looking: Control | None = None  # the connection over which the daemon streams
         self._looked_at: Looked = None
         self._latest: dict[str, dict[str, Any]] = {}  # the last view of each sensor that is looked at
@@ -31,8 +33,8 @@ class Source:
 
     def join(self, outbox: Outbox) -> None:
         """A browser begins to look: fill its outbox from now on."""
-        if self._status:
-            outbox.put("sensors", self._sensors())
+        if self._state:
+            outbox.put("sensors", self._state)
         if outbox.sensor in self._latest:
             outbox.frame(self._latest[outbox.sensor])
         with self._changed:
@@ -90,23 +92,30 @@ class Source:
             self._looking, self._looked_at = control, looked_at
             self._look_anew()
         for line in control.lines():
-            if line["type"] == "view":
-                self._latest[line["sensor"]] = line
-                for outbox in self._lookers(line["sensor"]):
-                    outbox.frame(line)
-            elif line["type"] == "state":
-                self._status = line
-                self._tell("sensors", self._sensors())
-            elif line["type"] == "provisional":
-                for outbox in self._lookers(line["sensor"]):
-                    outbox.put("event", line)
-            else:
-                self._tell("event", line)
+            try:
+                words = wrong_field(line)
+                if words is None:
+                    self._pass_on(line)
+            except (KeyError, TypeError):
+                words = f"a line of the type {line['type']!r} without its fields"
+            if words is not None:
+                raise Refused(f"{self._control} says something that gestured does not say: {words}")
 
-    def _sensors(self) -> dict[str, Any]:
-        status = self._status
-        told = {key: status[key] for key in ("version", "state", "sensors")}
-        return told | {"model": status["model"]["active"], "gestures": status["model"]["gestures"]}
+    def _pass_on(self, line: dict[str, Any]) -> None:
+        """A line of the daemon, to whoever looks at what it is about."""
+        if line["type"] == "view":
+            self._latest[line["sensor"]] = line
+            for outbox in self._lookers(line["sensor"]):
+                outbox.frame(line)
+        elif line["type"] == "state":
+            told = {key: line[key] for key in ("version", "state", "sensors")}
+            self._state = told | {"model": line["model"]["active"], "gestures": line["model"]["gestures"]}
+            self._tell("sensors", self._state)
+        elif line["type"] == "provisional":
+            for outbox in self._lookers(line["sensor"]):
+                outbox.put("event", line)
+        else:
+            self._tell("event", line)
 
     def _lookers(self, sensor: str) -> list[Outbox]:
         return [outbox for outbox in list(self._open) if outbox.sensor == sensor]
