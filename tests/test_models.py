@@ -39,6 +39,14 @@ def refusal(path: Path | str) -> str:
     return message
 
 
+def wrong(path: Path) -> str:
+    """What is wrong with a file, found in this process: onnxruntime does not come to grief over it."""
+    with pytest.raises(ValueError) as caught:
+        Model(path.read_bytes(), path.stem)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
 # --- models that are good ---
 
 
@@ -114,7 +122,7 @@ def test_truncated(tmp_path: Path, share: float) -> None:
     data = build(tmp_path / "whole.onnx").read_bytes()
     path = tmp_path / "cut.onnx"
     path.write_bytes(data[: int(len(data) * share)])
-    refusal(path)
+    wrong(path)
 
 
 KEYS = (
@@ -125,7 +133,7 @@ KEYS = (
 
 @pytest.mark.parametrize("key", KEYS)
 def test_missing_metadata_is_named(tmp_path: Path, key: str) -> None:
-    assert repr(key) in refusal(build(tmp_path / "m.onnx", drop=(key,)))
+    assert repr(key) in wrong(build(tmp_path / "m.onnx", drop=(key,)))
 
 
 def test_no_metadata_at_all(tmp_path: Path) -> None:
@@ -177,7 +185,7 @@ HALF_WINDOW = json.dumps({"rows": 9})
     ],
 )
 def test_malformed_metadata_is_named(tmp_path: Path, key: str, value: str) -> None:
-    assert f"'{key}'" in refusal(build(tmp_path / "m.onnx", **{key: value}))
+    assert f"'{key}'" in wrong(build(tmp_path / "m.onnx", **{key: value}))
 
 
 def test_grid_of_the_window_must_be_that_of_the_graph(tmp_path: Path) -> None:
@@ -453,7 +461,7 @@ def test_a_user_is_told_of_damage_and_of_a_file_without_a_digest(tmp_path: Path,
     path.write_bytes(exported)
     assert check(path)["digest"]
     assert not check(build(tmp_path / "older.onnx"))["digest"]
-    for copy in range(24):
+    for copy in range(4):  # the test above damages more copies, in this process
         data = bytearray(exported)
         for place in np.random.default_rng(copy).integers(0, len(data), 4):
             data[place] ^= 1 + copy

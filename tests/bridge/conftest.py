@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 
+from gestured.bridge.cli import main
 from gestured.client.control import Control
 from tests.daemon.harness import DEADLINE_S, Daemon
 from tests.sockets import free_address
@@ -92,6 +93,21 @@ def bridge(tmp_path: Path) -> Iterator[Callable[..., Process]]:
     for process in running:
         process.stop()
         assert "Traceback" not in process.said()
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """What gestured-bridge says, in this process, of flags with which it cannot begin."""
+
+    def refuse(*arguments: object) -> str:
+        try:
+            status = main([*map(str, arguments)])
+        except SystemExit as ended:  # argparse
+            status = ended.code
+        assert status in (1, 2)
+        return capsys.readouterr().err
+
+    return refuse
 
 
 @pytest.fixture(scope="module")

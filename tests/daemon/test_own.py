@@ -196,20 +196,14 @@ def test_one_enrolment_at_a_time_and_none_outlives_its_client(begin: Begin, tmp_
     assert ask(daemon, "gestures")["own"]["gestures"] == {"cut": 2}
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("swipe_left", "is a gesture of tiny"),
-        ("use", "is no gesture's name"),
-        ("Slash", "is no gesture's name"),
-        ("a" * 33, "is no gesture's name"),
-    ],
-)
-def test_names_that_cannot_be(begin: Begin, name: str, words: str) -> None:
+def test_names_that_cannot_be(begin: Begin) -> None:
     daemon = begin()
     ready(daemon)
-    with pytest.raises(Refused, match=words):
-        Enrolment(daemon, name)
+    with pytest.raises(Refused, match="is a gesture of tiny"):
+        Enrolment(daemon, "swipe_left")
+    for name in ("use", "Slash", "a" * 33):
+        with pytest.raises(Refused, match="is no gesture's name"):
+            Enrolment(daemon, name)
 
 
 def test_the_file_is_private_and_outlives_the_daemon_until_it_is_forgotten(begin: Begin, tmp_path: Path) -> None:

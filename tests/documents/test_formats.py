@@ -2,8 +2,6 @@
 
 import inspect
 import json
-import subprocess
-import sys
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, get_args
@@ -13,8 +11,10 @@ import pytest
 from gestured.core import messages
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.messages import parse_subscription
+from gestured.daemon.explain import explain
 from gestured.model.shipped import shipped
 from tests.daemon.harness import Sensor
+from tests.daemon.parts import settings_of
 from tests.documents.blocks import ROOT, Block, blocks
 
 SCHEMA = json.loads((ROOT / "docs" / "events.schema.json").read_text())
@@ -99,6 +99,4 @@ def test_the_requests_in_the_documents_are_valid(block: Block):
 def test_the_configurations_in_the_documents_are_valid(block: Block, tmp_path: Path):
     path = tmp_path / "gestured.toml"
     path.write_text(block.text)
-    command = [sys.executable, "-m", "gestured.daemon", "--config", str(path), "--explain"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
+    assert explain(*settings_of("--config", path))

@@ -148,6 +148,7 @@ def test_a_model_that_hangs_is_ended_and_hands_over_to_the_next(start, model: Pa
     assert "did not answer" in daemon.stderr()
 
 
+@pytest.mark.hostile
 def test_a_model_whose_opening_never_ends_is_no_model_to_start_with(model: Path, tmp_path: Path) -> None:
     bad = bad_models.endless(model, tmp_path / "bad.onnx")
     daemon = Daemon(tmp_path, "--model", bad, "--listen", "127.0.0.1:0", "--socket", tmp_path / "events.sock")
@@ -191,6 +192,7 @@ def test_the_end_does_not_wait_for_an_answer_that_never_comes(start, model: Path
     assert "ended by force" in daemon.stderr()
 
 
+@pytest.mark.hostile
 def test_a_model_whose_opening_never_ends_changes_nothing(start, model: Path, tmp_path: Path) -> None:
     path = tmp_path / "mine.onnx"
     path.write_bytes(model.read_bytes())
