@@ -1,4 +1,4 @@
-"""The metadata `provisional` of a model, as a value."""
+"""Reads the metadata `provisional` of a model, JSON, as a `Certainty`."""
 
 import json
 from collections.abc import Collection
@@ -7,11 +7,11 @@ from typing import Any
 from gestured.core.certainty import Certainty, Needed
 
 MOST_IN_A_ROW = 100  # frames; a model that needs more says nothing in time
-MOST_S = 3600.0  # no contact lasts that long; also, no number beyond a float's range
+MOST_S = 3600.0  # longer than any contact; it also keeps each number within a float's range
 
 
 def certainty(text: str, gestures: Collection[str]) -> Certainty:
-    """What a model of these gestures says; raises ValueError naming the key."""
+    """The certainty that `text` holds for a model of these gestures; raises ValueError naming the key."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError):

@@ -38,14 +38,14 @@ class Embedded:
         self.gestures = gestures  # in use, in the model's order
         self._sensor = sensor
         self._shape = sensor.front_end.sent
-        self._last = -math.inf  # s
+        self._last = -math.inf  # s, the time of the last frame
 
     def push(self, t: float, values: ArrayLike, *, touches: Sequence[Touch] = (), lost: int = 0) -> list[Event]:
         """Take the frame of `t` s, (R, C) counts as the sensor sends them; give what it decides.
 
         `touches` are the finger positions that the sensor knows, `lost` how many frames went missing just before.
         A frame with a value that is not finite is passed over, as if it had been lost. Raises ValueError for a time
-        that is not after the last frame's, for what is no frame of this sensor's grid, and for no count.
+        that is not after the last frame's, `values` that are no frame of this sensor's grid, a `lost` that is no count.
         """
         if not self._last < t < math.inf:
             after = f"a time after the last frame's, {self._last} s" if self._last > -math.inf else "seconds"
@@ -56,7 +56,7 @@ class Embedded:
         if not hasattr(lost, "__index__") or lost < 0:
             raise ValueError(f"lost: expected a count of frames, found {lost!r}")
         self._last = t
-        if not np.all(np.abs(frame) <= LARGEST):  # NaN is no larger, and no smaller
+        if not np.all(np.abs(frame) <= LARGEST):  # written so that NaN fails it, too
             return []
         return events_of(self._sensor.push(Frame(t, frame, tuple(touches), lost)))
 
@@ -114,8 +114,8 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     is how long a tap waits for a second one, 0.2 to 0.6 s. With `provisional` a contact's most probable gesture is
     said before it is over, where the model was made for that.
 
-    Recognisers of one model share it. Below a shipped model stand its fallbacks, as in the daemon: that one answers is
-    logged as a warning of the logger `gestured`. Raises ModelError for a model that cannot be used, SettingsError or
+    Recognisers of one model share it. Below a shipped model stand its fallbacks, as in the daemon; where one of them
+    answers, the logger `gestured` gets a warning. Raises ModelError for a model that cannot be used, SettingsError or
     OwnFileError for another mistake.
     """
     if not is_sensor(sensor):

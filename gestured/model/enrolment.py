@@ -15,15 +15,15 @@ from gestured.model.model import Model
 from gestured.model.own import Own, placed
 from gestured.model.prototypes import Prototype, Space
 
-SHORTEST_S = 0.15  # of an example: what is shorter is a tap, whatever was meant
-FEWEST = 3  # touched frames: fewer show no movement
+SHORTEST_S = 0.15  # of an example; a shorter contact is a tap, whatever was meant
+FEWEST = 3  # touched frames of an example; fewer show no movement
 
 
 class Examiner:
     """A model that judges the examples of an enrolment: what speaks against one, in words, or None."""
 
     def __init__(self, model: Model, space: Space, own: Own, in_use: Collection[str]) -> None:
-        """`own` are the gestures that there are already, `in_use` the model's."""
+        """`own` are the user's gestures so far, `in_use` the model's gestures that are in use."""
         self._model, self._space, self._own, self._in_use = model, space, own, in_use
 
     def example(self, segment: Segment) -> Example | None:
@@ -31,7 +31,7 @@ class Examiner:
         return Example.of(segment, self._model.metadata.window)
 
     def same_as(self, example: Example) -> str | None:
-        """The gesture that there is already, and how near."""
+        """The gesture that an example would be taken for, and how surely, in words; None where there is none."""
         taken = placed(self._model, self._space, example).taken
         if taken is not None and taken[0] in self._in_use:
             return f"{taken[0]} ({taken[1]:.2f})"
@@ -39,7 +39,7 @@ class Examiner:
         return None if match is None or match.confidence < NEAR else f"{match.name} ({match.confidence:.2f})"
 
     def unlike(self, example: Example, kept: Sequence[Example]) -> str | None:
-        """How near it is to those that were kept, where that is not near enough."""
+        """How near an example is to those that were kept, in words, where that is not near enough; else None."""
         near, *others = (placed(self._model, self._space, one).place for one in (example, *kept))
         confidence = Prototype.of(self._space, np.stack(others)).confidence(near)
         return None if confidence >= NEAR else f"{confidence:.2f}, expected {NEAR:.2f}"

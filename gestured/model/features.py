@@ -10,11 +10,11 @@ deployment are held against them.
 import numpy as np
 from numpy.typing import NDArray
 
-PRESSED = 0.2  # of the peak: a taxel in contact
+PRESSED = 0.2  # of the peak: from there on a taxel or a frame counts as touched, for `touch_pattern`
 
 MEASURES = ("duration_s", "area", "speed", "noise")
-ACTIVE = 0.15  # of the peak: a frame in contact
-COVERED = 0.2  # of the peak: a taxel in contact
+ACTIVE = 0.15  # of the peak: from there on a frame counts as touched, for `measures`
+COVERED = 0.2  # of the peak: from there on a taxel counts as touched, for `measures`
 
 
 def feature_names(rows: int, columns: int) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""A model's file before onnxruntime sees it: its bytes, its digest, no other file; and the self-test that it brings.
+"""A model's file before onnxruntime sees it: its bytes, its digest, whether it needs other files; its self-test.
 
 Functions here raise ValueError with the reason; `model.open_model` adds the file's name.
 """
@@ -25,7 +25,7 @@ MAX_MODEL_BYTES = (
 # What stands in a file before the 64 characters of its digest: the head of a protobuf entry of `metadata_props`.
 DIGEST = b"\x72\x4a\x0a\x06digest\x12\x40"
 MAX_SELF_TEST = 400_000  # numbers of a self-test's input; more do not fit into metadata.MAX_TEXT
-# The name under which a tensor says which file holds its data, after its length as protobuf may write that.
+# The word `location`, by which a tensor names the file of its data, after the word's length as protobuf writes it.
 _LOCATION = re.compile(rb"(?:\x08|\x88\x80*\x00)location")
 
 
@@ -73,8 +73,8 @@ def has_digest(data: bytes) -> bool:
 def check_alone(data: bytes) -> None:
     """ValueError for a model with data in another file, which onnxruntime would read with this process's rights.
 
-    Of a graph that it is given as bytes it follows relative names from the current folder on; 1.24 follows links and
-    absolute names, too, and addresses in memory. What names no location it refuses (tests/test_models.py).
+    onnxruntime follows names relative to the current folder, and version 1.24 also links, absolute names and addresses
+    in memory. Data in another file without a `location` it refuses by itself (tests/test_models.py).
     """
     if _LOCATION.search(data):
         raise ValueError("keeps data in another file, expected everything in this one")
@@ -82,7 +82,7 @@ def check_alone(data: bytes) -> None:
 
 @dataclass(frozen=True, eq=False)
 class SelfTest:
-    """An input and what the trained model made of it."""
+    """An input, and the outputs that the trained model gave for it."""
 
     values: NDArray[np.float32]  # (B, T, R, C) or (B, F)
     scores: NDArray[np.float32]  # (B, G)
@@ -102,7 +102,7 @@ class SelfTest:
 
     @classmethod
     def from_json(cls, stored: Mapping[str, Any]) -> "SelfTest":
-        """What `to_json` wrote, parsed; ValueError says what is wrong."""
+        """The self-test that `to_json` wrote, parsed; ValueError says what was expected."""
         missing = [key for key in ("shape", "values", "scores", "unknown") if key not in stored]
         if missing:
             raise ValueError(f"metadata 'self_test' has no {missing[0]!r}")

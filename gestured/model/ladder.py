@@ -18,9 +18,9 @@ from gestured.model.own import Own
 from gestured.model.rung import Rung
 from gestured.model.shipped import LADDER, shipped, shipped_name
 
-SLOW_S = 0.05  # s; a run that takes longer counts as slow. It delays an answer, and usually takes some milliseconds
+SLOW_S = 0.05  # a run that takes longer counts as slow, since it delays an answer; some milliseconds are usual
 SLOW_RUNS = 3  # slow runs in a row put a rung aside; a single one may be the fault of another program
-RETRY_S = 30.0  # s that a rung is put aside for; to try it again may delay an answer as much as before
+RETRY_S = 30.0  # how long a rung is put aside: trying it again may delay another answer
 
 
 class Ladder:
@@ -40,7 +40,7 @@ class Ladder:
         clock: Callable[[], float] = time.perf_counter,
         report: Callable[[str], None] | None = None,
     ) -> None:
-        """Opens the first rung that can be; ModelError where none can, or one knows other gestures.
+        """Opens the first rung that can be opened; ModelError where none can, or one knows other gestures.
 
         `report` is told in one sentence what happened to a rung.
         """
@@ -51,7 +51,7 @@ class Ladder:
         self.report = report or (lambda sentence: None)
         self.failures = 0  # how often a rung was put aside
         self._faint = 0  # previews in a row that failed, or took too long
-        self._previews_from = -math.inf  # s of `clock`
+        self._previews_from = -math.inf  # s of `clock`, before which there are no previews
         self.own = Own({})  # gestures of the user's own; may be replaced between two segments
         self._active, opened = self._first_open()
         self.gestures = opened.gestures
@@ -131,7 +131,7 @@ class Ladder:
             return None
         try:
             scores = model.classify(segment)
-        except Exception:  # whatever it dies of, it has nothing to say
+        except Exception:  # a preview that fails says nothing
             scores = None
         end = self._clock()
         self._faint = self._faint + 1 if scores is None or end - start > self._slow_s else 0
@@ -183,7 +183,7 @@ class Ladder:
 
 
 def ladder_for(source: str | Path, fallbacks: Sequence[str | Path] | None = None, **settings: Any) -> Ladder:
-    """The contract's rule: named fallbacks, else the shipped rungs below a shipped model, else none.
+    """The ladder of a model: its fallbacks are those named, else the shipped ones below a shipped model, else none.
 
     `settings` go to `Ladder`. Raises ModelError.
     """
@@ -204,7 +204,7 @@ def require_gestures(ladder: Ladder, names: Iterable[str]) -> None:
 
 
 def gestures_in_use(ladder: Ladder, chosen: Sequence[str] | None) -> tuple[str, ...]:
-    """The chosen gestures, or all where None is, in the ladder's order. Raises SettingsError."""
+    """The chosen gestures in the ladder's order, all where `chosen` is None. Raises SettingsError."""
     if chosen is None:
         return ladder.gestures
     if isinstance(chosen, str):

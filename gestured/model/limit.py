@@ -1,6 +1,6 @@
 """A run of a model that takes too long is ended: onnxruntime looks at its options' `terminate` between two operators.
 
-One thread for all models of the process. It looks now and then by itself as long as models are run, and is woken only
+One thread watches all models of the process. It looks now and then while models are run, and is woken only
 for a limit that ends before its next look: to wake it for each run makes every run slower. A single operator that never
 ends is not ended by this; that is the business of the watchdog outside.
 """
@@ -15,7 +15,7 @@ LOOK_S = 1.0  # the pause between two looks: shorter than a segment's run may ta
 AWAKE_S = 60.0  # how long after the last run the thread goes on looking
 ASLEEP_S = 3600.0  # the pause where nothing was run for AWAKE_S; the next run ends it
 
-_running: dict[int, tuple[float, Any]] = {}  # when its time is over (s, monotonic), and its options
+_running: dict[int, tuple[float, Any]] = {}  # by run: when its time is over (s, monotonic), and its options
 _changed = threading.Condition()
 _thread: threading.Thread | None = None
 _used = 0.0  # s, when a model was last run

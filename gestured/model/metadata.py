@@ -1,4 +1,4 @@
-"""What a model says of itself: the metadata of its file, held key by key against the contract.
+"""What a model says of itself: the metadata of its file, checked key by key.
 
 Functions here raise ValueError with the key and what was expected; `model.open_model` adds the file's name.
 """
@@ -47,9 +47,9 @@ class Metadata:
 
     @classmethod
     def parse(cls, properties: Mapping[str, str], *, sealed: bool = False) -> "Metadata":
-        """Holds every key against the contract; ValueError names the key and what was expected.
+        """Check every key; ValueError names the key and what was expected.
 
-        A file that is `sealed` ends in its digest, which is right.
+        `sealed`: whether the file ends in a digest that is right.
         """
         if "digest" in properties and not sealed:
             raise ValueError("metadata 'digest': expected at the file's end; another program has written the file anew")
@@ -119,7 +119,7 @@ def _naming(key: str) -> Iterator[None]:
 
 
 def _check_extent(key: str, text: str) -> None:
-    """Counts what JSON in a value would become, before it is parsed."""
+    """Raises ValueError for a value whose JSON would take too much memory; it is counted before it is parsed."""
     if len(text) > MAX_TEXT:
         raise ValueError(f"metadata {key[:64]!r} has {len(text)} characters, expected at most {MAX_TEXT}")
     items = depth = 0

@@ -1,6 +1,6 @@
 """A model: the bytes of an .onnx file, verified, self-tested and opened as a classifier.
 
-They are held against their digest, opened, held against their own metadata and made to reproduce their self-test.
+The bytes are compared with their digest and opened; the graph must fit its metadata and reproduce its self-test.
 """
 
 import hashlib
@@ -18,23 +18,23 @@ from gestured.model.file import check_alone, has_digest
 from gestured.model.metadata import Metadata
 from gestured.model.session import Session
 
-TOLERANCE = 1e-3  # of the self-test: other processors round differently, another model is further off
+TOLERANCE = 1e-3  # by which outputs may miss the self-test's, since other processors round differently
 ROUNDING = 1e-4  # by which a probability may lie outside of 0 to 1
 SUM_ROUNDING = 1e-3  # by which probabilities may miss 1 together
-RUN_S = 1.5  # for one segment; it takes some milliseconds
-SELF_TEST_S = 10.0  # for the self-test's few segments, on a machine that is busy starting
-BATCH_S = 3600.0  # for any number of segments at once
+RUN_S = 1.5  # that one segment may take; some milliseconds are usual
+SELF_TEST_S = 10.0  # that the self-test's few segments may take while the machine is busy starting
+BATCH_S = 3600.0  # that any number of segments at once may take
 
 
 class Model:
     """A model that has passed every check; implements `Classifier`."""
 
     def __init__(self, data: bytes, name: str) -> None:
-        """Opens `data`; `name` stands for it in events. ValueError says what is wrong."""
+        """Open the bytes of a file; `name` is the model's in events. ValueError says what is wrong."""
         self.name = name
         self.size = len(data)
         self.sha256 = hashlib.sha256(data).hexdigest()
-        self.sealed = has_digest(data)  # where it is not, nothing but the self-test finds damage
+        self.sealed = has_digest(data)  # whether it ends in its digest; else the self-test alone finds damage
         check_alone(data)
         self._session = Session(data)
         self.properties = self._session.properties()
@@ -50,7 +50,7 @@ class Model:
         self.self_test_error = self._self_test()
 
     def classify(self, segment: Segment) -> Scores:
-        """Scores of one segment. What is empty or not finite is unknown, whatever a net would say of it.
+        """Scores of one segment. A segment that is empty or not finite is unknown, whatever a net would say.
 
         Raises ModelError where the model fails or does not give probabilities.
         """
@@ -103,7 +103,7 @@ class Model:
         return embedding
 
     def report(self) -> dict[str, Any]:
-        """What is known of it, as JSON values."""
+        """What is known of the model, as JSON values."""
         known = self.metadata
         return {
             "kind": known.kind,

@@ -1,4 +1,4 @@
-"""Ways to open a model's file: here, in a process of its own, or only to hear what it knows.
+"""Ways to open a model's file: here, in a process of its own, or only to learn its gestures.
 
 A file is read once, checked against the manifest (where it ships) or tried in a process of its own first (where it
 does not: `process`), and opened from those bytes. Whatever is wrong is one `ModelError`: the file, what is wrong, what
@@ -20,8 +20,8 @@ _opened: WeakValueDictionary[tuple[str, str], Model] = WeakValueDictionary()
 def open_model(source: str | Path, tried: str | None = None) -> Model:
     """Open and verify a model: a path, or the bare name of a shipped one. Raises ModelError.
 
-    What does not ship is tried in a process of its own first, which takes about half a second, at most some seconds;
-    not where its sha256 is that of a file that was `tried` before. One that is open already is shared.
+    A file that does not ship is tried in a process of its own first, which takes about half a second, at most some
+    seconds, unless `tried` is its sha256, of an earlier try. A model that is open already is shared.
     """
     path, name, data, sha256 = read(source)
     with naming(path):

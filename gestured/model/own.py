@@ -29,22 +29,22 @@ class Placed:
     """What one model makes of a segment."""
 
     place: Array  # (K,)
-    taken: tuple[str, float] | None  # its own gesture that it is, and how surely, where the user's could not take it
+    taken: tuple[str, float] | None  # the model's gesture and its confidence, where no own one could take it
 
     @classmethod
     def of(cls, model: Model, space: Space, segment: Segment) -> "Placed":
-        """Raises ModelError where the model fails, or the segment is not finite."""
+        """What a model makes of a segment. Raises ModelError where it fails, or that is not finite."""
         scores, where = model.classify(segment), place(model, space, segment)
         sure = scores.confidence >= scores.threshold and space.claimed(where)
         return cls(where, (model.gestures[int(scores.values.argmax())], scores.confidence) if sure else None)
 
 
-# What was found out about an example, as long as both the model and the example are in use. It takes some runs each.
+# What models made of examples, as long as both are in use; each takes some runs of the model.
 _placed: WeakKeyDictionary[Model, WeakKeyDictionary[Example, Placed]] = WeakKeyDictionary()
 
 
 class Own:
-    """A list of gestures, and what each model that has answered makes of it."""
+    """The user's own gestures, and the prototypes of them that each model has made."""
 
     def __init__(self, gestures: Examples, known: Collection[str] = ()) -> None:
         """`known` are the models' gestures: one of the user's own that is called the same is off."""
@@ -54,7 +54,7 @@ class Own:
         self._banks: WeakKeyDictionary[Model, Bank | None] = WeakKeyDictionary()
 
     def match(self, model: Model, segment: Segment) -> Match | None:
-        """The nearest of them; None where the model has no embedding, or fails: its own answer is none the worse."""
+        """The own gesture that is nearest to a segment; None where the model has no embedding, or fails to give one."""
         bank = self._bank(model)
         if bank is None:
             return None
@@ -64,7 +64,7 @@ class Own:
             return None
 
     def nearest_to(self, model: Model, example: Example) -> Match | None:
-        """The same for an example. Raises ModelError."""
+        """The own gesture that is nearest to an example, as `match`. Raises ModelError where the model fails."""
         bank = self._bank(model)
         return None if bank is None else nearest(bank.space, bank.prototypes, placed(model, bank.space, example).place)
 
@@ -75,7 +75,7 @@ class Own:
             try:
                 bank = self._made(model, model.space)
             except ModelError:
-                pass  # where it fails it has none
+                pass  # a model that fails has no prototypes
         self._banks[model] = bank
 
     def made(self, model: Model) -> Bank | None:

@@ -24,7 +24,7 @@ class OwnFileError(GesturedError):
 
 
 class OwnFile(NamedTuple):
-    """A file, and what was found in it."""
+    """A file of own gestures, and what was found in it."""
 
     path: Path | None
     gestures: Examples
@@ -47,7 +47,7 @@ def where(chosen: Path | None, environ: Mapping[str, str]) -> Path | None:
 def load(path: Path | None, known: OwnFile | None = None) -> OwnFile:
     """Read the file; there are no gestures where there is none, or where it cannot be read.
 
-    Where it is what is `known` of it already, that is what is given, with the same examples.
+    A file that has not changed gives what is `known` of it, so that its examples stay the same objects.
     """
     try:
         data = _read(path)
@@ -63,7 +63,7 @@ def load(path: Path | None, known: OwnFile | None = None) -> OwnFile:
 
 
 def _read(path: Path | None) -> bytes | None:
-    """Its bytes, None where there is no file."""
+    """The file's bytes, None where there is none. Raises OwnFileError."""
     if path is None:
         return None
     try:
@@ -89,7 +89,7 @@ def _parse(data: bytes) -> Examples:
 
 
 def write(path: Path, gestures: Examples, model: str) -> OwnFile:
-    """Put them there, with the digest of the model that they were enrolled with. Raises OwnFileError."""
+    """Write these gestures, with the digest of the `model` that compares them now. Raises OwnFileError."""
     told = {"format": FORMAT, "model": model, "gestures": to_dict(gestures)}
     data = json.dumps(told, indent=1, allow_nan=False).encode() + b"\n"
     try:

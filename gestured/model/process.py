@@ -4,8 +4,8 @@ A graph of some kilobytes can ask onnxruntime for hours, for all memory, or for 
 not return cannot be ended from within a process. So the file is opened and tested by `worker`, in a child that has
 bounds for memory and for time.
 
-The child reads a byte, the seconds that it may take, and the file, to the end of its standard input. It answers with
-one line of JSON.
+The child reads its standard input to the end: one byte, which is the seconds that it may take, then the file. It
+answers with one line of JSON.
 """
 
 import json
@@ -27,17 +27,17 @@ START = "import sys; sys.path[:] = sys.argv[1:]; from gestured.model.worker impo
 ENVIRONMENT_KEPT = ("LD_LIBRARY_PATH",)  # of the environment: some systems find the C++ library by it
 
 _turn = threading.Lock()  # one file is opened at a time: each child may take memory of the same service
-_birth = threading.Lock()  # between a child's start and its place among `_children`
-_children: "weakref.WeakSet[subprocess.Popen[bytes]]" = weakref.WeakSet()  # one that nobody holds ends by itself
+_birth = threading.Lock()  # held from a child's start until it is among `_children`
+_children: "weakref.WeakSet[subprocess.Popen[bytes]]" = weakref.WeakSet()  # those that run; the set keeps none alive
 _ending = False
 
 
 def try_out(data: bytes) -> dict[str, Any]:
     """`Model.report` of a file that opens and passes its self-test. ValueError says what is wrong with it."""
-    with _turn, _start() as child:  # whoever leaves waits for its end
+    with _turn, _start() as child:  # leaving this block waits for the child's end
         assert child.stdin is not None and child.stdout is not None
         try:
-            with suppress(OSError):  # it has ended already
+            with suppress(OSError):  # the child has ended already
                 child.stdin.write(bytes([OPEN_S]))
                 child.stdin.write(data)
             with suppress(OSError):
@@ -54,7 +54,7 @@ def try_out(data: bytes) -> dict[str, Any]:
 
 
 def _end_of(child: "subprocess.Popen[bytes]") -> str:
-    """What it died of."""
+    """Why a child has ended without an answer."""
     child.kill()
     status = child.wait()
     if status == -signal.SIGALRM:
@@ -75,7 +75,7 @@ def end_all() -> None:
 
 
 def _start() -> "subprocess.Popen[bytes]":
-    """A child. It is born in a thread of its own, so that a handler that interrupts this one can wait for the birth."""
+    """Start a child, in a thread of its own, so that a handler that interrupts this one can wait for its birth."""
     if _ending:  # no thread can be started then
         raise ValueError("was not opened: the program ends")
     with ThreadPoolExecutor(1) as pool:

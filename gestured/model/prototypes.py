@@ -1,8 +1,8 @@
 """Prototypes: what a few examples say of a gesture of the user's own, in the space of a model's embedding.
 
 What differs between two performances of one person, and how far apart two gestures lie, is learned in the lab from
-many people (`Space`, a model's metadata `own`). A prototype is the mean of its examples, as sure as they are many; how
-near a segment is to it is a likelihood ratio: that gesture against any movement at all.
+many people (`Space`, a model's metadata `own`). A prototype is the mean of its examples, drawn to the space's
+mean where they are few. How near a segment is to it is a likelihood ratio: that gesture against any movement at all.
 """
 
 import base64
@@ -29,15 +29,15 @@ class Space:
     """Where embeddings of one model are compared: K directions, in which one person's repetitions spread by 1."""
 
     mean: Array  # (E,) of embeddings
-    directions: Array  # (K, E)
+    directions: Array  # (K, E) from an embedding to a place
     between: Array  # (K,) variance of gestures, in units of the variance within one
     built_in: Array  # (2, G, K) mean and variance of each of the model's gestures, over people
-    thresholds: tuple[float, ...]  # nearness that 1, 2 ... EXAMPLES examples ask for
+    thresholds: tuple[float, ...]  # nearness that a gesture of 1, 2 ... EXAMPLES examples asks for
     slope: float  # of the confidence over the nearness
     margin: float  # by how much nearer than the model's gestures a segment must be to be taken from the model
 
     def place(self, embedding: NDArray[np.floating[Any]]) -> Array:
-        """(E,) -> (K,), or many at once."""
+        """(..., E) embeddings -> (..., K) places."""
         return np.asarray((embedding - self.mean) @ self.directions.T)
 
     def built_in_nearness(self, place: Array) -> Array:
@@ -52,7 +52,7 @@ class Space:
         return bool(usual - self.built_in_nearness(place) < self.margin)
 
     def to_json(self) -> str:
-        """For a model's metadata."""
+        """The space as JSON, for a model's metadata."""
         return json.dumps(
             {
                 "mean": _packed(self.mean),
@@ -67,7 +67,7 @@ class Space:
 
     @classmethod
     def from_json(cls, told: Mapping[str, Any], gestures: int) -> "Space":
-        """What `to_json` wrote, of a model with so many gestures; ValueError says what is wrong."""
+        """The space that `to_json` wrote, of a model with so many gestures; ValueError says what was expected."""
         try:
             mean, between = _unpacked(told["mean"]), _unpacked(told["between"])
             inner, outer = len(between), len(mean)
@@ -93,11 +93,11 @@ class Prototype:
     space: Space
     mean: Array  # (K,) where it is expected
     variance: Array  # (K,) of a performance around that
-    threshold: float  # nearness
+    threshold: float  # nearness from which a segment is this gesture
 
     @classmethod
     def of(cls, space: Space, places: Array) -> "Prototype":
-        """From (n, K) places of 1 to EXAMPLES examples."""
+        """The prototype of 1 to EXAMPLES examples, by their (n, K) places."""
         n = len(places)
         sure = space.between * n / (space.between * n + 1.0)  # how far the examples are believed, 0 to 1
         mean = sure * places.mean(axis=0)
@@ -108,7 +108,7 @@ class Prototype:
         return _ratio(place, self.mean, self.variance, self.space.between)
 
     def confidence(self, place: Array) -> float:
-        """0 to 1 of a place (K,); NEAR at the threshold."""
+        """How surely a place (K,) is this gesture, 0 to 1; NEAR at the threshold."""
         ahead = self.space.slope * (self.nearness(place) - self.threshold)
         return float(1.0 / (1.0 + np.exp(-np.clip(ahead, -SUREST, SUREST))))
 

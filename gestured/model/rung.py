@@ -23,7 +23,7 @@ class Rung:
         self._refused: ModelError | None = None  # why the file that was tried is no model
 
     def open(self) -> Model:
-        """Its model. Not to be waited for: a file that does not ship is opened only after `gestures` has tried it."""
+        """The rung's model, at once: a file that does not ship was tried by `gestures` before. Raises ModelError."""
         if self._refused is not None:
             raise self._refused
         if self.model is None:
@@ -32,13 +32,13 @@ class Rung:
         return self.model
 
     def open_first(self) -> Model:
-        """Its model, however long it takes to try it."""
+        """The rung's model, however long it takes to try its file. Raises ModelError."""
         if self.model is None and not self._ships:
             self.gestures()
         return self.open()
 
     def gestures(self) -> tuple[str, ...]:
-        """What it knows. A file that ships is not opened for it; any other is tried, now and not again."""
+        """The gestures that the model knows. A file that ships is not opened for this; any other is tried, once."""
         if self.model is not None:
             return self.model.gestures
         assert isinstance(self.source, str | Path)
@@ -54,5 +54,5 @@ class Rung:
 
     @property
     def gone(self) -> bool:
-        """Whether it cannot come back before a reload."""
+        """Whether the rung cannot be used again before a reload."""
         return self._refused is not None

@@ -1,4 +1,4 @@
-"""A model's graph, opened and run by onnxruntime. But for the lab nothing else imports that."""
+"""A model's graph, opened and run by onnxruntime, which only this module and the lab import."""
 
 import os
 import re
@@ -12,11 +12,11 @@ from gestured.model.limit import limited
 from gestured.model.metadata import Metadata
 
 FATAL = 4  # onnxruntime's severity below which it logs nothing
-LONGEST = 200  # characters of its errors that are repeated
+LONGEST = 200  # characters of onnxruntime's errors that are passed on
 
 
 class Session:
-    """One graph; its inputs and outputs by name."""
+    """One graph, whose inputs and outputs have names."""
 
     def __init__(self, data: bytes) -> None:
         """Opens a file's bytes. ValueError where onnxruntime cannot."""
@@ -29,7 +29,7 @@ class Session:
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idling burns cores otherwise
-        options.add_session_config_entry("session.load_model_format", "ONNX")  # and not a format of its own
+        options.add_session_config_entry("session.load_model_format", "ONNX")  # refuse onnxruntime's own format
         options.enable_mem_reuse = False  # planning it is slow, and makes no run faster or smaller
         options.log_severity_level = FATAL
         try:

@@ -23,7 +23,7 @@ def shipped() -> dict[str, Path]:
 
 
 def _shipped_directory() -> Path:
-    """Beside the package, installed or in a checkout."""
+    """The folder of the shipped models, beside the package, installed or in a checkout."""
     return Path(__file__).resolve().parents[2] / "gestured_models"
 
 
@@ -32,7 +32,7 @@ def shipped_name(source: str | Path) -> str | None:
     try:
         return _locate(source)[1]
     except ModelError:
-        return None  # opening it says why
+        return None  # whoever opens it is told why
 
 
 def _locate(source: str | Path) -> tuple[Path, str | None]:
@@ -55,7 +55,7 @@ def _locate(source: str | Path) -> tuple[Path, str | None]:
         if path.resolve() == known[path.stem].resolve():
             return path, path.stem
     except (KeyError, OSError, ValueError, RuntimeError):
-        pass  # not one of them, or no path at all: reading says it
+        pass  # no shipped model, or no path at all, which `read` reports
     return path, None
 
 
@@ -83,7 +83,7 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def manifest_gestures(path: Path) -> tuple[str, ...]:
-    """What a shipped model knows, without opening it; ValueError where its manifest does not say."""
+    """The gestures of a shipped model, without opening it; ValueError where its manifest does not say."""
     return tuple(_manifest(path, "gestures"))
 
 

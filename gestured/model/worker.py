@@ -12,9 +12,9 @@ START_S = 8  # seconds that starting may take, until the model's bytes are here
 
 
 def main() -> None:
-    """Answer for the model on standard input, after the number of seconds that this may take, as one byte.
+    """Try the model on standard input, which begins with one byte, the seconds that this may take.
 
-    Whoever calls this is a program of its own, and may be killed.
+    Only a process of its own may call this, since the kernel kills it when the time is over.
     """
     # The kernel ends us, whatever a thread of onnxruntime does: the alarm's own action is death.
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
