@@ -68,11 +68,13 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str, str]]:
             try:
                 status = main([*map(str, arguments)])
             except SystemExit as ended:  # argparse
-                status = ended.code
+                status = ended.code if isinstance(ended.code, int) else 1
             finally:
                 for number, handler in handlers.items():
                     signal.signal(number, handler)
-            return status, *(file.seek(0) or file.read() for file in (out, err))
+            out.seek(0)
+            err.seek(0)
+            return status, out.read(), err.read()
 
     return finish
 
