@@ -6,6 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from matplotlib.figure import Figure
 
 from gestured.core.errors import GesturedError
 from gestured.lab import cli
@@ -16,25 +17,36 @@ from gestured.model.shipped import shipped
 from tests.lab.study.made_study import NAMES, made_study
 
 
-def test_it_names_models_in_every_field_and_what_was_said(tmp_path: Path) -> None:
-    root = ElementTree.fromstring(write_picture(made_study(), tmp_path).read_text())
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The picture; drawing it takes seconds."""
+    return write_picture(made_study(), tmp_path_factory.mktemp("first"))
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An empty picture, for tests of what is written beside it."""
+    monkeypatch.setattr("gestured.lab.study.report.picture.operating_points", lambda study: Figure())
+
+
+def test_it_names_models_in_every_field_and_what_was_said(first: Path) -> None:
+    root = ElementTree.fromstring(first.read_text())
     words = {text.text for text in root.iter("{http://www.w3.org/2000/svg}text")}
     assert words >= {f"A  {field}: error, per cent" for field in FIELDS.values()}
     assert words >= {f"{NAMES[method]}, ships" for method in ("lstm", "cnn_lstm")}
     assert words >= {f"{group}, {kind}" for group in GROUP_MARKS for kind in KINDS}
 
 
-def test_it_is_drawn_again_from_what_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    first = write_picture(made_study(), tmp_path)
+def test_it_is_drawn_again_from_what_is_kept(first: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     again = tmp_path / "again"
-    assert cli.main(["study", "--draw", str(tmp_path / "operating-points.json"), "--out", str(again)]) == 0
+    assert cli.main(["study", "--draw", str(first.with_name("operating-points.json")), "--out", str(again)]) == 0
     assert (again / first.name).read_text() == first.read_text()
     path, origin, *_ = capsys.readouterr().out.splitlines()
     assert Path(path).samefile(again / first.name) and stale(origin, again.iterdir()) == []
     assert not re.search(r"\b(nan|inf|None)\b", first.read_text())
 
 
-def test_real_figures_of_the_models_that_ship_are_the_manifests(tmp_path: Path) -> None:
+def test_real_figures_of_the_models_that_ship_are_the_manifests(tmp_path: Path, undrawn: None) -> None:
     """A study that timed a model of this checkout takes them from there, intervals too; else it keeps its own."""
     study, kept = made_study(), tmp_path / "study.json"
     study["about"]["models"] = {name: file_digest(path) for name, path in shipped().items()} | {"lstm": "0" * 64}
@@ -53,7 +65,7 @@ def test_real_figures_of_the_models_that_ship_are_the_manifests(tmp_path: Path) 
     assert found["error_low"] < found["error"] < found["error_high"]
 
 
-def test_the_table_below_it_is_put_into_a_document_and_only_there(tmp_path: Path) -> None:
+def test_the_table_below_it_is_put_into_a_document_and_only_there(tmp_path: Path, undrawn: None) -> None:
     study, kept, page = made_study(), tmp_path / "study.json", tmp_path / "figures.md"
     kept.write_text(json.dumps(study))
     page.write_text("before\n<!-- choice: begin -->\nold\n<!-- choice: end -->\nafter\n")
