@@ -14,7 +14,7 @@ from gestured.daemon.sinks import Output, outputs
 from gestured.model import own_file
 from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, require_gestures
 
-SLIP = 0.8  # of difflib's ratio: a name so near to one of the model's gestures was meant to be that
+SLIP = 0.8  # of difflib's ratio: a name so near to a gesture of the model is taken for a slip of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +36,9 @@ def open_all(settings: Settings, metrics: Metrics, *, insist: bool = False) -> A
 def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
     """Open and test the models. Raises ModelError, or SettingsError for gestures that they do not know.
 
-    With `insist` a fallback is not good enough: what runs already is better than that.
+    With `insist` a fallback is not good enough: at a reload the model that runs already is better.
     """
-    early: list[str] = []  # a failure may still be the answer to a reload, and the error says it all
+    early: list[str] = []  # not logged yet: where opening fails in the end, the error says all of it
     ladder = ladder_for(settings.model, settings.fallback or None, report=early.append)
     if insist and ladder.degraded:
         raise ModelError("; ".join(early))
@@ -51,7 +51,7 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
 
 
 def _may_be_own(name: str, settings: Settings, ladder: Ladder) -> bool:
-    """Whether a table may be for a gesture of the user's own, enrolled or not: it may come, and go, at any time."""
+    """Whether [gestures.NAME] may be for a gesture of the user's own, which may be enrolled at any time."""
     from difflib import get_close_matches
 
     possible = name not in ladder.gestures and own_file.where(settings.own_gestures, os.environ) is not None
@@ -59,6 +59,6 @@ def _may_be_own(name: str, settings: Settings, ladder: Ladder) -> bool:
 
 
 def scene_of(settings: Settings, ladder: Ladder) -> Scene:
-    """What decides, with the models of `ladder`, which knows all gestures that the settings name."""
+    """The scene of these settings, with a `ladder` that knows all gestures they name."""
     used = gestures_in_use(ladder, settings.gestures)
     return Scene.from_dict(settings.model_dump(), used, (ladder.rows, ladder.columns))

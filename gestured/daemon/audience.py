@@ -1,4 +1,4 @@
-"""Who wants to hear what: the clients of the event stream, in classes of those that ask for the same."""
+"""The clients of the event stream, in classes of those that ask for the same events."""
 
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.messages import Subscription
@@ -10,7 +10,7 @@ class Audience:
 
     def __init__(self) -> None:
         self._classes: dict[Subscription, set[Client]] = {}
-        self._owed: dict[tuple[str, int], set[Client]] = {}  # who was sent a provisional event, until its answer
+        self._owed: dict[tuple[str, int], set[Client]] = {}  # who was sent a provisional event
 
     def join(self, client: Client, subscription: Subscription) -> None:
         """Put a client, which is in no class, with those that ask for the same."""
@@ -26,7 +26,7 @@ class Audience:
         return self._classes.pop(client.subscription, None) is not None
 
     def of(self, event: Event) -> list[Client]:
-        """Who is to hear an event: who asks for it, and whoever was sent the provisional event that it answers."""
+        """The clients that hear an event: those who ask for it or were sent the provisional event that it answers."""
         wanted = [client for asked, clients in self._classes.items() if asked.matches(event) for client in clients]
         if isinstance(event, Provisional):
             self._owed[event.sensor, event.id] = set(wanted)

@@ -11,10 +11,10 @@ from gestured.daemon.mute import Sender
 TOGETHER_S = 0.004  # packets that arrived so close to each other are looked at together
 GROUP_BYTES = 64 << 10  # in one go at the most: 150 frames of 9 x 9 floats
 MOST_BYTES = 32 << 20  # four times what a kernel's buffer of 4 MiB hands over after a stall
-FLOOD_S = 1.0  # of work, after which it is looked whether the backlog shrinks
-PACE = 0.5  # seconds of arrivals that a second of work has to serve; where it serves fewer, that is a flood
+FLOOD_S = 1.0  # s of work, after which we look whether the backlog shrinks; also how long a flood lasts at least
+PACE = 0.5  # s of arrivals that one second of work must serve at least; else it is a flood
 OWNERS_SHARE = 0.75  # of the time, in a flood, for those who own a sensor; strangers get the rest
-CREDIT_S = 0.02  # of work that a sender may save up, and begins with: what the largest packet of frames costs
+CREDIT_S = 0.02  # s of work that a sender may save up and begins with: the price of the largest packet of frames
 FIRST_GUESS = 3e-7  # s of work a byte, until a sender's packets have been served
 NEWEST = 0.2  # weight of the newest measurement of what a sender's packets cost
 REMEMBERED_SENDERS = 4096  # senders whose costs and credit are remembered in a flood
@@ -29,7 +29,7 @@ class Datagram(NamedTuple):
 
 
 class Backlog:
-    """What was read and not yet served, oldest first.
+    """The packets that were read and not yet served, oldest first.
 
     In a flood, work is shared out: in each turn every sender gets the same time, what one does not need goes to the
     others, and what is too much is dropped, the oldest first. Who needs least is served first. A source that owns a
@@ -43,11 +43,11 @@ class Backlog:
         self._waiting: deque[Datagram] = deque()
         self._bytes = 0
         # Whether work catches up is measured from time to time: how much was done since, and how far that has led.
-        self._work = 0.0  # s that groups were served since the last measurement
-        self._oldest = 0.0  # s, the arrival of what waited longest at that time
-        self._until = 0.0  # s, when the flood is over unless something is dropped before
-        self._cost: dict[Sender, float] = {}  # s of work a byte
-        self._credit: dict[Sender, tuple[float, float]] = {}  # s of work, and `_equal` then
+        self._work = 0.0  # s of work on groups since the last measurement
+        self._oldest = 0.0  # s, the arrival of the oldest packet at the last measurement
+        self._until = 0.0  # s, when the flood is over unless packets are dropped before
+        self._cost: dict[Sender, float] = {}  # by sender: s of work that a byte costs
+        self._credit: dict[Sender, tuple[float, float]] = {}  # by sender: s of work saved up, and `_equal` at that time
         self._equal = 0.0  # s of work that each owner could have had so far, all turns together
         self._turns = 0.0  # s of turns that have passed since a packet was served that costs more than one
 
@@ -56,7 +56,7 @@ class Backlog:
 
     @property
     def oldest(self) -> float:
-        """When what has waited longest arrived, in s; infinite where nothing waits."""
+        """When the oldest packet arrived, in s; infinite where none waits."""
         return self._waiting[0].arrival if self._waiting else math.inf
 
     def add(self, datagrams: list[Datagram], now: float) -> None:
@@ -67,7 +67,7 @@ class Backlog:
         self._bytes += sum(len(datagram.packet) for datagram in datagrams)
 
     def flooded(self, now: float) -> bool:
-        """Whether more comes than can be done."""
+        """Whether more packets come than can be served; costs and credit are forgotten where that is over."""
         if self._bytes > MOST_BYTES or now < self._until:
             return True
         self._credit.clear()
@@ -75,7 +75,7 @@ class Backlog:
         return False
 
     def flood(self, until: float) -> None:
-        """Count it as a flood until then (s)."""
+        """Count what comes as a flood `until` then (s)."""
         self._until = max(self._until, until)
 
     def worked(self, seconds: float, now: float) -> None:
@@ -88,7 +88,7 @@ class Backlog:
             self._work, self._oldest = 0.0, oldest
 
     def group(self) -> list[Datagram]:
-        """The oldest that arrived together."""
+        """Take the oldest packets that arrived together, at most GROUP_BYTES."""
         first = self._waiting[0].arrival
         found: list[Datagram] = []
         size = 0
@@ -142,7 +142,7 @@ class Backlog:
 
     def _guess(self, datagram: Datagram) -> float:
         guess = len(datagram.packet) * self._cost.get(self.sender(datagram.source), FIRST_GUESS)
-        return min(guess, CREDIT_S)  # so that anybody is served in the end
+        return min(guess, CREDIT_S)  # no more than a sender can save up, so that anybody is served in the end
 
     def _newest(
         self, key: Sender, datagrams: list[Datagram], share: float, before: float, seconds: float

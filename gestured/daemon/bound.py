@@ -34,10 +34,10 @@ SOCKET_NAMES = {
 
 @dataclass(slots=True)
 class Bound:
-    """They stay open until `close`."""
+    """All sockets of a daemon, open until `close`."""
 
     udp: socket.socket
-    since: float  # s, monotonic: what waited in a socket that was passed counts as if it had come then
+    since: float  # s, monotonic: packets that waited in a socket from systemd count as if they came then
     events: Listener
     control: Listener
     http: socket.socket | None
@@ -52,7 +52,7 @@ class Bound:
         }
 
     def close(self) -> None:
-        """Close them; what stood in the file system because of us goes."""
+        """Close all sockets, and remove the paths that we made for them."""
         self.udp.close()
         self.events.close()
         self.control.close()
@@ -100,7 +100,7 @@ def bind_all(settings: Settings) -> Bound:
 def _passed() -> list[tuple[str, socket.socket]]:
     """(name, socket) of each socket that systemd holds for us; names as FileDescriptorName= gives them.
 
-    Once: the variables are removed, so that no child takes them for its own.
+    It can be asked once: the variables are removed, so that no child takes them for its own.
     """
     mine = os.environ.pop("LISTEN_PID", "") == str(os.getpid())
     count, names = os.environ.pop("LISTEN_FDS", ""), os.environ.pop("LISTEN_FDNAMES", "").split(":")

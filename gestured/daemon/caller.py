@@ -18,8 +18,8 @@ class Connection:
 
     def __init__(self, writer: asyncio.StreamWriter) -> None:
         self._writer = writer
-        self.lost = 0  # lines that found no room
-        self.streams = False  # it is sent lines as they come, and need not ask for anything
+        self.lost = 0  # lines that found no room in the backlog
+        self.streams = False  # whether it is sent a stream of lines, and need not ask for anything
         self.flush: Callable[[], None] = lambda: None  # has what waits for this connection sent
         self._over = False
 
@@ -35,7 +35,7 @@ class Connection:
 
     @property
     def unread(self) -> int:
-        """Bytes that wait to be read, but for what the kernel keeps."""
+        """Bytes that wait to be read, without those that the kernel keeps."""
         return 0 if self.closed else self._writer.transport.get_write_buffer_size()
 
     @property
@@ -44,18 +44,18 @@ class Connection:
         return self._over or self._writer.is_closing()
 
     def end(self) -> None:
-        """Send nothing more; what waits for it or is on its way still goes."""
+        """Send nothing more after what waits for this connection already."""
         self.flush()
         self._over = True
 
 
 @dataclass(frozen=True, slots=True)
 class Peer:
-    """The account of an operator's program."""
+    """The process and account of an operator's program."""
 
     pid: int
     uid: int
-    ours: bool  # root, or the daemon's own user
+    ours: bool  # whether it is root, or the daemon's own user
     may: bool  # whether it may control the daemon: root, our own user, or a member of our group
 
 

@@ -17,9 +17,9 @@ from gestured.core.errors import ProtocolError
 from gestured.core.messages import MAX_LINE, Subscription, parse_subscription
 from gestured.daemon.metrics import Metrics
 
-BACKLOG_BYTES = 256 << 10  # bytes that wait for one client at most; who is further behind wants the newest
-READ_BYTES = 1024  # small: a client that sends rubbish waits its turn
-TURNS = 20  # reads and lines of one client in a second; what is more waits
+BACKLOG_BYTES = 256 << 10  # the most bytes that wait for one client; one that is further behind loses the oldest lines
+READ_BYTES = 1024  # of one read; few, so that a client that sends rubbish waits its turn
+TURNS = 20  # reads and lines of one client in a second; more of them wait for the next second
 RUBBISH = 100  # bad lines without a good one between them after which a client is cut off: some seconds of nothing else
 
 
@@ -28,7 +28,7 @@ class Server(Protocol):
 
     loop: asyncio.AbstractEventLoop
     metrics: Metrics
-    gestures: Callable[[], Collection[str]]  # those that may be asked for
+    gestures: Callable[[], Collection[str]]  # the gestures that a client may ask for
 
     def subscribe(self, client: "Client", subscription: Subscription) -> None:
         """Change what a client wants."""
@@ -37,7 +37,7 @@ class Server(Protocol):
         """Have a client answer its next line when it is its turn."""
 
     def check(self, client: "Client") -> None:
-        """Remove a client that went quietly."""
+        """Remove a client that has gone without a word."""
 
     def cut_off(self, client: "Client", reason: str) -> None:
         """Remove a client that is a burden."""
@@ -53,12 +53,12 @@ class Client:
         self._server, self.sock = server, sock
         self.subscription = Subscription()
         self.blocked_since: float | None = None  # monotonic s, since when its socket takes nothing more
-        self.half_closed = False  # it will send no more, but may go on reading
+        self.half_closed = False  # whether it will send no more, though it may go on reading
         self._begun = b""  # rest of a line of which the client already has a part
-        self._waiting: deque[bytes] = deque()  # whole lines after it
-        self._size = 0  # their bytes
-        self._lost = 0  # lines that were dropped, and it was not told so far
-        self.turns = TURNS  # that it has left in this second
+        self._waiting: deque[bytes] = deque()  # whole lines that come after `_begun`
+        self._size = 0  # bytes of the lines in `_waiting`
+        self._lost = 0  # lines that were dropped, of which the client was not told so far
+        self.turns = TURNS  # turns that it has left in this second
         self._request = bytearray()  # a line that is not complete
         self._asked: deque[bytes] = deque()  # lines that wait for an answer
         self._rubbish = 0  # bad lines since the last good one
@@ -138,7 +138,7 @@ class Client:
         self.go_on()
 
     def go_on(self) -> None:
-        """See to what comes next, a line or a read, unless its turns are used up or it is gone."""
+        """Have the client's next line answered, or its socket read, unless its turns are used up or it is gone."""
         if self.turns > 0 and self.sock.fileno() >= 0:
             if self._asked:
                 self._server.queue(self)
@@ -146,7 +146,7 @@ class Client:
                 self._server.loop.add_reader(self.sock, self.read)
 
     def new_second(self) -> None:
-        """It has all its turns again."""
+        """Give the client all its turns again."""
         used_up, self.turns = self.turns <= 0, TURNS
         if used_up:
             self.go_on()

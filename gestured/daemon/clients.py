@@ -1,6 +1,6 @@
 """The event stream: JSON lines to any number of clients on a Unix socket.
 
-A line is encoded once and sent at once to each client that wants it; what its socket does not take waits there.
+A line is encoded once and sent at once to each client that wants it; what its socket does not take waits in `Client`.
 """
 
 import asyncio
@@ -29,7 +29,7 @@ DRAINED_S = 0.01  # at the end, the pause between two looks at what still waits
 class EventServer:
     """Accepts clients on a listening Unix socket, greets them with `hello()` and sends them events.
 
-    `gestures()` are those that a client may ask for; `changed()` is told when they ask for other provisional events.
+    `gestures()` are those that a client may ask for; `changed()` is called when they ask for other provisional events.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class EventServer:
         self._listener, self._hello, self._throttle = listener, hello, Throttle()
         self._clients: set[Client] = set()
         self._audience = Audience()
-        self._queue: deque[Client] = deque()  # each once, with a line that waits for its answer
+        self._queue: deque[Client] = deque()  # clients with a line that waits for its answer, each once
         self.loop.add_reader(listener, self._accept)
 
     @property
@@ -57,7 +57,7 @@ class EventServer:
 
     @property
     def backlog(self) -> int:
-        """Bytes that wait for all of them."""
+        """Bytes that wait for all clients together."""
         return sum(client.backlog for client in tuple(self._clients))
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
@@ -95,7 +95,7 @@ class EventServer:
             client.sock.close()
 
     def check(self, client: Client) -> None:
-        """Remove a client that went quietly, or has taken nothing for too long."""
+        """Remove a client that has gone without a word, or has taken nothing for STALLED_S."""
         if client.half_closed:
             poll = select.poll()
             poll.register(client.sock, 0)

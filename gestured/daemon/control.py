@@ -23,7 +23,7 @@ OPERATORS = 16  # connections at a time
 OPERATORS_KEPT = 4  # connections beyond OPERATORS for root and our own user: no member of the group can lock them out
 IDLE_S = 60.0  # an operator who asks nothing for so long, and is sent no stream, gives his place to others
 UNREAD_S = 10.0  # an operator who does not read an answer for so long is cut off
-LOGGED = 8  # lines of one verb and user in a log.PERIOD_S; what is more is counted
+LOGGED = 8  # log lines of one verb and user in log.PERIOD_S; further ones are counted
 TURN_BYTES = 16 << 10  # bytes of a stream that are made in one turn: less than a millisecond's work
 TURN_PAUSE_S = 0.1  # the longest pause after a turn
 # From Python 3.13 on a server that closes removes its socket's path. Whoever made it does that; systemd's is to stay.
@@ -37,9 +37,9 @@ class ControlServer:
         self._sock, self._verbs = sock, verbs
         self._throttle, self._journal = Throttle(), Throttle(burst=LOGGED)
         self._open: set[asyncio.StreamWriter] = set()
-        self._served = 0  # connections that have a place
+        self._served = 0  # connections that hold one of the places
         self._ended = False
-        self._streaming = False  # one at a time: each keeps what it sends in memory
+        self._streaming = False  # whether a stream is being sent: one at a time, since each keeps its lines in memory
         self._quick, self._slow = asyncio.Lock(), asyncio.Lock()
 
     async def start(self) -> None:
@@ -47,7 +47,7 @@ class ControlServer:
         self._server = await asyncio.start_unix_server(self._serve, sock=self._sock, limit=MAX_REQUEST_BYTES, **STAYS)
 
     def close(self) -> None:
-        """Take no more, and hang up. Nothing is asked from now on: what a verb looks at may be closed."""
+        """Hang up and take no more requests, since what a verb looks at may be closed from now on."""
         self._ended = True
         self._server.close()
         for writer in tuple(self._open):
@@ -74,7 +74,7 @@ class ControlServer:
                 writer.transport.set_write_buffer_limits(0)
                 await _drain(writer)
         except (OSError, asyncio.CancelledError):
-            pass  # gone, or we end
+            pass  # the operator has gone, or the daemon ends
         finally:
             self._open.discard(writer)
             writer.close()
@@ -88,7 +88,7 @@ class ControlServer:
             except TimeoutError:
                 writer.write(_refusal(f"nothing was asked for {IDLE_S:g} s; connect again"))
                 return
-            except ValueError:  # what is longer cannot be told from what follows it
+            except ValueError:  # the rest of a line that is too long cannot be told from the next line
                 writer.write(_refusal(f"a request has at most {MAX_REQUEST_BYTES} bytes"))
                 return
             if not line:
@@ -110,10 +110,10 @@ class ControlServer:
                 user = {"verb": name, "uid": who.uid, "pid": who.pid}
                 self._journal.info("control request", f"{name}, of uid {who.uid}", **user, **parameters)
         async with self._turn(self._slow if verb.slow else self._quick):
-            if connection.closed or self._ended:  # while it waited for its turn
+            if connection.closed or self._ended:  # the operator left while this waited for its turn
                 return
             found = await self._run(connection, verb, parameters)
-            # On its way before what the verb streams after it.
+            # The answer goes out before the lines that the verb streams.
             writer.write(json_line(found.answer if isinstance(found, ReplyStream) else found))
         if isinstance(found, ReplyStream):
             self._streaming = True
@@ -132,7 +132,7 @@ class ControlServer:
             return ReplyStream({"ok": True, **found.answer}, found.lines)
         except GesturedError as error:
             return _refused(str(error))
-        except Exception:  # a bug in a verb is this answer's end, not the daemon's
+        except Exception:  # a bug in a verb costs this answer alone
             self._throttle.error("a bug in a verb", "control")
             return _refused("a bug; the daemon's log has the traceback")
 
@@ -151,7 +151,7 @@ class ControlServer:
 
     @asynccontextmanager
     async def _turn(self, lock: asyncio.Lock) -> AsyncIterator[None]:
-        """For one operator. A pause as long as it took follows, so that half of the loop's time is left to frames."""
+        """A turn of one operator. A pause of the same length follows: half of the loop's time is left to frames."""
         async with lock:
             began = time.perf_counter()
             yield
@@ -159,7 +159,7 @@ class ControlServer:
 
 
 async def _drain(writer: asyncio.StreamWriter) -> None:
-    """Wait until it is read, but for what the kernel keeps; raises TimeoutError where nobody reads."""
+    """Wait until what was written is with the kernel; raises TimeoutError where nobody reads for UNREAD_S."""
     try:
         async with asyncio.timeout(UNREAD_S):
             await writer.drain()

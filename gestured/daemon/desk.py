@@ -1,4 +1,4 @@
-"""What becomes of the hub's facts: events are published, the rest is counted, logged and compared."""
+"""What becomes of the hub's facts: events are published, other facts are counted, logged and compared."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -16,15 +16,15 @@ CHANGES = {"silent": "sensor is silent", "restarted": "sensor restarted"}
 
 
 class Desk:
-    """Takes facts, and the complaints of those who read packets."""
+    """Takes the hub's facts, and what its reader has dropped."""
 
     def __init__(self, metrics: Metrics, publisher: Publisher, shift: Shift, own: OwnGestures, views: Views) -> None:
         self._metrics, self._publisher, self._own, self._views = metrics, publisher, own, views
-        self.shift = shift  # of the model that answers
+        self.shift = shift  # how the segments differ from the training data of the model that answers
         self._throttle = Throttle()
 
     def take(self, facts: Sequence[Fact]) -> None:
-        """Events go out first; whoever looks on has time after them."""
+        """Publish the events among the facts, then let those look on who act on none."""
         decided: list[Decided] = []
         for fact in facts:
             if isinstance(fact, Arrived):
@@ -37,7 +37,7 @@ class Desk:
             elif isinstance(fact, Changed):
                 self._changed(fact)
             elif isinstance(fact, Fault):
-                self.bug("in the path of a sensor; its recognizer is reset", fact.error, sensor=fact.sensor)
+                self.bug("in the path of a sensor; its front end is reset", fact.error, sensor=fact.sensor)
             elif not isinstance(fact, Taken):
                 self._publisher.publish(fact)
         if decided:
@@ -47,7 +47,7 @@ class Desk:
         self._views.see(facts)
 
     def drop(self, reason: str, count: int = 1, **fields: object) -> None:
-        """Count what was dropped; say so at a bounded rate."""
+        """Count packets that were dropped; log the reason at a bounded rate."""
         self._metrics.dropped.add(reason, count=count)
         self._throttle.warn("dropped", reason, **{name: value for name, value in fields.items() if value})
 
@@ -62,7 +62,7 @@ class Desk:
         self._throttle.error("a bug, caught", what, exc_info=error or True, **fields)
 
     def _beside(self, what: str, look: Callable[[Any], None], facts: Sequence[Fact]) -> None:
-        """Have facts looked at of which the events are out; a bug there is not the others' business."""
+        """Show facts to one that looks on. A bug in it is caught, so that it stops nobody else."""
         for fact in facts:
             try:
                 look(fact)

@@ -19,12 +19,12 @@ from gestured.model.ladder import Ladder, gestures_in_use
 
 
 def _felt(wait_s: float, rate_hz: float) -> str:
-    """Seconds from the last touched frame to the answer: the wait begins with the first quiet frame."""
+    """Seconds from the last touched frame to the answer, in words: the wait begins with the first quiet frame."""
     return f"{1 / rate_hz + wait_s:.2g} s"
 
 
 def explain(settings: Settings, sources: Mapping[str, str]) -> str:
-    """The text; opens the models to do so, binds nothing. Raises ModelError or SettingsError."""
+    """What `--explain` prints. It opens the models and binds nothing. Raises ModelError or SettingsError."""
     ladder = open_ladder(settings)
     model = ladder.model
     window = model.metadata.window

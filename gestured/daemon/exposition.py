@@ -10,7 +10,7 @@ from gestured.daemon.snapshot import Snapshot
 
 
 def exposition(metrics: Metrics, snapshot: Snapshot) -> bytes:
-    """What was counted, and how everything is; imports prometheus_client."""
+    """The text of /metrics: counters, and gauges of a snapshot. Imports prometheus_client."""
     from prometheus_client import CollectorRegistry, generate_latest
 
     registry = CollectorRegistry()
@@ -38,7 +38,7 @@ _OF_THE_DAEMON: tuple[tuple[str, str, Callable[[Snapshot], float]], ...] = (
 
 
 class _Collector:
-    """Reads everything once, for one answer."""
+    """Reads all numbers once, for one answer to /metrics."""
 
     def __init__(self, metrics: Metrics, snapshot: Snapshot) -> None:
         self._metrics, self._snapshot = metrics, snapshot

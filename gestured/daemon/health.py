@@ -10,31 +10,31 @@ from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.daemon.desk import Desk
 
-TICK_S = 0.25  # the loop comes round at least so often
-FADING = 0.95  # of the lag that is left after a tick: half of it in about four seconds
-CANARY_TAXELS = 4  # rows, and columns
+TICK_S = 0.25  # the longest pause between two turns of the loop
+FADING = 0.95  # share of the lag that is kept each tick, so that half of it is gone in about four seconds
+CANARY_TAXELS = 4  # rows, and as many columns, of the canary's grid
 
 
 class Pulse:
-    """Set by the loop as long as it turns, read by any thread."""
+    """The beat of the daemon's loop: set by the loop as long as it turns, read by any thread."""
 
     def __init__(self) -> None:
         self.beat = time.monotonic()
         self._lag = 0.0
 
     def woke(self, late_s: float) -> None:
-        """The loop came round, `late_s` after it wanted to."""
+        """The loop came round, `late_s` s later than it wanted to."""
         self.beat = time.monotonic()
         self._lag = max(late_s, FADING * self._lag)
 
     @property
     def age_s(self) -> float:
-        """Since it came round."""
+        """Seconds since the loop last came round."""
         return time.monotonic() - self.beat
 
     @property
     def lag_s(self) -> float:
-        """How late it is: its worst of late, and while it hangs, how long it does."""
+        """How late the loop is, in s: the worst of late, or how long it has been hanging."""
         return max(self._lag, self.age_s - TICK_S)
 
 
@@ -65,7 +65,7 @@ class Canary:
         try:
             values = np.array([self._random.gauss(100.0, 1.0) for _ in range(CANARY_TAXELS * CANARY_TAXELS)])
             self._front_end.push(Frame(self._t, values.reshape(CANARY_TAXELS, CANARY_TAXELS)))
-        except Exception:  # whatever ends this frame ends those of every sensor
+        except Exception:  # what fails for this frame fails for every sensor's
             self._desk.bug("in the way of the watchdog's frame")
             return False
         return True

@@ -1,8 +1,8 @@
 """/metrics, /healthz and /readyz, from a thread with an event loop of its own.
 
-So they answer while the daemon's loop hangs, and then /healthz says 503. A connection has DEADLINE_S in all
-and a bounded request; where there are too many, the oldest goes: slow clients hold up nobody who asks at once.
-Only loaded where `--metrics` is set.
+So these pages answer while the daemon's loop hangs, and then /healthz says 503. A connection has DEADLINE_S in all
+and a bounded request; where there are too many, the oldest is closed, so that slow clients hold up nobody.
+This module is loaded only where `--metrics` is set.
 """
 
 import asyncio
@@ -18,9 +18,9 @@ from gestured.daemon.metrics import Metrics
 from gestured.daemon.snapshot import Snapshot
 from gestured.daemon.sockets import AGAIN_S, AddressError, reason_of
 
-DEADLINE_S = 5.0
-REQUEST_BYTES = 8192
-HTTP_CONNECTIONS = 64
+DEADLINE_S = 5.0  # for a connection, from its start to its answer
+REQUEST_BYTES = 8192  # of a request's head, at most
+HTTP_CONNECTIONS = 64  # at a time
 
 Response = tuple[int, str, bytes]  # status, content type, body
 _REASONS = {
@@ -57,7 +57,7 @@ def serve_pages(sock: socket.socket, snapshot: Callable[[], Snapshot], metrics: 
 class HttpThread:
     """Serves GET and HEAD of `routes` (path -> function that makes the answer) on a listening socket.
 
-    Raises AddressError where it cannot, because there are too few descriptors for one.
+    Raises AddressError where it cannot, because there are too few descriptors for its loop.
     """
 
     def __init__(self, sock: socket.socket, routes: dict[str, Callable[[], Response]]) -> None:
@@ -120,7 +120,7 @@ class HttpThread:
                 writer.write(self._answer(head))
                 await writer.drain()
         except (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, asyncio.CancelledError):
-            pass  # too slow, too long or gone, or we end: not worth an answer
+            pass  # the client was too slow, too long or is gone, or the daemon ends: no answer
         finally:
             self._open.pop(writer, None)
             writer.transport.abort() if writer.transport.get_write_buffer_size() else writer.close()
@@ -137,7 +137,7 @@ class HttpThread:
                 status, kind, body = (
                     route() if route else as_json(404, {"error": "not found", "paths": list(self._routes)})
                 )
-            except Exception as error:  # a bug in a route is this answer's end, not the server's
+            except Exception as error:  # a bug in a route costs this answer alone
                 status, kind, body = as_json(500, {"error": repr(error)})
         header = (
             f"HTTP/1.1 {status} {_REASONS[status]}",

@@ -1,4 +1,4 @@
-"""Who writes the file of the user's own gestures: the first daemon that locks it, and that one alone."""
+"""Which daemon writes the file of the user's own gestures: the first one that locks it, and that one alone."""
 
 import fcntl
 import os
@@ -12,7 +12,7 @@ from gestured.model.own_file import OwnFile, OwnFileError
 from gestured.record.files import PRIVATE, delete_leftovers
 
 Change = Callable[[Examples], Examples]
-PID_DIGITS = 10
+PID_DIGITS = 10  # of the process number in the lock, at most
 
 
 class Keeper:
@@ -26,7 +26,7 @@ class Keeper:
         self._lock: BinaryIO | None = None
 
     def hold(self) -> None:
-        """Be the one that writes it. Raises OwnFileError, which names the daemon that is, or says what is wrong."""
+        """Lock the file for this daemon. Raises OwnFileError, which names the daemon that holds it, or the fault."""
         if self._lock is not None:
             return
         if self.path is None:
@@ -67,6 +67,6 @@ class Keeper:
         )
 
     def close(self) -> None:
-        """Leave it to others."""
+        """Let go of the lock, so that another daemon may write the file."""
         if self._lock is not None:
             self._lock.close()

@@ -18,7 +18,7 @@ import structlog
 
 LOG_LEVELS = {"debug": 10, "info": 20, "warning": 30, "error": 40}
 PERIOD_S = 10.0  # the time in which lines of one reason are bounded
-REASONS = 64  # more reasons than there are; a bound in case one slips in that a peer can choose
+REASONS = 64  # more than there are; a bound in case a peer can choose one of them
 WAITING_BYTES = 256 << 10  # bytes of lines that wait for a reader at most; later lines are thrown away, and counted
 LAST_S = 0.5  # how long the end waits for a reader to take the last lines
 STDOUT, STDERR = 1, 2
@@ -61,7 +61,7 @@ class LineWriter:
         data = line.encode(errors="backslashreplace") + b"\n"
         with self._changed:
             if self._lost or self._size + len(data) > WAITING_BYTES:
-                self._lost += 1  # and those that follow, until it is said: so it is said where they are missing
+                self._lost += 1  # so are later lines, until their number is logged, at the place where they are missing
             else:
                 self._lines.append(data)
                 self._size += len(data)
@@ -75,7 +75,7 @@ class LineWriter:
         self._thread.join(LAST_S)
 
     def _run(self) -> None:
-        signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # they are for the loop's thread
+        signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # signals are for the loop's thread
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._lines or self._lost or self._closed)
@@ -95,10 +95,10 @@ class LineWriter:
         while data:
             try:
                 data = data[os.write(self._descriptor, data) :]
-            except BlockingIOError:  # somebody who shares it has made it so
+            except BlockingIOError:  # another program that shares the descriptor has made it non-blocking
                 select.select([], [self._descriptor], [])
             except OSError:
-                return  # the other end is gone, or the disk full: thrown away
+                return  # the reader is gone, or the disk full: the line is thrown away
 
 
 _errors: LineWriter | None = None
@@ -121,7 +121,7 @@ def print_line(line: str) -> None:
 
 
 def close() -> None:
-    """Give whoever reads the log a moment to take the last lines. Another line begins anew."""
+    """Give the log's reader LAST_S to take the last lines. A later line opens it again."""
     global _errors
     if _errors is not None:
         _errors.close()
@@ -153,11 +153,11 @@ class Throttle:
         self._say(log.info, event, reason, fields)
 
     def warn(self, event: str, reason: str, /, **fields: Any) -> None:
-        """The same for something that is wrong."""
+        """Log `event` with `reason` at a bounded rate: something that is wrong."""
         self._say(log.warning, event, reason, fields)
 
     def error(self, event: str, reason: str, /, **fields: Any) -> None:
-        """The same for a bug that is being handled, with its traceback."""
+        """Log a bug that is being handled, with its traceback, at a bounded rate."""
         self._say(log.exception, event, reason, fields)
 
     def _say(self, method: Callable[..., None], event: str, reason: str, fields: dict[str, Any]) -> None:

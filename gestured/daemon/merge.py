@@ -20,7 +20,7 @@ ENVIRONMENT = "GESTURED_"
 KEYS = (*FLAGS, "config")  # settings that a variable can set
 # Kubernetes and Docker tell every container of every service: GESTURED_SERVICE_HOST, GESTURED_PORT_9000_UDP_ADDR.
 SERVICE = re.compile(r"GESTURED_(\w+_)?(SERVICE_HOST|SERVICE_PORT(_\w+)?|PORT_\d+_(TCP|UDP|SCTP)(_(ADDR|PORT|PROTO))?)")
-PORT = re.compile(r"GESTURED_(\w+_)?PORT")  # its value is a URL, as tcp://10.96.0.17:9000
+PORT = re.compile(r"GESTURED_(\w+_)?PORT")  # set by a platform where its value is a URL, as tcp://10.96.0.17:9000
 MAX_CONFIG_BYTES = 1 << 20  # of a configuration: many times what the largest number of sensors takes
 
 
@@ -79,12 +79,12 @@ def strange_variables(environ: Mapping[str, str]) -> list[str]:
 
 
 def _platforms(name: str, value: str) -> bool:
-    """Whether a container platform sets it by itself, for a service called gestured, or gestured-something."""
+    """Whether a container platform sets this variable, for a service called gestured, or gestured-something."""
     return bool(SERVICE.fullmatch(name) or (PORT.fullmatch(name) and "://" in value))
 
 
 def _near(key: str) -> str | None:
-    """The variable that is meant by one that is nearly a setting."""
+    """The variable whose key is nearest to this one; None where none is near."""
     import difflib
 
     near = difflib.get_close_matches(key, KEYS, 1)
@@ -124,7 +124,7 @@ def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:
 
 
 def load_settings(flags: Mapping[str, Any], environ: Mapping[str, str]) -> tuple[Settings, dict[str, str]]:
-    """Merge and validate. `flags` holds only what was given on the command line, and `config`.
+    """Merge and validate the settings. `flags` holds only what was given on the command line, and `config`.
 
     Returns the settings and where each key that was set came from. Raises SettingsError.
     """

@@ -1,4 +1,4 @@
-"""What is counted: plain integers, whether or not anybody asks for them.
+"""All counters of the daemon: plain integers, whether or not anybody asks for them.
 
 The loop's thread counts, the HTTP thread reads copies (exposition.py). The number of series is bounded whatever
 arrives: labels that a peer can choose (sensors) are folded together after the first few.
@@ -23,10 +23,10 @@ CONFIDENCE_BUCKETS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 
 
 class Counter:
-    """A total for each combination of labels; `most` of them, those after that together as "other"."""
+    """A total for each of the first `most` combinations of labels; all later ones are counted as "other"."""
 
     def __init__(self, name: str, text: str, *labels: str, most: int = 64, dated: bool = False) -> None:
-        """`dated`: it is remembered when each was last counted."""
+        """`dated`: the counter also remembers when each combination was last counted."""
         self.name, self.text, self.labels, self._most, self._dated = name, text, labels, most, dated
         self.values: dict[tuple[str, ...], int] = {}
         self.last: dict[tuple[str, ...], float] = {}  # monotonic s
@@ -94,7 +94,7 @@ class Metrics:
         )
         self.latency = Histogram("gestured_latency_seconds", "From the last touched frame to the event", LATENCY_S)
         self.confidence = Histogram("gestured_confidence", "Confidence of the published gestures", CONFIDENCE_BUCKETS)
-        self.kernel_drops, self.kernel_dropped_at = 0, 0.0  # packets, and monotonic s when there were last more of them
+        self.kernel_drops, self.kernel_dropped_at = 0, 0.0  # packets so far, and monotonic s when more were dropped
         self._named: set[str] = set()
         self._said: dict[str, float] = {}  # by sensor: when its provisional event was decided, s, until the answer
 
@@ -104,7 +104,7 @@ class Metrics:
             self.kernel_drops, self.kernel_dropped_at = drops, time.monotonic()
 
     def event(self, event: Event) -> None:
-        """Count an event, and what it says of latency and confidence."""
+        """Count a published event, its latency and its confidence."""
         if isinstance(event, Gesture | Unknown):
             self.latency.observe(event.decided - event.offset)
             if event.degraded:

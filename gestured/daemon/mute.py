@@ -17,27 +17,27 @@ from gestured.core.owner import Source
 TOO_MUCH = 64 << 10  # bytes that are dropped of a sender within a second, after which it is muted
 HEADER_BYTES = 512  # that a packet takes in the kernel's buffer beside its own
 FIRST_S = 1.0  # how long a sender is muted at first; each further time lasts twice as long as the one before
-LONGEST_S = 8.0  # how long a sender is muted at most: whoever has mended his flood is heard soon
+LONGEST_S = 8.0  # the longest that a sender is muted, so that one that has mended its flood is heard soon
 SO_ATTACH_FILTER, SO_DETACH_FILTER = 26, 27  # Linux; not in Python's socket module
 NETWORK = 0xFFF00000
 LOAD_WORD, LOAD_HALF, LOAD_BYTE, AND, JUMP_EQUAL, RETURN = 0x20, 0x28, 0x30, 0x54, 0x15, 0x06  # of absolute offsets
 LET_IN, THROW_AWAY = 0xFFFFFFFF, 0
 MOST_RULES = 256  # rules of one filter, at most 13 instructions each; the kernel takes 4096 instructions
 
-Sender = Source | str  # a host and port, or all of a host
+Sender = Source | str  # host and port, or a host for all its ports
 
 
 class Muted:
-    """Who is muted, and until when."""
+    """Which senders are muted, and until when."""
 
     def __init__(self) -> None:
-        self._until: dict[Sender, tuple[float, float]] = {}  # s, and for how long
-        self._next = math.inf  # s, when the first of them is to be heard again
-        self._dropped: dict[Sender, int] = {}  # bytes in the kernel's buffer, since
-        self._since = 0.0  # s
+        self._until: dict[Sender, tuple[float, float]] = {}  # by sender: until when, and for how long (s)
+        self._next = math.inf  # s, when the first muted sender is to be heard again
+        self._dropped: dict[Sender, int] = {}  # by sender: bytes that were dropped since `_since`
+        self._since = 0.0  # s, when the second began in which that is counted
 
     def blame(self, dropped: Mapping[Sender, Collection[bytes]], now: float) -> list[Sender]:
-        """These packets had to be dropped, by their senders: who is muted for it from now on."""
+        """The senders that are muted from `now` on, since these packets of theirs had to be dropped."""
         if now - self._since > 1.0:
             self._dropped, self._since = {}, now
         found: list[Sender] = []
@@ -54,7 +54,7 @@ class Muted:
         return found
 
     def over(self, now: float) -> list[Sender]:
-        """Who was muted and is to be heard again."""
+        """The senders that were muted and are to be heard again."""
         if now < self._next:
             return []
         found = [sender for sender, (until, _) in self._until.items() if self._next <= until <= now]
@@ -72,7 +72,7 @@ class Muted:
 
 
 class Rule(NamedTuple):
-    """What becomes of the packets of a sender."""
+    """Whether the kernel lets the packets of a sender in."""
 
     host: str
     port: int | None  # None: any

@@ -19,9 +19,9 @@ from gestured.daemon.status import scene
 from gestured.daemon.tap import Taps, as_lines
 from gestured.daemon.views import Views
 
-TEST_SENSORS = 64  # names of sensors that are not there
+TEST_SENSORS = 64  # the most names of sensors that were never heard which tests may use
 TEST_S = 0.4  # how long a made-up gesture took
-TEST_FRAMES = 6  # of it, at 15 Hz
+TEST_FRAMES = 6  # touched frames of a made-up gesture, at 15 Hz
 
 SENSOR = Parameter(
     (str, type(None)), "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", check=lambda name: name is None or is_sensor(name)
@@ -51,7 +51,7 @@ class Operations:
     snapshot: Callable[[], Snapshot]
     state: Callable[[], Reply]
     reload_all: Callable[[], Awaitable[str | None]]  # None, or why nothing has changed
-    _tested: set[str] = field(default_factory=set)  # names of sensors that were not there
+    _tested: set[str] = field(default_factory=set)  # names that tests have used of sensors that were never heard
 
     def verbs(self) -> dict[str, Verb]:
         """Name -> verb. This table is all that the control socket can do."""
@@ -70,11 +70,11 @@ class Operations:
         }
 
     async def status(self, connection: Connection) -> Reply:
-        """How the daemon is."""
+        """How the daemon is, as `gesturectl status` shows it."""
         return self.state()
 
     async def reload(self, connection: Connection) -> Reply:
-        """Read configuration and model anew; the old ones stay where the new ones are bad."""
+        """Read configuration and models anew; where one of them is bad, all old ones stay."""
         reason = await self.reload_all()
         if reason is not None:
             raise Refusal(f"{reason}; nothing has changed")
@@ -82,7 +82,7 @@ class Operations:
         return {"model": snapshot.models.active, "awaiting_restart": snapshot.awaiting_restart}
 
     async def recalibrate(self, connection: Connection, sensor: str | None = None) -> Reply:
-        """Learn the idle sensor anew: one, or all. Refused while one of them is touched: a hand is no baseline."""
+        """Learn one idle sensor anew, or all. Refused while one of them is touched, since a hand is no baseline."""
         heard = _heard(self.snapshot(), sensor)
         chosen = list(heard) if sensor is None else [sensor]
         if not chosen:
@@ -147,7 +147,7 @@ class Operations:
         return {"model": snapshot.models.active, "gestures": list(snapshot.gestures), "own": dict(snapshot.own)}
 
     async def forget(self, connection: Connection, name: str) -> Reply:
-        """Have a gesture of the user's own no longer; its examples are gone from the file."""
+        """Forget a gesture of the user's own, and delete its examples from the file."""
         await self.own.forget(name)
         return {"forgotten": name}
 
@@ -169,7 +169,7 @@ class Operations:
 
 
 def _not_yet(connection: Connection) -> None:
-    """Raises Refusal where lines are streamed over it already: they could not be told apart."""
+    """Raises Refusal where a stream is on this connection already: its lines could not be told from another's."""
     if connection.streams:
         raise Refusal("this connection is a tap already, or another stream; open one more")
 

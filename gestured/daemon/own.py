@@ -1,4 +1,4 @@
-"""The user's own gestures in a running daemon: who enrols one now, what is known, and the file they are kept in."""
+"""The user's own gestures in a running daemon: the enrolment that goes on, the list in use, and its file."""
 
 import asyncio
 import time
@@ -22,7 +22,7 @@ from gestured.model.own import Own
 from gestured.model.own_file import OwnFile, OwnFileError
 
 ATTEMPT_S = 120.0  # an enrolment without an attempt for so long gives its place to others
-ANSWERED_TWICE = "refractory"  # such a contact was decided, too
+ANSWERED_TWICE = "refractory"  # a contact so cancelled was `Decided`, too, and counts once
 
 
 class Ready(NamedTuple):
@@ -35,10 +35,10 @@ class Ready(NamedTuple):
 
 
 class OwnGestures:
-    """What is known, and one enrolment at a time. `changed` is called when the list is another one."""
+    """The own gestures in use, and one enrolment at a time. `changed` is called when the list has changed."""
 
     def __init__(self, changed: Callable[[], None]) -> None:
-        """`follow` comes before anything else."""
+        """`follow` must be called before anything else."""
         self._changed = changed
         self._keeper, self._read = Keeper(None), OwnFile(None, {})
         self._unkept: str | None = None  # why nothing can be written, as far as that was tried
@@ -49,9 +49,9 @@ class OwnGestures:
         self.writing = asyncio.Lock()  # held from where the file is read until what was read is used
 
     def read(self, path: Path | None, ladder: Ladder) -> Ready:
-        """Read a file, and have the model that answers look at it; any thread may that holds `writing`.
+        """Read a file, and have the model that answers look at it; any thread that holds `writing` may call it.
 
-        The start of a daemon locks the file, but makes no folder for it: who enrols nothing has none.
+        It locks the file, but makes no folder for it, since who enrols nothing needs none.
         """
         keeper, unkept = self._keeper if path == self._keeper.path else Keeper(path), None
         if path is not None and path.parent.is_dir():
@@ -74,13 +74,13 @@ class OwnGestures:
         self._use(ready.read, ready.own)
 
     def _use(self, read: OwnFile, own: Own) -> None:
-        """Compare with these from now on; say where they do not hold apart for the model that answers."""
+        """Compare with these from now on; log which of them the model that answers cannot tell apart."""
         self._read, self._ladder.own = read, own
         own.missing = self._prepare
         self._warn()
 
     def _prepare(self, model: Model) -> None:
-        """Another model answers than the one that has looked at the examples: until it has, it knows none of them."""
+        """Have a model that answers now look at the examples; until it has, it knows none of them."""
         if self._preparing is None or self._preparing.done():
             self._preparing = asyncio.get_running_loop().create_task(self._make(self._ladder.own, model))
 
@@ -99,7 +99,7 @@ class OwnGestures:
 
     @property
     def gestures(self) -> Examples:
-        """Those that are compared with what is performed."""
+        """The own gestures that contacts are compared with."""
         return self._ladder.own.gestures
 
     @property
@@ -108,7 +108,7 @@ class OwnGestures:
         return f"{self._ladder.active} has no embedding" if self._ladder.model.space is None else None
 
     def report(self) -> dict[str, Any]:
-        """For the status; any thread may ask."""
+        """What the status shows of own gestures; any thread may ask."""
         held = self._open
         return {
             "file": None if self._keeper.path is None else str(self._keeper.path),
@@ -125,7 +125,7 @@ class OwnGestures:
         return self._open is not None
 
     async def writable(self) -> None:
-        """Whether anything can be enrolled here; raises OwnFileError where not."""
+        """Raises OwnFileError where nothing can be enrolled, because the file cannot be written."""
         async with self.writing:
             if self._read.fault is not None:
                 raise OwnFileError(self._read.fault)
@@ -133,7 +133,7 @@ class OwnGestures:
             self._unkept = None
 
     def begin(self, connection: Connection, name: str, sensor: str, examples: int, in_use: Collection[str]) -> None:
-        """Take what is performed on a sensor as examples, and tell the connection of each. Raises Refusal."""
+        """Take contacts of a sensor as examples, and tell the connection of each. Raises Refusal."""
         self.tick()
         if self._open is not None:
             before, _ = self._open
@@ -147,10 +147,10 @@ class OwnGestures:
         judge = Examiner(model, model.space, self._ladder.own, in_use)
         self._open = Enrolment(name, sensor, examples, judge), connection
         self._heard = time.monotonic()
-        connection.streams = True  # it need not ask for anything meanwhile
+        connection.streams = True  # so that it is not ended for asking nothing
 
     def see(self, fact: Fact) -> None:
-        """Look at what the hub found: an answer on the sensor is an attempt."""
+        """Look at a fact of the hub: each answer of the sensor is an attempt."""
         if self._open is None or not isinstance(fact, Decided | Cancelled):
             return
         enrolment, connection = self._open
@@ -169,7 +169,7 @@ class OwnGestures:
             self._finishing = asyncio.get_running_loop().create_task(self._finish(enrolment, connection))
 
     def tick(self) -> None:
-        """Give up what nobody waits for any more; call it once a second."""
+        """Give up an enrolment that nobody waits for any more; call it once a second."""
         if self._open is None or self._finishing is not None:
             return
         if self._open[1].closed:
@@ -178,7 +178,7 @@ class OwnGestures:
             self._give_up(f"nothing was performed for {ATTEMPT_S:g} s")
 
     async def forget(self, name: str) -> None:
-        """Have a gesture no longer, nor its examples in the file. Raises Refusal or OwnFileError."""
+        """Forget a gesture and delete its examples from the file. Raises Refusal or OwnFileError."""
 
         def without(found: Examples) -> Examples:
             if name not in found and name not in self._read.gestures:

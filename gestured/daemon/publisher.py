@@ -18,17 +18,17 @@ class Publisher:
 
     def __init__(self, metrics: Metrics, sinks: tuple[Sink, ...]) -> None:
         self.sinks = sinks
-        self.models_failed = False  # no model could answer the last segment
+        self.models_failed = False  # whether no model could answer the last segment
         self._metrics, self._throttle = metrics, Throttle()
         self._recent: deque[dict[str, Any]] = deque(maxlen=RECENT)
 
     def publish(self, event: Event, *, test: bool = False) -> None:
-        """Give an event to every sink, then count it; a test's is no answer of a model."""
+        """Give an event to every sink, then count it. A `test` was made up, so it counts as no model's answer."""
         epoch = time.time() - time.monotonic()
         for sink in self.sinks:
             try:
                 sink.publish(event, epoch, test=test)
-            except Exception:  # a bug in one sink is not the others' business
+            except Exception:  # a bug in one sink must not keep the event from the others
                 self._metrics.internal_errors.add()
                 self._throttle.error("a bug in a sink", type(sink).__name__)
         if not test:
@@ -46,7 +46,7 @@ class Publisher:
             log.debug(messages.event_type(event), sensor=event.sensor, id=event.id, gesture=name)
 
     def recent(self) -> tuple[dict[str, Any], ...]:
-        """The last answers, as a person wants to see them, oldest first."""
+        """The last RECENT answers as `gesturectl status` shows them, oldest first."""
         return tuple(self._recent)
 
 

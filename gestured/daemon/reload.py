@@ -15,7 +15,7 @@ Loader = Callable[[], Settings]  # reads the configuration
 
 
 class Reload:
-    """Reads with `load`, opens, and hands all of it to `swap`; frames are served meanwhile."""
+    """Reads settings with `load`, opens what they ask for, and gives that to `swap`; frames are served meanwhile."""
 
     def __init__(self, load: Loader, swap: Callable[[Asked], Awaitable[None]], metrics: Metrics) -> None:
         self._load, self._swap, self._metrics = load, swap, metrics
@@ -23,11 +23,11 @@ class Reload:
 
     @property
     def running(self) -> bool:
-        """Whether one has begun and not ended."""
+        """Whether a reload has begun and not ended."""
         return self._lock.locked()
 
     async def run(self) -> str | None:
-        """Reload once those are over that have begun; None, or why nothing has changed."""
+        """Reload, after the reloads that have begun; returns None, or why nothing has changed."""
         async with self._lock:
             notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
             try:

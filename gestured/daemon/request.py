@@ -1,4 +1,4 @@
-"""What is asked on the control socket, held against the table of verbs as a whole, and what is answered; JSON lines."""
+"""Requests of the control socket, checked as a whole against the table of verbs, and replies; both JSON lines."""
 
 import json
 from collections.abc import Awaitable, Callable, Iterator, Mapping
@@ -21,7 +21,7 @@ def json_line(reply: Reply) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class ReplyStream:
-    """An answer that lines follow. They are made as they are read."""
+    """An answer and the lines that follow it, which are made as they are read."""
 
     answer: Reply
     lines: Iterator[bytes]
@@ -33,7 +33,7 @@ class Refusal(GesturedError):
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """What a request may say: a JSON type, in words for those who got it wrong, and whether it must be there."""
+    """One key of a request: its JSON type, the same in words for the refusal, and whether it must be there."""
 
     kind: type | tuple[type, ...]
     words: str
@@ -43,12 +43,12 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Verb:
-    """What `run(connection, **parameters)` does; it gives the answer or raises Refusal."""
+    """One verb: `run(connection, **parameters)` gives the answer or raises Refusal."""
 
     run: Callable[..., Awaitable[Reply | ReplyStream]]
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
-    changes: bool = True  # and so is logged
-    slow: bool = False  # it waits for another thread; what is quick need not wait for it
+    changes: bool = True  # whether it changes anything, so that it is logged
+    slow: bool = False  # whether it waits for another thread; quick verbs do not wait for slow ones
 
 
 def parse_request(line: bytes, verbs: Mapping[str, Verb]) -> tuple[str, dict[str, Any]]:

@@ -39,21 +39,21 @@ AT_A_RESTART = ("listen", "socket", "control", "metrics", "flight_recorder")  # 
 
 
 class Service:
-    """Everything that lives while the daemon runs."""
+    """All parts of a running daemon."""
 
     def __init__(self, asked: Asked, metrics: Metrics, bound: Bound, load: Loader) -> None:
-        """Serves from now on. `load` reads the configuration again, for a reload."""
+        """Serve packets from now on. `load` reads the configuration again, for a reload."""
         settings, ladder = asked.settings, asked.ladder
         self._settings, self._ladder, self._bound = settings, ladder, bound
         self._started_with = settings
         self._instance, self._started, self._stopping = secrets.token_hex(8), time.time(), False
         self._begun = time.monotonic()
         self._reloading: asyncio.Task[str | None] | None = None  # a task that nobody holds may be collected
-        self._said = ""  # to systemd
+        self._said = ""  # the last STATUS= that systemd was told
         self._pulse, self._metrics = Pulse(), metrics
         self._reload = Reload(load, self._swap, self._metrics)
         for name in settings.sensors:
-            self._metrics.sensor_label(name)  # those in the file are named first
+            self._metrics.sensor_label(name)  # the sensors of the configuration get the first labels
         self._own = OwnGestures(self._own_changed)
         self._own.follow(ladder, self._own.read(asked.own, ladder))
         self._hub = Hub(scene_of(settings, ladder), ladder)
@@ -119,7 +119,7 @@ class Service:
         return status(self.snapshot(), self._metrics)
 
     def _sinks(self) -> tuple[Sink, ...]:
-        """Where events go. Who acts on them comes before who looks on."""
+        """The sinks of events: those who act on them before those who look on."""
         return (self._clients, *self._outputs, self._taps, self._views)
 
     def _hello(self) -> bytes:
@@ -128,7 +128,7 @@ class Service:
         return messages.hello_json(__version__, self._instance, self._ladder.active, self._gestures(), sequences)
 
     def _gestures(self) -> tuple[str, ...]:
-        """Those that a client may hear of: the model's in use, and the user's own."""
+        """The gestures that a client may hear of: the model's in use, and the user's own."""
         return (*self._hub.scene.gestures, *self._own.gestures)
 
     def _own_changed(self) -> None:
@@ -144,11 +144,11 @@ class Service:
         self._hub.foresee(None if every else named)
 
     async def start(self) -> None:
-        """Take what needs a loop that turns: the operators' connections."""
+        """Take operators' connections, which needs a loop that turns."""
         await self._control.start()
 
     async def serve(self, stop: asyncio.Event, reload: asyncio.Event) -> None:
-        """Look after timers, until `stop`; then finish what is in flight."""
+        """Look after the timers until `stop` is set; then finish what is in flight."""
         watchdog = watchdog_period()
         canary = Canary(self._desk)
         period = min(TICK_S, watchdog or TICK_S)
@@ -209,7 +209,7 @@ class Service:
         log.info("ended")
 
     async def _swap(self, asked: Asked) -> None:
-        """Go on with what a reload has opened; what is forgotten or enrolled meanwhile waits until that is used."""
+        """Go on with what a reload has opened. Changes of own gestures wait until that is in use."""
         async with self._own.writing:
             self._go_on(asked, await asyncio.to_thread(self._own.read, asked.own, asked.ladder))
 

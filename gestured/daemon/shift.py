@@ -23,15 +23,15 @@ from gestured.model.features import MEASURES, measures
 from gestured.model.model import Model
 
 LAST = 100  # gestures
-LEAST_GESTURES = 20  # before which nothing is said
+LEAST_GESTURES = 20  # the fewest gestures from which a shift is told
 UNLIKELY = 0.2  # share outside; with 2 % expected, 4 of 20 come by chance once in 1700 times (binomial)
-MANY = 0.5  # share of segments that are unknown
+MANY = 0.5  # share of unknown segments from which it is a shift
 UNKNOWN = "unknown"
 QUANTITIES = ("strength", *MEASURES, "confidence")
 
 
 class Shift:
-    """What came, held against a model's `quantiles` (metadata); knows nothing where they say nothing."""
+    """The last gestures, compared with a model's `quantiles` (metadata), as far as these have the quantities."""
 
     def __init__(self, quantiles: Mapping[str, Any], window: Window) -> None:
         self._window = window
@@ -41,11 +41,11 @@ class Shift:
 
     @classmethod
     def of(cls, model: Model) -> "Shift":
-        """What comes from now on, held against what a model's file says."""
+        """A comparison of the gestures from now on with the `quantiles` of a model."""
         return cls(model.metadata.quantiles, model.metadata.window)
 
     def see(self, decided: Decided) -> None:
-        """A segment was decided, as a gesture or as unknown. The quantiles say nothing of a fallback's answers."""
+        """Take a segment that was decided, unless a fallback did: the quantiles are not that model's."""
         if not self._outside or decided.scores.degraded:
             return
         if UNKNOWN in self._outside:
@@ -64,7 +64,7 @@ class Shift:
         return max((len(self._outside[name]) for name in self.ranges), default=0)
 
     def shares(self) -> dict[str, float]:
-        """Share outside the training range for each quantity, share of `unknown`; empty for fewer gestures."""
+        """By quantity, the share outside the training range, and that of `unknown`, from LEAST_GESTURES on."""
         return {
             name: sum(tuple(outside)) / len(outside)
             for name, outside in self._outside.items()

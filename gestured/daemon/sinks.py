@@ -15,7 +15,7 @@ from gestured.daemon.sockets import resolve
 class Sink(Protocol):
     """Takes every event; `epoch` is what to add to an event's times to get seconds since the Unix epoch.
 
-    `test`: nobody made this gesture; whoever gets it is told so.
+    `test`: the event was made up by an operator, which the sink must tell its receivers.
     """
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
@@ -29,19 +29,19 @@ class Output(Sink, Protocol):
     foresees: bool  # whether it wants provisional events
 
     def close(self) -> None:
-        """Nothing more will come."""
+        """Let go of what the output holds; no event comes after this."""
         ...
 
 
 def outputs(settings: Settings, metrics: Metrics) -> list[Output]:
-    """All that a configuration names. Looks up names of hosts, which may take long."""
+    """All outputs that a configuration names. It looks up names of hosts, which may take long."""
     return [OscSink(address, metrics, provisional=settings.publish_provisional) for address in settings.publish]
 
 
 class OscSink:
     """OSC over UDP to one destination: gestures and the status; their times are seconds since the Unix epoch.
 
-    With `provisional` also what a contact will most probably be, and where it turns out otherwise that it is revoked.
+    With `provisional` it also sends provisional events, and which of them are revoked.
 
     The socket is connected, so that a port where nobody listens is told to us (by the next call). A
     destination that cannot be reached costs a failed system call an event, nothing more.
@@ -56,7 +56,7 @@ class OscSink:
         self._socket: socket.socket | None = None
         self._connected = False
         self.foresees = provisional
-        self._said: dict[str, Provisional] = {}  # by sensor, until its answer
+        self._said: dict[str, Provisional] = {}  # by sensor: the provisional event that was sent, until its answer
         try:
             family, self._where = resolve(destination, socket.SOCK_DGRAM)  # once: a look-up may block for seconds
             self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
@@ -64,9 +64,9 @@ class OscSink:
             log.error("publish: no such destination", destination=str(destination), error=error.strerror)
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
-        """Send a gesture or the status, where asked for a provisional event; others do not travel by OSC.
+        """Send a gesture, the status, or where asked for a provisional event; others do not travel by OSC.
 
-        A test's gesture stands in a bundle behind `/gestured/test ,s sensor`: its own arguments are the contract's.
+        A test's gesture stands in a bundle behind `/gestured/test ,s sensor`; its own arguments are the usual ones.
         """
         if isinstance(event, Gesture | Unknown | Cancelled):
             self._judge(event)
@@ -110,7 +110,7 @@ class OscSink:
                 self._metrics.sent.add("sent")
                 return
             except ConnectionRefusedError:
-                self._failed("refused")  # says that of an earlier packet: this one was not sent yet
+                self._failed("refused")  # the refusal of an earlier packet: this one was not sent yet
             except BlockingIOError:
                 self._failed("full")
                 return

@@ -14,25 +14,25 @@ HANG_S = 2.0  # the loop counts as hanging after so long without a beat
 
 @dataclass(frozen=True, slots=True)
 class Models:
-    """The models that answer, and what they make of what they see."""
+    """The model that answers, its place on the ladder, and its shift."""
 
     active: str  # the rung that answers
-    asked: str  # the first one
-    rung: int
+    asked: str  # the rung that the configuration names
+    rung: int  # how far down the ladder `active` stands; 0 is the best
     degraded: bool
     failures: int
     file: str
     version: str
     sha256: str
     grid: tuple[int, int]  # rows and columns of its input
-    failed: bool  # no model could answer the last segment
+    failed: bool  # whether no model could answer the last segment
     shift_count: int  # gestures that the shift was measured on
-    shift: Mapping[str, float]  # share of gestures outside of what it was trained on
-    unlike: tuple[str, ...]  # where that is too many
+    shift: Mapping[str, float]  # by quantity: share of gestures outside of what the model was trained on
+    unlike: tuple[str, ...]  # quantities of which that share is too large
 
     @classmethod
     def of(cls, ladder: Ladder, shift: Shift, failed: bool) -> "Models":
-        """As they are now."""
+        """What is known of a ladder's models now."""
         model = ladder.model
         return cls(
             ladder.active, ladder.name, ladder.rung, ladder.degraded, ladder.failures, ladder.source,
@@ -43,7 +43,7 @@ class Models:
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """Everything at once; durations in seconds."""
+    """Everything about the daemon at one moment; durations in seconds."""
 
     instance: str  # changes at every start
     time: float  # s since the Unix epoch
@@ -52,19 +52,19 @@ class Snapshot:
     uptime_s: float
     stopping: bool
     loop_age_s: float  # since the loop last came round
-    loop_lag_s: float  # how late it is
+    loop_lag_s: float  # how late the loop is
     models: Models
     gestures: tuple[str, ...]  # of the model's, in use
     own: Mapping[str, Any]  # the user's own; see `OwnGestures.report`
     sensors: Mapping[str, Reading]
-    recent: tuple[Mapping[str, Any], ...]  # answers
+    recent: tuple[Mapping[str, Any], ...]  # the last answers
     clients: int  # of the event socket
     backlog_bytes: int  # that wait for slow clients
-    kernel_drops: int  # packets that found no room
+    kernel_drops: int  # packets for which the kernel had no room
     taps: int
     flight_limit_bytes: int
     flight_held_bytes: int
-    addresses: Mapping[str, str | None]  # where it can be reached
+    addresses: Mapping[str, str | None]  # by kind of socket: where the daemon can be reached
     settings: Settings
     awaiting_restart: list[str]  # keys of settings that a reload has read, and only a restart puts to use
 

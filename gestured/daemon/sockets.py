@@ -14,11 +14,11 @@ from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
 RECEIVE_BYTES = 4 << 20  # twenty times the usual default: what a sensor sends while the loop stands still
-BACKLOG = 1024  # a thousand clients may come back at once after a restart
+BACKLOG = 1024  # connections that wait to be accepted: a thousand clients may come back at once after a restart
 AGAIN_S = 1.0  # the pause before the next connection is accepted where there was no descriptor for one
 SO_RCVBUFFORCE = 33  # Linux; these three are not in Python's socket module
 SO_TIMESTAMPNS = 35
-SO_MEMINFO = 55  # nine numbers, the last of which counts drops
+SO_MEMINFO = 55  # it gives nine numbers, the last of which counts dropped packets
 
 
 class AddressError(GesturedError):
@@ -74,14 +74,14 @@ def reason_of(error: OSError) -> str:
 
 
 def bind_tcp(address: Address) -> socket.socket:
-    """A listening, non-blocking TCP socket."""
+    """A listening, non-blocking TCP socket. Raises AddressError."""
     sock = _bind("metrics", address, socket.SOCK_STREAM)
     sock.listen(BACKLOG)
     return sock
 
 
 def name_of(sock: socket.socket) -> str:
-    """HOST:PORT as it was bound."""
+    """HOST:PORT that an IP socket is bound to."""
     host, port = sock.getsockname()[:2]
     return str(Address(host, port))
 
@@ -107,7 +107,7 @@ class UnixListener(Listener):
     """
 
     def __init__(self, path: Path, key: str = "socket") -> None:
-        """`key` is the setting to name where it cannot be had."""
+        """`key` is the setting that an error names. Raises AddressError."""
         self.path, self._key = path, key
         self._lock_path = path.with_name(path.name + ".lock")
         try:

@@ -28,8 +28,8 @@ from gestured.daemon.settings import Settings
 from gestured.daemon.sockets import AddressError
 from gestured.model.process import end_all
 
-DESCRIPTORS = 4096  # for 1024 clients; the usual soft limit is 1024 in all
-FEWEST_DESCRIPTORS = 64  # for itself, operators, destinations and a few clients
+DESCRIPTORS = 4096  # wanted, for 1024 clients; the usual soft limit is 1024 in all
+FEWEST_DESCRIPTORS = 64  # needed for the daemon itself, operators, destinations and a few clients
 STOPS = (signal.SIGTERM, signal.SIGINT)
 END_S = 4.0  # for what is in flight, and for clients to read it; the units give it 5
 
@@ -46,7 +46,7 @@ def run(settings: Settings, load: Loader) -> None:
 
 
 async def _run(settings: Settings, load: Loader) -> None:
-    """Bind, open, serve. What cannot be had ends it before it says that it is ready."""
+    """Bind sockets, open models, serve. What cannot be had ends the daemon before it says that it is ready."""
     loop = asyncio.get_running_loop()
     _abort(signal.SIG_BLOCK)  # in the threads that are made from here on, so that it finds this one
     loop.set_default_executor(ThreadPoolExecutor(initializer=_abort, initargs=(signal.SIG_BLOCK,)))
@@ -95,7 +95,7 @@ def _when(number: signal.Signals, act: Callable[[], object]) -> None:
 
 
 def _ignore_stops() -> None:
-    """It ends already: a stop that is repeated now must not look like a crash."""
+    """Ignore further signals, since the daemon ends: a stop that is repeated must not look like a crash."""
     for number in (*STOPS, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
 
@@ -103,7 +103,7 @@ def _ignore_stops() -> None:
 def _end_at_once(bound: Bound) -> None:
     """End a start: nobody waits for a model whose opening never ends.
 
-    Not by an exception: a library that is being imported makes an error of its own of it.
+    It raises no exception, since a library that is being imported would make an error of its own of it.
     """
     _ignore_stops()
     bound.close()

@@ -17,7 +17,7 @@ from gestured.daemon.snapshot import Snapshot
 
 
 def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
-    """Everything at once; durations in seconds, `time` since the Unix epoch."""
+    """The answer to `status`; durations in seconds, `time` in seconds since the Unix epoch."""
     models = snapshot.models
     return {
         "version": __version__,
@@ -153,5 +153,5 @@ def _by_label(values: Mapping[tuple[str, ...], int]) -> dict[str, int]:
 
 
 def _ages(counter: Counter, now: float) -> dict[str, float]:
-    """By label, how many seconds ago it was last counted."""
+    """By label, how many seconds ago a counter was last raised."""
     return {" ".join(labels) or "all": round(now - last, 1) for labels, last in dict(counter.last).items()}

@@ -18,28 +18,28 @@ from gestured.core.owner import Source
 from gestured.daemon.caller import Connection
 from gestured.daemon.request import json_line
 
-KEPT_S = 30.0  # of the flight recorder
+KEPT_S = 30.0  # how long the flight recorder keeps a packet
 OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps
-SOON_S = 0.025  # how long a packet's lines wait: what came together with it is answered first, from many sensors, too
+SOON_S = 0.025  # how long a packet's line waits, so that packets of many sensors that came with it are answered first
 TURN_LINES = 32  # lines that are made and sent before the loop looks after its frames again
 Remembered = tuple[int, Source, bytes] | bytes  # a packet with its time in ns (monotonic), or an event's line
 
 
 class Taps:
-    """Live taps, and the ring. `active` says whether anything here wants packets."""
+    """Live taps, and the ring of the flight recorder."""
 
     def __init__(self, ring_bytes: int) -> None:
         """Remember the last KEPT_S seconds, but never more than `ring_bytes` (0: nothing)."""
         self.ring_bytes = ring_bytes
         self._live: list[Connection] = []
-        self._waiting: deque[Remembered] = deque()  # to be streamed, soon
+        self._waiting: deque[Remembered] = deque()  # packets and events that are to be streamed soon
         self._timer: asyncio.Handle | None = None
-        self._ring: deque[tuple[int, int, Remembered]] = deque()  # ns, bytes, what
+        self._ring: deque[tuple[int, int, Remembered]] = deque()  # ns, bytes held, and what is held
         self._size = 0
 
     @property
     def active(self) -> bool:
-        """Whether packets are wanted."""
+        """Whether a tap or the flight recorder wants packets."""
         return bool(self.ring_bytes or self._live)
 
     @property
@@ -54,19 +54,19 @@ class Taps:
         self._live.append(connection)
 
     def packets(self, waiting: Sequence[tuple[bytes, Source]], now: float) -> None:
-        """What was read in one go at `now` (monotonic s)."""
+        """Take packets that were served together at `now` (monotonic s)."""
         t_ns = round(now * 1e9)
         for packet, source in waiting:
             self._remember(t_ns, len(packet), (t_ns, source, packet))
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
-        """A sink: events as they come of the packets. The status and a test come of none."""
+        """Take an event, as a sink. The status and a test are left out, since no packet led to them."""
         if self.active and not test and not isinstance(event, Status):
             line = messages.to_json(event, epoch)
             self._remember(time.monotonic_ns(), len(line), line)
 
     def flush(self) -> None:
-        """Stream what waits, now."""
+        """Stream now all that waits."""
         while self._waiting:
             self._stream()
 
@@ -77,7 +77,7 @@ class Taps:
 
     @property
     def held_bytes(self) -> int:
-        """How much the ring holds."""
+        """Bytes that the flight recorder holds."""
         return self._size
 
     def tick(self) -> None:

@@ -1,8 +1,8 @@
-"""OSC over UDP in: reads what waits in the socket, and hands it on with the time at which it arrived.
+"""OSC over UDP in: reads the packets that wait in a socket, and hands them on with their times of arrival.
 
-A reader of its own instead of a DatagramProtocol, for two reasons. It asks the kernel when each packet came, so that
-a stall of the loop, however long, moves no frame: what waited is served as if it had been read at once. And it takes
-together what comes thick, as of hundreds of sensors, about every millisecond, which costs less per packet.
+It is a reader of its own instead of a DatagramProtocol, for two reasons. It asks the kernel when each packet came, so
+that a stall of the loop, however long, moves no frame: what waited is served as if it had been read at once. And where
+packets come thick, as of hundreds of sensors, it reads them together each millisecond: that costs less.
 
 Work is done in slices: between two of them the loop serves everybody else.
 """
@@ -26,13 +26,13 @@ PACKET_BYTES = 65_536
 BATCH = 256  # packets in one read at the most: others have their turn between two reads
 SLICE_S = 0.005  # of work on waiting packets, before the loop serves everybody else
 FLOOD_SLICE_S = 0.001  # of work on waiting packets in a flood, which fills the kernel's buffer while we work
-TURN_S = 0.05  # of work in one turn of a flood at the most, where packets cost more than their sender's last ones
+TURN_S = 0.05  # the most work in one turn of a flood, where packets cost more than their senders' earlier ones
 DRAIN_S = 0.25  # for serving what still waits when the daemon ends
-PAUSE_S = 0.001  # between reads of packets that come thick: to be woken for each is a large part of its price
+PAUSE_S = 0.001  # between reads of packets that come thick, since waking for each is much of its price
 FEW = 8  # packets found by a read, up to which it is followed by a pause
 FULL_S = 0.25  # for which a stall explains that the kernel drops packets; if it lasts longer, it is a flood
-EARLY_S = 0.001  # by which we are woken before something is due: the loop's timers know milliseconds alone
-SPARSE_S = 0.02  # between packets, from which on there is time to wait for a moment more exactly than that
+EARLY_S = 0.001  # by which we wake before a wait is over, since the loop's timers know whole milliseconds only
+SPARSE_S = 0.02  # between packets; where they are further apart, there is time to wait for that moment exactly
 STEP_S = 0.05  # by which the wall clock may move against ours; after a larger step the kernel's times say nothing
 
 TIMESTAMP = struct.Struct("@qq")  # s and ns since the epoch, by the wall clock
@@ -51,7 +51,7 @@ class Receiver:
         taps: Taps,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Gives `hub` what came since the socket was `empty` (s), and its facts to `desk`; `taps` are shown it."""
+        """Give `hub` the packets since the socket was `empty` (s), and its facts to `desk`; `taps` see the packets."""
         self._loop = asyncio.get_running_loop()
         self._sock, self._hub, self._desk, self._taps, self._clock = sock, hub, desk, taps, clock
         self._backlog = Backlog(lambda source: source in hub.owners)
@@ -61,11 +61,11 @@ class Receiver:
         # s: what arrived until then was served. Time must not decide beyond it: a sensor whose packets wait, read or
         # in the socket behind those of others, is not silent.
         self.served = empty
-        self.behind_s = 0.0  # by which that was behind the clock at the last read
-        self._drops = 0  # packets that the kernel had dropped then
-        self._dropping = -FLOOD_S  # s, when it began to
+        self.behind_s = 0.0  # by which `served` was behind the clock at the last read
+        self._drops = 0  # packets that the kernel had dropped at the last look
+        self._dropping = -FLOOD_S  # s, when the kernel began to drop packets
         self._looked = 0.0  # s, when we last looked whether something waits
-        self._found = 0  # packets, then
+        self._found = 0  # packets that the last read found
         self._sparse = False  # whether the last ones came after a pause
         self._pause: asyncio.TimerHandle | None = None
         self._again: asyncio.Handle | None = None
@@ -94,7 +94,7 @@ class Receiver:
         self._loop.add_reader(self._sock, self._wake)
 
     def drain(self) -> None:
-        """Serve everything that waits, within reason: the end is near."""
+        """Serve everything that waits, for DRAIN_S at the most: the daemon ends."""
         end = self._clock() + DRAIN_S
         self.read()
         while self._again is not None and self._clock() < end:
@@ -140,7 +140,7 @@ class Receiver:
                 return now, wall - now
 
     def _receive(self) -> tuple[list[tuple[bytes, bytes, Source]], bool]:
-        """Packets with the kernel's time and their source; whether some may be left."""
+        """(packets with the kernel's time and their source, whether some may be left in the socket)."""
         receive = self._sock.recvmsg
         found: list[tuple[bytes, bytes, Source]] = []
         try:
@@ -162,7 +162,7 @@ class Receiver:
         return min(now, max(self._empty, came))
 
     def _datagrams(self, found: list[tuple[bytes, bytes, Source]], now: float) -> list[Datagram]:
-        """What was found with its arrivals, which never go back."""
+        """The packets that were found with the times of their arrival, which never go back."""
         arrival = self._empty
         datagrams: list[Datagram] = []
         for packet, stamp, source in found:
@@ -216,7 +216,7 @@ class Receiver:
         self._expect()
 
     def _expect(self) -> None:
-        """Be woken when the time alone will decide something; what waits is served before."""
+        """Set the alarm for when time alone decides something. Packets that wait are served before."""
         if self._hub.due != self._due and not self._backlog:
             self._due = self._hub.due
             if self._alarm is not None:
@@ -227,7 +227,7 @@ class Receiver:
                 self._alarm = self._loop.call_later(max(woken - self._clock(), 0.0), self._wait)
 
     def _wait(self) -> None:
-        """Something is due, or is in a millisecond, for which we wait turn by turn: the loop serves everybody else."""
+        """Decide what is due. Where that is a millisecond off, come back each turn: the loop serves everybody else."""
         if self._clock() < self._due:
             self._alarm = self._loop.call_soon(self._wait)
         else:
@@ -237,13 +237,13 @@ class Receiver:
             self._expect()
 
     def _count_drops(self, now: float) -> None:
-        """Tell the hub where the kernel had no room for something."""
+        """Tell the hub that the kernel has dropped packets since the last look, and whether that makes a flood."""
         drops = kernel_drops(self._sock)
         if drops == self._drops:
             return
         self._drops = drops
         self._hub.missed()
-        if self._dropping <= now - FULL_S <= self._dropping + FLOOD_S:  # again: more comes than we can read
+        if self._dropping <= now - FULL_S <= self._dropping + FLOOD_S:  # it drops again: more comes than we can read
             self._backlog.flood(now + FLOOD_S)
         elif now > self._dropping + FLOOD_S:
             self._dropping = now

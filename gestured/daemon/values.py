@@ -1,4 +1,4 @@
-"""Values that settings are made of: how they are written, and what is said where they are not."""
+"""The types of settings: how a value is written, and what was expected where it is written otherwise."""
 
 import ipaddress
 import os

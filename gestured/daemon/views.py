@@ -1,4 +1,4 @@
-"""Those who look on: views of the sensors they look at, all events and the daemon's state, made once for all of them.
+"""What clients that look on are sent: views of sensors, all events and the daemon's state, made once for all.
 
 Nothing is made where nobody looks. What is made is made soon after the frames that it shows have been answered, and
 is sent in few writes: who acts on an event waits neither for a picture nor for who looks at one.
@@ -19,8 +19,8 @@ from gestured.daemon.request import Reply, json_line
 from gestured.daemon.status import viewed
 from gestured.daemon.tap import SOON_S
 
-VIEW_S = 1 / 30  # between two views of one sensor: nobody sees more
-VIEWS = 16  # sensors whose last view is kept for who asks again
+VIEW_S = 1 / 30  # between two views of one sensor, since nobody sees more than 30 a second
+VIEWS = 16  # sensors whose last view is kept for clients that ask again
 UNREAD_BYTES = 32 << 10  # bytes that may wait for a connection; where more do, it misses views until it has read them
 
 
@@ -32,7 +32,7 @@ class Look:
     raw: bool  # counts as they were sent, too
 
     def hears(self, event: Event) -> bool:
-        """Whether it is told of an event: of all, but of provisional ones only where it looks."""
+        """Whether the connection is told of an event; of provisional ones only those of the sensors it looks at."""
         return not isinstance(event, Provisional) or event.sensor in self.sensors
 
 
@@ -40,11 +40,11 @@ class Views:
     """Views for those who ask, and for those who look on."""
 
     def __init__(self, hub: Hub, state: Callable[[], Reply], changed: Callable[[], None]) -> None:
-        """`state` tells all about the daemon; `changed` hears when others are looked at than before."""
+        """`state` gives the daemon's state; `changed` is called when other sensors are looked at than before."""
         self._hub, self._state, self._changed = hub, state, changed
-        self._made: dict[tuple[str, bool], tuple[float, Reply | None]] = {}  # s, and the view
+        self._made: dict[tuple[str, bool], tuple[float, Reply | None]] = {}  # when (s), and the view
         self._looks: dict[Connection, Look] = {}
-        self._due: set[str] = set()  # sensors that are looked at, with something new
+        self._due: set[str] = set()  # sensors that are looked at and have sent frames since
         self._said: list[tuple[Event, float, bool]] = []  # events that those who look have not been told, as published
         self._state_due = False
         self._timer: asyncio.Handle | None = None
@@ -52,11 +52,11 @@ class Views:
 
     @property
     def sensors(self) -> frozenset[str]:
-        """Those that somebody looks at."""
+        """The sensors that somebody looks at."""
         return frozenset().union(*(look.sensors for look in self._looks.values()))
 
     def view(self, sensor: str, *, raw: bool) -> Reply | None:
-        """A sensor as it is felt now, the same for who asks again within VIEW_S; None where it was not heard."""
+        """A sensor as it is felt now, or up to VIEW_S s ago; None where it was not heard."""
         made, view = self._made.get((sensor, raw), (-math.inf, None))
         return view if time.monotonic() - made < VIEW_S else self._make(sensor, raw)
 
@@ -76,7 +76,7 @@ class Views:
             self._expect({name for look in self._looks.values() for name in look.sensors & arrived})
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
-        """A sink: what was published is told to who looks. The status is not: the state says more."""
+        """Take an event, as a sink, for all who look on. The status is left out, since the state says more."""
         if self._looks and not isinstance(event, Status):
             self._said.append((event, epoch, test))
             self._expect(())
@@ -130,7 +130,7 @@ class Views:
                 self._send(json_line({"type": "view"} | view), lookers)
 
     def _send(self, line: bytes, connections: Collection[Connection]) -> None:
-        """Send what is replaced by the next one: who has not read the last ones misses it."""
+        """Send a view or a state; a connection that has not read the last ones misses it."""
         for connection in connections:
             if connection.unread <= UNREAD_BYTES:
                 connection.send(line)
