@@ -143,23 +143,6 @@ def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None) -> dict
     }
 
 
-def events(asked: Asked, provisional: dict[str, Any], gestures: Sequence[str]) -> NDArray[np.int64]:
-    """(G,) the question at which each contact's provisional event is given, -1 for none.
-
-    `provisional` is a rule as `calibrated` gives it, for which one frame is enough.
-    """
-    rows = [provisional["gestures"].get(name, provisional["thresholds"]) for name in gestures]
-    level = np.array([[np.inf if value is None else value for value in row] for row in rows])
-    return by_contact(asked.confidence >= level[asked.best, asked.stretch], asked)
-
-
-def by_contact(sure_enough: NDArray[np.bool_], asked: Asked) -> NDArray[np.int64]:
-    """(G,) the first question about each contact that is sure enough, -1 for none."""
-    found, first = np.full(len(asked.answer), -1, np.int64), given(sure_enough, asked.contact)
-    found[asked.contact[first]] = first
-    return found
-
-
 def published(answers: Answers, least: float) -> NDArray[np.int64]:
     """(N,) the gesture that is published from a confidence of `least` on, -1 for none."""
     return np.where(confidence(answers) >= least, answers[0].argmax(axis=1), -1)

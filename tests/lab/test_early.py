@@ -1,12 +1,24 @@
 """Thresholds for provisional events: what they promise holds on people who were not learned from."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from gestured.lab.early import CONFIRMED, STRETCHES, Asked, calibrated, chance_of, events
+from gestured.lab.early import CONFIRMED, STRETCHES, Asked, calibrated, chance_of, given
 
 GESTURES = ("swipe_up", "swipe_down")
 NONE = -1
+
+
+def events(asked: Asked, provisional: dict[str, Any], gestures: tuple[str, ...]) -> np.ndarray:
+    """(G,) the question at which each contact's provisional event is given, -1 for none: one frame is enough."""
+    rows = [provisional["gestures"].get(name, provisional["thresholds"]) for name in gestures]
+    level = np.array([[np.inf if value is None else value for value in row] for row in rows])
+    found = np.full(len(asked.answer), -1, np.int64)
+    first = given(asked.confidence >= level[asked.best, asked.stretch], asked.contact)
+    found[asked.contact[first]] = first
+    return found
 
 
 def world(seed: int, contacts: int = 4000, *, honest: bool = True, people: int | None = None) -> Asked:

@@ -52,12 +52,7 @@ def said(model: Path) -> list[Origin] | None:
         return None
     try:
         return [
-            Origin(
-                str(o["file"]),
-                str(o["sha256"]),
-                [str(s) for s in o["subjects"]],
-                {str(s): str(day) for s, day in o.get("consents", {}).items()},
-            )
+            Origin(str(o["file"]), str(o["sha256"]), [str(s) for s in o["subjects"]], dict(o.get("consents", {})))
             for o in json.loads(text)
         ]
     except (TypeError, KeyError, AttributeError, RecursionError) as error:

@@ -14,12 +14,6 @@ from gestured.lab.recordings.quality import Captured
 from gestured.record.check import EVENT_FIELDS, FINGERS
 from gestured.record.recordings import Recordings
 
-UNKNOWN_VALUES = {
-    "speeds": "",
-    "inclinations": "",
-    "kinds": "",
-    "consents": "",
-}  # where one set has the field and one has not
 TOGETHER = ("onsets", "releases")  # are left out where one set does not know them
 
 
@@ -62,7 +56,7 @@ def _unknown(field: str, part: Recordings) -> NDArray[Any]:
         return np.full((len(part.frames), FINGERS, 2), np.nan, np.float32)
     if field == "touch_ids":
         return np.full((len(part.frames), FINGERS), -1, np.int32)
-    return np.full(len(part), UNKNOWN_VALUES[field])
+    return np.full(len(part), "")
 
 
 def compact(frames: NDArray[Any]) -> NDArray[Any]:

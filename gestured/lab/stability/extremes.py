@@ -15,7 +15,7 @@ from gestured.core.frames import Segment
 from gestured.core.window import Window
 from gestured.lab.samples import WINDOW
 from gestured.lab.stability.path import events, fault, labels
-from gestured.lab.stability.segments import broken_segments, segment_cases
+from gestured.lab.stability.segments import segment_cases
 from gestured.lab.stability.streams import Case, streams
 from gestured.lab.table import Table, Value
 from gestured.model.features import touch_pattern
@@ -75,9 +75,6 @@ def parts_table(models: list[Model], quick: bool) -> Table:
     kept: dict[str, list[str]] = {}
     for family, segment in segment_cases(quick):
         kept.setdefault(family, []).append(_parts(segment, models))
-    for family, segment in broken_segments(quick):
-        sure = [model.name for model in models if model.classify(segment).unknown != 1.0]
-        kept.setdefault(family, []).append(f"{', '.join(sure)} gave an answer" if sure else "")
     rows: list[tuple[Value, ...]] = [
         (family, len(found), sum(map(bool, found)), next(filter(None, found), "")) for family, found in kept.items()
     ]
@@ -87,8 +84,7 @@ def parts_table(models: list[Model], quick: bool) -> Table:
         rows,
         (
             f"Each segment through {len(WINDOWS)} windows, their features and the {len(models)} shipped models.",
-            "Faults: a warning, a window outside 0 to 1, anything not finite, scores that are no probabilities;",
-            "and any answer but unknown to what is not finite.",
+            "Faults: a warning, a window outside 0 to 1, anything not finite, scores that are no probabilities.",
         ),
     )
 

@@ -42,13 +42,3 @@ def segment_cases(quick: bool) -> Iterator[tuple[str, Segment]]:
         moved = np.array([finger(shape[0] / 2, shape[1] * k / 12, *shape, 1.0) for k in range(12)])
         for frames in (moved, -moved, 0.0 * moved, 0.0 * moved + FINITE[0]):
             yield "2 x 2 to 64 x 64", made(frames)
-
-
-def broken_segments(quick: bool) -> Iterator[tuple[str, Segment]]:
-    """What is not finite, at each place of three frames."""
-    for place in range(0, 3 * 81, 9 if quick else 1):
-        for value in (np.nan, np.inf, -np.inf):
-            frames = np.zeros(3 * 81, np.float32)
-            frames[:81] = SIGNAL
-            frames[place] = value
-            yield "NaN, infinity at each position", Segment(frames.reshape(3, 9, 9), np.arange(3) / 15, 0, 2, NOISE)

@@ -4,7 +4,7 @@ The rooms, from the data to the figures:
 
     cohort, material      what is learned from and judged on
     shifting              the paper's Algorithm 1
-    wavelets, touch_patterns, motion_history, trajectory_boosting      what a classifier sees of a gesture
+    views, wavelets       what a classifier sees of a gesture
     nets, training        the networks; vectors: a support vector machine for many features
     onnx_form, boosted    what was learned, as it would ship
     methods               the registry: each method, its hyperparameters, the paper's figures

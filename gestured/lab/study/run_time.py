@@ -30,8 +30,7 @@ from gestured.lab.study.cohort import Cohort
 from gestured.lab.study.material import Data
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.runners import Runner, runners
-from gestured.lab.study.trajectory_boosting import trajectory_row
-from gestured.lab.study.views import Values
+from gestured.lab.study.views import Values, trajectory_row
 from gestured.simulator import GESTURES
 
 WARM = 20  # gestures that are answered before anything is timed

@@ -5,18 +5,80 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
+from gestured.lab.fit import batch_of
 from gestured.lab.samples import WINDOW, Samples
-from gestured.lab.study.motion_history import motion_history
-from gestured.lab.study.touch_patterns import paper_features
 from gestured.lab.study.training import Images, Windows
-from gestured.lab.study.trajectory_boosting import trajectory_matrix, trajectory_row
 from gestured.lab.study.wavelets import spatio_temporal
-from gestured.model.features import touch_pattern
+from gestured.lab.trajectory import trajectory_features
+from gestured.model.features import PRESSED, touch_pattern
 
 Values = Mapping[str, Any]  # hyperparameters
 Rows = NDArray[np.float32]
+WHOLE = 0.0  # the decay of a motion history takes as long as the gesture
+BATCH_WINDOWS = 256
+
+
+def motion_history(window: NDArray[np.floating], decay_s: float = WHOLE) -> NDArray[np.float32]:
+    """(T, R, C) window -> (R, C) image, 0..1: the whole gesture, in which what was pressed last is brightest.
+
+    A taxel is 1 while it is pressed and falls linearly afterwards, to 0 after `decay_s` (Bobick and Davis 2001, with
+    the pressed taxels in the place of moving ones). The image is taken at the last frame with contact. The paper leaves
+    the decay open. Ours is as long as the gesture itself (0 stands for that), so that a slow swipe and a fast one leave
+    the same picture. A taxel is pressed from a fifth of the gesture's peak on.
+    """
+    pressed = window >= PRESSED
+    frames = np.flatnonzero(pressed.any(axis=(1, 2)))
+    if not len(frames):
+        return np.zeros(window.shape[1:], np.float32)
+    pressed = pressed[frames[0] : frames[-1] + 1]
+    time = len(pressed)
+    age = pressed[::-1].argmax(axis=0)  # frames since it was pressed
+    decay = decay_s * WINDOW.rate_hz if decay_s > 0 else float(time)
+    image = np.maximum(1.0 - age / decay, 0.0) * pressed.any(axis=0)
+    return np.asarray(image, np.float32)
+
+
+def paper_features(window: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(T, R, C) window -> (6 + R + C,) the paper's touch-pattern features, which ignore the order of frames.
+
+    Mean pressure over taxels and time; the maximum over both; variability, the mean absolute difference of successive
+    frames over all taxels; the mean of each row and of each column; the largest and the mean contact area of a frame;
+    the duration. The daemon's own set (`gestured.model.features`) takes standard deviations in the place of that
+    variability, the mean of the frames' maxima in the place of the maximum, and has the maxima and the variability of
+    rows and columns. The paper leaves open from which pressure on a taxel is in contact. Ours is `PRESSED` of the
+    gesture's peak. Frames without contact count for nothing, so padding changes nothing.
+    """
+    touched = window[window.max(axis=(1, 2)) >= PRESSED].astype(np.float64)
+    if not len(touched):
+        touched = window[:1].astype(np.float64)
+    steps = np.abs(np.diff(touched, axis=0))
+    area = (touched >= PRESSED).mean(axis=(1, 2))
+    values = [
+        [touched.mean(), touched.max(), steps.mean() if len(steps) else 0.0],
+        touched.mean(axis=(0, 2)),
+        touched.mean(axis=(0, 1)),
+        [area.max(), area.mean(), len(touched) / WINDOW.rate_hz],
+    ]
+    return np.concatenate(values).astype(np.float32)
+
+
+def trajectory_matrix(samples: Samples) -> NDArray[np.float32]:
+    """(G, F) trajectory features of all samples, by the code that stands in the shipped models' graph."""
+    order = np.argsort(samples.lengths(), kind="stable")
+    batches = [order[i : i + BATCH_WINDOWS] for i in range(0, len(order), BATCH_WINDOWS)]
+    with torch.no_grad():
+        parts = [trajectory_features(*batch_of(samples, batch)).numpy() for batch in batches]
+    found = np.concatenate(parts)
+    return np.asarray(found[np.argsort(order, kind="stable")], np.float32)
+
+
+def trajectory_row(window: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(T, R, C) window -> (1, F)."""
+    with torch.no_grad():
+        return np.asarray(trajectory_features(torch.from_numpy(window[None])).numpy(), np.float32)
 
 
 @dataclass(frozen=True)

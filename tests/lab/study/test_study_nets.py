@@ -9,7 +9,7 @@ from gestured.lab.study import onnx_form, training
 from gestured.lab.study.material import classes
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.nets import HistoryNet, sequence_net
-from gestured.lab.study.trajectory_boosting import trajectory_matrix
+from gestured.lab.study.views import trajectory_matrix
 from tests.lab.study.material_made import samples
 
 KINDS = ("lstm", "cnn_lstm", "cnn_gru", "tcn", "transformer")

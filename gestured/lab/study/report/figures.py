@@ -1,4 +1,4 @@
-"""The page's figures: the paper's shares and ours, which gesture is taken for which, and how sure a method is."""
+"""The page's figures: the paper's shares and ours, and which gesture is taken for which."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import PercentFormatter
 
 from . import reading
-from .drawing import GRID, INK, SOFT, Mark, mark_of, sheet
+from .drawing import GRID, INK, Mark, sheet
 from .reading import Row, Study
 
 PROTOCOLS = {
@@ -73,20 +73,4 @@ def confusion(study: Study) -> Figure:
         axes.set_yticks(range(len(names)), names)
         for i, j in np.argwhere(shares):
             axes.text(j, i, f"{shares[i, j]:.0f}", ha="center", va="center", fontsize=8)
-    return figure
-
-
-def calibration(study: Study) -> Figure:
-    """How often an answer of a given confidence is right, by method; below the dashed line it is too sure."""
-    figure = sheet(900, 420)
-    axes = figure.subplots()
-    axes.plot([0, 1], [0, 1], color=SOFT, linewidth=1, linestyle="--")
-    for row in study["calibration"]:
-        mark = mark_of(study, row["method"])
-        at, right = ([group[name] for group in row["bins"]] for name in ("confidence", "right"))
-        axes.plot(at, right, label=reading.title(study, row["method"]), **mark.style | {"linestyle": "-", "lw": 1})
-    axes.set(xlim=(0, 1), ylim=(0, 1), title="right, per cent", xlabel="confidence, per cent")
-    axes.xaxis.set_major_formatter(PercentFormatter(1, symbol=""))
-    axes.yaxis.set_major_formatter(PercentFormatter(1, symbol=""))
-    figure.legend(loc="outside right upper", frameon=False)
     return figure

@@ -13,7 +13,6 @@ FIGURES = {  # title -> the part of the study that it needs, and how it is drawn
     "The published figures and ours": ("cells", figures.overview),
     picture.TITLE: ("run_time", lambda study: picture.operating_points(picture.points(study))),
     "Which gesture is taken for which": ("cells", figures.confusion),
-    "How sure the methods are": ("calibration", figures.calibration),
 }
 TABLE = re.compile(r"^### (?P<title>.*)\n\n(?:(?P<notes>[^|].*)\n\n)?(?P<lines>(?:^\|.*\n)+)", re.MULTILINE)
 EMPTY = re.compile(r"^### .*\n\n(?:[^|\n].*\n\n)?(?:^\|.*\n){2}(?!\|)\n?", re.MULTILINE)  # a table without a row
