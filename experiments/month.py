@@ -16,8 +16,7 @@ from gestured.core.facts import events_of
 from gestured.core.frames import Frame
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
-from gestured.lab.stability.made import IDLE_LEVEL, NOISE, swipes
-from gestured.lab.stability.path import labels
+from gestured.lab.stability.path import IDLE_LEVEL, NOISE, labels, swipes
 from gestured.lab.table import Table
 from gestured.model.opening import open_model
 

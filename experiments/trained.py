@@ -21,10 +21,15 @@ def options(text: str | None) -> argparse.ArgumentParser:
     return parser
 
 
-def trained(args: argparse.Namespace) -> tuple[TrainingPlan, TrainingData, Trained]:
-    """The plan, its data and its networks."""
+def loaded(args: argparse.Namespace) -> tuple[TrainingPlan, TrainingData]:
+    """The plan and its data."""
     torch.set_num_threads(args.jobs)
     plan = TrainingPlan.quick() if args.quick else TrainingPlan()
     args.cache.mkdir(parents=True, exist_ok=True)
-    data = load_data(plan, args.cache, args.real, args.jobs, args.recordings)
+    return plan, load_data(plan, args.cache, args.real, args.jobs, args.recordings)
+
+
+def trained(args: argparse.Namespace) -> tuple[TrainingPlan, TrainingData, Trained]:
+    """The plan, its data and its networks."""
+    plan, data = loaded(args)
     return plan, data, learn(plan, data, args.cache)

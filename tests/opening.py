@@ -53,14 +53,14 @@ def mcap(path: Path) -> object:
 
 def csv(path: Path) -> object:
     """As `import` reads one gesture."""
-    from gestured.lab.recordings.sources import Csv, read_csv
+    from gestured.lab.recordings.importing import Csv, read_csv
 
     return read_csv(path, Csv(3, 3, "s", "swipe_left", "07", ""))
 
 
 def wide(path: Path) -> object:
     """As `import` reads a session of a large sensor."""
-    from gestured.lab.recordings.sources import Csv, read_csv
+    from gestured.lab.recordings.importing import Csv, read_csv
 
     return read_csv(path, Csv(64, 64, "s", "session", "07", ""))
 

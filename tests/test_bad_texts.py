@@ -27,11 +27,11 @@ def test_a_file_of_nothing_but_bad_lines_is_given_up(tmp_path: Path) -> None:
 
 
 def test_frames_of_a_text_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from gestured.lab.recordings import sources
+    from gestured.lab.recordings import importing
 
     path = tmp_path / "a.csv"
     path.write_text("".join(f"{k}," + ",".join("0" * 9) + "\n" for k in range(100)))
-    monkeypatch.setattr(sources, "NUMBERS", 500)
+    monkeypatch.setattr(importing, "NUMBERS", 500)
     assert "expected at most 500 numbers" in refused("csv", path)
 
 

@@ -55,12 +55,8 @@ def parser() -> argparse.ArgumentParser:
 
     def add_data(command: argparse.ArgumentParser) -> None:
         add_work(command)
-        command.add_argument(
-            "--real",
-            type=Path,
-            metavar="FOLDER",
-            help="folder of real recordings, as docs/training.md has it (default: simulated people alone)",
-        )
+        command.add_argument("--real", type=Path, metavar="FOLDER", help="folder of real recordings, as "
+                             "docs/training.md has it (default: simulated people alone)")  # fmt: skip
 
     mine: dict[str, Any] = {"type": Path, "nargs": "+", "default": [], "metavar": "FILE"}
     train = add("train", "train the three models from nothing; goes on where it was interrupted",
@@ -90,13 +86,8 @@ def parser() -> argparse.ArgumentParser:
                    "writes cards and manifest",
                    "gestured-lab evaluate --models models")  # fmt: skip
     evaluate.add_argument("--models", type=Path, default=MODELS, help=f"folder of the models (default: {MODELS})")
-    evaluate.add_argument("--curve", action="store_true", help="also print right, wrong and accepted by threshold")
-    evaluate.add_argument(
-        "--document",
-        type=Path,
-        metavar="FILE",
-        help="a page whose tables of figures are written anew, such as docs/figures.md",
-    )
+    evaluate.add_argument("--document", type=Path, metavar="FILE", help="a page whose tables of figures are "
+                          "written anew, such as docs/figures.md")  # fmt: skip
     evaluate.add_argument("--recordings", **mine, help="the recordings with which the models were trained")
     add_data(evaluate)
     online = add("online", "start a daemon, send it continuous simulated sessions over UDP, and score its events",
@@ -125,8 +116,8 @@ def parser() -> argparse.ArgumentParser:
         "--seed", type=int, default=0, help="of splits and training: same seed, same numbers (default: 0)"
     )
     add_data(study)
-    own = add("own", "learn what a model needs for gestures of your own, and write it into its file; "
-              "prints what enrolment is worth", "gestured-lab own models/cnn_lstm.onnx")  # fmt: skip
+    own = add("own", "learn what a model needs for gestures of your own, and write it into its file",
+              "gestured-lab own models/cnn_lstm.onnx")  # fmt: skip
     own.add_argument("models", type=Path, nargs="+", metavar="MODEL", help="an .onnx file that has an embedding")
     add_work(own)
     add_recordings(add)

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from gestured.lab.decide import THRESHOLDS, Answers, confidence, curve, decided
+from gestured.lab.decide import Answers, confidence, decided
 from gestured.lab.fit import RECURRENT, padded, targets
 from gestured.lab.samples import Samples
 from gestured.lab.study.bootstrap import interval
@@ -133,17 +133,6 @@ def simulated_figures(models: Mapping[str, Path], data: TrainingData) -> dict[st
             found[name][test] = asdict(result) | {"kinds": by_kind(given, samples, model.threshold)}
             print(result.rows(f"{name}, simulated, {test}"), flush=True)
     return found
-
-
-def print_curve(name: str, path: Path, data: TrainingData) -> None:
-    """Right, wrong and accepted of a model on the test sets by the threshold from which answers are published."""
-    model = open_model(path)
-    points = {test: curve(model_answers(model, s), targets(s)) for test, s in data.tests.items()}
-    print(f"{name}: published from {model.threshold:.2f}", flush=True)
-    print(f"{'threshold':>9}" + "".join(f"  {test + ': right':>16}{'wrong':>8}{'accepted':>10}" for test in points))
-    for k, least in list(enumerate(THRESHOLDS))[::5]:
-        cells = "".join(f"  {found[k][0]:>16.3f}{found[k][1]:>8.3f}{found[k][2]:>10.3f}" for found in points.values())
-        print(f"{least:>9.2f}{cells}", flush=True)
 
 
 def by_kind(given: Answers, samples: Samples, least: float) -> dict[str, float]:

@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     counts: Counter[str] = Counter()
     wrong: Counter[str] = Counter()
     waits: list[float] = []
-    minutes, false, idle_false, idle_minutes, real_s, took_s = 0.0, 0, 0, 0.0, 0.0, 0.0
+    minutes, idle_false, idle_minutes, real_s, took_s = 0.0, 0, 0.0, 0.0, 0.0
     todo = list(takes(args.minutes, args.idle_minutes, args.seed))
     for what, take in progress(todo, len(todo), "sessions"):
         events, zero, took = play(args.model, take, args.speed)
@@ -104,14 +104,13 @@ def run(args: argparse.Namespace) -> int:
                 wrong[f"{done} -> {outcome.event['gesture']}"] += 1
         counts.update(tally.counts)
         waits += tally.latencies
-        false += tally.counts["false"]
     gestures = counts["right"] + counts["wrong"] + counts["missed"]
     figures = {
         "model": args.model, "data": "simulated: gestured's own simulator, nominal sensor, new participants",
         "minutes": round(minutes, 1), "gestures": gestures,
         "right": round(counts["right"] / max(gestures, 1), 4), "wrong": round(counts["wrong"] / max(gestures, 1), 4),
         "missed": round(counts["missed"] / max(gestures, 1), 4),
-        "false_per_minute": round(false / max(minutes, 1e-9), 3), "non_gestures_rejected": counts["rejected"],
+        "false_per_minute": round(counts["false"] / max(minutes, 1e-9), 3), "non_gestures_rejected": counts["rejected"],
         "idle_minutes": round(idle_minutes, 1), "idle_false": idle_false,
         "decided_after_s_median": round(median(waits), 3) if waits else None,
         "decided_after_s_p95": round(float(np.quantile(waits, 0.95)), 3) if waits else None,

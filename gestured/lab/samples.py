@@ -53,13 +53,7 @@ class Samples:
     def digest(self) -> str:
         """The SHA-256 of all that the samples hold."""
         total = hashlib.sha256()
-        for array in (
-            self.frames,
-            self.offsets,
-            self.labels.astype("U40"),
-            self.kinds.astype("U40"),
-            self.people,
-        ):
+        for array in (self.frames, self.offsets, self.labels.astype("U40"), self.kinds.astype("U40"), self.people):
             total.update(np.ascontiguousarray(array).tobytes())
         return total.hexdigest()
 

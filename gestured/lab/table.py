@@ -2,8 +2,7 @@
 
 import textwrap
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass, field
 
 Value = str | int | float
 
@@ -18,20 +17,13 @@ class Table:
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        cells = [self.head, *self.cells()]
+        cells = [[f"{cell:.2g}" if isinstance(cell, float) else str(cell) for cell in row]
+                 for row in (self.head, *self.rows)]  # fmt: skip
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
         lines = [_line(row, widths) for row in cells]
         rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
         notes = textwrap.fill(" ".join(self.notes), 118)
         return "\n".join([f"### {self.title}", "", lines[0], rule, *lines[1:], "", notes, ""])
-
-    def cells(self) -> list[list[str]]:
-        """The rows as they are shown."""
-        return [[f"{cell:.2g}" if isinstance(cell, float) else str(cell) for cell in row] for row in self.rows]
-
-    def plain(self) -> dict[str, Any]:
-        """The same as JSON values."""
-        return asdict(self)
 
 
 def _line(cells: Sequence[str], widths: Sequence[int]) -> str:

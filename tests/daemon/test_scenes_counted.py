@@ -10,7 +10,7 @@ from benchmarks.scenes_counted import Count, counted, table
 from gestured.client.osc_out import dated
 from gestured.client.sensor import Form
 from gestured.core.frames import Frame
-from gestured.lab.stability.made import swipes
+from gestured.lab.stability.path import swipes
 from gestured.model.shipped import shipped
 
 

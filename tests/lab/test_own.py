@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments.own import figures
 from gestured.core.errors import ModelError
 from gestured.core.own import EXAMPLES
 from gestured.lab.own import command
-from gestured.lab.own.learn import Seen, figures, learn, played_through
+from gestured.lab.own.learn import Seen, learn, played_through
 from gestured.lab.own.play import PLAN, REPETITIONS, repeated
 from gestured.lab.own.signs import JUDGED, LEARNED, SIGNS, sign
 from gestured.lab.samples import Sample, Samples, collect

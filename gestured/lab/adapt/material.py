@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.dataset import recorded
-from gestured.lab.recordings.sources import UNNAMED
+from gestured.lab.recordings.importing import UNNAMED
 from gestured.lab.recordings.store import touched
 from gestured.lab.samples import Samples, collect, join
 from gestured.record.arrays import read

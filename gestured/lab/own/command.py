@@ -1,41 +1,31 @@
 """`gestured-lab own`: what a model needs to learn its user's own gestures, learned and written into its file."""
 
 import argparse
-import json
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import onnx
 
+from gestured.client.say import tell
 from gestured.core.errors import ModelError
+from gestured.core.own import EXAMPLES
 from gestured.lab.manifest import NAME, measured, write_manifest
-from gestured.lab.own.learn import Figures, Seen, figures, learn, played_through
+from gestured.lab.own.learn import Seen, learn
 from gestured.lab.own.play import played
-from gestured.lab.own.signs import JUDGED
 from gestured.model.file import read_bytes, sealed
 from gestured.model.model import Model
 from gestured.model.prototypes import Space
 from gestured.record.files import PUBLIC, atomic_write
 
-PEOPLE, JUDGES = 20, 12  # people to learn from, and others to judge by
+PEOPLE = 20  # to learn from
 QUICK_PEOPLE = 3
 
 
 def run(args: argparse.Namespace) -> int:
-    """Learn it for each model, write it, and print what enrolment is worth then."""
-    people, judges = (QUICK_PEOPLE, QUICK_PEOPLE) if args.quick else (PEOPLE, JUDGES)
-    told: dict[str, Any] = {}
+    """Learn it for each model, and write it into its file."""
     for path in args.models:
-        space = teach(path, args.cache, people, args.jobs)
-        samples = played(args.cache, judges, args.jobs, judge=True)
-        seen = Seen.by(_embedding(path), samples)
-        found = figures(space, (trial for trial in played_through(seen, space) if trial.kind in JUDGED))
-        told[str(path)] = {"prototypes": [asdict(one) for one in found]}
-        if not args.json:
-            print(table(path.stem, found), flush=True)
-    if args.json:
-        print(json.dumps(told, indent=2))
+        space = teach(path, args.cache, QUICK_PEOPLE if args.quick else PEOPLE, args.jobs)
+        told = {"model": str(path), "examples": EXAMPLES, "directions": len(space.directions)}
+        tell(args.json, told, f"{path}: learned from {len(space.directions)} directions of its embedding, and written")
     return 0
 
 
@@ -44,7 +34,7 @@ def teach(path: Path, cache: Path, people: int, jobs: int) -> Space:
 
     Raises ModelError for a model without one.
     """
-    space = learn(Seen.by(_embedding(path), played(cache, people, jobs)))
+    space = learn(Seen.by(embedding_of(path), played(cache, people, jobs)))
     figures_of = {model.stem: measured(model) for model in path.parent.glob("*.onnx")}  # the graph stays the same
     proto = onnx.load(path)
     kept = {one.key: one.value for one in proto.metadata_props if one.key != "digest"} | {"own": space.to_json()}
@@ -69,19 +59,9 @@ def open_file(path: Path) -> Model:
         raise ModelError(f"{path}: {error}") from error
 
 
-def _embedding(path: Path) -> Model:
+def embedding_of(path: Path) -> Model:
+    """A model that can compare examples; ModelError for one that has no embedding."""
     model = open_file(path)
     if not model.embeds:
         raise ModelError(f"{path}: has no output 'embedding', expected a model that gestured-lab train made")
     return model
-
-
-def table(name: str, found: list[Figures]) -> str:
-    """The figures for a person."""
-    head = f"{'examples':<10}{'can be enrolled':>17}{'recall':>10}{'others accepted':>17}{'built-in taken':>17}"
-    lines = [f"{name}: gestures that nobody has enrolled before, of people whom nothing was learned from", head]
-    lines += [
-        f"{one.examples:<10}{one.enrolled:>17.3f}{one.recall:>10.3f}{one.accepted:>17.4f}{one.taken:>17.4f}"
-        for one in found
-    ]
-    return "\n".join(lines)

@@ -193,29 +193,3 @@ def _shrunk(covariance: Array) -> Array:
     size = len(covariance)
     even = np.trace(covariance) / size * np.eye(size)
     return np.asarray((1.0 - DIAGONAL) * covariance + DIAGONAL * np.diag(np.diag(covariance)) + EVEN * even)
-
-
-@dataclass(frozen=True, slots=True)
-class Figures:
-    """What enrolment is worth after so many examples; shares."""
-
-    examples: int
-    enrolled: float  # of the gestures: the others are refused as too near to one of the model's
-    recall: float  # further repetitions that are recognised
-    accepted: float  # other non-gestures that are taken for it
-    taken: float  # the model's gestures that are taken for it
-
-
-def figures(space: Space, trials: Iterator[Trial]) -> list[Figures]:
-    """For each number of examples, with the thresholds and the margin of a space."""
-    every = list(trials)
-    found = []
-    for count in range(1, EXAMPLES + 1):
-        some = [trial for trial in every if trial.examples == count]
-        fit = [trial for trial in some if trial.fits]
-
-        def share(of: str, fit: list[Trial] = fit, least: float = space.thresholds[count - 1]) -> float:
-            return float(np.concatenate([getattr(trial, of).taken(least, space.margin) for trial in fit]).mean())
-
-        found.append(Figures(count, len(fit) / len(some), share("again"), share("others"), share("gestures")))
-    return found

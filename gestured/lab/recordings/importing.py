@@ -1,16 +1,64 @@
-"""`gestured-lab import`: CSV files -> one file of recordings."""
+"""`gestured-lab import`: CSV with one row a frame -> one file of recordings.
+
+A line that is no frame is left out and told; its frame counts as lost, which the times show. Where that is more than
+half of a file, its form is another one, and the file is refused.
+"""
 
 import argparse
 import sys
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from io import TextIOWrapper
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gestured.client.say import say, tell
 from gestured.core.errors import GesturedError, RecordingError
-from gestured.lab.recordings.sources import Csv, LeftOut, read_csv
-from gestured.lab.recordings.store import join_recordings
+from gestured.lab.recordings.store import compact, join_recordings, touched
 from gestured.record.arrays import write
+from gestured.record.check import SESSION
+from gestured.record.files import open_regular
 from gestured.record.recordings import Recordings
 
+UNNAMED = "other"  # something was performed, and nobody knows exactly what
+UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+LINE = 256 << 10  # characters of a line; 64 x 64 numbers with all their digits have half as many
+NUMBERS = 1 << 27  # of all frames of a file: a gibibyte in memory
+BAD_LINES = 10_000  # lines of a file that are left out and named; with more it is no file of this kind
 LEFT_OUT_SHOWN = 10  # of the lines that were left out; the rest is counted
+LARGEST_COUNT = 1e30  # of any number; sums and differences of such counts still fit into a float32
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """A line that is no frame."""
+
+    file: Path
+    line: int
+    reason: str  # the field, and what was expected
+
+    def __str__(self) -> str:
+        return f"{self.file}: line {self.line} is left out: {self.reason}"
+
+
+@dataclass(frozen=True, slots=True)
+class Csv:
+    """What a CSV file does not say itself.
+
+    It holds one recording, a row for each frame: time, then rows x columns values, row by row, the top row first;
+    commas between them, a heading or none.
+    """
+
+    rows: int
+    columns: int
+    unit: str  # of the time: a key of UNITS
+    label: str  # a gesture, "none" or "session"
+    participant: str
+    consent: str  # YYYY-MM-DD, or empty
 
 
 def run(args: argparse.Namespace) -> int:
@@ -42,3 +90,97 @@ def run(args: argparse.Namespace) -> int:
     words = f"{len(together)} recordings, {len(together.frames)} frames"
     tell(args.json, found, f"{args.out}: {words}; left out: {len(refused)} files, {len(left)} lines")
     return 0
+
+
+def read_csv(path: Path, form: Csv) -> tuple[Recordings, list[LeftOut]]:
+    """One recording; RecordingError where the file does not hold one."""
+    times: list[float] = []
+    values = array("d")
+    last: list[float] = []
+    left: list[LeftOut] = []
+    for number, text in _lines(path):
+        cells = text.split(",")
+        if number == 1 and _number(cells[0]) is None:
+            continue  # a heading
+        try:
+            t, *counts = _numbers(cells, 1 + form.rows * form.columns)
+            t *= UNITS[form.unit]
+            if times and t == times[-1] and counts == last:
+                continue  # the same frame again
+            if times and t <= times[-1]:
+                raise ValueError(f"time: expected later than {times[-1]:.6f} s, found {t:.6f} s")
+        except ValueError as error:
+            _leave(left, LeftOut(path, number, str(error)))
+            continue
+        if len(values) + len(counts) > NUMBERS:
+            raise RecordingError(f"{path}: line {number}: expected at most {NUMBERS} numbers in a file; split it")
+        times.append(t)
+        values.extend(counts)
+        last = counts
+    if len(times) < 2 or len(left) > len(times):
+        first = f"; {left[0].reason} (line {left[0].line})" if left else ""
+        raise RecordingError(f"{path}: expected frames, found {len(times)} and {len(left)} lines that are none{first}")
+    frames = compact(np.frombuffer(values).reshape(-1, form.rows, form.columns))
+    return _marked(frames, np.array(times), path, form), left
+
+
+def _marked(frames: NDArray[np.generic], times: NDArray[np.float64], path: Path, form: Csv) -> Recordings:
+    """One recording of (T, R, C) frames felt at (T,) s; of a gesture with its first and last touched frame."""
+    whole = Recordings(
+        frames=frames,
+        times=times - times[0],
+        offsets=np.array([0, len(times)], np.int64),
+        labels=np.array([form.label]),
+        subjects=np.array([form.participant]),
+        kinds=np.array([form.label]),
+        consents=np.array([form.consent]),
+    )
+    if form.label == SESSION:
+        return whole
+    contact = touched(frames, times - times[0])
+    if contact is None:
+        raise RecordingError(f"{path}: frames: expected one {form.label} with untouched frames before or after it")
+    return replace(whole, onsets=np.array(contact[:1]), releases=np.array(contact[1:]))
+
+
+def _leave(left: list[LeftOut], line: LeftOut) -> None:
+    """Leave a line out. RecordingError where so many are bad that nobody needs a list of them."""
+    if len(left) >= BAD_LINES:
+        raise RecordingError(
+            f"{line.file}: expected frames, found more than {BAD_LINES} lines that are none; {line.reason}"
+        )
+    left.append(line)
+
+
+def _lines(path: Path) -> Iterator[tuple[int, str]]:
+    """The lines that are not empty, with their numbers from 1. RecordingError for one that no frame needs."""
+    try:
+        with TextIOWrapper(open_regular(path), encoding="utf-8-sig", errors="replace") as file:
+            for number in count(1):
+                line = file.readline(LINE + 1)
+                if not line:
+                    return
+                if len(line) > LINE:
+                    raise RecordingError(f"{path}: line {number}: expected at most {LINE} characters")
+                if text := line.strip():
+                    yield number, text
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def _number(cell: str) -> float | None:
+    try:
+        return float(cell)
+    except ValueError:
+        return None
+
+
+def _numbers(cells: list[str], count: int) -> list[float]:
+    """ValueError, with the field, for what is no frame."""
+    if len(cells) != count:
+        raise ValueError(f"line: expected {count} numbers, found {len(cells)}")
+    found = [_number(cell) for cell in cells]
+    for k, value in enumerate(found, 1):
+        if value is None or not abs(value) <= LARGEST_COUNT:
+            raise ValueError(f"number {k}: expected a finite number, found {cells[k - 1][:20]!r}")
+    return [value for value in found if value is not None]

@@ -5,6 +5,7 @@ import json
 import os
 import platform
 from collections.abc import Iterator
+from dataclasses import asdict
 from datetime import date
 
 import numpy as np
@@ -24,9 +25,8 @@ from gestured.model.shipped import LADDER, shipped
 def all_tables(quick: bool) -> Iterator[Table]:
     """One after the other, as they are done."""
     yield filters_table(quick)
-    models = {name: open_model(name) for name in LADDER}
-    yield parts_table(list(models.values()), quick)
-    yield whole_path_table(models[LADDER[0]], quick)
+    yield parts_table(quick)
+    yield whole_path_table(open_model(LADDER[0]), quick)
     streams = [stream for _, stream in simulated_series(10 if quick else 60)]
     windows = [WINDOW.apply(segment) for stream in streams for segment in cuts(stream.frames, stream.times)]
     yield decisions_table(LADDER, windows, quick)
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"{where}\n{made_of('gestured-lab stability', shipped().values())}\n")
     done = []
     for table in all_tables(args.quick):
-        done.append(table.plain())
+        done.append(asdict(table))
         if not args.json:
             print(table, flush=True)
     if args.json:

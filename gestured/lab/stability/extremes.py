@@ -1,11 +1,10 @@
 """What no sensor should send, through the very code that the daemon runs: does anything not finite come out?
 
-Windows, features and models are given segments; the whole path is given streams of a finger that swipes to the
+Windows and features are given segments; the whole path is given streams of a finger that swipes to the
 right. Every warning counts as a fault.
 """
 
 import warnings
-from collections.abc import Callable
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from gestured.lab.stability.segments import segment_cases
 from gestured.lab.stability.streams import Case, streams
 from gestured.lab.table import Table, Value
 from gestured.model.features import touch_pattern
-from gestured.model.model import Model
 
 WINDOWS = (
     WINDOW,
@@ -27,7 +25,6 @@ WINDOWS = (
     Window(5, 7, 60.0, 1, 1 / 15, 1 / 15, 4.0),
     Window(27, 15, 5.0, 1, 1 / 15, 1 / 15, 0.0),
 )
-LONG = 1000  # frames: more than any front end gives, and for a model without the daemon's limit of time
 FOUND = "swipe_right"  # what all swipes of `swipes` are
 
 
@@ -70,52 +67,34 @@ def whole_path_table(classifier: Classifier, quick: bool) -> Table:
     )
 
 
-def parts_table(models: list[Model], quick: bool) -> Table:
-    """Windows, features and models on segments: cases, and what went wrong."""
+def parts_table(quick: bool) -> Table:
+    """Windows and features of segments: cases, and what went wrong."""
     kept: dict[str, list[str]] = {}
     for family, segment in segment_cases(quick):
-        kept.setdefault(family, []).append(_parts(segment, models))
+        kept.setdefault(family, []).append(_parts(segment))
     rows: list[tuple[Value, ...]] = [
         (family, len(found), sum(map(bool, found)), next(filter(None, found), "")) for family, found in kept.items()
     ]
     return Table(
-        "Extremes: windows, features and models",
+        "Extremes: windows and features",
         ("segments", "how many", "faults", "the first"),
         rows,
         (
-            f"Each segment through {len(WINDOWS)} windows, their features and the {len(models)} shipped models.",
-            "Faults: a warning, a window outside 0 to 1, anything not finite, scores that are no probabilities.",
+            f"Each segment through {len(WINDOWS)} windows, and their features. Faults: a warning, a window outside 0",
+            "to 1, anything not finite.",
         ),
     )
 
 
-def _parts(segment: Segment, models: list[Model]) -> str:
-    checks: list[Callable[[], bool]] = [
-        *(lambda window=window: _window(window, segment) for window in WINDOWS),
-        *(lambda model=model: _scores(model, segment) for model in models),
-    ]
+def _parts(segment: Segment) -> str:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for check in checks:
-            try:
-                if not check():
+        try:
+            for window in WINDOWS:
+                made = window.apply(segment)
+                values = touch_pattern(made, window.rate_hz)
+                if not (len(made) and np.isfinite(values).all() and made.min() >= 0.0 and made.max() <= 1.0 + 1e-6):
                     return "out of range"
-            except (Warning, ArithmeticError, ValueError) as error:
-                return f"{type(error).__name__}: {error}"
+        except (Warning, ArithmeticError, ValueError) as error:
+            return f"{type(error).__name__}: {error}"
     return ""
-
-
-def _window(window: Window, segment: Segment) -> bool:
-    made = window.apply(segment)
-    values = touch_pattern(made, window.rate_hz)
-    return bool(len(made) and np.isfinite(values).all() and made.min() >= 0.0 and made.max() <= 1.0 + 1e-6)
-
-
-def _scores(model: Model, segment: Segment) -> bool:
-    if len(segment.frames) < LONG:
-        answer = model.classify(segment)
-        return bool(abs(float(answer.values.sum()) - 1.0) < 1e-3 and 0.0 <= answer.unknown <= 1.0)
-    window = model.metadata.window.apply(segment)
-    features = model.metadata.features is not None
-    scores, unknown = model.run((touch_pattern(window, model.metadata.rate_hz) if features else window)[np.newaxis])
-    return bool(abs(float(scores.sum()) - 1.0) < 1e-3 and 0.0 <= unknown[0] <= 1.0)

@@ -101,12 +101,7 @@ FILTERS = (
     Filter("noise (core/idle)", NOISE_TAU_S, _noise, 0.5, REVIEW_S, UNSEEN_S),
     Filter("idle activity (core/activity)", NOISE_TAU_S, _usual, 0.0, dtypes=(np.float64,)),
     Filter(
-        "after-effect of a contact (core/contact)",
-        RECOVERY_S,
-        _after_effect,
-        1.0,
-        over_s=AFTER_S,
-        dtypes=(np.float64,),
+        "after-effect of a contact (core/contact)", RECOVERY_S, _after_effect, 1.0, over_s=AFTER_S, dtypes=(np.float64,)
     ),
     Filter("Prony branch (simulator/textile)", 1.0, _branch, 0.0, even=True),
     Filter("remanence (simulator/textile)", REMANENCE_S, _remanence, 1.0, even=True),

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gestured.core.frames import Segment
-from gestured.lab.stability.made import FINITE, NOISE, SIGNAL, finger
-from gestured.lab.stability.path import Array
+from gestured.lab.stability.path import FINITE, NOISE, SIGNAL, Array, finger
 
 
 def segment_cases(quick: bool) -> Iterator[tuple[str, Segment]]:

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gestured.lab.stability.made import FINITE, IDLE_LEVEL, NOISE, SIGNAL, finger, swipes
-from gestured.lab.stability.path import Array, Series
+from gestured.lab.stability.path import FINITE, IDLE_LEVEL, NOISE, SIGNAL, Array, Series, finger, swipes
 
 LEAST_GRID = 3  # on 2 x 2 taxels a swipe is two taps
 

@@ -118,19 +118,5 @@ def choices(
         results = {value: found[task] for value, task in choice.tasks.items()}
         rows = [{"value": value, **summary(right(of), of["person"])} for value, of in results.items()]
         told = {"choice": choice.choice, "ours": choice.ours, "method": choice.method}
-        out.append({**told, "alternatives": rows, "effect": effect(choice.ours, rows)})
+        out.append({**told, "alternatives": rows})
     return out
-
-
-def effect(ours: str, rows: list[dict[str, Any]]) -> str:
-    """In words: how far the alternatives lie apart, and where ours lies."""
-    best, worst = (pick(rows, key=lambda row: float(row["right"])) for pick in (max, min))
-    own = next(row for row in rows if row["value"] == ours)
-    apart = 100 * (best["right"] - worst["right"])
-    if best["value"] == ours:
-        place = "ours is the best"
-    elif own["high"] >= best["right"]:
-        place = f"{best['value']} is best, within our interval"
-    else:
-        place = f"{best['value']} is {100 * (best['right'] - own['right']):.1f} points better than ours"
-    return f"{apart:.1f} points between best and worst; {place}"

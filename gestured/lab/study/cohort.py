@@ -8,6 +8,7 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,14 +91,12 @@ def load_cohort(cache: Path, trials: NDArray[np.int64], jobs: int, seed: int = S
 def _write(path: Path, trials: NDArray[np.int64], segments: list[Segment | None]) -> None:
     cut = [(index, segment) for index, segment in zip(trials, segments, strict=True) if segment is not None]
     kept = [segment for _, segment in cut]
+    fields: dict[str, Any] = {
+        "frames": np.concatenate([s.frames for s in kept]).astype(np.float32),
+        "times": np.concatenate([s.times for s in kept]), "noise": np.array([s.noise for s in kept]),
+        "offsets": np.cumsum([0, *(len(s.frames) for s in kept)], dtype=np.int64),
+        "first": np.array([s.first for s in kept], np.int64), "last": np.array([s.last for s in kept], np.int64),
+        "trial": np.array([index for index, _ in cut], np.int64),
+    }  # fmt: skip
     with atomic_write(path, PUBLIC, durable=False) as file:
-        np.savez(
-            file,
-            frames=np.concatenate([s.frames for s in kept]).astype(np.float32),
-            times=np.concatenate([s.times for s in kept]),
-            offsets=np.concatenate([[0], np.cumsum([len(s.frames) for s in kept])]).astype(np.int64),
-            first=np.array([s.first for s in kept], np.int64),
-            last=np.array([s.last for s in kept], np.int64),
-            noise=np.array([s.noise for s in kept]),
-            trial=np.array([index for index, _ in cut], np.int64),
-        )
+        np.savez(file, **fields)

@@ -65,27 +65,20 @@ def export(name: str, values: Values, data: Data, seed: int, path: Path) -> None
 
 def score(model: str, sessions: list[Take], title: str) -> dict[str, Any]:
     """Play every session to a daemon with this model; counts and shares of the gestures that were performed."""
-    rights: list[bool] = []
-    people: list[int] = []
-    counts = dict.fromkeys(("right", "wrong", "missed", "false"), 0)
-    waits: list[float] = []
-    minutes = 0.0
-    for person, take in enumerate(progress(sessions, len(sessions), title)):
+    tallies = []
+    for take in progress(sessions, len(sessions), title):
         events, zero, _ = play(model, take, SPEED)
-        tally, _ = tallied(take, zero, events)
-        for key in counts:
-            counts[key] += tally.counts[key]
-        performed = tally.counts["right"] + tally.counts["wrong"] + tally.counts["missed"]
-        rights += [k < tally.counts["right"] for k in range(performed)]
-        people += [person] * performed
-        waits += tally.latencies
-        minutes += float(take.sensor_times[-1] - take.sensor_times[0]) / 60
-    total = len(rights)
-    right, low, high = interval(rights, people)
+        tallies.append(tallied(take, zero, events)[0])
+    of = {key: np.array([tally.counts[key] for tally in tallies]) for key in ("right", "wrong", "missed", "false")}
+    performed = of["right"] + of["wrong"] + of["missed"]
+    rights = np.concatenate([np.arange(n) < right for n, right in zip(performed, of["right"], strict=True)])
+    right, low, high = interval(rights, np.repeat(np.arange(len(tallies)), performed))
+    waits, total = [wait for tally in tallies for wait in tally.latencies], len(rights)
+    minutes = sum(float(take.sensor_times[-1] - take.sensor_times[0]) / 60 for take in sessions)
     return {
         "gestures": total, "right": round(right, 4), "low": round(low, 4), "high": round(high, 4),
-        "wrong": round(counts["wrong"] / total, 4), "missed": round(counts["missed"] / total, 4),
-        "extra": round(counts["false"] / total, 4), "false_per_minute": round(counts["false"] / minutes, 3),
+        "wrong": round(of["wrong"].sum() / total, 4), "missed": round(of["missed"].sum() / total, 4),
+        "extra": round(of["false"].sum() / total, 4), "false_per_minute": round(of["false"].sum() / minutes, 3),
         "latency_ms": {f"p{q}": round(1000 * float(np.quantile(waits, q / 100))) if waits else None for q in (50, 95)},
     }  # fmt: skip
 
@@ -104,7 +97,6 @@ def online(
         export(name, tuned[name], data, plan.seed, path)
         published = METHODS[name].published_online
         ours.append({"method": name, **score(str(path), sessions, f"sessions, {name}"), "published": published})
-        shipped.append(
-            {"method": name, **score(SHIPPED[name], sessions, f"sessions, shipped {name}"), "published": published}
-        )
+        theirs = score(SHIPPED[name], sessions, f"sessions, shipped {name}")
+        shipped.append({"method": name, **theirs, "published": published})
     return ours, shipped

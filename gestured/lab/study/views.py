@@ -99,12 +99,6 @@ def _alone(one: Callable[[Rows, Values], Rows], *by: str, form: Callable[[Rows],
     return View(every, one, by)
 
 
-def _all_touches(samples: Samples, values: Values, padded: bool) -> Rows:
-    if values["features"] == "daemon":
-        return samples.features()
-    return np.stack([paper_features(samples.window(i)) for i in range(len(samples))])
-
-
 def _touches(window: Rows, values: Values) -> Rows:
     """Touch-pattern features: those that the paper lists, or all that the daemon's forest sees."""
     return (touch_pattern(window, WINDOW.rate_hz) if values["features"] == "daemon" else paper_features(window))[None]
@@ -116,7 +110,7 @@ WAVELETS = _alone(
     "level",
     "reading",
 )
-TOUCHES = View(_all_touches, _touches, ("features",))
+TOUCHES = _alone(_touches, "features")
 HISTORY = _alone(lambda window, values: motion_history(window, values["decay_s"])[None], "decay_s", form=Images)
 FRAMES = View(lambda samples, values, padded: Windows(samples, padded), lambda window, values: window[None])
 TRAJECTORIES = View(
