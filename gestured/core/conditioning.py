@@ -1,7 +1,7 @@
 """From raw counts to counts above the baseline: what is known of one sensor, and one look at a frame.
 
-Three things are known, each by itself: what the idle sensor shows (`Baseline`), how much it moves (`Noise`, and how
-active it usually is: `Activity`), and which taxels are bad (`Taxels`).
+Three things are known, each by itself: what the idle sensor shows and how much it moves (`Idle`), how active it usually
+is (`Activity`), and which taxels are bad (`Taxels`).
 """
 
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gestured.core.activity import Activity, hardly_ever
 from gestured.core.contact import AfterEffect
-from gestured.core.idle import Baseline, Noise
+from gestured.core.idle import Idle
 from gestured.core.taxels import Inspection, Taxels
 
 Array = NDArray[np.float64]
@@ -40,30 +40,17 @@ class Conditioner:
     """What is known of one sensor of R x C taxels after mounting. Taxels are flat here: (N,) with N = R * C."""
 
     def __init__(self, rows: int, columns: int) -> None:
-        self.baseline = Baseline(rows * columns)
-        self.noise = Noise(rows * columns)
+        self.idle = Idle(rows * columns)
         self.activity = Activity(rows, columns)
         self.taxels = Taxels(rows, columns)
         self._weight: Array = np.ones(rows * columns)  # 1 / noise, 0 for bad taxels
         self._deep = hardly_ever(rows * columns)  # noise units below the baseline that are no noise
 
-    @property
-    def ready(self) -> bool:
-        """Whether the idle sensor is known, so that a touch can be told from it."""
-        return self.baseline.known
-
-    def mistaken(self, t: float, raw: Array) -> bool:
-        """Whether (N,) counts at `t` s show that what was learned was no idle sensor; a stable second replaces it."""
-        if self.baseline.provisional or not self.noise.mistaken(t, raw):
-            return False
-        self.baseline.doubt()
-        return True
-
     def look(self, t: float, raw: Array, after: AfterEffect) -> Look:
         """See (N,) counts at `t` s. By its after-effect textile may still swing below its baseline."""
-        if self.noise.learns_step(raw):
+        if self.idle.learns_step(raw):
             self._review()
-        above = raw - self.baseline.counts
+        above = raw - self.idle.counts
         scaled = above * self._weight
         activity, lowest = self.activity.measure(scaled)
         if not lowest < -self._deep:
@@ -78,51 +65,50 @@ class Conditioner:
 
     def place(self, look: Look) -> tuple[float, float]:
         """Where a frame is pressed, its centroid (row, column); bad taxels are left out."""
-        return self.activity.place(np.where(self._weight > 0, look.above, 0.0), self.noise.level)
+        return self.activity.place(np.where(self._weight > 0, look.above, 0.0), self.idle.level)
 
     def settle(self, t: float, raw: Array) -> bool:
         """Offer a frame that may be idle; true when the sensor was learned from the second that ends here."""
-        learned = self.baseline.settle(t, raw)
+        learned = self.idle.settle(t, raw)
         if learned is None:
             return False
-        self.noise.learn(t, raw, learned.noise, learned.step, learned.frames, still=learned.still)
         self.taxels.stuck.learn(learned.constant)
         self.taxels.frozen.learn(fine=learned.fine)
         self.taxels.flickering.learn()
         self.activity.unlearn()
         self._review()
-        self.activity.learn((learned.frames - self.baseline.counts) * self._weight)
+        self.activity.learn((learned.frames - self.idle.counts) * self._weight)
         self._review()
         return True
 
-    def idle(self, look: Look, *, recovering: bool) -> None:
+    def untouched(self, look: Look, *, recovering: bool) -> None:
         """Nobody touches the sensor: baseline and noise follow. `recovering`: a contact has just ended."""
-        baseline, t = self.baseline, look.t
-        if baseline.provisional or look.sunken:
+        idle, t = self.idle, look.t
+        if idle.provisional or look.sunken:
             self.settle(t, look.raw)
         else:
-            baseline.unsettle()
+            idle.unsettle()
         flickering = self.taxels.flickering
         if flickering.any or self.taxels.frozen.any:
             self._watch(look)
-        since = baseline.idle_since(t)
+        since = idle.idle_since(t)
         if since is None:
             return
         self.activity.follow(t, since, look.activity)
         if not look.burst:  # one such reading must not pull the baseline down
             above = np.where(flickering.mask, 0.0, look.above) if flickering.any else look.above
-            baseline.follow(t, since, above, recovering=recovering)
-        if self.noise.follow(t, look.above):
+            idle.follow(t, since, above, recovering=recovering)
+        if idle.follow_noise(t, look.above):
             self._review()
 
-    def busy(self, look: Look) -> None:
+    def touched(self, look: Look) -> None:
         """The sensor is touched: the baseline stands still, and taxels that freeze or flicker are found."""
-        self.baseline.hold()
+        self.idle.hold()
         self._watch(look)
 
     def inspect(self, frames: Array) -> Inspection:
         """Look at the frames of a contact, (T, N) counts above the baseline, for taxels that stood still."""
-        return self.taxels.inspect(frames, self.noise.level)
+        return self.taxels.inspect(frames, self.idle.level)
 
     def judge(self, seen: Inspection) -> None:
         """The contact that was inspected is over: what it says of the taxels counts."""
@@ -130,17 +116,17 @@ class Conditioner:
             self._review()
 
     def _watch(self, look: Look) -> None:
-        taxels, noise = self.taxels, self.noise
-        frozen = taxels.frozen.watch(look.t, look.raw, look.above, noise.sigma)
-        if taxels.flickering.watch(look.t, look.above, noise.level, taxels.bad) or frozen:
+        taxels, idle = self.taxels, self.idle
+        frozen = taxels.frozen.watch(look.t, look.raw, look.above, idle.sigma)
+        if taxels.flickering.watch(look.t, look.above, idle.level, taxels.bad) or frozen:
             self._review()
 
     def _review(self) -> None:
         """Weigh the taxels anew, from all that is known of them."""
-        noise = self.noise
-        self.taxels.review(noise.sigma, noise.level)
+        idle = self.idle
+        self.taxels.review(idle.sigma, idle.level)
         self.activity.review()
-        sigma = self.activity.scale * np.maximum(noise.sigma, LEAST_SIGMA * noise.level)
+        sigma = self.activity.scale * np.maximum(idle.sigma, LEAST_SIGMA * idle.level)
         self._weight = np.where(self.taxels.bad, 0.0, 1.0 / sigma)
 
 

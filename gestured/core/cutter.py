@@ -95,7 +95,7 @@ class Cutter:
     def keep(self, look: Look, lost: int, place: Place | None) -> None:
         """Take a frame. One that repeats the last is no news, unless the idle sensor repeats its frames, too."""
         t, shown = look.t, look.raw.tobytes()
-        if shown != self._shown or not self._conditioner.noise.lively:
+        if shown != self._shown or not self._conditioner.idle.lively:
             self._new = t
         self._shown = shown
         self._kept.append(_new(Kept, (t, look.above, lost, place, self._new)))
@@ -163,7 +163,7 @@ class Cutter:
         last = int(np.searchsorted(times, offset))
         frames = np.clip(conditioner.taxels.bridge(stack), -LARGEST, LARGEST).astype(np.float32)
         lost = sum(frame.lost for frame in kept[first + 1 : last + 1])
-        segment = Segment(frames, times, first, last, conditioner.noise.level, lost)
+        segment = Segment(frames, times, first, last, conditioner.idle.level, lost)
         return segment, stack
 
 

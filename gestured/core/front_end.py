@@ -84,7 +84,7 @@ class FrontEnd:
     @property
     def ready(self) -> bool:
         """Whether the idle sensor is known, so that a touch can be told from it."""
-        return self.conditioner.ready
+        return self.conditioner.idle.known
 
     @property
     def touched(self) -> bool:
@@ -94,12 +94,12 @@ class FrontEnd:
     @property
     def baseline(self) -> NDArray[np.float64]:
         """(N,) counts of the idle sensor after mounting, row by row; replaced, never changed in place."""
-        return self.conditioner.baseline.counts
+        return self.conditioner.idle.counts
 
     @property
     def noise(self) -> float:
         """Counts, one standard deviation of the median taxel."""
-        return self.conditioner.noise.level
+        return self.conditioner.idle.level
 
     @property
     def bad_taxels(self) -> int:
@@ -132,11 +132,11 @@ class FrontEnd:
         found = self._pass(t)
         conditioner, segmenter, cutter = self.conditioner, self.segmenter, self._cutter
         self.frame, self.look = frame, None
-        if not conditioner.ready:
+        if not conditioner.idle.known:
             if conditioner.settle(t, raw):
                 cutter.settled(t)
             return found
-        if t >= conditioner.noise.glance and conditioner.mistaken(t, raw) and segmenter.phase.pending:
+        if t >= conditioner.idle.glance and conditioner.idle.mistaken(t, raw) and segmenter.phase.pending:
             return found + self._restart(keep=False)
         self.look = look = conditioner.look(t, raw, segmenter.after)
         if look.shifted:
@@ -154,7 +154,7 @@ class FrontEnd:
         if segmenter.phase.touched:
             conditioner.settle(t, raw)  # what stays on the sensor becomes part of its baseline
         else:
-            conditioner.idle(look, recovering=segmenter.after.recovering(t))
+            conditioner.untouched(look, recovering=segmenter.after.recovering(t))
         return found
 
     def _pressed(self, look: Look) -> Sequence[Found]:
@@ -162,7 +162,7 @@ class FrontEnd:
         segmenter = self.segmenter
         if len(self._cutter) > self.timing.limit_frames:
             return self.give_up(look.t)
-        self.conditioner.busy(look)
+        self.conditioner.touched(look)
         if not segmenter.phase.let_go or look.t - segmenter.last_touched < DRAFT_S or self.fleeting:
             return ()
         segment = self._cutter.draft(segmenter.onset, segmenter.last_touched)
@@ -213,7 +213,7 @@ class FrontEnd:
                 found += self._cancel("silence")
         segmenter.reset()
         self._cutter.silent()
-        self.conditioner.baseline.doubt()
+        self.conditioner.idle.doubt()
         return found
 
     def reset(self) -> list[Found]:
@@ -248,7 +248,7 @@ class FrontEnd:
         """Start clean. `keep`: the frames that may show the idle sensor as it is now count already."""
         found = self._cancel("restart") if self.touched else []
         self.segmenter.reset()
-        self.conditioner.baseline.forget(keep=keep)
+        self.conditioner.idle.forget(keep=keep)
         self._cutter.clear()
         self._below_since = None
         return found

@@ -22,95 +22,61 @@ OUTLIER = 4.0  # times its noise: a taxel that is further off counts as this far
 QUIETER = 10.0  # times: where frames move so much less than when the noise was learned, that was no idle sensor
 GLANCE_S = 0.19  # the pause between two glances at how much frames move
 GLANCE, GLANCE_REPEATED, GLANCES = 3, 1, 9  # what a quieter glance counts, and one at a repeated frame; how much tells
-LIVELY_FRAMES = 10  # from so many one can tell that a sensor never sends the same frame twice in a row
 
 
-class Baseline:
-    """The counts of one idle sensor. It stands still under a contact: a tracker that went on would erase the hand."""
+class Idle:
+    """What one sensor shows while nobody touches it, and how much it moves.
+
+    It stands still under a contact: a tracker that went on would erase the hand.
+    """
 
     def __init__(self, taxels: int) -> None:
         self.counts: Array = np.zeros(taxels)  # replaced, never changed in place
+        self.sigma: Array = np.ones(taxels)  # counts, each taxel's standard deviation
+        self.level = 1.0  # counts, the median taxel's
+        self.step = 0.0  # counts, one quantisation step: below it noise cannot be known
+        self.lively = False  # whether no frame of the idle sensor repeated the one before it
         self.known = False
-        self.provisional = False  # it is doubtful, and the next stable second replaces it
+        self.provisional = False  # it is in doubt, and the next stable second replaces it
+        self.glance = math.inf  # s, when `mistaken` is to be asked next
         self._settling = Settling()
         self._followed: float | None = None  # s, the last idle frame; None after a contact or a silence
+        self._reviewed = 0.0  # s, when the noise was last looked at
+        self._learned = 1.0  # counts, the level as it was learned
+        self._quieter = 0  # what the glances of late say for a noise that was learned from no idle sensor
+        self._smallest = 0.0  # counts, the smallest change of a sensor that stood still when it was learned; else 0
+        self._shown: Array = np.zeros(taxels)  # the last raw counts, as far as they are needed
 
     def settle(self, t: float, raw: Array) -> Learned | None:
         """Offer (N,) counts that may be idle; what was learned, if a stable second ends here."""
         learned = self._settling.push(t, raw, patience=not self.known)
         if learned is not None:
-            self.counts = learned.baseline
+            self.counts, self.step, self.lively = learned.baseline, learned.step, learned.lively
             self.known, self.provisional = True, not learned.stable
-            self._followed = t
+            self._followed = self._reviewed = t
+            self._smallest, self._shown = math.inf if learned.still else 0.0, raw
+            self._set(learned.noise)
+            self._quieter, self._learned = 0, self.level
+            self.glance = t + GLANCE_S if self.level >= QUIETER * self.step else math.inf  # what moves, moves by a step
         return learned
 
     def unsettle(self) -> None:
         """Forget the frames that `settle` was offered: there is no need, or the sensor is touched."""
         self._settling.clear()
 
-    def idle_since(self, t: float) -> float | None:
-        """When the idle frame before that at `t` s was, in s; None where a contact or a silence lies between."""
-        since, self._followed = self._followed, t
-        return since
-
-    def follow(self, t: float, since: float, above: Array, *, recovering: bool) -> None:
-        """Follow the sensor, idle from `since` until `t` s and then (N,) counts `above` this; the step is exact."""
-        tau = RECOVERY_TAU_S if recovering else BASELINE_TAU_S
-        self.counts = self.counts + above * -math.expm1((since - t) / tau)
-
-    def hold(self) -> None:
-        """The sensor is touched: what passes now is not followed."""
-        self._followed = None
-        self._settling.clear()
-
-    def doubt(self) -> None:
-        """After a silence: go on, but replace it by the next stable second."""
-        self.provisional = True
-        self._followed = None
-
-    def forget(self, *, keep: bool) -> None:
-        """The next stable second is a new baseline. `keep`: what `settle` was offered counts for it."""
-        self.known = self.provisional = False
-        self._followed = None
-        if not keep:
-            self._settling.clear()
-
-
-class Noise:
-    """The noise of one sensor: learned with its baseline, then followed while it is idle."""
-
-    def __init__(self, taxels: int) -> None:
-        self.sigma: Array = np.ones(taxels)  # counts, each taxel's standard deviation
-        self.level = 1.0  # counts, the median taxel's
-        self.step = 0.0  # counts, one quantisation step: below it noise cannot be known
-        self.lively = False  # whether no frame of the idle sensor repeated the one before it
-        self._reviewed = 0.0  # s, when it was last looked at
-        self.glance = math.inf  # s, when `mistaken` is to be asked next
-        self._quieter = 0  # what the glances of late say for a noise that was learned from no idle sensor
-        self._learned = 1.0  # counts, the level as it was learned
-        self._smallest = 0.0  # counts, the smallest change of a sensor that stood still when it was learned; else 0
-        self._shown: Array = np.zeros(taxels)  # the last raw counts, as far as they are needed
-
-    def learn(self, t: float, raw: Array, sigma: Array, step: float, frames: Array, *, still: bool) -> None:
-        """Begin anew at `t` s with what (n, N) idle `frames` told, the last of them `raw`; `still`: none changed."""
-        self.step, self._reviewed = step, t
-        self.lively = len(frames) >= LIVELY_FRAMES and bool(np.diff(frames, axis=0).any(axis=1).all())
-        self._smallest, self._shown = math.inf if still else 0.0, raw
-        self._set(sigma)
-        self._quieter, self._learned = 0, self.level
-        self.glance = t + GLANCE_S if self.level >= QUIETER * step else math.inf  # what moves, moves by a step
-
     @property
     def doubtful(self) -> bool:
-        """Whether it was learned from what was no idle sensor, as frames since then show."""
+        """Whether the noise was learned from what was no idle sensor, as frames since then show."""
         return self._quieter >= GLANCES
 
     def mistaken(self, t: float, raw: Array) -> bool:
-        """Whether (N,) counts at `t` s and those before them show that the noise was learned from no idle sensor.
+        """Whether (N,) counts at `t` s and those before them show that no idle sensor was learned; then it is in doubt.
 
         A finger moves few taxels, so it may be there meanwhile. A repeated frame says less than another one, since the
         sensor may have frozen, and nothing where the idle sensor repeats itself.
         """
+        if self.provisional:
+            return False
         jumps = np.abs(raw - self._shown)
         jumps = jumps[jumps > 0]
         self.glance, self._shown = t + GLANCE_S, raw
@@ -118,6 +84,8 @@ class Noise:
             self._quieter = 0
         elif jumps.size or self.lively:
             self._quieter += GLANCE if jumps.size else GLANCE_REPEATED
+        if self.doubtful:
+            self.doubt()
         return self.doubtful
 
     def learns_step(self, raw: Array) -> bool:
@@ -139,8 +107,18 @@ class Noise:
         self._set(np.full_like(self.sigma, smallest))
         return True
 
-    def follow(self, t: float, above: Array) -> bool:
-        """Follow the idle sensor, (N,) counts off its baseline at `t` s; whether it was time to look at the noise."""
+    def idle_since(self, t: float) -> float | None:
+        """When the idle frame before that at `t` s was, in s; None where a contact or a silence lies between."""
+        since, self._followed = self._followed, t
+        return since
+
+    def follow(self, t: float, since: float, above: Array, *, recovering: bool) -> None:
+        """Follow the sensor, idle from `since` until `t` s and then (N,) counts `above` this; the step is exact."""
+        tau = RECOVERY_TAU_S if recovering else BASELINE_TAU_S
+        self.counts = self.counts + above * -math.expm1((since - t) / tau)
+
+    def follow_noise(self, t: float, above: Array) -> bool:
+        """Follow how much the sensor moves, idle and (N,) counts off its baseline at `t` s; whether it was time to."""
         if t - self._reviewed < REVIEW_S:
             return False
         since = max(self._reviewed, t - UNSEEN_S)
@@ -149,6 +127,22 @@ class Noise:
         self._set(np.maximum(sigma, self.step / 2))  # what shows no noise may have some all the same
         self._reviewed = t
         return True
+
+    def hold(self) -> None:
+        """The sensor is touched: what passes now is not followed."""
+        self._followed = None
+        self._settling.clear()
+
+    def doubt(self) -> None:
+        """Go on, but with the next stable second instead."""
+        self.provisional, self._followed = True, None
+
+    def forget(self, *, keep: bool) -> None:
+        """The next stable second is learned. `keep`: what `settle` was offered counts for it."""
+        self.known = self.provisional = False
+        self._followed = None
+        if not keep:
+            self._settling.clear()
 
     def _set(self, sigma: Array) -> None:
         self.sigma = sigma

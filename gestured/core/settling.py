@@ -33,6 +33,7 @@ CLIPPED_SHARE = 0.25  # of the taxels: where so many lie at the lowest value twi
 CLIPPED_QUANTILE = 0.75  # of the taxels' noise, where it is cut off: most taxels seem quieter than they are
 PRIOR_FRAMES = 16  # frames that the noise of all taxels weighs: a second of frames knows a taxel's own noise badly
 LEAST_STEP = 1e-35  # counts; its reciprocal must stay a number
+LIVELY_FRAMES = 10  # from so many one can tell that a sensor never sends the same frame twice in a row
 WHOLE = 2.0**52  # counts: from here on every float64 is a whole number, which says nothing
 RESOLUTION = 1e-6  # of the largest count: less than float32 resolves is no step of a sensor
 
@@ -47,6 +48,7 @@ class Learned(NamedTuple):
     fine: bool  # whether a finger's tremble shows in the last digit
     step: float  # counts, one quantisation step
     still: bool  # nothing changed at all, so that the step is a guess
+    lively: bool  # no frame repeated the one before it
     frames: Array  # (n, N) counts that this was learned from
 
     @property
@@ -113,8 +115,10 @@ def _learned(stack: Array) -> Learned:
         constant[:] = False  # a clipped or coarse sensor stands still when idle: that proves nothing
     pooled = (len(stack) * spread**2 + PRIOR_FRAMES * floor**2) / (len(stack) + PRIOR_FRAMES)
     noise = np.maximum(np.sqrt(pooled), floor / 2)
-    fine = usual >= TREMBLE * step
-    return Learned(baseline, noise, constant, int(np.count_nonzero(moved)), fine, step, not jumps.any(), stack)
+    return Learned(
+        baseline, noise, constant, int(np.count_nonzero(moved)), usual >= TREMBLE * step, step,
+        not jumps.any(), len(stack) >= LIVELY_FRAMES and bool(jumps.any(axis=1).all()), stack,
+    )  # fmt: skip
 
 
 def _usual(jumps: Array, *, clipped: bool) -> float:

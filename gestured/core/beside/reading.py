@@ -96,7 +96,7 @@ class Vitals:
         self.interval_s = front_end.interval_s
         if self.first is None and front_end.ready:
             self.first = front_end.baseline
-        if front_end.conditioner.noise.lively:  # of others the noise is a guess
+        if front_end.conditioner.idle.lively:  # of others the noise is a guess
             self._quietest = min(self._quietest, front_end.noise)
 
     def silent(self) -> None:
@@ -112,7 +112,7 @@ class Vitals:
     def condition(self, front_end: FrontEnd, *, inverted: bool) -> tuple[str, str]:
         """The state of a sensor that is there, and where it is "starting" or "degraded" why: see `Reading`."""
         conditioner, phase = front_end.conditioner, front_end.segmenter.phase
-        if not conditioner.ready or conditioner.noise.doubtful:
+        if not front_end.ready or conditioner.idle.doubtful:
             return "starting", "it is being learned, and waits for a second in which nothing moves on it"
         if inverted:
             return "inverted", ""

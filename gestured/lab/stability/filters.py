@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gestured.core.activity import Activity
 from gestured.core.contact import AFTER_S, RECOVERY_S, AfterEffect
-from gestured.core.idle import BASELINE_TAU_S, NOISE_TAU_S, RECOVERY_TAU_S, REVIEW_S, UNSEEN_S, Baseline, Noise
+from gestured.core.idle import BASELINE_TAU_S, NOISE_TAU_S, RECOVERY_TAU_S, REVIEW_S, UNSEEN_S, Idle
 from gestured.core.settling import SIGMA_PER_DEVIATION
 from gestured.simulator.textile import REMANENCE_S, relax
 
@@ -41,7 +41,7 @@ class Filter:
 
 def _baseline(recovering: bool) -> FilterRun:
     def run(times: Array, inputs: Array) -> Array:
-        made, out, since = Baseline(9), np.zeros_like(inputs), 0.0
+        made, out, since = Idle(9), np.zeros_like(inputs), 0.0
         made.counts = made.counts.astype(inputs.dtype)
         for k, (t, x) in enumerate(zip(times.tolist(), inputs, strict=True)):
             made.follow(t, since, x - made.counts, recovering=recovering)
@@ -52,11 +52,11 @@ def _baseline(recovering: bool) -> FilterRun:
 
 
 def _noise(times: Array, inputs: Array) -> Array:
-    made, out = Noise(9), np.zeros_like(inputs)
+    made, out = Idle(9), np.zeros_like(inputs)
     made.sigma = np.full(9, 0.75, inputs.dtype)
     for k, (t, x) in enumerate(zip(times.tolist(), inputs, strict=True)):
         above = np.full(9, (0.5 + 0.5 * x) / SIGMA_PER_DEVIATION, inputs.dtype)  # never taken for an outlier
-        made.follow(t, above)
+        made.follow_noise(t, above)
         out[k] = 2.0 * made.sigma[0] - 1.0
     return out
 
