@@ -1,4 +1,4 @@
-"""Where a daemon has its sockets, unless somebody says it."""
+"""Where the Unix sockets of a daemon are, unless a setting names them."""
 
 import os
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ SYSTEM = Path("/run/gestured/events.sock")  # of the installed service, and of r
 
 
 def default_socket(environ: Mapping[str, str]) -> Path:
-    """The event socket of a daemon that is told none: where systemd, the session or root keeps such things.
+    """The event socket of a daemon without that setting: in the folder of systemd, of the session, or of root.
 
     Raises SettingsError where there is no such folder.
     """
@@ -28,15 +28,16 @@ def default_socket(environ: Mapping[str, str]) -> Path:
 
 
 def control_beside(socket: Path) -> Path:
-    """The control socket of a daemon that is told none: beside its event socket."""
+    """The control socket of a daemon without that setting: beside its event socket."""
     return socket.with_suffix(".ctl")
 
 
 def find_socket(environ: Mapping[str, str]) -> Path:
     """The event socket that is meant where none is named, the first of these.
 
-    What the environment says, as the daemon reads it; that of a daemon in the session; the installed service's; the one
-    that a daemon would make. Who serves it, `client.peer` looks at. Raises SettingsError where none can be meant.
+    The one that the environment names, as the daemon reads it; that of a daemon in the session; the installed
+    service's; the one that a daemon would make. `client.peer` checks who serves it. Raises SettingsError where there is
+    none.
     """
     if path := setting(environ, "socket"):
         return Path(path)
@@ -59,14 +60,14 @@ def find_all_controls(environ: Mapping[str, str]) -> list[Path]:
     session = environ.get("XDG_RUNTIME_DIR")
     folders = [SYSTEM.parent.parent, *([Path(session)] if session else [])]
     found = {path for folder in folders for path in folder.glob(f"{SYSTEM.parent.name}*/{SYSTEM.stem}.ctl")}
-    with suppress(SettingsError):  # none is meant
+    with suppress(SettingsError):  # no socket can be meant
         if os.path.exists(meant := find_control(environ)):
             found.add(meant)
     return sorted(found)
 
 
 def setting(environ: Mapping[str, str], key: str) -> str | None:
-    """A setting of the daemon's that a variable, or the file that a variable names, has; None where neither does."""
+    """A setting of the daemon, from its variable or from the file of GESTURED_CONFIG; None where neither has it."""
     if value := environ.get(f"GESTURED_{key.upper()}"):
         return value
     if not (path := environ.get("GESTURED_CONFIG")):
@@ -76,6 +77,6 @@ def setting(environ: Mapping[str, str], key: str) -> str | None:
     try:
         with open(path, "rb") as file:
             value = tomllib.load(file).get(key)
-    except (OSError, ValueError):  # what is wrong with the file, the daemon says
+    except (OSError, ValueError):  # the daemon says what is wrong with the file
         return None
     return value if isinstance(value, str) else None

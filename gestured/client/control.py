@@ -1,4 +1,4 @@
-"""A client of the daemon's control socket: ask a verb, get an answer."""
+"""A client of the daemon's control socket: a verb is asked, and an answer comes."""
 
 import json
 import socket
@@ -11,21 +11,21 @@ ANSWER_TIMEOUT_S = 20.0  # a reload opens and tests a model; everything else tak
 
 
 class Control(Lines):
-    """One connection. Raises Unreachable where no daemon answers."""
+    """One connection to a control socket. Raises Unreachable where no daemon answers."""
 
     def __init__(self, path: Path, patience_s: float = ANSWER_TIMEOUT_S) -> None:
         """`patience_s` is how long an answer may take."""
         super().__init__(path, "--control")
         self._patience_s = patience_s
-        self.finished = False  # it was we who ended it
+        self.finished = False  # whether `finish` was called
 
     def ask(self, verb: str, **parameters: object) -> dict[str, Any]:
-        """What the daemon answers. Raises Refused with its reason, Unreachable where no answer comes."""
+        """The daemon's answer to a verb. Raises Refused with its reason, Unreachable where no answer comes."""
         request = {"verb": verb} | parameters
         try:
             self.socket.sendall(json.dumps(request).encode() + b"\n")
         except OSError:
-            pass  # it hung up; what it said before that is worth more
+            pass  # the daemon hung up; the reason that it gave before that is read below
         self.socket.settimeout(self._patience_s)
         try:
             answer = next(self.lines(), None)
@@ -42,9 +42,9 @@ class Control(Lines):
         return answer
 
     def finish(self) -> None:
-        """Ask for no more: what is on its way still comes, then `lines` ends. Any thread may call it."""
+        """End the requests: lines that are on their way still come, then `lines` ends. Any thread may call it."""
         self.finished = True
         try:
             self.socket.shutdown(socket.SHUT_WR)
         except OSError:
-            pass  # it hung up already
+            pass  # the daemon hung up already

@@ -12,14 +12,14 @@ import gestured
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
-STOP_S = 5.0
+STOP_S = 5.0  # that the daemon may take to end
 
 
 class Engine:
     """`gestured` as a child process; a context manager. Raises GesturedError where it does not start."""
 
     def __init__(self, model: str, rows: int, columns: int, *more: str) -> None:
-        """Start it, with `more` of its flags."""
+        """Start the daemon with a grid of rows x columns; `more` are further flags of its command line."""
         self._folder = tempfile.TemporaryDirectory(prefix="gestured-demo-")
         folder = Path(self._folder.name)
         self._log = folder / "log"
@@ -27,7 +27,7 @@ class Engine:
         safe = [] if root == Path.cwd() else ["-P"]  # a folder named gestured in the current one is not the package
         command = [sys.executable, *safe, "-m", "gestured.daemon", "--model", model, "--listen", "127.0.0.1:0"]
         command += ["--socket", str(folder / "events.sock"), "--grid", f"{rows}x{columns}"]
-        command += ["--own-gestures", str(folder / "own-gestures.json"), *more]  # not the user's: they change answers
+        command += ["--own-gestures", str(folder / "own-gestures.json"), *more]  # the user's would change answers
         environment = {name: value for name, value in os.environ.items() if not name.startswith("GESTURED_")}
         with self._log.open("wb") as log:
             # A session of its own: Ctrl-C is for us, and we end it in our own time.
@@ -58,12 +58,12 @@ class Engine:
 
     @property
     def listen(self) -> Address:
-        """Where it takes frames."""
+        """The UDP address at which the daemon takes frames."""
         return Address.parse(self.ready["listen"])
 
     @property
     def socket(self) -> Path:
-        """Where it gives events."""
+        """The daemon's event socket."""
         return Path(self.ready["socket"])
 
     @property
@@ -72,7 +72,7 @@ class Engine:
         return self._process.pid
 
     def close(self) -> None:
-        """End it as an operator would; again is nothing."""
+        """End the daemon as an operator would; a second call does nothing."""
         self._process.terminate()
         try:
             self._process.wait(STOP_S)

@@ -1,4 +1,4 @@
-"""Whether a daemon's line has the fields that the protocol gives it: a peer may be mad, or no gestured at all."""
+"""Whether a daemon's line has the fields that the protocol gives it: a peer may have a bug, or be no daemon at all."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
@@ -7,7 +7,7 @@ from typing import Any, get_args, get_type_hints
 from gestured.core.events import Event
 from gestured.core.messages import quoted
 
-LONGEST_S = 6e10  # how far from 1970 a time may be: in 1900 years Python's calendar ends
+LONGEST_S = 6e10  # the largest number in a line: Python's calendar knows no time further from 1970, some 1900 years
 
 
 def _is(*types: type) -> Callable[[Any], bool]:
@@ -41,7 +41,7 @@ _FIELDS: dict[str, dict[str, Any]] = {name: get_type_hints(event) for name, even
     "gestures": {"gestures": list[str]},
     "lost": {"count": int},
 }
-# Fields that an older daemon does not say.
+# Fields of an event that lines of an older daemon do not have.
 _ADDED = {
     name: {field.name for field in fields(event) if field.default is not MISSING} for name, event in _EVENTS.items()
 }
@@ -50,8 +50,7 @@ _ADDED = {
 def wrong_field(line: Mapping[str, Any]) -> str | None:
     """What is wrong with a daemon's line, such as `decided "soon": expected a number`; None where it is sound.
 
-    A newer daemon may say more: fields that are not known are passed over, and so are all but `sensor` of an unknown
-    type of line.
+    A newer daemon may say more, so unknown fields are passed over; of a line of unknown type only `sensor` counts.
     """
     name = line.get("type")
     known = _FIELDS.get(name, {}) if isinstance(name, str) else {}

@@ -1,4 +1,4 @@
-"""Which process has a port, as far as Linux lets us know."""
+"""Which process holds a port, as far as Linux tells us."""
 
 import errno
 import os
@@ -27,7 +27,7 @@ def holder(port: int, kind: int) -> str | None:
             if any(os.readlink(link) in inodes for link in (folder / "fd").iterdir()):
                 return f"{(folder / 'comm').read_text().strip()} (pid {folder.name})"
         except OSError:
-            continue  # another user's, or it has just ended
+            continue  # the process is another user's, or has just ended
     return None
 
 

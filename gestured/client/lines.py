@@ -20,7 +20,7 @@ class Unreachable(GesturedError):
 
 
 class Forbidden(Unreachable):
-    """There is a socket, but not for us."""
+    """The socket exists, but this account may not connect to it."""
 
 
 class Refused(GesturedError):
@@ -32,10 +32,10 @@ class Unsubscribed(Refused):
 
 
 class Lines:
-    """One connection; a context manager."""
+    """One connection to a daemon's Unix socket; a context manager."""
 
     def __init__(self, path: Path, flag: str) -> None:
-        """Connect. `flag` is the one that names another socket. Raises Unreachable, Stranger."""
+        """Connect to `path`; `flag` is the option that an error names. Raises Unreachable (or Forbidden), Stranger."""
         self.path = path
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
@@ -82,7 +82,7 @@ class Lines:
 
 
 def read_ahead(lines: Iterable[T], most: int = 0) -> "queue.Queue[T | None]":
-    """A queue that a thread fills with these lines, at most so many at a time; None where they end, or cannot go on."""
+    """A queue that a thread fills with `lines`, at most `most` at a time (0: any number); None stands for their end."""
     waiting: queue.Queue[T | None] = queue.Queue(most)
 
     def read() -> None:
@@ -99,7 +99,7 @@ def read_ahead(lines: Iterable[T], most: int = 0) -> "queue.Queue[T | None]":
 
 
 def parsed(line: bytes, path: Path) -> dict[str, Any]:
-    """One line as an object; raises Refused for anything else."""
+    """The JSON object in a line from the socket at `path`; raises Refused for anything else."""
     message = json_object(line)
     if message is None:
         raise Refused(f"{path} sent a line that is no JSON object: {line[:80]!r}")

@@ -1,4 +1,4 @@
-"""What a service tells systemd (sd_notify). Does nothing where nobody asked."""
+"""What a service tells systemd (sd_notify). It does nothing without $NOTIFY_SOCKET."""
 
 import os
 import socket

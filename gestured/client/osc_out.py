@@ -11,10 +11,10 @@ from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message import OscMessage
 from pythonosc.osc_message_builder import OscMessageBuilder
 
-HEADS = 1024  # heads of frames that are remembered: one or two a sensor
+HEADS = 1024  # heads of messages that are remembered; a sensor has one or two
 ANEW_S = 2_085_978_496  # s since 1970, in 2036, when a time tag's 32 bits of seconds begin anew
-AGAIN_S = 2**32  # from one such beginning to the next
-NOT_ZERO_S = 2.0**-32  # so little that it is lost in the time tag of 1970
+AGAIN_S = 2**32  # from one beginning of a time tag's seconds to the next
+NOT_ZERO_S = 2.0**-32  # in place of 0: so little that the time tag is that of 1970 all the same
 
 _size = Struct(">i").pack
 
@@ -28,7 +28,7 @@ def message(address: str, types: str, args: Sequence[int | float | str | bytes])
 
 
 def bundle(*messages: OscMessage) -> OscBundle:
-    """A bundle for now ("immediately")."""
+    """A bundle of messages with the time tag "immediately"."""
     builder = OscBundleBuilder(IMMEDIATELY)
     for content in messages:
         builder.add_content(content)

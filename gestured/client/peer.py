@@ -1,4 +1,4 @@
-"""Who serves a Unix socket, and whether a client believes him.
+"""Which account serves a Unix socket, and whether a client trusts it.
 
 A client shows what a daemon says, and opens files that it names. So it asks nothing of a stranger: a path says where a
 daemon should be, not who is there.
@@ -17,13 +17,13 @@ CREDENTIALS = struct.Struct("iII")  # pid, uid, gid: struct ucred of Linux
 
 
 class Stranger(GesturedError):
-    """The socket is served by an account that this client does not believe."""
+    """The socket is served by an account that this client does not trust."""
 
 
 def check_peer(connected: socket.socket, path: Path, flag: str) -> None:
     """Raises Stranger unless `path` is served by root, by ourselves, or by the account that root gave its folder to.
 
-    The kernel says who made the socket listen, whatever stands in the file system by now. `flag` names another socket.
+    The kernel says who made the socket listen, whatever stands at the path by now. An error names the option `flag`.
     """
     credentials = connected.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size)
     _, uid, _ = CREDENTIALS.unpack(credentials)

@@ -6,15 +6,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-SIZE = 9  # columns, and rows: two of them share a line of text
+SIZE = 9  # columns and rows of a picture; two rows share a line of text
 SHADES = " ░▒▓█"
 BLOCKS = {(False, False): " ", (True, False): "▀", (False, True): "▄", (True, True): "█"}
-FAINTEST = 0.15  # what is fainter is left dark
-BACKGROUND, FAINT, GREYS = 233, 238, 17  # on the grey ramp of 256-colour terminals
+FAINTEST = 0.15  # of 0 to 1: what is fainter is left dark
+BACKGROUND, FAINT, GREYS = 233, 238, 17  # of 256 colours: two greys, and how many greys follow
 RAMP = (17, 18, 60, 66, 102, 144, 186, 228)  # of 256-colour terminals, from dark blue to yellow, ever brighter
 LINES, COLUMNS = 16, 40  # characters of a moving picture: beside it stands text, in 80 x 24
 ARROWS = "→↘↓↙←↖↑↗"  # by eighths of a turn, clockwise from the right
-MOVED = 0.5  # taxel pitches: what is nearer has no direction
+MOVED = 0.5  # taxel pitches: a shorter way has no direction
 LATELY = 4  # places of a path that tell its direction
 
 
@@ -48,7 +48,7 @@ def draw(picture: NDArray[np.float32], colour: bool) -> list[str]:
 
 
 def _coloured(cells: list[tuple[float, float]]) -> str:
-    # The form says where, the grey says when: so it is readable as plain text too.
+    # The block says where the finger was, the grey says when, so the picture can be read as plain text too.
     drawn = (f"\x1b[38;5;{FAINT + round(GREYS * max(c))}m{BLOCKS[c[0] > FAINTEST, c[1] > FAINTEST]}" for c in cells)
     return f"\x1b[48;5;{BACKGROUND}m" + "".join(drawn) + "\x1b[0m"
 
@@ -60,7 +60,7 @@ def _shaded(cells: list[tuple[float, float]]) -> str:
 def moving(values: NDArray[np.floating], path: Sequence[tuple[float, float]], full: float, colour: bool) -> list[str]:
     """(R, C) counts with a fixed scale from 0 to `full`, and an arrow where the finger is, the last (row, column).
 
-    At most LINES lines of COLUMNS characters: two rows of pixels in a line; taxels are enlarged, or thinned out.
+    At most LINES lines of COLUMNS characters: two rows of dots in a line; taxels are enlarged, or thinned out.
     """
     rows, columns = values.shape
     zoom = max(1, min(2 * LINES // rows, COLUMNS // columns))

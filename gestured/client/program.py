@@ -1,4 +1,4 @@
-"""What programs with subcommands have in common: their help, and what is said where one fails."""
+"""The command line of programs with subcommands: their help, and the sentence where one fails."""
 
 import argparse
 import sys

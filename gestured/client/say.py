@@ -1,4 +1,4 @@
-"""What the programs print: text that somebody else chose is shown, never obeyed.
+"""How programs print: text that somebody else chose is shown, and never acts on the terminal.
 
 Names come from packets, sockets and files, and whoever chose them may have chosen what a terminal acts upon. So the
 programs print through this module alone.
@@ -8,7 +8,7 @@ import json
 import sys
 from typing import TextIO
 
-MOST = 2000  # characters of a line: no own one is longer, unless a path in it is
+MOST = 2000  # characters of a line at most: none of our own is longer, unless a path in it is
 
 
 def shown(text: object, most: int = MOST) -> str:
@@ -39,7 +39,7 @@ def say_json(value: object) -> None:
 
 
 def tell(as_json: bool, value: object, *lines: object) -> None:
-    """Print a value as JSON, or what it says in words."""
+    """Print a value as JSON, or the lines that say it in words."""
     if as_json:
         say_json(value)
     else:
@@ -47,5 +47,5 @@ def tell(as_json: bool, value: object, *lines: object) -> None:
 
 
 def say_drawn(text: str, end: str = "\n", to: TextIO | None = None) -> None:
-    """Print what has line breaks, colours or a picture of its own; what is foreign in it went through `shown`."""
+    """Print text with line breaks, colours or a picture; foreign text in it must have gone through `shown`."""
     print(text, end=end, file=to or sys.stdout, flush=True)

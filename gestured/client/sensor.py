@@ -24,7 +24,7 @@ BLOBS: dict[str, np.dtype[Any]] = {
 
 @dataclass(frozen=True)
 class Form:
-    """How a frame is written. `values` is "floats", "ints" or one of BLOBS; `plain` has no bundle."""
+    """How a simulated sensor writes its frames. `values` is "floats", "ints" or one of BLOBS; `plain` has no bundle."""
 
     sensor: str
     values: str = "floats"
@@ -79,7 +79,7 @@ class Sensor:
         self.socket.connect(address)
         self.to, self.form = Address(*to), form
         self.sent = 0
-        self.unheard = 0  # packets that a closed port answered
+        self.unheard = 0  # packets to which a closed port answered
         self.start = time.monotonic()
         self.epoch = time.time()
         self.stop = threading.Event()
@@ -94,7 +94,7 @@ class Sensor:
             self.sent += 1
 
     def moment(self, t: float) -> float:
-        """A frame's time as epoch seconds."""
+        """The time `t` of a frame in seconds since the Unix epoch."""
         return self.epoch + t
 
     def close(self) -> None:

@@ -9,12 +9,12 @@ from gestured.client.fields import wrong_field
 from gestured.client.lines import Lines, Refused, Unreachable
 
 PROTOCOL = 1
-GREETING_S = 10.0  # a daemon greets at once
+GREETING_S = 10.0  # to wait for the hello, which a daemon sends at once
 SILENT = f"says nothing within {GREETING_S:g} s: it hangs, or this is not its event socket (--socket)"
 
 
 class Stream(Lines):
-    """One connection. `hello` is the daemon's first line; iterate for the lines after it."""
+    """One connection to an event socket. `hello` is its first line; iterating gives the lines after it."""
 
     def __init__(self, path: Path, subscribe: Mapping[str, Sequence[str]] | None = None) -> None:
         """Connect and subscribe (None: gestures only). Raises Unreachable or Refused."""

@@ -20,9 +20,9 @@ from gestured.client.lines import Forbidden, Lines, Refused, Unreachable, Unsubs
 from gestured.client.stream import GREETING_S, SILENT, check_hello
 from gestured.core.errors import GesturedError
 
-FIRST_S, LONGEST_S = 0.1, 2.0  # from one attempt to connect to the next: doubled each time, a restart takes a second
+FIRST_S, LONGEST_S = 0.1, 2.0  # between attempts to connect, doubled each time; a restart takes a second
 CHUNK = 65536  # bytes read at a time
-LINE_BYTES = 4 << 20  # of the longest line; a hello with all sensors that a daemon keeps has an eighth of that
+LINE_BYTES = 4 << 20  # of a line, at most; a hello with all sensors that a daemon keeps has an eighth of that
 LOG = logging.getLogger("gestured")
 
 
@@ -32,7 +32,7 @@ class Subscriber:
     It connects when it is first iterated, and again by itself whenever a daemon goes and returns. A `lost` line is
     given as an event, a `hello` is not: `hello` is that of the daemon whose event was given last, `path` its socket.
     Its `instance` changes, and `sequence` counts anew, when the daemon has started again. A line in which a field is
-    missing or of another type than the protocol says is passed over, and said.
+    missing or of another type than the protocol says is passed over, and `say` is told.
 
     One thread iterates; any may `close` it, which ends the iteration.
     """
@@ -93,9 +93,9 @@ class Subscriber:
         return all(source.hello for source in self._sources)
 
     def close(self) -> None:
-        """End the iteration and hang up; again is nothing. Any thread and any signal handler may call it."""
+        """End the iteration and hang up; a second call does nothing. Any thread and any signal handler may call it."""
         self._closed = True
-        with suppress(OSError):  # closed already
+        with suppress(OSError):  # the subscriber is closed already
             self._wake.send(b".")
         if self._iterating.acquire(blocking=False):  # else whoever iterates wakes now, and does it
             for source in self._sources:
@@ -136,7 +136,7 @@ class Subscriber:
         return None
 
     def _wait(self, end: float) -> None:
-        """Until something has come, a daemon is to be called, or it is `end` (monotonic seconds)."""
+        """Wait until a line has come, a daemon is to be called, or it is `end` (monotonic seconds)."""
         now = time.monotonic()
         for source in self._sources:
             if source.due <= now and source.lines is None:
@@ -151,16 +151,16 @@ class Subscriber:
     def _call(self, source: "_Source", now: float) -> None:
         try:
             source.lines = Lines(source.path, "--socket")
-        except Forbidden:  # waiting changes nothing
+        except Forbidden:  # to call it again changes nothing
             raise
         except Unreachable as error:
             self._gone(source, error)
             return
-        with suppress(ConnectionError):  # it hung up; what it said before that is read
+        with suppress(ConnectionError):  # the daemon hung up; its last lines are read all the same
             source.lines.socket.sendall(self._request)
         source.lines.socket.setblocking(False)
         self._selector.register(source.lines.socket, selectors.EVENT_READ, source)
-        source.due = now + GREETING_S  # its hello
+        source.due = now + GREETING_S  # by then its hello must have come
 
     def _receive(self, source: "_Source") -> None:
         assert source.lines is not None
@@ -219,7 +219,7 @@ class _Source:
 
     path: Path
     lines: Lines | None = None
-    hello: dict[str, Any] = field(default_factory=dict)  # of this connection; empty until it came
-    begun: bytearray = field(default_factory=bytearray)  # of a line whose end has not come yet
+    hello: dict[str, Any] = field(default_factory=dict)  # the hello of this connection; empty until it came
+    begun: bytearray = field(default_factory=bytearray)  # the part of a line whose end has not come yet
     due: float = 0.0  # monotonic s: when to call it, or by when it must have said hello
-    wait_s: float = FIRST_S  # after the next failure
+    wait_s: float = FIRST_S  # how long to wait after the next failure

@@ -7,7 +7,7 @@ from gestured.core.address import Address, Grid, is_sensor
 
 
 def host_port(text: str) -> Address:
-    """The address of a peer, whose port is known."""
+    """The address of a peer; port 0 is refused. Raises ArgumentTypeError, as all functions here."""
     try:
         address = Address.parse(text)
         if address.port:
@@ -41,7 +41,7 @@ def sensor_name(text: str) -> str:
 
 
 def number(low: float, high: float, *, whole: bool = False) -> Callable[[str], float]:
-    """Reads a number in these bounds."""
+    """A reader of numbers from `low` to `high`."""
 
     def read(text: str) -> float:
         try:
@@ -57,7 +57,7 @@ def number(low: float, high: float, *, whole: bool = False) -> Callable[[str], f
 
 
 def some_of(known: Sequence[str]) -> Callable[[str], list[str]]:
-    """Reads words with commas between them, each of them `known`."""
+    """A reader of words with commas between them, each of them `known`."""
 
     def read(text: str) -> list[str]:
         words = [word.strip() for word in text.split(",") if word.strip()]

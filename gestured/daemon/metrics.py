@@ -76,9 +76,7 @@ class Metrics:
         self.lead = Histogram(
             "gestured_provisional_lead_seconds", "From a provisional event that was confirmed to its answer", LEAD_S
         )
-        self.internal_errors = Counter(
-            "gestured_internal_errors", "Bugs caught; the sensor's recognizer was reset", dated=True
-        )
+        self.internal_errors = Counter("gestured_internal_errors", "Bugs that were caught", dated=True)
         self.degraded = Counter("gestured_degraded_answers", "Segments answered by a fallback model")
         self.reloads = Counter("gestured_reloads", "Reloads of model and configuration", "result", dated=True)
         self.sent = Counter("gestured_osc_messages", "OSC messages to destinations", "result", dated=True)
