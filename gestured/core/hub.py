@@ -30,8 +30,11 @@ Waiting = dict[str, tuple[Sensor, list[Arrival]]]  # by its name: a sensor, and 
 class Hub:
     """All sensors of a scene."""
 
-    def __init__(self, scene: Scene, classifier: Classifier) -> None:
-        """`classifier` must know the scene's gestures (ValueError)."""
+    def __init__(self, scene: Scene, classifier: Classifier, *, later: bool = False) -> None:
+        """`classifier` must know the scene's gestures (ValueError).
+
+        Provisional events are given at once, or `later`: by `look`, for whoever must not have answers wait for them.
+        """
         self._sensors: dict[str, Sensor] = {}
         self._numbers: dict[str, tuple[int, int]] = {}  # sequence and id that sensors which are not there have used
         self._missed = 0  # times that this machine had no room for a packet
@@ -40,6 +43,8 @@ class Hub:
         self._asked: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
         self._waits: dict[str, Sensor] = {}  # sensors in which a contact may be over before the next frame
         self._due = math.inf  # s, when the first contact of all sensors may be over
+        self._later = later
+        self.looks: dict[str, Sensor] = {}  # sensors that wait for `look`, the one that has waited longest first
         self._set(scene, classifier)
 
     @property
@@ -75,6 +80,8 @@ class Hub:
             due = sensor.arrives
             if due < math.inf:
                 self._waits[name], self._due = sensor, min(self._due, due)
+            if (self._asked is None or self._asked) and sensor.looks:
+                self.looks[name] = sensor
         return facts
 
     def wait(self, now: float) -> list[Fact]:
@@ -83,9 +90,23 @@ class Hub:
         if now >= self._due:
             for sensor in sorted(self._waits.values(), key=lambda sensor: sensor.arrives):
                 sensor.elapse(now, facts)
+            self.looks |= {name: sensor for name, sensor in self._waits.items() if sensor.looks}
             due = {name: sensor.arrives for name, sensor in self._waits.items()}
             self._waits = {name: sensor for name, sensor in self._waits.items() if due[name] < math.inf}
             self._due = min(due.values(), default=math.inf)
+        return facts
+
+    def look(self, now: float) -> list[Fact]:
+        """Have the model look at the contact that has waited longest for it: one run, and perhaps a provisional event.
+
+        What has not been looked at when its sensor's next frame comes is not said.
+        """
+        facts: list[Fact] = []
+        while self.looks:
+            sensor = self.looks.pop(next(iter(self.looks)))
+            if sensor.looks:
+                sensor.look_later(now, facts)
+                break
         return facts
 
     def tick(self, now: float) -> list[Fact]:
@@ -133,7 +154,7 @@ class Hub:
         """
         self._asked = None if sensors is None else frozenset(sensors)
         for sensor in self._sensors.values():
-            sensor.foresee(asked=self.foreseen(sensor.name))
+            sensor.foresee(asked=self.foreseen(sensor.name), later=self._later)
 
     def foreseen(self, name: str) -> bool:
         """Whether somebody asks for a sensor's provisional events."""
@@ -202,7 +223,7 @@ class Hub:
                 return None
             numbers = self._numbers.pop(name, (0, 0))
             sensor = self._sensors[name] = Sensor(name, self._scene, self._classifier, source, numbers)
-            sensor.foresee(asked=self.foreseen(name))
+            sensor.foresee(asked=self.foreseen(name), later=self._later)
             self._told[name] = self._missed
             facts.append(Changed(name, "new", source))
         if not sensor.owner.admits(source, now, self._scene.stale_s):
@@ -235,6 +256,7 @@ class Hub:
         """Give a sensor's place away. Should it return, its sequences and ids go on where they were."""
         del self._sensors[sensor.name], self._told[sensor.name]
         self._waits.pop(sensor.name, None)
+        self.looks.pop(sensor.name, None)
         if len(self._numbers) >= REMEMBERED:
             self._numbers.pop(next(iter(self._numbers)))
         self._numbers[sensor.name] = sensor.numbers

@@ -58,6 +58,7 @@ class Sensor:
         self._stamper = Stamper(scene.clock_of(name))
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # no scores where it failed
         self._foresight = Foresight(name, taps=scene.provisional_taps)
+        self._later = False  # whether looks for provisional events wait until `look`
         self._habits, self._vitals = Habits(*self.front_end.sent), Vitals()
         self._square = self.front_end.rows == self.front_end.columns  # its idle frames say nothing of its habits
         self._fresh = True  # no frame was used since it came or restarted
@@ -78,8 +79,10 @@ class Sensor:
             told += self._tell(found)
         if foresight.asked and front_end.segmenter.phase.pending:
             last = found[-1] if found else None
-            preview = foresight.see(front_end, frame.t, last.segment if isinstance(last, Shown) else None)
-            told += self._foresee(preview)
+            if isinstance(last, Shown):
+                told += self._foresee(foresight.preview(front_end, last.segment, frame.t, drafted=True))
+            foresight.see(front_end, frame.t)
+            told += self._at_once()
         if not self._square or ((look := front_end.look) is not None and look.burst):
             self._habits.see(front_end)
         return told
@@ -171,7 +174,15 @@ class Sensor:
 
     def _late(self, t: float) -> list[Told]:
         """What is said before the answer because no frame has come until `t` s."""
-        return self._foresee(self._foresight.wait(self.front_end, min(t, self.front_end.pace.sure)))
+        self._foresight.wait(self.front_end, min(t, self.front_end.pace.sure))
+        return self._at_once()
+
+    def _at_once(self) -> list[Told]:
+        return [] if self._later or self._foresight.wanted is None else self.look()
+
+    def look(self) -> list[Told]:
+        """What can be said of the contact that goes on, where a model is to look at it: one run of it at most."""
+        return self._foresee(self._foresight.look(self.front_end))
 
     def _foresee(self, preview: Preview | None) -> list[Told]:
         """What can be said of a contact that is not over."""
@@ -277,9 +288,22 @@ class Sensor:
         self.classifier, self._decision, self._asked = classifier, Decision(scene), None
         self._foresight.taps = scene.provisional_taps
 
-    def foresee(self, *, asked: bool) -> None:
-        """Say of contacts from now on, or no longer, what they will most probably be."""
-        self._foresight.asked = asked
+    def foresee(self, *, asked: bool, later: bool = False) -> None:
+        """Say of contacts from now on, or no longer, what they will most probably be.
+
+        It costs runs of the model. They are made at once, or `later`: where `looks`, by `look`. What was not looked at
+        when the next frame comes is not said.
+        """
+        self._foresight.asked, self._later = asked, later
+
+    @property
+    def looks(self) -> bool:
+        """Whether there is something for `look`."""
+        return self._foresight.wanted is not None
+
+    def look_later(self, now: float, facts: list[Fact]) -> None:
+        """`look`, at `now`."""
+        self._run(lambda _: self.look(), now, facts)
 
     def review(self) -> None:
         """Look at what is not looked at with each frame."""

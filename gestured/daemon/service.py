@@ -56,7 +56,7 @@ class Service:
             self._metrics.sensor_label(name)  # the sensors of the configuration get the first labels
         self._own = OwnGestures(self._own_changed)
         self._own.follow(ladder, self._own.read(asked.own, ladder))
-        self._hub = Hub(scene_of(settings, ladder), ladder)
+        self._hub = Hub(scene_of(settings, ladder), ladder, later=True)
         self._taps = Taps(settings.flight_recorder << 20)
         self._clients = EventServer(
             bound.events.sock,

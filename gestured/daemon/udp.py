@@ -32,6 +32,7 @@ PAUSE_S = 0.001  # between reads of packets that come thick, since waking for ea
 FEW = 8  # packets found by a read, up to which it is followed by a pause
 FULL_S = 0.25  # for which a stall explains that the kernel drops packets; if it lasts longer, it is a flood
 EARLY_S = 0.001  # by which we wake before a wait is over, since the loop's timers know whole milliseconds only
+REST = 2  # seconds that the loop has for everything else, for each second that is spent on provisional events
 SPARSE_S = 0.02  # between packets; where they are further apart, there is time to wait for that moment exactly
 STEP_S = 0.05  # by which the wall clock may move against ours; after a larger step the kernel's times say nothing
 
@@ -71,12 +72,13 @@ class Receiver:
         self._again: asyncio.Handle | None = None
         self._due = math.inf  # s, when time alone will decide something
         self._alarm: asyncio.Handle | None = None
+        self._foreseeing: asyncio.Handle | None = None
         self._loop.add_reader(sock, self._wake)
 
     def close(self) -> None:
         """Stop reading; the socket stays its owner's."""
         self._loop.remove_reader(self._sock)
-        for handle in (self._pause, self._again, self._alarm):
+        for handle in (self._pause, self._again, self._alarm, self._foreseeing):
             if handle is not None:
                 handle.cancel()
 
@@ -215,8 +217,21 @@ class Receiver:
         self._desk.take(self._hub.receive(packets, now))
         self._expect()
 
+    def _foresee(self) -> None:
+        """Give a provisional event where nothing else is to be done: it costs a run of the model, and answers wait."""
+        self.read()
+        took_s = 0.0
+        if self._again is None:
+            began = self._clock()
+            self._desk.take(self._hub.look(began))
+            took_s = self._clock() - began
+        pause_s = PAUSE_S + REST * took_s
+        self._foreseeing = self._loop.call_later(pause_s, self._foresee) if self._hub.looks else None
+
     def _expect(self) -> None:
         """Set the alarm for when time alone decides something. Packets that wait are served before."""
+        if self._hub.looks and self._foreseeing is None:
+            self._foreseeing = self._loop.call_soon(self._foresee)
         if self._hub.due != self._due and not self._backlog:
             self._due = self._hub.due
             if self._alarm is not None:

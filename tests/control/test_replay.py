@@ -159,7 +159,10 @@ def test_what_was_said_before_an_answer_is_on_the_tape_and_can_be_said_again(
     daemon, path = serve("--clock", "sensor", model=model), tmp_path / "a.mcap"
     recorder = start("record", path, "--control", daemon.ready["control"])
     assert b"recording into" in recorder.stderr.readline()
-    asking, sensor = daemon.client().subscribe("provisional"), Sensor(daemon, "arm").begin().perform("left")
+    asking, sensor = daemon.client().subscribe("provisional"), Sensor(daemon, "arm").begin()
+    sensor.send(sensor.hand.swipe("left"))
+    asking.events("provisional", "arm")  # for which the daemon takes its time
+    sensor.send(sensor.hand.idle(1.0))
     asking.events("gesture", "arm")
     asking.close()
     plain = daemon.client().subscribe("release")

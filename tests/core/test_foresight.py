@@ -343,13 +343,19 @@ STEPS = st.sampled_from(
 )  # fmt: skip
 
 
-def answers_of(make: Callable[[], tuple[Any, Clock]], stream: Sequence[Frame], *, asked: bool) -> list[Event]:
+def answers_of(
+    make: Callable[[], tuple[Any, Clock]], stream: Sequence[Frame], *, asked: bool, looks: Sequence[bool] = ()
+) -> list[Event]:
+    """`looks`: after which frames, in turn, there is time for a provisional event; none: it is given at once."""
     classifier, clock = make()
-    subject = recognizer(classifier, asked=asked, thresholds={"left": 0.5}, refractory={"one_tap": 2.0})
+    subject = recognizer(classifier, thresholds={"left": 0.5}, refractory={"one_tap": 2.0})
+    subject.foresee(asked=asked, later=bool(looks))
     events: list[Event] = []
-    for frame in stream:
+    for n, frame in enumerate(stream):
         clock.now = 10 * frame.t  # so fast that rungs which were put aside come back within a stream
         events += events_of(subject.push(frame))
+        if looks and looks[n % len(looks)]:
+            events += events_of(subject.look())
     return events + events_of(subject.flush(stream[-1].t + 0.2))
 
 
@@ -374,12 +380,16 @@ def a_ladder() -> tuple[Any, Clock]:
 
 @pytest.mark.parametrize("make", [an_oracle, a_ladder])
 @settings(max_examples=40, deadline=None)
-@given(st.sampled_from(["15", "15 jitter 15ms", "60"]), st.lists(STEPS, min_size=2, max_size=12))
+@given(
+    st.sampled_from(["15", "15 jitter 15ms", "60"]),
+    st.lists(STEPS, min_size=2, max_size=12),
+    st.lists(st.booleans(), max_size=9),
+)
 def test_answers_are_the_same_whether_or_not_anybody_asks(
-    make: Callable[[], tuple[Any, Clock]], rate: str, steps: list[str]
+    make: Callable[[], tuple[Any, Clock]], rate: str, steps: list[str], looks: list[bool]
 ) -> None:
     stream = frames(f"sensor rate {rate}", IDLE, *steps, PAUSE)
-    asked, unasked = (answers_of(make, stream, asked=asked) for asked in (True, False))
+    asked, unasked = (answers_of(make, stream, asked=asked, looks=looks) for asked in (True, False))
     assert bare(asked) == unasked
     assert violations(lines(asked)) == [] == violations(lines(unasked))
 
@@ -456,6 +466,35 @@ def test_only_sensors_that_somebody_asks_for_cost_a_run() -> None:
     hub.foresee(())
     assert not any(isinstance(fact, Provisional) for fact in feed(hub, "before", hand.swipe("left"), 20.0))
     assert len(seer.looked) == looked > 0
+
+
+def test_what_waits_for_its_turn_is_looked_at_one_at_a_time_and_not_said_once_it_is_old() -> None:
+    seer = Seer(certainty=replace(CERTAINTY, in_a_row=1))
+    hub = Hub(SCENE, seer, later=True)
+    hub.foresee(None)
+    sensors = {name: Hand() for name in ("one", "two", "three")}
+    for name, hand in sensors.items():
+        feed(hub, name, [*hand.idle(2.0), *hand.swipe("left")[:3]], 0.0)
+    assert hub.looks and not seer.looked
+    assert [[one.sensor for one in hub.look(2.2)] for _ in range(2)] == [["one"], ["two"]]
+    assert hub.looks and len(seer.looked) == 2 and not seer.asked
+    hand = sensors["three"]
+    facts = feed(hub, "three", [*hand.swipe("left")[3:], *hand.idle(1.0)], 2.2)
+    assert names([fact for fact in facts if isinstance(fact, Event)]) == ["left", "release"]  # there was no time for it
+    assert hub.look(9.0) == [] and not hub.looks and len(seer.looked) == 2
+
+
+@pytest.mark.parametrize("looks", [[True], [True, False]])
+def test_what_is_looked_at_later_is_said_as_if_it_had_been_at_once(looks: list[bool]) -> None:
+    stream = frames(IDLE, *[SWIPE, PAUSE, TAP, PAUSE, TAP, SHORT, SWIPE, PAUSE] * 3)
+    later = answers_of(an_oracle, stream, asked=True, looks=looks)
+    said, at_once = (
+        {one.id: one for one in events if isinstance(one, Provisional)}
+        for events in (later, answers_of(an_oracle, stream, asked=True))
+    )
+    assert said and said.keys() <= at_once.keys()
+    if all(looks):
+        assert [one.gesture for one in said.values()] == [one.gesture for one in at_once.values()]
 
 
 @pytest.mark.parametrize("how", ["reload", "no longer asked", "bug"])

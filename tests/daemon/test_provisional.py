@@ -50,6 +50,14 @@ def words(lines: list[dict[str, Any]], sensor: str) -> list[str]:
     return found
 
 
+def swipe(sensor: Sensor, client: Client, direction: str, *then: list[Any]) -> list[dict[str, Any]]:
+    """A swipe that goes on until something is said of it, for which the daemon has time once nothing waits."""
+    sensor.send(sensor.hand.swipe(direction))
+    lines = client.until(lambda line: (line["type"], line.get("sensor")) == ("provisional", sensor.name))
+    sensor.send(*then, sensor.hand.idle(1.0))
+    return lines
+
+
 def two_taps(sensor: Sensor) -> None:
     sensor.send(sensor.hand.tap(), sensor.hand.idle(0.2), sensor.hand.tap(), sensor.hand.idle(1.0))
 
@@ -57,8 +65,10 @@ def two_taps(sensor: Sensor) -> None:
 def test_it_comes_before_the_answer_which_confirms_it(daemon: Daemon) -> None:
     client = daemon.client().subscribe(*ALL, sensors=["confirmed"])
     plain = daemon.client().subscribe("gesture", sensors=["confirmed"])
-    Sensor(daemon, "confirmed").begin().perform("left", "tap")
-    lines = client.until(lambda line: line["type"] == "release" and line["id"] == 2)
+    sensor = Sensor(daemon, "confirmed").begin()
+    lines = swipe(sensor, client, "left")
+    sensor.perform("tap")
+    lines += client.until(lambda line: line["type"] == "release" and line["id"] == 2)
     assert words(lines, "confirmed") == [
         "onset", "swipe_left?", "swipe_left confirmed", "release", "onset", "one_tap?", "one_tap confirmed", "release",
     ]  # fmt: skip
@@ -76,8 +86,9 @@ def test_what_turns_out_otherwise_is_revoked(daemon: Daemon) -> None:
     sensor = Sensor(daemon, "revoked").begin()
     two_taps(sensor)
     assert said(client, "revoked") == ["onset", "one_tap?", "double_tap revoked", "release"]
-    sensor.send(sensor.hand.swipe("left"), [sensor.hand.frame(1.0) for _ in range(90)], sensor.hand.idle(1.0))
-    assert said(client, "revoked", 2) == ["onset", "swipe_left?", "cancelled revoked", "release"]
+    lines = swipe(sensor, client, "left", [sensor.hand.frame(1.0) for _ in range(90)])
+    assert words(lines, "revoked") == ["onset", "swipe_left?"]
+    assert said(client, "revoked", 2) == ["cancelled revoked", "release"]
 
 
 def test_whoever_was_sent_it_is_sent_the_answer(daemon: Daemon) -> None:
@@ -85,11 +96,11 @@ def test_whoever_was_sent_it_is_sent_the_answer(daemon: Daemon) -> None:
     taps = daemon.client().subscribe("provisional", gestures=["one_tap"])
     changed = daemon.client().subscribe("provisional", sensors=["owed"])
     sensor = Sensor(daemon, "owed").begin()
-    sensor.perform("left")
+    lines = swipe(sensor, only, "left")
     two_taps(sensor)
-    sensor.perform("up")
+    lines += only.until(lambda line: line.get("gesture") == "double_tap")
+    lines += swipe(sensor, only, "up")
     expected = ["swipe_left?", "swipe_left confirmed", "one_tap?", "double_tap revoked", "swipe_up?"]
-    lines = only.until(lambda line: line.get("gesture") == "swipe_up")
     assert words(lines, "owed") == expected
     lines = taps.until(lambda line: line["type"] == "gesture")
     assert words(lines, "owed") == ["one_tap?", "double_tap revoked"]
@@ -160,7 +171,8 @@ def test_it_is_counted(daemon: Daemon) -> None:
 
     before, lead = counts(), daemon.metric("gestured_provisional_lead_seconds_count")
     client = daemon.client().subscribe(*ALL, sensors=["counted"])
-    sensor = Sensor(daemon, "counted").begin().perform("left")
+    sensor = Sensor(daemon, "counted").begin()
+    swipe(sensor, client, "left")
     two_taps(sensor)
     said(client, "counted", 2)
     assert [new - old for new, old in zip(counts(), before, strict=True)] == [2, 1, 1]
@@ -186,16 +198,28 @@ def published_to(out: socket.socket) -> tuple[str, ...]:
     return "--clock", "sensor", "--publish", f"osc://127.0.0.1:{out.getsockname()[1]}"
 
 
-@pytest.mark.parametrize("taps", ["true", "false"])
-def test_over_osc(start: Callable[..., Daemon], early: Path, udp: socket.socket, taps: str) -> None:
-    daemon = start(*published_to(udp), "--publish-provisional", "true", "--provisional-taps", taps, model=early)
-    two_taps(Sensor(daemon, "arm").begin().perform("left"))
+def heard(out: socket.socket, last: str) -> list[tuple[str, str, list[Any]]]:
+    """What is published of the sensor, with its types and arguments, until that."""
     found: list[tuple[str, str, list[Any]]] = []
-    while len([one for one in found if one[0].endswith("gesture")]) < 2:
-        message = OscMessage(udp.recv(9999))
+    while not found or found[-1][0] != last:
+        message = OscMessage(out.recv(9999))
         if message.address != "/gestured/status":
             types = message.dgram[message.dgram.index(b",") :].split(b"\0")[0].decode()
             found.append((message.address.removeprefix("/gestured/arm/"), types, message.params))
+    return found
+
+
+@pytest.mark.parametrize("taps", ["true", "false"])
+def test_over_osc(start: Callable[..., Daemon], early: Path, udp: socket.socket, taps: str) -> None:
+    daemon = start(*published_to(udp), "--publish-provisional", "true", "--provisional-taps", taps, model=early)
+    found: list[tuple[str, str, list[Any]]] = []
+    sensor = Sensor(daemon, "arm").begin()
+    hand = sensor.hand
+    for begin in ([hand.swipe("left")], [hand.tap(), hand.idle(0.2), hand.tap()]):
+        sensor.send(*begin)
+        found += heard(udp, "provisional")
+        sensor.send(hand.idle(1.0))
+        found += heard(udp, "gesture")
     before = [("provisional", "one_tap"), ("revoked", "one_tap")] if taps == "true" else [("provisional", "double_tap")]
     assert [(what, params[0]) for what, _, params in found] == [
         ("provisional", "swipe_left"), ("gesture", "swipe_left"), *before, ("gesture", "double_tap"),

@@ -1,7 +1,5 @@
 """The way in on a machine made of arithmetic: a clock, a kernel's buffer, and work that takes its time."""
 
-import asyncio
-import socket
 import struct
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -18,33 +16,47 @@ from gestured.daemon.health import TICK_S
 from gestured.daemon.mute import Rule
 from gestured.daemon.udp import TIMESTAMP, Receiver
 
+START_S = 1000.0
 STOP_S = 1.3
-LOOP_S = 0.005  # between two reads
+TURN_S = 1e-5  # of the loop, besides what is done in it
 READ_S = 3e-6  # what it takes to read a packet
 BUFFER_BYTES = 208 << 10  # what the kernel grants whoever may not ask for more
 
 Sent = tuple[float, bytes, Source]  # s, a packet, and who sends it
 
 
+class Timer:
+    """What a loop is to do, and when."""
+
+    def __init__(self, when: float, act: Callable[[], None]) -> None:
+        self.when, self.act = when, act
+        self.cancelled = False
+
+    def cancel(self) -> None:
+        self.cancelled = True
+
+
 class Machine:
-    """A processor and the UDP socket that it reads; `cost` says how many seconds a packet takes to serve.
+    """A processor, its loop and the UDP socket that it reads; `cost` says how many seconds a packet takes to serve.
 
     It stands still for STOP_S at those of the looks at its clock that `stops` counts off.
     """
 
     def __init__(self, sent: Iterable[Sent], cost: Callable[[bytes], float], stops: Collection[int] = ()) -> None:
-        self.now = self.worked_s = 0.0
+        self.now, self.worked_s = START_S, 0.0
         self.admitted: list[float] = []  # s, when packets came for which there was room
         self.served: list[tuple[bytes, Source]] = []
         self.owners: set[Source] = set()  # those who were served before the last tick
         self.due = float("inf")
-        self._sent, self._cost = deque(sorted(sent)), cost
+        self._sent, self._cost = deque((START_S + t, packet, source) for t, packet, source in sorted(sent)), cost
         self._buffer: deque[Sent] = deque()
         self._size = self._dropped = self._looks = 0
         self._stops = stops
         self._rules: list[Rule] = []
-        self._pair = socket.socketpair()
-        self.fileno = self._pair[0].fileno
+        self._timers: list[Timer] = []
+        self._reader: Callable[[], None] | None = None
+        self.looks, self.look_s, self.looked_s = False, 0.0, 0.0  # at contacts, for provisional events
+        self.latest_s = 0.0  # that a packet was served after it came
 
     def work(self, seconds: float) -> None:
         """The processor does something for so long."""
@@ -66,15 +78,41 @@ class Machine:
                 self.admitted.append(one[0])
                 self._size += len(one[1])
 
-    def rest(self) -> None:
-        """The loop does something else, for long where all was served."""
-        self.wait(1e-4 if len(self.served) < len(self.admitted) else LOOP_S)
-
     def clock(self) -> float:
         self._looks += 1
         if self._looks in self._stops:
             self.wait(STOP_S)
         return self.now
+
+    # --- the loop
+
+    def add_reader(self, _: object, act: Callable[[], None]) -> None:
+        self._reader = act
+
+    def remove_reader(self, _: object) -> None:
+        self._reader = None
+
+    def call_later(self, seconds: float, act: Callable[[], None]) -> Timer:
+        self._timers.append(Timer(self.now + round(seconds, 3), act))  # a loop's timers know milliseconds alone
+        return self._timers[-1]
+
+    def call_soon(self, act: Callable[[], None]) -> Timer:
+        return self.call_later(0.0, act)
+
+    def turn(self) -> None:
+        """Do what is due, or wait for what is next."""
+        self._timers = [timer for timer in self._timers if not timer.cancelled]
+        due = [timer for timer in self._timers if timer.when <= self.now]
+        self._timers = [timer for timer in self._timers if timer.when > self.now]
+        for timer in due:
+            if not timer.cancelled:
+                timer.act()
+        if self._buffer and self._reader is not None:
+            self._reader()
+        elif not due:
+            following = [timer.when for timer in self._timers] + [t for t, _, _ in list(self._sent)[:1]]
+            self.wait(max(0.0, min(following, default=self.now) - self.now))
+        self.wait(TURN_S)
 
     # --- the socket
 
@@ -97,9 +135,15 @@ class Machine:
     active = False
 
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Any]:
-        for packet, _ in packets:
+        for packet, source in packets:
+            self.latest_s = max(self.latest_s, self.now - self.admitted[len(self.served)])
             self.work(self._cost(packet))
-        self.served += packets
+            self.served.append((packet, source))
+        return []
+
+    def look(self, now: float) -> list[Any]:
+        self.work(self.look_s)
+        self.looked_s += self.look_s
         return []
 
     def missed(self) -> None: ...
@@ -112,24 +156,22 @@ class Machine:
 
 
 def run(machine: Machine, seconds: float, look: Callable[[Receiver], None] = lambda receiver: None) -> None:
-    """Read for so long, as the daemon's loop does, and look at the receiver after each read."""
-
-    async def main() -> None:
-        receiver = Receiver(machine, 0.0, machine, machine, machine, machine.clock)  # type: ignore[arg-type]
-        tick = 0.0
-        while machine.now < seconds:
-            if machine.now >= tick:
-                tick = machine.now + TICK_S
-                machine.owners = {source for _, source in machine.served}
-            receiver.read()
-            look(receiver)
-            machine.rest()
-        receiver.close()
-
+    """Let the daemon's loop turn for so long, and look at the receiver after each turn."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(udp, "time", SimpleNamespace(time=machine.clock, thread_time=lambda: machine.worked_s))
         patch.setattr(udp, "mute", Machine.mute)
-        asyncio.run(main())
+        patch.setattr(udp, "asyncio", SimpleNamespace(get_running_loop=lambda: machine))
+        receiver = Receiver(machine, START_S, machine, machine, machine, machine.clock)  # type: ignore[arg-type]
+
+        def tick() -> None:
+            machine.call_later(TICK_S, tick)
+            receiver.read()
+            machine.owners = {source for _, source in machine.served}
+
+        tick()
+        while machine.now < START_S + seconds:
+            machine.turn()
+            look(receiver)
 
 
 def sensors(count: int, frames: int) -> list[Sent]:
@@ -163,5 +205,19 @@ def test_while_owners_send_full_packets_nobody_else_loses_one(ports: int, cost_s
     machine = Machine([*good, *full], lambda packet: cost_s if len(packet) > 1000 else 1e-4)
     run(machine, 10.0)
     heard = Counter(int(packet) for packet, (host, _) in machine.served if host == "10.0.0.1")
-    assert all(heard[n] == 4 for n in range(30, 145))  # by then it was seen to be a flood
     assert sum(heard.values()) >= 0.97 * len(good)
+    assert sum(heard[n] for n in range(30, 145)) >= 0.99 * 4 * 115  # by then it was seen to be a flood
+
+
+@pytest.mark.parametrize("look_s", [0.0003, 0.0015, 0.012])
+def test_provisional_events_take_a_third_of_the_time_and_no_packet_waits_for_two_of_them(look_s: float) -> None:
+    """However many contacts there are to look at."""
+    latest, seconds = [], 6.0
+    for looks in (False, True):
+        machine = Machine(sensors(80, 75), lambda packet: 2e-4)
+        machine.looks, machine.look_s = looks, look_s
+        run(machine, seconds)
+        latest.append(machine.latest_s)
+        assert len(machine.served) == 80 * 75
+    assert latest[1] < latest[0] + 2 * look_s
+    assert 0.1 * seconds < machine.looked_s < seconds / 3

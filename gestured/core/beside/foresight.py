@@ -38,6 +38,7 @@ class Foresight:
         """`taps`: whether one tap is said before a second one may come."""
         self._sensor, self.taps = sensor, taps
         self.asked = False  # whether somebody asks for provisional events
+        self.wanted: float | None = None  # s, as of when a model is to look at the contact that goes on
         self._id = 0
         self._said: Provisional | None = None
         self._best = ""  # the gesture of which the model was sure enough at the last preview
@@ -47,42 +48,54 @@ class Foresight:
 
     def begin(self, number: int) -> None:
         """Another contact begins, of which nothing was shown or said; `number` is its id."""
-        self._id, self._said, self._row, self._passed_over = number, None, 0, 0
+        self._id, self._said, self._row, self._passed_over, self.wanted = number, None, 0, 0, None
 
     def due(self, front_end: FrontEnd) -> float | None:
         """When a finger that has left will have been off for `DRAFT_S`, in s; None where that was shown."""
         offset = front_end.segmenter.last_touched
         return offset + DRAFT_S if self.asked and front_end.segmenter.phase.let_go and self._left != offset else None
 
-    def see(self, front_end: FrontEnd, t: float, shown: Segment | None) -> Preview | None:
-        """What a model may look at after a frame at `t` s; `shown` is the segment that the front end showed with it.
+    def see(self, front_end: FrontEnd, t: float) -> None:
+        """A frame came at `t` s: whether a model is to look at the contact that goes on.
 
-        While the finger is down, that is at most 15 times a second, and with every frame at 15 Hz.
+        While the finger is down, that is at most 15 times a second, and with every frame at 15 Hz. Once it has left,
+        the front end shows the segment itself.
         """
+        self._pass_over()
         if front_end.segmenter.phase.let_go:
             if t - front_end.segmenter.last_touched >= DRAFT_S and not front_end.fleeting:
                 self._left = front_end.segmenter.last_touched
-            return None if shown is None else self._preview(front_end, shown, t, drafted=True)
+            return
         if front_end.fleeting:
-            return None
+            return
         self._passed_over += 1
         interval_s = front_end.interval_s
         if self._passed_over * interval_s < PREVIEW_S and interval_s < EACH_FRAME_S:
-            return None
+            return
         self._passed_over = 0
-        segment = front_end.so_far()
-        return None if segment is None else self._preview(front_end, segment, t, drafted=False)
+        self.wanted = t if self._said is None else None
 
-    def wait(self, front_end: FrontEnd, until: float) -> Preview | None:
-        """What a model may look at because no frame has come until `until` s: the finger is off."""
+    def wait(self, front_end: FrontEnd, until: float) -> None:
+        """No frame has come until `until` s: a model is to look once more because the finger is off."""
         due = self.due(front_end)
-        if due is None or due > until:
-            return None
-        self._left = front_end.segmenter.last_touched
-        segment = None if front_end.fleeting else front_end.so_far()
-        return None if segment is None else self._preview(front_end, segment, due, drafted=False)
+        if due is not None and due <= until:
+            self._pass_over()
+            self._left = front_end.segmenter.last_touched
+            self.wanted = due if self._said is None else None
 
-    def _preview(self, front_end: FrontEnd, segment: Segment, t: float, *, drafted: bool) -> Preview:
+    def _pass_over(self) -> None:
+        """What a model was to look at is no more; frames in a row are looked at, each of them."""
+        if self.wanted is not None:
+            self.wanted, self._row = None, 0
+
+    def look(self, front_end: FrontEnd) -> Preview | None:
+        """What of the contact that goes on a model is to look at now; the next time there is nothing."""
+        t, self.wanted = self.wanted, None
+        segment = None if t is None or not self.asked or front_end.fleeting else front_end.so_far()
+        return None if t is None or segment is None else self.preview(front_end, segment, t, drafted=False)
+
+    def preview(self, front_end: FrontEnd, segment: Segment, t: float, *, drafted: bool) -> Preview:
+        """That segment of the contact that goes on, at `t` s."""
         hole_s = front_end.hole(segment, t)
         return Preview(segment, t, not front_end.segmenter.phase.let_go, drafted, front_end.segmenter.second, hole_s)
 
@@ -109,8 +122,8 @@ class Foresight:
         return self._said
 
     def judged(self, answer: Answer) -> Answer:
-        """The answer of a contact, with what became of what was said of it."""
-        said = self._said
+        """The answer of a contact, with what became of what was said of it. There is nothing to be said any more."""
+        said, self.wanted = self._said, None
         if said is None or said.id != answer.id:
             return answer
         right = isinstance(answer, Gesture) and answer.gesture == said.gesture
