@@ -61,8 +61,8 @@ lab: .venv-dev/.dev .venv-dev/.lab  ## what training needs (torch), and how to t
 
 hostile: .venv-dev/.dev .venv-dev/.lab  ## the slow fault tests, what damage does to gestures, a minute of each fuzzer
 	@.venv-dev/bin/python -m pytest -m hostile $(ARGS)
-	@.venv-dev/bin/python -m tests.hostile.damage
-	@.venv-dev/bin/python -m tests.hostile.deaf
+	@.venv-dev/bin/python -m experiments.damage
+	@.venv-dev/bin/python -m experiments.deaf
 	@$(MAKE) -s --no-print-directory fuzz
 
 fuzz: .venv-dev/.fuzz  ## fuzz the parsers and the model loader, each for: SECONDS=60
@@ -70,8 +70,8 @@ fuzz: .venv-dev/.fuzz  ## fuzz the parsers and the model loader, each for: SECON
 		.venv-dev/bin/python -m tests.fuzz.run $$target --seconds "$(SECONDS)" || exit 1; done
 
 soak: .venv-dev/.dev  ## a day compressed, then ten minutes of 20 sensors in real time
-	@.venv-dev/bin/python -m tests.hostile.soak --compressed
-	@.venv-dev/bin/python -m tests.hostile.soak
+	@.venv-dev/bin/python -m experiments.soak --compressed
+	@.venv-dev/bin/python -m experiments.soak
 
 install: PYTHON := $(or $(PYTHON),/usr/bin/python3)
 install:  ## into DESTDIR, below PREFIX=/usr, for PYTHON=/usr/bin/python3: programs, units, pages

@@ -16,7 +16,7 @@ GENERATED = {
     "docs/performance.md": ("make bench",),
     "docs/limits-and-choices.md": ("python -m experiments.taps",),
     "docs/numerics.md": ("gestured-lab stability",),
-    "docs/reliability.md": ("python -m tests.hostile.damage", "python -m tests.hostile.deaf"),
+    "docs/reliability.md": ("python -m experiments.damage", "python -m experiments.deaf"),
     "docs/study.md": ("gestured-lab study",),
 }
 

@@ -10,9 +10,9 @@ from contextlib import suppress
 
 import pytest
 
+from experiments.stall import play
 from tests.daemon.harness import Daemon, Sensor
 from tests.hostile.grammar import TYPES, violations
-from tests.hostile.stall import play
 from tests.hostile.test_network import play as send
 from tests.hostile.test_network import swipe
 

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
+from experiments import damage
 from gestured.model.shipped import shipped
 from gestured.simulator import Take
-from tests.hostile import damage
 from tests.hostile.faults import FAULTS, Fault
 from tests.hostile.grammar import violations
 

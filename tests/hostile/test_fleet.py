@@ -2,8 +2,8 @@
 
 import pytest
 
+from experiments.fleet import trial
 from tests.daemon import tiny_model
-from tests.hostile.fleet import trial
 
 
 @pytest.mark.hostile

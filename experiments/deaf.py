@@ -1,6 +1,6 @@
-"""How long a sensor is deaf after its frames were rubbish: `python -m tests.hostile.deaf`.
+"""How long a sensor is deaf after its frames were rubbish: `python -m experiments.deaf`.
 
-Simulated people gesture on the nominal sensor, as in `tests.hostile.damage`; for a while, at the start or in the
+Simulated people gesture on the nominal sensor, as in `experiments.damage`; for a while, at the start or in the
 middle, its frames are something else. The daemon's own backlog and hub take them.
 """
 
@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.damage import FIRST, Bench, damage
 from gestured.daemon import log
 from gestured.daemon.health import TICK_S
 from gestured.lab.made_of import made_of
 from gestured.model.shipped import shipped
 from gestured.record.judge import Performed, Tally
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
-from tests.hostile.damage import FIRST, Bench, damage
 from tests.hostile.faults import Counts, Fault, Frames, Stream, Times
 
 SESSION_S = 100.0
@@ -161,7 +161,7 @@ def main() -> int:
     bench = Bench("cnn_lstm")
     takes = [take(person) for person in range(FIRST, FIRST + args.people)]
     sound = [hear(healthy, BAD["none"], seed, bench) for seed, healthy in enumerate(takes)]
-    print(made_of("python -m tests.hostile.deaf", [shipped()["cnn_lstm"]]) + "\n")
+    print(made_of("python -m experiments.deaf", [shipped()["cnn_lstm"]]) + "\n")
     for number, name in enumerate(args.bad or BAD):
         row = figures(name, takes, sound, bench)
         if not number:

@@ -1,4 +1,4 @@
-"""What a stall of the daemon costs: `python -m tests.hostile.stall --sensors 100 --rate 15 --stall 3`.
+"""What a stall of the daemon costs: `python -m experiments.stall --sensors 100 --rate 15 --stall 3`.
 
 Made-up hands swipe and tap on many sensors, in real time, without frame counters. The daemon's process is stopped for
 a while, and goes on. Every gesture should be recognised as if nothing had happened, as far as the kernel's buffer

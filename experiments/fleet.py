@@ -1,6 +1,6 @@
 """Several instances on one machine, one of which is killed: what the others lose, and when its sensors are back.
 
-`python -m tests.hostile.fleet --instances 4 --sensors 1000 --rate 15` prints it as JSON. Each sensor is untouched, has
+`python -m experiments.fleet --instances 4 --sensors 1000 --rate 15` prints it as JSON. Each sensor is untouched, has
 a port of its own, sends steadily, and counts its frames. What is killed is started again, as systemd does it.
 """
 
@@ -180,7 +180,7 @@ def cpu_s(pid: int) -> float:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m tests.hostile.fleet", description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(prog="python -m experiments.fleet", description=__doc__.partition("\n")[0])
     parser.add_argument("--model", default="cnn_lstm", help="model of the instances (cnn_lstm)")
     parser.add_argument("--instances", type=int, default=4, help="daemons (4)")
     parser.add_argument("--sensors", type=int, default=1000, help="sensors of all (1000)")

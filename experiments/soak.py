@@ -1,4 +1,4 @@
-"""A long time with a real daemon: does it grow, or slow down? `python -m tests.hostile.soak [--compressed]`.
+"""A long time with a real daemon: does it grow, or slow down? `python -m experiments.soak [--compressed]`.
 
 Without a flag: ten minutes in real time, 20 sensors at 15 Hz. `--compressed`: 24 hours of one sensor by its own
 clock, as fast as it goes. Simulated people touch the sensors all the time; between two readings a client comes and
@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
+from experiments.damage import FIRST, take
+from experiments.fleet import cpu_s
 from gestured.client.sensor import Form
 from gestured.core.frames import Frame
 from tests.daemon.harness import Daemon, Sensor
-from tests.hostile.damage import FIRST, take
-from tests.hostile.fleet import cpu_s
 from tests.hostile.grammar import TYPES, violations
 
 TAKE_S = 600.0

@@ -1,4 +1,4 @@
-"""How often a damaged gesture is wrong, for each fault: `python -m tests.hostile.damage`.
+"""How often a damaged gesture is wrong, for each fault: `python -m experiments.damage`.
 
 Simulated people (the project's own simulator, nominal sensor, people whom the models have not seen) perform
 gestures; a fault damages what the sensor sends, or when it is served; the daemon's own backlog and hub take it at
@@ -214,7 +214,7 @@ def main() -> int:
         found.append(measure(name, takes, idle, bench).figures())
         if not args.json:  # row by row: it takes a while
             if len(found) == 1:
-                print(made_of("python -m tests.hostile.damage", [shipped().get(args.model, Path(args.model))]) + "\n")
+                print(made_of("python -m experiments.damage", [shipped().get(args.model, Path(args.model))]) + "\n")
                 print("| " + " | ".join(found[0]) + " |\n|" + "---|" * len(found[0]))
             print(
                 "| " + " | ".join("-" if value is None else str(value) for value in found[-1].values()) + " |",
