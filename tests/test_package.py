@@ -222,6 +222,7 @@ with gestured.Subscriber("/run/gestured/events.sock", types=["gesture"]) as even
 """
 
 
+@pytest.mark.parametrize("environment", ["wheel"], indirect=True)
 def test_a_type_checker_sees_the_front_door(environment: Environment):
     pytest.importorskip("mypy")
     (environment.beside / "use.py").write_text(USE)

@@ -116,20 +116,20 @@ def test_a_sensor_that_sends_only_while_it_is_touched(run, own) -> None:
 
 
 @pytest.mark.parametrize(("rate", "level"), [(3.0, "warn"), (15.0, "ok"), (960.0, "ok"), (1500.0, "warn")])
-def test_a_rate_outside_the_range_is_told_with_the_range(run, own, rate: float, level: str) -> None:
-    daemon = own("", "--clock", "sensor", "--stale-s", 30)
-    sensor, hand = Sensor(daemon, "arm"), Hand()
+def test_a_rate_outside_the_range_is_told_with_the_range(ctl, daemon: Daemon, rate: float, level: str) -> None:
+    name = f"at_{rate:.0f}_hz"
+    sensor, hand = Sensor(daemon, name), Hand()
     for n in range(round(max(2 * rate, 30))):
-        packet = encoding.bundle([floats("/arm/pressure", hand.frame(), n)], 1.7e9 + n / rate)
+        packet = encoding.bundle([floats(f"/{name}/pressure", hand.frame(), n)], 1.7e9 + n / rate)
         sensor.sock.send(packet)
-    awaited(daemon, "arm", "ok")
-    while abs(asked(daemon)["sensors"]["arm"]["rate_hz"] / rate - 1) > 0.1:
+    awaited(daemon, name, "ok")
+    while abs(asked(daemon)["sensors"][name]["rate_hz"] / rate - 1) > 0.1:
         pass
-    control = ("--control", daemon.ready["control"])
-    found = of("arm", run("doctor", *control, "--json")[1])
+    found = of(name, ctl("doctor", "--json")[1])
     words = [f for f in found if "5 to 1000 Hz" in f["what"]]
     assert [f["level"] for f in words] == ([level] if level == "warn" else [])
-    assert ("5 to 1000 Hz" in run("status", *control)[1]) == (level == "warn")
+    (line,) = [line for line in ctl("status")[1].splitlines() if name in line]
+    assert ("5 to 1000 Hz" in line) == (level == "warn")
 
 
 def swipes(rows: int, columns: int) -> np.ndarray:
@@ -158,8 +158,7 @@ def test_rows_and_columns_that_are_exchanged(run, own) -> None:
     assert not any("rows and columns" in found["what"] for found in of("right", out))
 
 
-def test_doctor_says_what_still_happens_and_when_it_last_did(run, own) -> None:
-    daemon = own()
+def test_doctor_says_what_still_happens_and_when_it_last_did(daemon: Daemon) -> None:
     with socket.socket(type=socket.SOCK_DGRAM) as sender:
         sender.connect(daemon.address)
         sender.send(b"rubbish!")
@@ -192,22 +191,22 @@ def test_a_sensor_that_hears_little_says_why(run, own) -> None:
 
 
 @pytest.mark.parametrize("kind", ["lost frames", "kernel drops", "lines", "osc"])
-def test_what_is_over_is_no_finding(own, kind: str) -> None:
-    daemon = own("", "--clock", "sensor")
-    Sensor(daemon, "arm", counted).begin()
-    awaited(daemon, "arm", "ok")
+def test_what_is_over_is_no_finding(daemon: Daemon, kind: str) -> None:
+    name, many = kind.replace(" ", "_"), 777_777
+    Sensor(daemon, name, counted).begin()
+    awaited(daemon, name, "ok")
     for seconds, level in ((1.0, "warn"), (RECENT_S + 1, "ok")):
         status = asked(daemon)
         last = status["last_s_ago"]
         if kind == "lost frames":
-            status["sensors"]["arm"] |= {"lost": 7, "lost_s_ago": seconds}
+            status["sensors"][name] |= {"lost": many, "lost_s_ago": seconds}
         elif kind == "kernel drops":
-            status["input"]["kernel_drops"], last["kernel_drops"] = 7, seconds
+            status["input"]["kernel_drops"], last["kernel_drops"] = many, seconds
         elif kind == "lines":
-            status["output"]["lines_lost"], last["lines_lost"] = 7, {"all": seconds}
+            status["output"]["lines_lost"], last["lines_lost"] = many, {"all": seconds}
         else:
-            status["output"]["osc"], last["osc"] = {"failed": 7}, {"failed": seconds}
-        (found,) = [f for f in examine_status(status) if "7 " in f.what and "ago" in f.what]
+            status["output"]["osc"], last["osc"] = {"failed": many}, {"failed": seconds}
+        (found,) = [f for f in examine_status(status) if f"{many} " in f.what and "ago" in f.what]
         assert found.level == level
 
 
@@ -222,11 +221,10 @@ def test_what_no_daemon_sends_ends_listen_with_2_and_a_line_that_names_it(run, d
     assert status == 2 and out == "" and "swipe_lefft" in err and "swipe_left" in err
 
 
-def test_why_an_answer_is_unknown_is_shown(start, own) -> None:
-    daemon = own("", "--clock", "sensor", "--stale-s", 30)
+def test_why_an_answer_is_unknown_is_shown(start, daemon: Daemon) -> None:
     listener = start("listen", "--socket", daemon.socket, "--types", "status,unknown")
     assert listener.stdout.readline()  # a first status says that the subscription holds
-    sensor = Sensor(daemon, "arm", counted).begin()
+    sensor = Sensor(daemon, "holes", counted).begin()
     for n, frame in enumerate([*sensor.hand.swipe("left"), *sensor.hand.idle(1.0)]):
         packet = sensor.packet(frame)
         if n not in (2, 3, 4, 5):  # they are lost on the way
