@@ -1,0 +1,1 @@
+"""Hours of everyday life on a sensor, and what is said in them."""

@@ -1,0 +1,150 @@
+"""What a model says in hours in which hardly anything is meant: `python -m experiments.everyday --hours 20`.
+
+Hours of everyday life (life.py), each of another person at one place after the other, pass through the
+daemon's own path. A gesture that is said of nothing that was meant is false. One of a contact that is a tap in truth,
+though nobody meant it, is counted apart: no model can know better there.
+"""
+
+import argparse
+import json
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from experiments.everyday.life import PLACES, Day, day
+from gestured.core.classifier import Classifier
+from gestured.core.events import Event, Gesture, Provisional
+from gestured.core.facts import events_of
+from gestured.core.frames import Frame
+from gestured.core.scene import Scene
+from gestured.core.sensor import Sensor
+from gestured.lab.progress import progress
+from gestured.lab.table import Table
+from gestured.model.opening import open_model
+from gestured.record.judge import NONE, Performed, verdict, whose
+
+HOUR_S = 3600.0
+FIRST = 5000  # the first day's seed; no training has drawn it
+DRAWS = 2000  # of people, for an interval
+TAPS = ("one_tap", "double_tap")
+
+
+@dataclass
+class Hours:
+    """What was said in some hours, and how it went."""
+
+    seconds: float = 0.0
+    deaf_s: float = 0.0  # in which the idle sensor was not known
+    contacts: int = 0
+    said: Counter[str] = field(default_factory=Counter)  # right, wrong, missed, false, apart, provisional
+    names: Counter[str] = field(default_factory=Counter)  # of what was false
+    each: list[tuple[float, int]] = field(default_factory=list)  # by person: hours, and false gestures
+
+    def __iadd__(self, other: "Hours") -> "Hours":
+        self.seconds, self.deaf_s = self.seconds + other.seconds, self.deaf_s + other.deaf_s
+        self.contacts += other.contacts
+        self.said += other.said
+        self.names += other.names
+        self.each += other.each
+        return self
+
+    def per_hour(self, what: str) -> float:
+        """How often that was so in an hour."""
+        return HOUR_S * self.said[what] / self.seconds
+
+    def share(self, what: str) -> float:
+        """The share of the gestures that were meant."""
+        return self.said[what] / max(sum(self.said[name] for name in ("right", "wrong", "missed")), 1)
+
+    def interval(self) -> tuple[float, float]:
+        """95 % of false gestures an hour, people drawn anew; at none the upper end is that of a Poisson count."""
+        hours, false = np.array(self.each).T
+        if not false.any():
+            return 0.0, 3.0 / float(hours.sum())
+        drawn = np.random.default_rng([0, 0xE7]).integers(0, len(hours), (DRAWS, len(hours)))
+        low, high = np.quantile(false[drawn].sum(axis=1) / hours[drawn].sum(axis=1), [0.025, 0.975])
+        return float(low), float(high)
+
+
+def heard(life: Day, classifier: Classifier) -> tuple[list[Event], float]:
+    """The events of a day, provisional ones among them, and for how many seconds the idle sensor was not known."""
+    times, frames = life.take.times, life.take.frames
+    sensor = Sensor("lab", Scene(classifier.gestures, frames.shape[1:]), classifier)
+    sensor.foresee(asked=True)
+    found: list[Any] = []
+    deaf = 0
+    for t, values in zip(times.tolist(), frames, strict=True):
+        found += sensor.push(Frame(t, values))
+        deaf += not sensor.front_end.ready
+    found += sensor.flush(float(times[-1]) + 5.0)
+    return events_of(found), deaf * float(times[-1]) / len(times)
+
+
+def judged(life: Day, events: Iterable[Event], deaf_s: float) -> Hours:
+    """How it went."""
+    meant = [
+        Performed(act.label, act.kind, act.onset_s, act.offset_s) for act in life.take.events if act.label != "none"
+    ]
+    alone = [Performed(NONE, act.kind, act.onset_s, act.offset_s) for act in life.like]
+    hours = Hours(float(life.take.times[-1]), deaf_s, life.contacts)
+    for event in events:
+        if isinstance(event, Provisional):
+            hours.said["provisional"] += whose(event.onset, event.decided, meant) is None
+        if not isinstance(event, Gesture):
+            continue
+        act = whose(event.onset, event.offset, meant)
+        found = verdict(event.gesture, act, answered=act is not None and act.answered)
+        if act is not None:
+            act.answered = True
+        elif event.gesture in TAPS and whose(event.onset, event.offset, alone) is not None:
+            found = "apart"
+        hours.said[found] += 1
+        if found == "false":
+            hours.names[event.gesture] += 1
+    hours.said["missed"] += sum(not act.answered for act in meant)
+    hours.each.append((hours.seconds / HOUR_S, hours.said["false"]))
+    return hours
+
+
+def main() -> None:
+    """Print false gestures an hour, and what became of those that were meant."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--model", default="cnn_lstm", help="a shipped model, or a file (default: cnn_lstm)")
+    parser.add_argument("--hours", type=int, default=20, help="of simulated life, in turn at each place (default: 20)")
+    parser.add_argument("--seed", type=int, default=FIRST, help=f"of the first hour (default: {FIRST})")
+    parser.add_argument("--json", action="store_true", help="print the table as JSON")
+    args = parser.parse_args()
+    model, names = open_model(args.model), list(PLACES)
+    places: dict[str, Hours] = {name: Hours() for name in names}
+    for n in progress(range(args.hours), args.hours, "hours"):
+        life = day(args.seed + n, names[n % len(names)], HOUR_S)
+        places[life.place] += judged(life, *heard(life, model))
+    every = Hours()
+    for one in places.values():
+        every += one
+    head = ("place", "hours", "contacts an hour", "false an hour", "95 %", "counted apart", "provisional false",
+            "right", "wrong", "missed", "deaf s an hour")  # fmt: skip
+    rows = [_row(name, one) for name, one in (*places.items(), ("all", every)) if one.seconds]
+    table = Table(f"Everyday life, simulated: {args.model}", head, rows)
+    if args.json:
+        print(json.dumps(table.plain() | {"false": dict(every.names)}))
+    else:
+        print(table)
+        print("false: " + ", ".join(f"{name} {count}" for name, count in every.names.most_common()))
+
+
+def _row(name: str, one: Hours) -> tuple[str | int | float, ...]:
+    low, high = one.interval()
+    hours = one.seconds / HOUR_S
+    return (
+        name, round(hours), round(one.contacts / hours), one.per_hour("false"), f"{low:.1f} to {high:.1f}",
+        one.per_hour("apart"), one.per_hour("provisional"), f"{one.share('right'):.3f}", f"{one.share('wrong'):.3f}",
+        f"{one.share('missed'):.3f}", one.deaf_s / hours,
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
