@@ -23,8 +23,8 @@ from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
 from gestured.core.wire import Arrival
 
-ABSENT_S = 60.0  # of silence: whoever touches a sensor that sends only then has gone, or it has
-HELD_S = 60.0  # of arrivals: a contact that lasts longer by the sensor's own clock is given up
+ABSENT_S = 60.0  # of silence, after which a sensor that sends only while it is touched counts as stale
+HELD_S = 60.0  # on the hub's clock: a contact that lasts longer is given up, whatever the sensor's own clock says
 NOBODY: Source = ("", 0)  # who feeds a sensor that is in no hub
 
 Told = Event | Decided
@@ -35,9 +35,9 @@ _new = tuple.__new__  # Arrived(...) takes twice the time
 class Sensor:
     """One sensor of a scene. `classifier` may be replaced between two frames.
 
-    The classifier is asked while the segmenter still waits whether the finger stays off: once it is sure, the answer
-    is there. Where the finger comes back, that answer is thrown away. Where somebody asks for provisional events, it is
-    asked about contacts that are not over as well, and what it is sure of is said; no answer depends on that.
+    The classifier is asked while the segmenter still waits whether the finger stays off, so that the answer is there
+    when the wait is over. Where the finger comes back, that answer is thrown away. Where somebody asks for provisional
+    events, the classifier is asked about contacts that are not over as well; no answer depends on that.
     """
 
     def __init__(
@@ -48,25 +48,25 @@ class Sensor:
         source: Source = NOBODY,
         numbers: tuple[int, int] = (0, 0),
     ) -> None:
-        """`numbers`: the sequence and the id that it has used before."""
+        """`numbers`: the last sequence and the last id that the sensor has used before."""
         self.name, self.classifier = name, classifier
         self.owner = Owner(source)
-        self.silent = False  # and has been flushed
+        self.silent = False  # whether the stream has ended or paused, and was flushed
         self.sequence, self.segments = numbers
         self.front_end = _front_end(name, scene)
         self._scene, self._decision = scene, Decision(scene)
         self._stamper = Stamper(scene.clock_of(name))
-        self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # no scores where it failed
+        self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # last; no scores where it failed
         self._foresight = Foresight(name, taps=scene.provisional_taps)
         self._later = False  # whether looks for provisional events wait until `look`
         self._habits, self._vitals = Habits(*self.front_end.sent), Vitals()
-        self._square = self.front_end.rows == self.front_end.columns  # its idle frames say nothing of its habits
+        self._square = self.front_end.rows == self.front_end.columns  # then idle frames say nothing of its habits
         self._fresh = True  # no frame was used since it came or restarted
         self._open: int | None = None  # id of the contact that was not released yet
         self._answered = True  # whether that contact has its answer
         self._since = 0.0  # s, on the hub's clock: when the frame arrived that opened it
-        self._lost = 0  # frames
-        self._lost_at: float | None = None  # s
+        self._lost = 0  # frames that went missing so far
+        self._lost_at: float | None = None  # s, on the hub's clock: when the last of them did
 
     # --- by the stream's time
 
@@ -113,7 +113,7 @@ class Sensor:
         return self._tell(self.front_end.reset())
 
     def _tell(self, found: Sequence[Found]) -> list[Told]:
-        """What a front end has found, signed and numbered."""
+        """The events of what the front end has found, with the sensor's name and ids."""
         told: list[Told] = []
         for one in found:
             if isinstance(one, Shown):
@@ -131,7 +131,7 @@ class Sensor:
         return told
 
     def _ask(self, segment: Segment) -> Scores | None:
-        """The classifier is asked once for each segment."""
+        """The classifier's scores of a segment, which is asked about once; None where it fails."""
         classifier, asked = self.classifier, self._asked
         if asked is None or asked[0] is not classifier or asked[1] is not segment:
             try:
@@ -142,7 +142,7 @@ class Sensor:
         return asked[2]
 
     def _decide(self, cut: Cut) -> list[Told]:
-        """The answer, and what was decided, where a model could."""
+        """The answer to a segment, and `Decided` where a classifier gave scores."""
         name, segment, decision = self.name, cut.segment, self._decision
         answer = self._ask(segment)
         self._asked = None
@@ -173,7 +173,7 @@ class Sensor:
         return self._foresight.judged(Cancelled(self.name, self.segments, why))
 
     def _late(self, t: float) -> list[Told]:
-        """What is said before the answer because no frame has come until `t` s."""
+        """The provisional event, if any, of a finger that is off because no frame has come until `t` s."""
         self._foresight.wait(self.front_end, min(t, self.front_end.pace.sure))
         return self._at_once()
 
@@ -181,11 +181,11 @@ class Sensor:
         return [] if self._later or self._foresight.wanted is None else self.look()
 
     def look(self) -> list[Told]:
-        """What can be said of the contact that goes on, where a model is to look at it: one run of it at most."""
+        """The provisional event, if any, of the contact that goes on. It costs one run of the model at most."""
         return self._foresee(self._foresight.look(self.front_end))
 
     def _foresee(self, preview: Preview | None) -> list[Told]:
-        """What can be said of a contact that is not over."""
+        """The provisional event of a contact that is not over, if the classifier is sure enough."""
         classifier, foresight, decision = self.classifier, self._foresight, self._decision
         if preview is None or (certainty := classifier.certainty) is None:
             return []
@@ -205,7 +205,7 @@ class Sensor:
 
     @property
     def numbers(self) -> tuple[int, int]:
-        """The last sequence and the last id."""
+        """The last sequence and the last id that were used."""
         return self.sequence, self.segments
 
     def count(self) -> tuple[int, int]:
@@ -291,8 +291,8 @@ class Sensor:
     def foresee(self, *, asked: bool, later: bool = False) -> None:
         """Say of contacts from now on, or no longer, what they will most probably be.
 
-        It costs runs of the model. They are made at once, or `later`: where `looks`, by `look`. What was not looked at
-        when the next frame comes is not said.
+        Its runs of the model are made at once, or `later`: by `look`, where `looks` is true. A contact that was not looked
+        at when the next frame comes has no provisional event for that frame.
         """
         self._foresight.asked, self._later = asked, later
 
@@ -306,11 +306,11 @@ class Sensor:
         self._run(lambda _: self.look(), now, facts)
 
     def review(self) -> None:
-        """Look at what is not looked at with each frame."""
+        """Look at what need not be looked at with each frame; called with each tick."""
         self._vitals.review(self.front_end)
 
     def stale(self, now: float) -> bool:
-        """Whether the sensor is silent."""
+        """Whether nothing of the sensor was admitted for `stale_s` of the scene."""
         return now - self.owner.heard > self._scene.stale_s
 
     def condition(self, now: float) -> tuple[str, str]:
@@ -371,7 +371,7 @@ class Sensor:
             self._open = None
 
     def _add(self, told: Sequence[Told], now: float, facts: list[Fact]) -> None:
-        """Tell of it, and remember what is open for those who hear it."""
+        """Add events to `facts`, and remember which contact is open for those who read them."""
         for one in told:
             if isinstance(one, Onset):
                 self._open, self._answered, self._since = one.id, False, now

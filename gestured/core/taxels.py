@@ -15,15 +15,15 @@ FROZEN_NOISE = 3.0  # times a taxel's own noise: above this a taxel that froze i
 STRIKES = 2  # gestures in which a taxel stood still while its neighbours were pressed, after which it is stuck
 STRUCK_SHARE = 0.4  # of the contact's peak that the neighbours of such a taxel have to reach
 STRUCK_NOISE = 8.0  # times the sensor's noise that they have to reach as well
-TURNS = 5  # times in one contact that a taxel turns round from one frame to the next, as no finger makes it
-TURNS_TOO = 3  # the same, where another taxel flickers: they seldom do alone
-TURN_FRAMES = 15  # without a turn, after which a taxel's turns are counted anew
-TURN_SHARE = 0.15  # of the most that it showed in the contact: smaller jumps are a finger's tremble
-ALONE = 4.0  # times what its neighbours show: a finger presses them as well
+TURNS = 5  # jumps up and down in one contact, from which on a taxel flickers: no finger does that
+TURNS_TOO = 3  # jumps that are enough where another taxel flickers already, since taxels seldom flicker alone
+TURN_FRAMES = 15  # frames without a turn, after which a taxel's turns are counted anew
+TURN_SHARE = 0.15  # of the taxel's peak in the contact: smaller jumps are a finger's tremble
+ALONE = 4.0  # times its neighbours' peaks: a finger presses those as well, so a taxel above that is no finger's
 HELD_SHARE = 0.5  # of the highest other taxel, from which one that flickers may have made the contact
-RUBBISH_ONE_IN = 2  # taxels; where more than one in so many flickers, the frames are rubbish ...
-RUBBISH_S = 1.0  # ... if it lasts so long: a burst passes
-STEADY_FRAMES = 30  # without a turn, after which a taxel flickers no more
+RUBBISH_ONE_IN = 2  # taxels; where more than one in so many jumps for RUBBISH_S, the frames are rubbish
+RUBBISH_S = 1.0  # how long a contact must last before its frames are rubbish: a burst passes
+STEADY_FRAMES = 30  # frames without a turn, after which a taxel flickers no more
 NEAR, DIAGONAL = 2.0, 1.0  # weights of a taxel's eight neighbours
 
 
@@ -31,7 +31,7 @@ class Inspection(NamedTuple):
     """What the frames of one contact say of its taxels."""
 
     still: Mask  # (N,) taxels that did not change
-    suspect: Mask  # (N,) those of them whose neighbours were pressed
+    suspect: Mask  # (N,) taxels that did not change although their neighbours were pressed
     any_suspect: bool
 
 
@@ -78,7 +78,7 @@ class Frozen:
         self._set(np.zeros_like(self.mask))
 
     def watch(self, t: float, raw: Array, above: Array, sigma: Array) -> bool:
-        """See (N,) counts and what they are above the baseline, `sigma` being the taxels' noise; whether others froze.
+        """See (N,) counts and what they are above the baseline, `sigma` being their noise; True if `mask` changed.
 
         Asked while the sensor is touched, and later as long as a taxel is frozen.
         """
@@ -107,13 +107,13 @@ class Flickering:
         self._shape = rows, columns
         self.mask: Mask = np.zeros(rows * columns, dtype=bool)
         self.any = False
-        self.rubbish = False  # most taxels have jumped like that in this contact, or what held it: it is no touch
-        self._frames = 0  # that were seen
+        self.rubbish = False  # whether most taxels, or those that held the contact, jumped so: it is no touch
+        self._frames = 0  # frames that were seen
         self._turned = np.zeros(rows * columns, dtype=np.int64)  # the frame in which each taxel turned round last
         self.begin(0.0)
 
     def begin(self, t: float) -> None:
-        """A contact begins at `t` s. Where taxels flicker, others are watched on."""
+        """A contact begins at `t` s: turns are counted anew, unless a taxel flickers already."""
         self._began, self.rubbish = t, False
         if not self.any:
             size = self.mask.size
@@ -125,7 +125,7 @@ class Flickering:
         self._set(np.zeros_like(self.mask))
 
     def watch(self, t: float, above: Array, noise: float, bad: Mask) -> bool:
-        """See (N,) counts above the baseline at `t` s, `noise` being the sensor's; whether others flicker.
+        """See (N,) counts above the baseline at `t` s, `noise` being the sensor's; True if `mask` changed.
 
         Asked while the sensor is touched, and later as long as a taxel flickers. `bad` taxels held no contact.
         """
@@ -168,7 +168,7 @@ class Taxels:
         self.count = 0  # how many taxels are bad
 
     def review(self, sigma: Array, noise: float) -> None:
-        """Say which are bad, by each taxel's noise (N,) and the sensor's. Were it all of them, none would be left."""
+        """Say which are bad, by each taxel's noise (N,) and the sensor's. Where all are, none counts as bad."""
         self.bad = self.stuck.mask | self.frozen.mask | self.flickering.mask | (sigma > NOISY * noise)
         if self.bad.all():
             self.bad = np.zeros_like(self.bad)
