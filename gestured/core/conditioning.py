@@ -17,7 +17,7 @@ from gestured.core.taxels import Inspection, Taxels
 Array = NDArray[np.float64]
 
 LEAST_SIGMA = 0.2  # of the sensor's noise: a taxel that hardly moves counts for at most five times a usual one
-BELOW_SHARE = 0.3  # of the highest taxel's height: what lies less deep than that may come with a firm finger
+BELOW_SHARE = 0.3  # of the highest taxel: taxels less deep than that share may come with a firm finger
 SHIFTED, SHIFTED_OF = 3, 20  # taxels: where so many of so many lie far below the baseline, no touch does that
 
 
@@ -32,8 +32,8 @@ class Look(NamedTuple):
     above: Array  # (N,) counts above the baseline
     activity: float  # noise units, of the strongest spot
     sunken: bool  # a taxel lies clearly below its baseline, as after a hand that rested there when it was learned
-    burst: bool  # and deeper than textile swings after a contact, as after interference
-    shifted: bool  # and many do: no touch does that; the sensor restarted, or that hand has left
+    burst: bool  # one lies deeper than textile swings after a contact, as after interference
+    shifted: bool  # many lie so deep: no touch does that; the sensor restarted, or a hand has left
 
 
 class Conditioner:
@@ -47,7 +47,7 @@ class Conditioner:
         self._deep = hardly_ever(rows * columns)  # noise units below the baseline that are no noise
 
     def look(self, t: float, raw: Array, after: AfterEffect) -> Look:
-        """See (N,) counts at `t` s. By its after-effect textile may still swing below its baseline."""
+        """What (N,) counts at `t` s show. `after` says how far textile may still swing below its baseline."""
         if self.idle.learns_step(raw):
             self._review()
         above = raw - self.idle.counts

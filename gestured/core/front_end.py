@@ -76,8 +76,8 @@ class FrontEnd:
         self.segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
         self._cutter = Cutter(self.conditioner, travel)
         self._as_sent = self.mounting == Mounting()
-        self.frame: Frame | None = None  # the last one that was taken
-        self.look: Look | None = None  # how it was seen; None before the idle sensor is known
+        self.frame: Frame | None = None  # the last frame that was taken
+        self.look: Look | None = None  # what `frame` shows; None before the idle sensor is known
         self.pace = Pace()
         self._below_since: float | None = None  # s, since when the frames lie far below the baseline
 
@@ -254,7 +254,7 @@ class FrontEnd:
         return found
 
     def _done(self, deeds: list[Deed], seen: float) -> list[Found]:
-        """What the segmenter decided, the sensor having been seen until then (s)."""
+        """What was found by the segmenter's deeds; the sensor was seen until `seen` (s)."""
         found: list[Found] = []
         for action, onset, offset, decided in deeds:
             if action is Action.OPEN:

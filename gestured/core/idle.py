@@ -1,6 +1,6 @@
 """What the idle sensor shows, how much it moves, and in which step it counts.
 
-Learned from a second in which nothing moved, then followed while it is idle.
+That is learned from a second in which nothing moved, then followed while the sensor is idle.
 """
 
 import math
@@ -18,32 +18,32 @@ RECOVERY_TAU_S = 0.4  # time constant just after a contact: textile comes back s
 NOISE_TAU_S = 30.0  # the time constant with which noise is followed: it changes slowly
 REVIEW_S = 0.5  # the pause between two looks at the noise; they would cost too much at each frame
 UNSEEN_S = 4.0  # the most that one look counts of the time under a contact or in silence
-OUTLIER = 4.0  # times its noise: a taxel that is further off counts as this far, since one outlier must not rule
-QUIETER = 10.0  # times: where frames move so much less than when the noise was learned, that was no idle sensor
+OUTLIER = 4.0  # times a taxel's noise: the furthest that it counts as off its baseline, since one outlier must not rule
+QUIETER = 10.0  # where frames move so many times less than the noise that was learned, that was no idle sensor's
 GLANCE_S = 0.19  # the pause between two glances at how much frames move
-GLANCE, GLANCE_REPEATED, GLANCES = 3, 1, 9  # what a quieter glance counts, and one at a repeated frame; how much tells
+GLANCE, GLANCE_REPEATED, GLANCES = 3, 1, 9  # weights of a quieter frame and of a repeated one; the sum that tells
 
 
 class Idle:
     """What one sensor shows while nobody touches it, and how much it moves.
 
-    It stands still under a contact: a tracker that went on would erase the hand.
+    All of it stands still under a contact: a tracker that went on would erase the hand.
     """
 
     def __init__(self, taxels: int) -> None:
-        self.counts: Array = np.zeros(taxels)  # replaced, never changed in place
+        self.counts: Array = np.zeros(taxels)  # the baseline; replaced, never changed in place
         self.sigma: Array = np.ones(taxels)  # counts, each taxel's standard deviation
-        self.level = 1.0  # counts, the median taxel's
+        self.level = 1.0  # counts, the median taxel's standard deviation
         self.step = 0.0  # counts, one quantisation step: below it noise cannot be known
         self.lively = False  # whether no frame of the idle sensor repeated the one before it
-        self.known = False
-        self.provisional = False  # it is in doubt, and the next stable second replaces it
+        self.known = False  # whether an idle second was learned
+        self.provisional = False  # whether what was learned is in doubt, and the next stable second replaces it
         self.glance = math.inf  # s, when `mistaken` is to be asked next
         self._settling = Settling()
         self._followed: float | None = None  # s, the last idle frame; None after a contact or a silence
         self._reviewed = 0.0  # s, when the noise was last looked at
-        self._learned = 1.0  # counts, the level as it was learned
-        self._quieter = 0  # what the glances of late say for a noise that was learned from no idle sensor
+        self._learned = 1.0  # counts, `level` as it was learned
+        self._quieter = 0  # sum of the weights of the last glances that were quieter
         self._smallest = 0.0  # counts, the smallest change of a sensor that stood still when it was learned; else 0
         self._shown: Array = np.zeros(taxels)  # the last raw counts, as far as they are needed
 
@@ -113,7 +113,7 @@ class Idle:
         return since
 
     def follow(self, t: float, since: float, above: Array, *, recovering: bool) -> None:
-        """Follow the sensor, idle from `since` until `t` s and then (N,) counts `above` this; the step is exact."""
+        """Follow the sensor, idle from `since` until `t` s and then (N,) counts `above` its baseline."""
         tau = RECOVERY_TAU_S if recovering else BASELINE_TAU_S
         self.counts = self.counts + above * -math.expm1((since - t) / tau)
 
@@ -134,11 +134,11 @@ class Idle:
         self._settling.clear()
 
     def doubt(self) -> None:
-        """Go on, but with the next stable second instead."""
+        """Put what was learned in doubt: it holds until the next stable second replaces it."""
         self.provisional, self._followed = True, None
 
     def forget(self, *, keep: bool) -> None:
-        """The next stable second is learned. `keep`: what `settle` was offered counts for it."""
+        """Learn the next stable second. `keep`: the frames that `settle` was offered count for it."""
         self.known = self.provisional = False
         self._followed = None
         if not keep:

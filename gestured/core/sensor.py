@@ -291,8 +291,8 @@ class Sensor:
     def foresee(self, *, asked: bool, later: bool = False) -> None:
         """Say of contacts from now on, or no longer, what they will most probably be.
 
-        Its runs of the model are made at once, or `later`: by `look`, where `looks` is true. A contact that was not looked
-        at when the next frame comes has no provisional event for that frame.
+        The model is run at once, or `later`: by `look`, where `looks` is true. A frame that was not looked at when the
+        next one comes gives no provisional event.
         """
         self._foresight.asked, self._later = asked, later
 
@@ -302,7 +302,7 @@ class Sensor:
         return self._foresight.wanted is not None
 
     def look_later(self, now: float, facts: list[Fact]) -> None:
-        """`look`, at `now`."""
+        """Do what `look` does at `now` (s), and add its events to `facts`."""
         self._run(lambda _: self.look(), now, facts)
 
     def review(self) -> None:

@@ -15,17 +15,17 @@ Array = NDArray[np.float64]
 
 SETTLE_S = 0.93  # a stable second at 15 Hz: half-way between its last two frames, so jitter cannot miss it
 LOOK_S = 0.06  # how often it is looked whether the last second was stable
-SETTLE_FRAMES = 64  # frames kept of that second; faster sensors are thinned out
-LEAST_FRAMES = 4  # with fewer there are no two halves to compare
+SETTLE_FRAMES = 64  # frames kept of a second; those of faster sensors are thinned out
+LEAST_FRAMES = 4  # of a second; fewer have no two halves to compare
 PATIENCE_S = 5.0  # a sensor that never settles (hum, a hand that never rests) is used all the same after this
 RESTLESS = 5.0  # a taxel that moves more than this many times the sensor's noise was touched, or is bad
 MOVED = 3  # taxels that may move in a stable second, whatever the sensor's size
 MOVED_ONE_IN = 20  # of a large sensor one taxel in so many may move: bad ones must not keep it from settling
-HALVES = 1.4  # times the noise of the quieter half is a second's at most; what is more is the end of a movement
-HALF_CHANGES = 16  # of taxels in half a second, from which its noise can be told
+HALVES = 1.4  # the most that a second's noise may be, in times its quieter half's; above it a movement has just ended
+HALF_CHANGES = 16  # changes of taxels in half a second, from which on that half's noise can be told
 CONSTANT_ONE_IN = 4  # where more than one taxel in so many stands still, standing still is the sensor's way
 SPIKE = 1000.0  # a frame so many times further off than frames usually jump is a fault of the readout, not idle
-SPIKES_ONE_IN = 8  # frames; where more than one in so many is that far off, they are no single frames
+SPIKES_ONE_IN = 8  # frames; where more than one in so many is a spike, none of them is taken for a fault
 JUMP_PER_SIGMA = 1.128  # of normal noise, the mean absolute difference of successive values: 2 / sqrt(pi)
 SIGMA_PER_DEVIATION = 1.2533  # of normal noise, its sigma by its mean absolute deviation: sqrt(pi / 2)
 TREMBLE = 0.35  # of a step: with that much noise a finger's tremble shows in the last digit
@@ -47,8 +47,8 @@ class Learned(NamedTuple):
     moved: int  # taxels that moved
     fine: bool  # whether a finger's tremble shows in the last digit
     step: float  # counts, one quantisation step
-    still: bool  # nothing changed at all, so that the step is a guess
-    lively: bool  # no frame repeated the one before it
+    still: bool  # whether nothing changed at all, so that the step is a guess
+    lively: bool  # whether no frame repeated the one before it
     frames: Array  # (n, N) counts that this was learned from
 
     @property

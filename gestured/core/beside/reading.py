@@ -11,11 +11,11 @@ from gestured.core.quantiles import median
 # From good to bad.
 STATES = ("ok", "starting", "degraded", "intermittent", "inverted", "stale", "no_data", "faulty")
 SILENT = ("no_data", "stale")  # states of sensors that are not there now
-SMALLEST = 1e-30  # counts; noise that is nothing divides nothing
-SHORT_S = 5.0  # frames between two silences for no longer than this are no more than some gestures
+SMALLEST = 1e-30  # counts; the least noise that anything is divided by
+SHORT_S = 5.0  # a stretch of frames between two silences that is shorter may hold a few gestures alone
 STRETCHES = 3  # short stretches in a row after which a sensor is said to send only while it is touched
 FAULTY = 0.25  # share of the taxels: where so many are bad, what is bridged between them is guesswork
-LOUD = 10.0  # times the least noise that the sensor has had: then touches are missed
+LOUD = 10.0  # times the least noise that the sensor has had; from there on touches are missed
 WEIGHT = 1 / 16  # weight of the newest interval in the jitter (RFC 3550, 6.4.1)
 
 
@@ -36,15 +36,15 @@ class Reading:
     noise: float = 0.0  # counts
     source: tuple[str, int] | None = None
     heard: float = 0.0  # s, on the hub's clock
-    lost: int = 0  # frames
-    lost_at: float | None = None  # s, on the hub's clock: when the last of them were
+    lost: int = 0  # frames that went missing
+    lost_at: float | None = None  # s, on the hub's clock: when the last of them went missing
     exchanged: bool = False  # touches look like a finger's with rows and columns the other way round
     touched: bool = False
     contact: int | None = None  # id of the contact that was not released yet
     sequence: int = 0  # of its last gesture
     segments: int = 0  # so far; the last one's id
     first: NDArray[np.float64] | None = None  # (N,) counts: the first baseline that was learned
-    baseline: NDArray[np.float64] | None = None  # (N,) counts: today's
+    baseline: NDArray[np.float64] | None = None  # (N,) counts: the baseline now
     reason: str = ""  # of "starting" and "degraded", in a sentence: what is wrong, or what the sensor waits for
 
     @property
@@ -70,7 +70,7 @@ class Vitals:
         self._quietest = np.inf  # counts: the least noise so far
         self._last: float | None = None
         self._began = 0.0  # s, the first frame after the last silence
-        self._stretches = 0  # short ones, in a row
+        self._stretches = 0  # stretches in a row that were shorter than SHORT_S
 
     @property
     def intermittent(self) -> bool:
@@ -96,7 +96,7 @@ class Vitals:
         self.interval_s = front_end.interval_s
         if self.first is None and front_end.ready:
             self.first = front_end.baseline
-        if front_end.conditioner.idle.lively:  # of others the noise is a guess
+        if front_end.conditioner.idle.lively:  # the noise of other sensors is a guess
             self._quietest = min(self._quietest, front_end.noise)
 
     def silent(self) -> None:
@@ -106,7 +106,7 @@ class Vitals:
         self._last = None
 
     def restart(self) -> None:
-        """The sensor is learned anew."""
+        """Forget the first baseline and the least noise: the sensor is learned anew."""
         self.first, self._quietest = None, np.inf
 
     def condition(self, front_end: FrontEnd, *, inverted: bool) -> tuple[str, str]:
