@@ -1,6 +1,6 @@
 """gestured: real-time tactile gesture recognition, as a daemon and as a library (docs/embedding.md)."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # Each name comes from its module when it is first used, so that importing the package imports nothing else. Type
 # checkers take this constant for true; typing's own would have to be imported.

@@ -130,7 +130,7 @@ def main() -> None:
     rows = [_row(name, one) for name, one in (*places.items(), ("all", every)) if one.seconds]
     table = Table(f"Everyday life, simulated: {args.model}", head, rows)
     if args.json:
-        print(json.dumps(table.plain() | {"false": dict(every.names)}))
+        print(json.dumps({"head": head, "rows": rows, "false": dict(every.names)}))
     else:
         print(table)
         print("false: " + ", ".join(f"{name} {count}" for name, count in every.names.most_common()))
