@@ -154,8 +154,10 @@ def test_the_readme_quotes_the_tables():
         assert cells(readme, f"{field} ")[1:] == [count, right, wrong, lost, rejected]
     _, count, _, right, wrong, *_ = cells(figures, "`cnn_lstm.onnx`, real, taps and swipes")
     assert f"{right} of {count} taps" in screen and f"{wrong} were wrong" in screen
-    missed, false = re.findall(r"(\S+) missed\.\s+There were (\d\.\d+) false events a minute", figures)[0]
-    assert f"{60 * float(false):.0f} an hour, with {missed} of" in screen
+    people, contacts, false, interval, _, _, right, *_ = map(str.strip, cells(figures, "all ")[1:])
+    assert f"{false} in an hour" in screen and f"interval {interval})" in screen
+    assert f"{people} simulated people" in screen
+    assert f"of {contacts} contacts an hour" in screen and f"while {right} of the gestures" in screen
     for begins in ("answer decided to event received (p50)", "start to ready"):
         assert cells(performance, begins)[1] in readme, begins
     assert f"{float(cells(performance, 'resident memory, one sensor')[1].split()[0]):.0f} MiB" in readme

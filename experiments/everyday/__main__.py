@@ -1,8 +1,11 @@
-"""What a model says in hours in which hardly anything is meant: `python -m experiments.everyday --hours 20`.
+"""What a model says in hours of everyday contact, in which few gestures are meant.
 
-Hours of everyday life (life.py), each of another person at one place after the other, pass through the
-daemon's own path. A gesture that is said of nothing that was meant is false. One of a contact that is a tap in truth,
-though nobody meant it, is counted apart: no model can know better there.
+    python -m experiments.everyday --hours 20
+    python -m experiments.everyday --hours 20 --document docs/figures.md
+
+Each hour is of another simulated person, at one place after the other (life.py); its frames pass through the daemon's
+own path. A gesture that is said where none was meant is false. A tap that is said of a contact which was a tap, though
+nobody meant it, is counted apart: no model can know better there. With --document the table is written into a page.
 """
 
 import argparse
@@ -10,6 +13,7 @@ import json
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,9 +25,11 @@ from gestured.core.facts import events_of
 from gestured.core.frames import Frame
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
+from gestured.lab.made_of import made_of, renew
 from gestured.lab.progress import progress
 from gestured.lab.table import Table
 from gestured.model.opening import open_model
+from gestured.model.shipped import shipped
 from gestured.record.judge import NONE, Performed, verdict, whose
 
 HOUR_S = 3600.0
@@ -116,6 +122,7 @@ def main() -> None:
     parser.add_argument("--hours", type=int, default=20, help="of simulated life, in turn at each place (default: 20)")
     parser.add_argument("--seed", type=int, default=FIRST, help=f"of the first hour (default: {FIRST})")
     parser.add_argument("--json", action="store_true", help="print the table as JSON")
+    parser.add_argument("--document", type=Path, help="a page whose table `everyday` is written anew")
     args = parser.parse_args()
     model, names = open_model(args.model), list(PLACES)
     places: dict[str, Hours] = {name: Hours() for name in names}
@@ -128,12 +135,15 @@ def main() -> None:
     head = ("place", "hours", "contacts an hour", "false an hour", "95 %", "counted apart", "provisional false",
             "right", "wrong", "missed", "deaf s an hour")  # fmt: skip
     rows = [_row(name, one) for name, one in (*places.items(), ("all", every)) if one.seconds]
-    table = Table(f"Everyday life, simulated: {args.model}", head, rows)
+    falsely = "False gestures: " + ", ".join(f"{name} {count}" for name, count in every.names.most_common()) + "."
+    table = Table(f"Everyday contact, simulated: {args.model}", head, rows, (falsely,))
+    if args.document:
+        made = made_of("python -m experiments.everyday", [shipped().get(args.model, Path(args.model))])
+        renew(args.document, "everyday", [made, "", str(table)])
     if args.json:
         print(json.dumps({"head": head, "rows": rows, "false": dict(every.names)}))
     else:
         print(table)
-        print("false: " + ", ".join(f"{name} {count}" for name, count in every.names.most_common()))
 
 
 def _row(name: str, one: Hours) -> tuple[str | int | float, ...]:

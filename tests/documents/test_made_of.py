@@ -12,7 +12,11 @@ from tests.documents.blocks import ROOT, documents
 
 # The tables that speak of the shipped models, and the beginning of the command that makes them.
 GENERATED = {
-    "docs/figures.md": ("gestured-lab evaluate", "python -m experiments.foreign.judge"),
+    "docs/figures.md": (
+        "gestured-lab evaluate",
+        "python -m experiments.foreign.judge",
+        "python -m experiments.everyday",
+    ),
     "docs/performance.md": ("make bench",),
     "docs/limits-and-choices.md": ("python -m experiments.taps",),
     "docs/numerics.md": ("gestured-lab stability",),
