@@ -45,7 +45,7 @@ HEAD = (
     "|---|---|---|---|---|---|---|---|",
 )
 OF_A_CARD = (
-    "The hardest honest figure: people and sensors of a second simulator (`experiments/foreign`), written "
+    "Answers on a second simulator of people and sensors (`experiments/foreign`), written "
     "independently of the first, from",
     "which no model learns. Sensors are as good as the nominal one, or much worse (hard).",
 )
