@@ -119,7 +119,7 @@ class Bench:
                     if states is not None:
                         states += [(tick, reading.state) for reading in hub.readings(tick).values()]
                 tick += TICK_S
-            backlog.add([Datagram(t, packet, SOURCE) for t, packet in found], now)
+            backlog.add([Datagram(t, packet, SOURCE) for t, packet in found])
             while backlog:
                 group = backlog.group()
                 facts += hub.receive([(datagram.packet, datagram.source) for datagram in group], group[-1].arrival)

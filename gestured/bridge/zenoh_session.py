@@ -12,11 +12,11 @@ from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import MOST_SENSORS, OLD_S, Daemon, Line
 from gestured.bridge.forward import Forward
 from gestured.bridge.options import BridgeError, host_name
+from gestured.core.address import is_sensor
 
 ROUTER = "tcp/127.0.0.1:7447"  # where a router of this machine listens unless told otherwise
 AGAIN_S = 0.5  # from one attempt to reach the router to the next
 HEARD = frozenset(("ok", "degraded", "starting", "faulty"))  # states of a sensor whose frames come
-SITE = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
 
 class Zenoh:
@@ -28,7 +28,7 @@ class Zenoh:
 
         zenoh.init_log_from_env_or("off")  # what is wrong is said here, in one line
         self._site = args.site or host_name(None)
-        if not SITE.fullmatch(self._site):
+        if not is_sensor(self._site):
             raise BridgeError(f"--site {self._site}: expected letters, digits, _ and -, at most 64")
         self._config = _configuration(args)
         self._is_called = bool(args.listen or args.scout)  # nobody has to be there

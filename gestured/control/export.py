@@ -11,11 +11,10 @@ from gestured.client.say import tell
 from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame
 from gestured.record import arrays as recording
+from gestured.record.check import FINGERS, SESSION
 from gestured.record.recordings import Recordings
 from gestured.record.replay import frames_used, opened
 from gestured.record.tape import Tape
-
-FINGERS = 3
 
 
 def add(commands: Commands) -> None:
@@ -81,7 +80,7 @@ def _recordings(sessions: dict[str, list[Frame]], found: Tape) -> Recordings:
         frames=np.stack([frame.values for frame in frames]),
         times=np.array([frame.t for frame in frames]),
         offsets=np.cumsum([0, *map(len, sessions.values())], dtype=np.int64),
-        labels=np.array(["session"] * len(sessions)),
+        labels=np.array([SESSION] * len(sessions)),
         subjects=np.array(list(sessions)),
         touches=touches,
         touch_ids=ids,

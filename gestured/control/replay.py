@@ -108,7 +108,7 @@ def _here(args: argparse.Namespace, source: Playable) -> int:
 
 def _opened(source: Playable, model: str | None) -> tuple[Scene, Ladder]:
     if isinstance(source, Labelled):
-        ladder = ladder_for(model or DEFAULT_MODEL, None)
+        ladder = ladder_for(model or DEFAULT_MODEL)
         return source.scene(ladder.gestures), ladder
     maker = source.maker
     if model is None:
@@ -116,7 +116,7 @@ def _opened(source: Playable, model: str | None) -> tuple[Scene, Ladder]:
         ladder = ladder_for(first, others or None)
     else:
         ladder = ladder_for(model)
-    if model is None and getattr(ladder.model, "sha256", None) != maker.sha256:
+    if model is None and ladder.model.sha256 != maker.sha256:
         say(f"{ladder.name} is not the file that it was when this was recorded", to=sys.stderr)
     ladder.own = Own(maker.own, ladder.gestures)
     return maker.scene, ladder

@@ -65,5 +65,5 @@ Fact = Event | Decided | Arrived | Taken | Dropped | Changed | Fault
 
 
 def events_of(found: Iterable[Event | Decided]) -> list[Event]:
-    """The events among what a recognizer found."""
+    """The events among what a sensor told."""
     return [one for one in found if not isinstance(one, Decided)]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gestured.core.address import SIDES
 from gestured.core.frames import Segment
+from gestured.core.timing import RANGE_HZ
 from gestured.core.window import LEAST_PEAK, Window
 
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
@@ -24,7 +25,6 @@ EXAMPLES = 5  # of one gesture, at most
 MOST_FRAMES = 200  # of an example; the longest contact takes some 80 at 15 Hz
 MOST_S = 8.0  # of an example; a contact is given up after five seconds, and quiet frames stand around it
 MOST_VALUES = 16_384  # of an example
-RATES_HZ = (5.0, 1000.0)  # of an example
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -40,7 +40,7 @@ class Example:
     def __post_init__(self) -> None:
         count, rows, columns = self.frames.shape
         for name, value, least, most in (
-            ("rate_hz", self.rate_hz, *RATES_HZ),
+            ("rate_hz", self.rate_hz, *RANGE_HZ),
             ("frames", count, 1, min(MOST_FRAMES, MOST_S * self.rate_hz)),
             ("rows", rows, *SIDES),
             ("columns", columns, *SIDES),

@@ -104,7 +104,7 @@ class Decoder:
         self._grids = grids
         self._keep_touches = keep_touches
         self._layouts = Layouts()
-        self._routes: dict[tuple[str, str], _Route | None] = {}  # a memo, bounded
+        self._routes: dict[tuple[str, str], _Route] = {}  # a memo, bounded
         self._pending: dict[tuple[Hashable, str], tuple[Touch, ...]] = {}  # touches that wait for their frame
 
     def decode(self, packet: bytes, source: Hashable = None) -> tuple[list[Arrival], list[ProtocolError]]:

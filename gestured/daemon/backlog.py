@@ -59,7 +59,7 @@ class Backlog:
         """When the oldest packet arrived, in s; infinite where none waits."""
         return self._waiting[0].arrival if self._waiting else math.inf
 
-    def add(self, datagrams: list[Datagram], now: float) -> None:
+    def add(self, datagrams: list[Datagram]) -> None:
         """Let these wait, in the order of their arrival."""
         if not self._waiting and datagrams:
             self._work, self._oldest = 0.0, datagrams[0].arrival

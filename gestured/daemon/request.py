@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gestured.core.errors import GesturedError
-from gestured.core.messages import quoted
+from gestured.core.messages import json_object, quoted
 
 MAX_REQUEST_BYTES = 4096  # bytes of a request
 
@@ -53,12 +53,9 @@ class Verb:
 
 def parse_request(line: bytes, verbs: Mapping[str, Verb]) -> tuple[str, dict[str, Any]]:
     """(verb, parameters) of one line; raises Refusal with the key, what was found and what was expected."""
-    try:
-        request = json.loads(line)
-    except (ValueError, RecursionError):
-        raise Refusal('expected one JSON object a line, such as {"verb":"status"}') from None
-    if not isinstance(request, dict) or not isinstance(request.get("verb"), str):
-        raise Refusal('verb: expected one JSON object with a "verb", such as {"verb":"status"}')
+    request = json_object(line)
+    if request is None or not isinstance(request.get("verb"), str):
+        raise Refusal('expected one JSON object a line with a "verb", such as {"verb":"status"}')
     name = request.pop("verb")
     if name not in verbs:
         raise Refusal(f"verb: unknown {quoted(name)}, expected one of {', '.join(verbs)}")

@@ -161,7 +161,7 @@ class Service:
             self._desk.take(self._hub.tick(self._receiver.served))
             if now >= status_at:
                 status_at = max(status_at + STATUS_S, now)  # on time, but not all at once after a stall
-                self._every_second(now)
+                self._every_second()
             if watchdog and canary.sings():
                 notify("WATCHDOG=1")
             if reload.is_set() and not self._reload.running:
@@ -178,7 +178,7 @@ class Service:
             self._reloading.cancel()
         await self._finish()
 
-    def _every_second(self, now: float) -> None:
+    def _every_second(self) -> None:
         self._clients.tick()
         self._taps.tick()
         self._views.tick()

@@ -117,7 +117,7 @@ class Receiver:
         late = bool(found) and now - self._arrival(found[0][1], now) >= TOGETHER_S
         if found and (full or much or late or self._backlog or self._backlog.flooded(now)):
             datagrams = self._datagrams(found, now)
-            self._backlog.add(datagrams, now)
+            self._backlog.add(datagrams)
             self._count_drops(now)
             if found[-1][1]:
                 self._empty = datagrams[-1].arrival  # the kernel gives packets in the order in which they came

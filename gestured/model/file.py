@@ -19,9 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-MAX_MODEL_BYTES = (
-    32 << 20
-)  # far more than a net for a grid of taxels needs; while it is opened, memory holds it some five times
+# Far more than a net for a grid of taxels needs; while a file is opened, memory holds it some five times.
+MAX_MODEL_BYTES = 32 << 20
 # What stands in a file before the 64 characters of its digest: the head of a protobuf entry of `metadata_props`.
 DIGEST = b"\x72\x4a\x0a\x06digest\x12\x40"
 MAX_SELF_TEST = 400_000  # numbers of a self-test's input; more do not fit into metadata.MAX_TEXT

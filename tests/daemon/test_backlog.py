@@ -17,7 +17,7 @@ def backlog() -> Backlog:
 def test_what_arrived_together_is_served_together_in_order() -> None:
     waiting = backlog()
     arrivals = [0.0, TOGETHER_S / 2, TOGETHER_S, 1.0]
-    waiting.add([Datagram(t, b"%d" % n, ARM) for n, t in enumerate(arrivals)], 2.0)
+    waiting.add([Datagram(t, b"%d" % n, ARM) for n, t in enumerate(arrivals)])
     groups = []
     while waiting:
         groups.append([datagram.packet for datagram in waiting.group()])
@@ -26,7 +26,7 @@ def test_what_arrived_together_is_served_together_in_order() -> None:
 
 def test_a_group_is_bounded() -> None:
     waiting = backlog()
-    waiting.add([Datagram(0.0, bytes(GROUP_BYTES), ARM)] * 3, 0.0)
+    waiting.add([Datagram(0.0, bytes(GROUP_BYTES), ARM)] * 3)
     assert len(waiting.group()) == 1
 
 
@@ -41,7 +41,7 @@ def serve(waiting: Backlog, now: float, count: int, each_s: float) -> float:
 
 def test_a_backlog_that_is_worked_off_is_no_flood_however_long_it_takes() -> None:
     waiting = backlog()
-    waiting.add([Datagram(90.0 + n / 100, FRAME, ARM) for n in range(1000)], 100.0)
+    waiting.add([Datagram(90.0 + n / 100, FRAME, ARM) for n in range(1000)])
     now = serve(waiting, 100.0, 500, 0.009)
     now += 5.0  # the daemon was stopped again
     assert not waiting.flooded(now)
@@ -51,7 +51,7 @@ def test_a_backlog_that_is_worked_off_is_no_flood_however_long_it_takes() -> Non
 
 def test_what_is_served_slower_than_it_arrives_is_a_flood() -> None:
     waiting = backlog()
-    waiting.add([Datagram(n / 100, FRAME, ARM) for n in range(1000)], 10.0)
+    waiting.add([Datagram(n / 100, FRAME, ARM) for n in range(1000)])
     now = serve(waiting, 10.0, 49, 0.021)
     assert waiting.flooded(now)
     waiting.share(0.001, now)
@@ -60,16 +60,16 @@ def test_what_is_served_slower_than_it_arrives_is_a_flood() -> None:
 
 def test_a_machine_that_is_a_little_late_is_not_flooded() -> None:
     waiting, now = backlog(), 0.0
-    waiting.add([Datagram(now, FRAME, ARM)] * 3, now)
+    waiting.add([Datagram(now, FRAME, ARM)] * 3)
     for _ in range(1000):
         now = serve(waiting, now, 1, 0.01)
-        waiting.add([Datagram(now, FRAME, ARM)], now)
+        waiting.add([Datagram(now, FRAME, ARM)])
     assert not waiting.flooded(now)
 
 
 def test_what_fills_the_memory_is_a_flood_at_once() -> None:
     waiting = backlog()
-    waiting.add([Datagram(0.0, bytes(60_000), ARM)] * (MOST_BYTES // 60_000 + 1), 0.0)
+    waiting.add([Datagram(0.0, bytes(60_000), ARM)] * (MOST_BYTES // 60_000 + 1))
     assert waiting.flooded(0.0)
 
 
@@ -80,7 +80,7 @@ def flood(
     waiting, served, now = backlog(), dict.fromkeys(senders, 0), 0.0
     for _ in range(turns):
         now += 0.002
-        waiting.add([Datagram(now, FRAME, source) for source, count in senders.items() for _ in range(count)], now)
+        waiting.add([Datagram(now, FRAME, source) for source, count in senders.items() for _ in range(count)])
         found, dropped = waiting.share(seconds, now)
         assert len(found) + sum(map(len, dropped.values())) == sum(senders.values()) and not waiting
         for datagram in found:
@@ -108,9 +108,9 @@ def test_who_sends_now_and_then_has_saved_up_for_it_where_many_owners_flood() ->
     waiting, sent, served = Backlog({*crowd, *good}.__contains__), 0, 0
     for turn in range(3000):
         now = 0.006 * turn
-        waiting.add([Datagram(now, bytes(60_000), crowd[turn % len(crowd)])], now)
+        waiting.add([Datagram(now, bytes(60_000), crowd[turn % len(crowd)])])
         if turn % 10 == 0:
-            waiting.add([Datagram(now, FRAME, source) for source in good], now)
+            waiting.add([Datagram(now, FRAME, source) for source in good])
             sent += len(good)
         for datagram in waiting.share(0.001, now)[0]:
             waiting.took(datagram, 3.75e-7 * len(datagram.packet))
@@ -124,7 +124,7 @@ def test_a_stranger_is_heard_beside_owners_that_flood() -> None:
 
 def test_the_newest_of_what_is_too_much_is_served() -> None:
     waiting = backlog()
-    waiting.add([Datagram(n / 1000, b"%4d" % n * 100, ARM) for n in range(1000)], 1.0)
+    waiting.add([Datagram(n / 1000, b"%4d" % n * 100, ARM) for n in range(1000)])
     found, _ = waiting.share(0.001, 1.0)
     assert found and [int(datagram.packet[:4]) for datagram in found] == list(range(1000 - len(found), 1000))
 
