@@ -5,9 +5,8 @@ merged first and validated once, as a whole; an error names the key, the value, 
 was expected. pydantic-settings would do the merging for 105 ms more at every start.
 """
 
-import os
+import errno
 import re
-import stat
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,6 +14,7 @@ from pydantic import ValidationError
 
 from gestured.core.errors import SettingsError
 from gestured.daemon.settings import FLAGS, AddressSettings, GestureSettings, Part, SensorSettings, Settings
+from gestured.record.files import open_regular
 
 ENVIRONMENT = "GESTURED_"
 KEYS = (*FLAGS, "config")  # settings that a variable can set
@@ -25,13 +25,10 @@ MAX_CONFIG_BYTES = 1 << 20  # of a configuration: many times what the largest nu
 
 
 def _read(path: str) -> str:
-    # A FIFO or a device would make a plain open, or the read after it, wait for ever.
-    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY)) as file:
-        if (
-            not stat.S_ISREG(os.fstat(file.fileno()).st_mode)
-            or len(data := file.read(MAX_CONFIG_BYTES + 1)) > MAX_CONFIG_BYTES
-        ):
-            raise SettingsError(f"config: {path}: expected a regular file of at most {MAX_CONFIG_BYTES >> 20} MiB")
+    with open_regular(path) as file:
+        data = file.read(MAX_CONFIG_BYTES + 1)
+    if len(data) > MAX_CONFIG_BYTES:
+        raise OSError(errno.EFBIG, "is too large", path)
     return data.decode()
 
 
@@ -41,7 +38,8 @@ def _from_file(path: str) -> dict[str, Any]:
     try:
         found = tomllib.loads(_read(path))
     except OSError as error:
-        raise SettingsError(f"config: cannot read {path}: {error.strerror}") from error
+        limit = f"{MAX_CONFIG_BYTES >> 20} MiB"
+        raise SettingsError(f"config: {path}: {error.strerror}, expected a regular file of at most {limit}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise SettingsError(f"config: {path} is not valid TOML: {error}") from error
     if "per_gesture" in found:  # our own name for the tables of [gestures], no key of the file's

@@ -8,9 +8,7 @@ import binascii
 import hashlib
 import json
 import math
-import os
 import re
-import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +16,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gestured.record.files import open_regular
 
 # Far more than a net for a grid of taxels needs; while a file is opened, memory holds it some five times.
 MAX_MODEL_BYTES = 32 << 20
@@ -31,24 +31,14 @@ _LOCATION = re.compile(rb"(?:\x08|\x88\x80*\x00)location")
 def read_bytes(path: Path) -> bytes:
     """The file's bytes, read once; a regular file of at most `MAX_MODEL_BYTES`."""
     try:
-        # Non-blocking: opening a FIFO must not wait for a writer.
-        file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
-    except (OSError, ValueError) as error:
-        raise ValueError(f"cannot be opened: {getattr(error, 'strerror', None) or error}") from error
-    with file:
-        status = os.fstat(file.fileno())
-        if not stat.S_ISREG(status.st_mode):
-            raise ValueError("is not a regular file")
-        if status.st_size > MAX_MODEL_BYTES:
-            raise ValueError(f"has {status.st_size} bytes, expected at most {MAX_MODEL_BYTES}")
-        try:
+        with open_regular(path) as file:
             data = file.read(MAX_MODEL_BYTES + 1)
-        except OSError as error:
-            raise ValueError(f"cannot be read: {error.strerror or error}") from error
+    except OSError as error:
+        raise ValueError(f"cannot be opened: {error.strerror}") from error
     if not data:
         raise ValueError("is empty, expected an ONNX model")
     if len(data) > MAX_MODEL_BYTES:
-        raise ValueError(f"grew while it was read, expected at most {MAX_MODEL_BYTES} bytes")
+        raise ValueError(f"has more than {MAX_MODEL_BYTES} bytes, the most that a model may have")
     return data
 
 

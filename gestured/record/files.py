@@ -69,7 +69,7 @@ def _sync_folder(folder: Path) -> None:
 def open_regular(path: str | Path) -> BinaryIO:
     """A regular file to read from; OSError for anything else. Nobody waits for a pipe's other end."""
     try:
-        file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
+        file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY))
     except ValueError as error:  # a path with a NUL
         raise OSError(errno.EINVAL, str(error), str(path)) from error
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
