@@ -70,3 +70,4 @@ class Keeper:
         """Let go of the lock, so that another daemon may write the file."""
         if self._lock is not None:
             self._lock.close()
+            self._lock = None

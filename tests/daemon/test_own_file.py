@@ -87,3 +87,12 @@ def test_what_somebody_else_has_changed_meanwhile_is_read_before_it_is_written(t
 def test_where_it_is_unless_somebody_says_it(environ: dict[str, str], expected: str | None) -> None:
     assert own_file.where(None, environ) == (expected and Path(expected))
     assert own_file.where(Path("mine.json"), environ) == Path("mine.json")
+
+
+def test_who_has_let_go_of_a_file_must_lock_it_again(tmp_path: Path) -> None:
+    one, other = Keeper(tmp_path / "own.json"), Keeper(tmp_path / "own.json")
+    one.hold()
+    one.close()
+    other.hold()
+    with pytest.raises(OwnFileError, match=rf"gestured \(pid {os.getpid()}\) writes it"):
+        one.hold()
