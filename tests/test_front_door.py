@@ -175,10 +175,10 @@ def test_recognisers_share_a_model_as_long_as_its_file_is_the_same(tmp_path: Pat
     assert opened == ["mine"] * 2 and kept[-1].gestures != kept[0].gestures
 
 
-def stroke(recognizer: Any, frames: list[Any], before: int = 30) -> list[Any]:
+def stroke(recognizer: Any, frames: list[Any]) -> list[Any]:
     """What comes of frames between idle seconds, in the sensor's counts."""
     hand = Hand()
-    frames = [*hand.idle(before / 15), *frames, *hand.idle(1.0)]
+    frames = [*hand.idle(2.0), *frames, *hand.idle(1.0)]
     return [event for n, frame in enumerate(frames) for event in recognizer.push(n / 15, frame)]
 
 

@@ -178,11 +178,13 @@ def test_doctor_says_first_what_to_set_where_everything_is_dropped(run, serve) -
 
     sending = threading.Thread(target=send)
     sending.start()
-    while "size" not in asked(daemon)["input"]["dropped"]:
-        pass
-    out = run("doctor", "--control", daemon.ready["control"], "--json")[1]
-    stop.set()
-    sending.join()
+    try:
+        while "size" not in asked(daemon)["input"]["dropped"]:
+            pass
+        out = run("doctor", "--control", daemon.ready["control"], "--json")[1]
+    finally:
+        stop.set()
+        sending.join()
     cause, *rest = [found for found in map(json.loads, out.splitlines()) if found["level"] == "bad"]
     assert "does not fit the settings" in cause["what"]
     assert cause["remedy"].splitlines()[1] == "[sensors.arm]" and re.search(r'grid = "(12x8|8x12)"', cause["remedy"])

@@ -133,7 +133,7 @@ def test_a_line_without_end_is_refused_before_it_fills_the_memory(fake: FakeDaem
             while True:
                 fake.say(b" " * 65536)
 
-    thread = threading.Thread(target=serve)
+    thread = threading.Thread(target=serve, daemon=True)
     thread.start()
     with pytest.raises(Refused, match=f"{fake.path} sent a line of more than"):
         next(Subscriber(fake.path))
