@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gestured.lab.adapt.judging import Answers
 from gestured.lab.adapt.learning import opinions
+from gestured.lab.cli import CACHE
 from gestured.lab.dataset import simulated
 from gestured.lab.decide import decided
 from gestured.lab.fit import FitConfig
@@ -101,7 +102,7 @@ def row(title: str, every: Answers, without: Answers, least: float) -> str:
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cache", type=Path, default=Path(".cache/lab"), help="of a training (%(default)s)")
+    parser.add_argument("--cache", type=Path, default=CACHE, help="of a training (%(default)s)")
     args = parser.parse_args()
     samples = first(simulated(args.cache, "wide", 4, PLAN.wide_early), TAKES)
     model, least = network(args.cache, None)

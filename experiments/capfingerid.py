@@ -13,6 +13,7 @@ import numpy as np
 
 from gestured.lab.recordings.store import compact, join_recordings
 from gestured.record.arrays import write
+from gestured.record.check import SESSION, UNNAMED
 from gestured.record.recordings import Recordings
 
 GRID = (27, 15)  # electrodes of the Nexus 5's panel
@@ -33,11 +34,11 @@ def session(path: Path) -> Recordings:
         frames=compact(frames),
         times=times,
         offsets=np.array([0, len(times)], np.int64),
-        labels=np.array(["session"]),
+        labels=np.array([SESSION]),
         subjects=np.array(who[0][:1]),
         kinds=np.array([f"{who[0][2]} finger, {who[0][1]} hand"]),
         event_recording=np.zeros(len(tasks), np.int64),
-        event_labels=np.array(["other"] * len(tasks)),
+        event_labels=np.array([UNNAMED] * len(tasks)),
         event_kinds=np.array([task.lower() for task, _ in tasks]),
         event_onsets=np.array([times[of[0]] for _, of in tasks]),
         event_offsets=np.array([times[of[-1]] for _, of in tasks]),

@@ -20,6 +20,7 @@ from gestured.lab.adapt.judging import Answers, Interval, Shares
 from gestured.lab.adapt.learning import Course, opinions
 from gestured.lab.adapt.material import Own, own_recordings
 from gestured.lab.adapt.takes import simulate
+from gestured.lab.cli import CACHE
 from gestured.lab.decide import decided
 from gestured.lab.evaluate import without
 from gestured.lab.nets import Judged
@@ -88,8 +89,8 @@ def table(said: dict[str, Said]) -> str:
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cache", type=Path, default=Path(".cache/lab"), help="of a training (%(default)s)")
-    parser.add_argument("--real", type=Path, default=Path("../shared/data"), help="real recordings (%(default)s)")
+    parser.add_argument("--cache", type=Path, default=CACHE, help="of a training (%(default)s)")
+    parser.add_argument("--real", type=Path, required=True, metavar="FOLDER", help="of the real recordings")
     args = parser.parse_args()
     torch.set_num_threads(1)
     plan, course = TrainingPlan(), Course()

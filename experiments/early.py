@@ -2,8 +2,8 @@
 
     python -m experiments.early --model cnn_lstm --minutes 20
 
-Nothing is cut by hand: frames go through the recogniser as in the daemon, and a tap is the
-beginning of a double tap, a scribble begins as a swipe.
+Frames go through a whole `Sensor` as in the daemon, and nothing is cut by hand. So what begins alike counts: a tap may
+become a double tap, and a scribble begins as a swipe.
 """
 
 import argparse
@@ -17,10 +17,12 @@ import numpy as np
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP
 from gestured.lab.dataset import Truth, truths
+from gestured.lab.made_of import made_of
 from gestured.lab.online import NON_GESTURE_SHARE, SESSION_S
 from gestured.lab.progress import progress
 from gestured.lab.study.said import heard
 from gestured.model.opening import open_model
+from gestured.model.shipped import shipped, shipped_name
 from gestured.record.judge import owners, verdict
 from gestured.simulator import NONE, Participant, SimulatedSensor, Take, any_sensor, generator, session
 
@@ -124,7 +126,7 @@ def takes(which: str, count: int, seed: int) -> Iterator[Take]:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--model", default="cnn_lstm", help="the model that is asked (%(default)s)")
+    parser.add_argument("--model", default="cnn_lstm", help="a shipped model's name, or a path (%(default)s)")
     parser.add_argument("--minutes", type=float, default=20, help="minutes of sessions of each kind (%(default)s)")
     parser.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (%(default)s)")
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
@@ -140,6 +142,9 @@ def main() -> None:
     if args.json:
         print(json.dumps(figures, indent=2))
     else:
+        name = shipped_name(args.model)
+        if name is not None:
+            print(made_of("python -m experiments.early", [shipped()[name]]))
         print(table({which: figures[which] for which in SETS}))
 
 

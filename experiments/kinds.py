@@ -20,6 +20,7 @@ from gestured.lab.adapt.adaptation import settled
 from gestured.lab.adapt.learning import Course
 from gestured.lab.adapt.material import Own
 from gestured.lab.adapt.takes import simulate
+from gestured.lab.cli import CACHE
 from gestured.lab.dataset import from_take
 from gestured.lab.samples import Sample, collect
 from gestured.simulator import (
@@ -78,7 +79,7 @@ def evening(sensor: SimulatedSensor, nth: int) -> Own:
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cache", type=Path, default=Path(".cache/lab"), help="of a training (%(default)s)")
+    parser.add_argument("--cache", type=Path, default=CACHE, help="of a training (%(default)s)")
     args = parser.parse_args()
     torch.set_num_threads(1)
     takes, course = simulate(args.cache, 2), Course()

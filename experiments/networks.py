@@ -17,6 +17,7 @@ from gestured.lab.decide import decided, fit_decision, threshold
 from gestured.lab.evaluate import Evaluation, outcome
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import logits, targets
+from gestured.lab.made_of import made_of
 from gestured.lab.nets import Decision, Judged, Opinion
 from gestured.lab.samples import WINDOW
 from gestured.lab.train import Trained, TrainingData, TrainingPlan, calibration_set, learn
@@ -90,6 +91,7 @@ def compare(plan: TrainingPlan, data: TrainingData, found: Trained, cache: Path)
 def main() -> None:
     """The command line."""
     args = options(__doc__).parse_args()
+    print(made_of("python -m experiments.networks", [args.models / f"{name}.onnx" for name in ("cnn_lstm", "lstm")]))
     compare(*trained(args), args.cache)
 
 

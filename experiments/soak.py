@@ -169,7 +169,7 @@ def main() -> int:
     parser.add_argument("--compressed", action="store_true", help="one sensor, as fast as it goes")
     parser.add_argument("--hours", type=float, help="of the sensor's time (default: 24 compressed, else 1/6)")
     parser.add_argument("--sensors", type=int, default=20, help="in real time (default: 20)")
-    parser.add_argument("--model", default="cnn_lstm")
+    parser.add_argument("--model", default="cnn_lstm", help="a shipped model's name, or a path (%(default)s)")
     args = parser.parse_args()
     hours = args.hours or (24.0 if args.compressed else 1 / 6)
     with tempfile.TemporaryDirectory(prefix="gestured-soak-") as folder:

@@ -123,7 +123,7 @@ def listen(client: Client) -> list[dict[str, Any]]:
 def main() -> int:
     """Print what became of the gestures; 1 where one was wrong, made up, or missed without need."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--model", default="cnn_lstm")
+    parser.add_argument("--model", default="cnn_lstm", help="a shipped model's name, or a path (%(default)s)")
     parser.add_argument("--sensors", type=int, default=40)
     parser.add_argument("--rate", type=float, default=15.0, help="frames a second of each sensor (default: 15)")
     parser.add_argument("--stall", type=float, default=1.0, help="seconds for which the daemon stands still")

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from experiments.heads import Heads
 from experiments.trained import options, trained
+from gestured.lab.adapt.learning import opinions
 from gestured.lab.augment import symmetry_table
 from gestured.lab.cards import with_interval
 from gestured.lab.decide import Answers, confidence, decided
 from gestured.lab.evaluate import Evaluation, model_answers, outcome
-from gestured.lab.fit import CLASSES, logits, targets
+from gestured.lab.fit import CLASSES, targets
 from gestured.lab.made_of import made_of, renew
 from gestured.lab.samples import Samples
 from gestured.lab.study.bootstrap import interval
@@ -154,12 +155,11 @@ def whole_left_out(trained: Trained, data: TrainingData, plan: TrainingPlan, cac
 def _answers(trained: Trained, data: TrainingData, plan: TrainingPlan, classes: Sequence[int]) -> list[Said]:
     """What a network that was trained and calibrated on these data answers on the test sets."""
     module, calibration, _ = judged(trained, NAME, calibration_set(trained, data, plan))
-    found = []
-    for test, samples in data.tests.items():
-        of = logits(trained.nets, samples)
-        answers = decided(module.decision, of[NAME], of["trajectory"])
-        found.append(Said(test, answers, samples, calibration["threshold"], classes))
-    return found
+    least = calibration["threshold"]
+    return [
+        Said(test, decided(module.decision, *opinions(module, samples)), samples, least, classes)
+        for test, samples in data.tests.items()
+    ]
 
 
 TAUGHT = {

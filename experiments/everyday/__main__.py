@@ -91,9 +91,7 @@ def heard(life: Day, classifier: Classifier) -> tuple[list[Event], float]:
 
 def judged(life: Day, events: Iterable[Event], deaf_s: float) -> Hours:
     """How it went."""
-    meant = [
-        Performed(act.label, act.kind, act.onset_s, act.offset_s) for act in life.take.events if act.label != "none"
-    ]
+    meant = [Performed(act.label, act.kind, act.onset_s, act.offset_s) for act in life.take.events if act.label != NONE]
     alone = [Performed(NONE, act.kind, act.onset_s, act.offset_s) for act in life.like]
     hours = Hours(float(life.take.times[-1]), deaf_s, life.contacts)
     for event in events:

@@ -123,7 +123,7 @@ def _machine(grid: tuple[int, int], classifier: Any | None) -> tuple[Any, FrontE
 
 
 def judge(recording: Take, seed: int, level: str, classifier: Any | None) -> Outcome:
-    """Run one take through a fresh front end (and recognizer, where a classifier is given)."""
+    """Run one take through a fresh front end or, where a classifier is given, through a fresh sensor."""
     machine, front = _machine(recording["frames"].shape[1:], classifier)
     onset, release = recording["onset"], recording["release"]
     events: list[Any] = []

@@ -21,6 +21,7 @@ from gestured.core.front_end import Cut, FrontEnd
 from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
 from gestured.lab.samples import WINDOW, Sample, Samples, collect, sample
+from gestured.record.check import UNNAMED
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.record.recordings import Recordings
 from gestured.simulator import (
@@ -155,9 +156,9 @@ def _recorded(recordings: Recordings, i: int) -> Iterator[Sample]:
             Truth(str(labels[k]), str(kinds[k]), person, float(onsets[k]) - half, float(offsets[k]) + half)
             for k in np.flatnonzero(of == i)
         ]
-        known = [p for p in performed if p.label != "other"]
+        known = [p for p in performed if p.label != UNNAMED]
         for segment in cuts(frames, times):
-            if all(segment.offset < p.onset or segment.onset > p.offset for p in performed if p.label == "other"):
+            if all(segment.offset < p.onset or segment.onset > p.offset for p in performed if p.label == UNNAMED):
                 yield from matched([segment], known)
         return
     first, last = int(_needed(recordings, "onsets")[i]), int(_needed(recordings, "releases")[i])

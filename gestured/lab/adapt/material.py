@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.lab.dataset import recorded
-from gestured.lab.recordings.importing import UNNAMED
 from gestured.lab.recordings.store import touched
 from gestured.lab.samples import Samples, collect, join
 from gestured.record.arrays import read
-from gestured.record.check import SESSION
+from gestured.record.check import SESSION, UNNAMED
 from gestured.record.recordings import Recordings
 from gestured.simulator import GESTURES, NONE
 

@@ -9,9 +9,8 @@ from pathlib import Path
 from gestured.client.values import host_port, number, rows_by_columns, sensor_name
 from gestured.core.address import Address
 from gestured.core.own import is_name
-from gestured.lab.recordings.importing import UNNAMED
 from gestured.lab.recordings.protocol import pseudonym
-from gestured.record.check import SESSION
+from gestured.record.check import SESSION, UNNAMED
 from gestured.simulator import GESTURES, NONE
 
 FOLDER = Path("recordings")

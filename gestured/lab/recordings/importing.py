@@ -24,7 +24,6 @@ from gestured.record.check import SESSION
 from gestured.record.files import open_regular
 from gestured.record.recordings import Recordings
 
-UNNAMED = "other"  # something was performed, and nobody knows exactly what
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 LINE = 256 << 10  # characters of a line; 64 x 64 numbers with all their digits have half as many
 NUMBERS = 1 << 27  # of all frames of a file: a gibibyte in memory

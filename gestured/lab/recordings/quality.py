@@ -10,7 +10,7 @@ from gestured.core.frames import Frame
 STROKE_FRAMES = 3  # fewer touched frames show no movement; a tap needs one
 GAP = 1.6  # times the usual step between two frames; from there on one was lost between them: 1.5 and some jitter
 RAIL_FRAMES = 3  # frames with a taxel at exactly the contact's largest count, fewer of which are chance
-RAIL_SHARE = 0.3  # of a contact's frames with such a taxel; 5 of CapFingerId's 997 whole touches reach it
+RAIL_SHARE = 0.3  # of a contact's frames with such a taxel
 RAIL_TAXELS = 3  # taxels of one frame at exactly the largest count; so many are cut off whatever the other frames show
 FINEST = 50  # steps between least and largest count; a sensor with fewer shows the same count again by chance
 
