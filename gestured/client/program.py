@@ -24,7 +24,8 @@ Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 
 def program(name: str, kind: str, description: str, epilog: str) -> tuple[Parser, Commands]:
     """The command line of a program, and where its subcommands, each called a `kind`, add themselves and set `run`."""
-    parser = Parser(prog=name, description=description, epilog=epilog)
+    more = f"`{name} {kind} --help` explains one {kind.lower()}, with examples."
+    parser = Parser(prog=name, description=description, epilog=f"{epilog}\n\n{more}")
     parser.add_argument("--version", action="version", version=f"{name} {gestured.__version__}")
     return parser, parser.add_subparsers(metavar=kind, required=True)
 

@@ -35,8 +35,10 @@ def parser() -> argparse.ArgumentParser:
     """The command line; every subcommand's help has an example."""
     top = argparse.ArgumentParser(
         prog="gestured-lab",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
         description="Train and evaluate gestured's models.",
-        epilog="example: gestured-lab train --out models",
+        epilog="example: gestured-lab train --out models\n\n"
+        "`gestured-lab COMMAND --help` explains one command, with an example.",
     )
     top.add_argument("--version", action="version", version=f"gestured-lab {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
