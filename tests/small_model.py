@@ -1,8 +1,10 @@
 """A small real model file of two gestures, and what can be wrong with one; and a clock for a ladder of models."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +16,22 @@ from gestured.model.file import SelfTest
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=0.1, tail_s=0.1, floor=4.0)
 GESTURES = ("one_tap", "swipe_up")
+
+
+STRICTER = {"eager": 0.3, "normal": 0.6, "strict": 0.9}  # thresholds of the points that `operating_points` makes
+
+
+def operating_points(gestures: Sequence[str] = GESTURES, **changes: Any) -> str:
+    """The metadata `operating_points` of a model of these gestures, `changes` in place of what stands there."""
+    made = {
+        name: {
+            "thresholds": dict.fromkeys(gestures, least), "provisional": None if name == "eager" else least + 0.05,
+            "missed": round(least / 10, 3), "false_per_hour": round(4 * (1 - least), 3), "hours": 12.0,
+        }
+        for name, least in STRICTER.items()
+    }  # fmt: skip
+    curve = [[k / 20, k / 200, 5 - k / 4] for k in range(1, 20)]
+    return json.dumps(made | {"curve": curve} | changes)
 
 
 @dataclass

@@ -1,5 +1,6 @@
 """What `import gestured` offers: cheap until it is used, and clear about mistakes."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +19,7 @@ from gestured.model.model import Model
 from gestured.model.opening import open_model
 from tests.daemon import tiny_model
 from tests.daemon.harness import Hand
-from tests.small_model import build
+from tests.small_model import build, operating_points
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -71,6 +72,8 @@ def test_another_name_is_an_error_as_of_any_module():
         ({"thresholds": {"one_tap": 5}}, "thresholds: one_tap: expected 0 to 1, found 5"),
         ({"thresholds": {"one_tap": "0.5"}}, "thresholds: one_tap: expected 0 to 1, found '0.5'"),
         ({"thresholds": 0.5}, "thresholds: expected a confidence for each name, .*found 0.5"),
+        ({"strictness": "lax"}, "strictness: expected eager or normal or strict, found 'lax'"),
+        ({"strictness": None}, "strictness: expected eager or normal or strict, found None"),
         ({"own_gestures": "none.json"}, r"none\.json: cannot be read: No such file"),
     ],
 )
@@ -238,3 +241,27 @@ def test_a_grid_that_is_not_told_is_the_models(tmp_path: Path):
     recognizer = gestured.open(build(tmp_path / "own.onnx"))
     with pytest.raises(ValueError, match=r"grid \(9, 9\)"):
         recognizer.push(0.0, [[0.0]])
+
+
+def test_strictness_is_an_operating_point_of_the_model_which_says_where_it_has_none(
+    model: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
+    def answer(path: Path, **more: Any) -> str:
+        (found,) = [
+            event
+            for event in stroke(gestured.open(path, **more), Hand().swipe("left"))
+            if isinstance(event, gestured.Gesture | gestured.Unknown)
+        ]
+        return type(found).__name__
+
+    points = json.loads(operating_points(tiny_model.GESTURES))
+    points["strict"]["thresholds"]["swipe_left"] = 1.0
+    path = tiny_model.make(tmp_path / "mine.onnx", operating_points=json.dumps(points))
+    assert [answer(path), answer(path, strictness="eager"), answer(path, strictness="strict")] == [
+        "Gesture", "Gesture", "Unknown",
+    ]  # fmt: skip
+    assert answer(path, strictness="strict", thresholds={"swipe_left": 0.5}) == "Gesture"
+    assert caplog.messages == [] and answer(model) == "Gesture" and caplog.messages == []
+    assert answer(model, strictness="strict") == "Gesture"
+    (said,) = caplog.messages
+    assert said.endswith("has no operating points: whatever the strictness, it takes its one threshold")

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
-from gestured.model.ladder import RETRY_S, SLOW_RUNS, SLOW_S, Ladder, ladder_for
+from gestured.model.ladder import RETRY_S, SLOW_RUNS, SLOW_S, Ladder, ladder_for, report_missing_points
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
-from tests.small_model import GESTURES, Clock, build, segment
+from tests.small_model import GESTURES, STRICTER, Clock, build, operating_points, segment
 
 
 @dataclass
@@ -170,6 +170,30 @@ def test_shipped_model_has_the_shipped_rungs_below_it(shelf: Path) -> None:
 def test_shipped_rungs_are_not_files_of_that_name_nearby(shelf: Path) -> None:
     build(Path("lstm"), version="mine", gestures='["a", "b"]')
     ladder_for("cnn_lstm")  # would refuse a fallback with other gestures
+
+
+def test_each_rung_answers_with_its_own_operating_points_or_its_one_threshold(tmp_path: Path, clock: Clock) -> None:
+    some = open_model(build(tmp_path / "some.onnx", operating_points=operating_points()))
+    none = open_model(build(tmp_path / "none.onnx", calibration='{"threshold": 0.7}'))
+    best = Fake("best", clock, error=ModelError("broken"))
+    points = Ladder([best, some, none], clock=clock).classify(segment()).points
+    assert points is not None and points.points["strict"].thresholds == dict.fromkeys(GESTURES, STRICTER["strict"])
+    scores = Ladder([best, none, some], clock=clock).classify(segment())
+    assert (scores.points, scores.threshold) == (None, 0.7)
+
+
+@pytest.mark.parametrize("strictness", ["eager", "normal", "strict", None])
+def test_a_strictness_that_the_model_does_not_have_is_said_where_it_is_set(
+    tmp_path: Path, strictness: str | None
+) -> None:
+    said: list[str] = []
+    path = build(tmp_path / "some.onnx", operating_points=operating_points())
+    report_missing_points(ladder_for(path, report=said.append), ("strict", strictness))
+    assert said == []
+    path = build(tmp_path / "none.onnx")
+    report_missing_points(ladder_for(path, report=said.append), (None, "normal", strictness))
+    sentence = "none has no operating points: whatever the strictness, it takes its one threshold"
+    assert said == ([sentence] if strictness in ("eager", "strict") else [])
 
 
 def test_own_model_has_no_fallback_but_those_that_are_named(shelf: Path, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 from gestured.core.errors import ModelError
 from gestured.model import file as model_file
+from gestured.model import points
 from gestured.model import process as model_process
 from gestured.model.features import touch_pattern
 from gestured.model.model import Model
@@ -27,7 +28,7 @@ from gestured.model.shipped import LADDER, shipped
 from tests.bounds import little_memory
 from tests.daemon import tiny_model
 from tests.hostile import bad_models
-from tests.small_model import GESTURES, WINDOW, build, oracle, segment
+from tests.small_model import GESTURES, STRICTER, WINDOW, build, operating_points, oracle, segment
 
 
 def refusal(path: Path | str) -> str:
@@ -171,6 +172,8 @@ HALF_WINDOW = json.dumps({"rows": 9})
         ("training_data", "yesterday"),
         ("quantiles", "null"),
         ("provisional", "[]"),
+        ("operating_points", "[]"),
+        ("operating_points", operating_points().replace("12.0", "NaN")),
         ("provisional", '{"in_a_row":0,"elapsed_s":[0],"thresholds":[0.9],"tap":null}'),
         ("provisional", '{"in_a_row":2,"elapsed_s":[0,0.2,0.2],"thresholds":[0.9,0.9,0.9],"tap":null}'),
         ("provisional", '{"in_a_row":2,"elapsed_s":[0],"thresholds":[1.5],"tap":null}'),
@@ -186,6 +189,65 @@ HALF_WINDOW = json.dumps({"rows": 9})
 )
 def test_malformed_metadata_is_named(tmp_path: Path, key: str, value: str) -> None:
     assert f"'{key}'" in wrong(build(tmp_path / "m.onnx", **{key: value}))
+
+
+POINT = json.loads(operating_points())["normal"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"lax": POINT}, "expected eager, normal, strict and curve"),
+        ({"strict": None}, "strict: expected an object with thresholds, provisional"),
+        (
+            {"strict": POINT | {"thresholds": {"one_tap": 0.5}}},
+            "strict: thresholds: expected one for each of the model's",
+        ),
+        (
+            {"eager": POINT | {"thresholds": {"one_tap": 0.5, "swipe_up": 1.1}}},
+            "eager: thresholds: swipe_up: expected a",
+        ),
+        ({"normal": POINT | {"provisional": "0.9"}}, "normal: provisional: expected a number from 0 to 1, found '0.9'"),
+        ({"normal": POINT | {"missed": True}}, "normal: missed: expected a number from 0 to 1, found True"),
+        ({"normal": POINT | {"false_per_hour": 10**400}}, "normal: false_per_hour: expected a number from 0 to 1e"),
+        ({"curve": []}, "curve: expected a list of 1 to 1000 rows"),
+        ({"curve": [[0.5, 0.1]]}, "curve: expected rows of threshold, missed and false an hour"),
+        ({"curve": [[0.5, 0.1, 3], [0.5, 0.2, 2]]}, "curve: expected thresholds that rise, found 0.5 after 0.5"),
+    ],
+)
+def test_operating_points_that_cannot_be_are_named(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
+    message = wrong(build(tmp_path / "m.onnx", operating_points=operating_points(**changes)))
+    assert f"metadata 'operating_points': {words}" in message
+
+
+def test_a_model_without_operating_points_is_as_before_and_one_with_them_reports_them(tmp_path: Path) -> None:
+    assert open_model(build(tmp_path / "old.onnx")).points is None
+    assert check(tmp_path / "old.onnx")["operating_points"] is None
+    path = build(tmp_path / "new.onnx", operating_points=operating_points())
+    model, told = open_model(path), json.loads(operating_points())
+    assert model.points is not None and [list(row) for row in model.points.curve] == told.pop("curve")
+    assert json.loads(json.dumps(check(path)))["operating_points"] == told
+    assert model.classify(segment()).points is model.points
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(0, 2) | st.text(max_size=3),
+    lambda one: st.lists(one, max_size=3) | st.dictionaries(st.sampled_from([*POINT, *GESTURES]), one, max_size=5),
+    max_leaves=8,
+)  # fmt: skip
+
+
+@given(st.dictionaries(st.sampled_from([*STRICTER, "curve"]), JSON | st.just(POINT)), st.sampled_from([*POINT]), JSON)
+def test_whatever_stands_for_operating_points_is_taken_or_refused_in_a_sentence(
+    changes: dict[str, Any], key: str, value: Any
+) -> None:
+    told = json.loads(operating_points()) | {"eager": POINT | {key: value}} | changes
+    try:
+        found = points.operating_points(told, GESTURES)
+    except ValueError as error:
+        assert "expected" in str(error) and "\n" not in str(error)
+        return
+    assert all(0 <= p.thresholds[g] <= 1 and 0 <= p.missed <= 1 for p in found.points.values() for g in GESTURES)
 
 
 def test_grid_of_the_window_must_be_that_of_the_graph(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ SHOWN: dict[str, Any] = {
     "sensors.rotate": 90,
     "sensors.mirror": True,
     "sensors.clock": "sensor",
+    "sensors.strictness": "strict",
     "gestures.threshold": 0.8,
     "gestures.refractory_s": 0.5,
 }

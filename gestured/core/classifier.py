@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from gestured.core.certainty import Certainty
 from gestured.core.frames import Segment
+from gestured.core.points import OperatingPoints
 
 NEAR = 0.5  # confidence from which a segment is a gesture of the user's own, where nothing else is set
 
@@ -29,9 +30,10 @@ class Scores:
     unknown: float  # probability that it is none of them
     model: str
     degraded: bool = False  # whether a fallback answered
-    threshold: float = 0.5  # confidence from which the model's calibration has it published
+    threshold: float = 0.5  # confidence from which the model's calibration has it published, where it has no `points`
     took_s: float = 0.0  # s that the model ran
     own: Match | None = None  # the nearest gesture of the user's own, where there are any
+    points: OperatingPoints | None = None  # of the model
 
     @property
     def confidence(self) -> float:

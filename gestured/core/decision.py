@@ -6,21 +6,23 @@ from collections.abc import Sequence
 from gestured.core.classifier import NEAR, Match, Scores
 from gestured.core.cutter import bearable_s
 from gestured.core.frames import Segment
+from gestured.core.points import Point
 from gestured.core.scene import Scene
 from gestured.core.timing import outside
 
 
 class Decision:
-    """The thresholds, gestures in use and refractory pauses of a scene, for one sensor.
+    """The thresholds, strictness, gestures in use and refractory pauses of a scene, for one sensor.
 
     What falls to gestures that are not in use is not given to those that are left. A segment of which
     the model is not sure enough, or with a hole in which the finger may have moved unseen, is unknown. A gesture of the
     user's own may take what the model does not know, and what is much nearer to it than to the model's gestures.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, sensor: str) -> None:
         self._in_use = frozenset(scene.gestures)
         self._thresholds, self._refractory = scene.thresholds, scene.refractory
+        self._strictness = scene.strictness_of(sensor)
         self._last_offset: dict[str, float] = {}  # s, of the last time that each gesture was published
 
     def best(self, gestures: Sequence[str], answer: Scores) -> tuple[dict[str, float], str, float]:
@@ -34,8 +36,18 @@ class Decision:
         return scores, best, scores[best] * (1.0 - answer.unknown)
 
     def threshold(self, gesture: str, answer: Scores) -> float:
-        """The confidence from which an answer is that gesture."""
-        return self._thresholds.get(gesture, answer.threshold)
+        """The confidence from which an answer is that gesture: the scene's, else that of the model which answers."""
+        point = self._point(answer)
+        usual = answer.threshold if point is None else point.thresholds[gesture]
+        return self._thresholds.get(gesture, usual)
+
+    def early(self, gesture: str, answer: Scores) -> float:
+        """The confidence from which a provisional event may be that gesture, besides what a `Certainty` asks for."""
+        point = self._point(answer)
+        return max(self.threshold(gesture, answer), 0.0 if point is None else point.provisional or 0.0)
+
+    def _point(self, answer: Scores) -> Point | None:
+        return None if answer.points is None else answer.points.points[self._strictness]
 
     def is_own(self, match: Match | None, *, known: bool) -> bool:
         """Whether a gesture of the user's own may have a segment; `known`: the model would have it, too."""

@@ -9,10 +9,11 @@ import ipaddress
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from gestured.core.address import SIDES
 from gestured.core.mounting import Mounting
+from gestured.core.points import STRICTNESS, USUAL, Strictness
 from gestured.core.timing import Timing
 from gestured.core.wire import Addresses
 
@@ -32,6 +33,7 @@ class Setup:
     grid: tuple[int, int] | None = None  # rows and columns of its frames, as they are sent
     mounting: Mounting = Mounting()
     clock: Clock | None = None
+    strictness: Strictness | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +50,7 @@ class Scene:
     max_sensors: int = 64
     allow: tuple[Network, ...] = ()  # who may send; anybody where it is empty
     thresholds: Mapping[str, float] = field(default_factory=dict)  # by gesture: confidences in place of the model's own
+    strictness: Strictness = USUAL  # the operating point of the model that answers, where `thresholds` says nothing
     refractory: Mapping[str, float] = field(default_factory=dict)  # by gesture: s in which it is not published again
     provisional_taps: bool = True  # whether a tap is said provisionally while a second one may follow
     touches: bool = False  # whether finger positions are kept
@@ -67,11 +70,18 @@ class Scene:
             if not math.isfinite(value):
                 raise ValueError(f"gestures: expected thresholds and seconds that are finite, found {value!r}")
         for name in ("", *self.sensors):
-            rows, columns = self.grid_of(name)
-            if not (SIDES[0] <= rows <= SIDES[1] and SIDES[0] <= columns <= SIDES[1]):
-                raise ValueError(f"grid: expected sides of {SIDES[0]} to {SIDES[1]} taxels, found {rows} x {columns}")
-            if self.clock_of(name) not in ("arrival", "sensor"):
-                raise ValueError(f"clock: expected arrival or sensor, found {self.clock_of(name)!r}")
+            self._check_sensor(name)
+
+    def _check_sensor(self, name: str) -> None:
+        rows, columns = self.grid_of(name)
+        if not (SIDES[0] <= rows <= SIDES[1] and SIDES[0] <= columns <= SIDES[1]):
+            raise ValueError(f"grid: expected sides of {SIDES[0]} to {SIDES[1]} taxels, found {rows} x {columns}")
+        for key, found, expected in (
+            ("clock", self.clock_of(name), get_args(Clock)),
+            ("strictness", self.strictness_of(name), STRICTNESS),
+        ):
+            if found not in expected:
+                raise ValueError(f"{key}: expected {' or '.join(expected)}, found {found!r}")
 
     @classmethod
     def from_dict(cls, told: Mapping[str, Any], gestures: tuple[str, ...], grid: tuple[int, int]) -> "Scene":
@@ -82,7 +92,8 @@ class Scene:
         """
         parts = told.get("per_gesture", {}).items()
         plain: tuple[tuple[str, type], ...] = (
-            ("clock", str), ("stale_s", float), ("tap_gap_s", float), ("provisional_taps", bool), ("max_sensors", int),
+            ("clock", str), ("strictness", str), ("stale_s", float), ("tap_gap_s", float), ("provisional_taps", bool),
+            ("max_sensors", int),
         )  # fmt: skip
         return cls(
             gestures=gestures,
@@ -106,6 +117,10 @@ class Scene:
     def clock_of(self, sensor: str) -> Clock:
         """Which clock the times of a sensor's frames come from."""
         return self.setup(sensor).clock or self.clock
+
+    def strictness_of(self, sensor: str) -> Strictness:
+        """How sure a model must be of what a sensor felt."""
+        return self.setup(sensor).strictness or self.strictness
 
     @property
     def waits_for_double_tap(self) -> bool:
@@ -134,4 +149,4 @@ def _grid(value: Any) -> tuple[int, int]:
 def _setup(own: Mapping[str, Any]) -> Setup:
     grid = own.get("grid")
     mounting = Mounting(own.get("rotate", 0), own.get("mirror", False), own.get("invert", False))
-    return Setup(grid and _grid(grid), mounting, own.get("clock"))
+    return Setup(grid and _grid(grid), mounting, own.get("clock"), own.get("strictness"))

@@ -54,7 +54,7 @@ class Sensor:
         self.silent = False  # whether the stream has ended or paused, and was flushed
         self.sequence, self.segments = numbers
         self.front_end = _front_end(name, scene)
-        self._scene, self._decision = scene, Decision(scene)
+        self._scene, self._decision = scene, Decision(scene, name)
         self._stamper = Stamper(scene.clock_of(name))
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # last; no scores where it failed
         self._foresight = Foresight(name, taps=scene.provisional_taps)
@@ -198,7 +198,8 @@ class Sensor:
         _, best, confidence = decision.best(classifier.gestures, answer)
         least = decision.threshold(best, answer)
         held = decision.too_early(best, preview.segment) or decision.is_own(answer.own, known=confidence >= least)
-        said = foresight.say(preview, certainty, best, confidence, math.inf if held else least)
+        needed = math.inf if held else decision.early(best, answer)
+        said = foresight.say(preview, certainty, best, confidence, needed)
         return [] if said is None else [said]
 
     # --- by the hub's time: what is found is added to `facts`
@@ -285,7 +286,7 @@ class Sensor:
             self._square = new.rows == new.columns
         if another_clock:
             self._stamper = Stamper(scene.clock_of(self.name))
-        self.classifier, self._decision, self._asked = classifier, Decision(scene), None
+        self.classifier, self._decision, self._asked = classifier, Decision(scene, self.name), None
         self._foresight.taps = scene.provisional_taps
 
     def foresee(self, *, asked: bool, later: bool = False) -> None:

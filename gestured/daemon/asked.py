@@ -12,7 +12,7 @@ from gestured.daemon.metrics import Metrics
 from gestured.daemon.settings import Settings
 from gestured.daemon.sinks import Output, outputs
 from gestured.model import own_file
-from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, require_gestures
+from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, report_missing_points, require_gestures
 
 SLIP = 0.8  # of difflib's ratio: a name so near to a gesture of the model is taken for a slip of it
 
@@ -45,6 +45,7 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
     ladder.report = lambda sentence: log.warning("model", what=sentence)
     for sentence in early:
         ladder.report(sentence)
+    report_missing_points(ladder, (settings.strictness, *(own.strictness for own in settings.sensors.values())))
     gestures_in_use(ladder, settings.gestures)
     require_gestures(ladder, (name for name in settings.per_gesture if not _may_be_own(name, settings, ladder)))
     return ladder

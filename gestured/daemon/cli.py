@@ -9,6 +9,7 @@ from typing import Any
 
 from gestured import __version__
 from gestured.core.errors import GesturedError, ModelError, SettingsError
+from gestured.core.points import STRICTNESS
 from gestured.daemon.merge import load_settings, strange_variables
 from gestured.daemon.settings import FLAGS, REPEATED, Settings
 
@@ -18,8 +19,9 @@ example:
            --socket /run/gestured/events.sock --metrics 127.0.0.1:9108 --config gestured.toml
 
 Each flag is a variable (GESTURED_MODEL=...) and a key of the TOML file (model = "...") too; flags win over
-variables, these over the file. The file also takes [sensors.NAME] (grid, rotate, mirror, invert, clock),
-[gestures.NAME] (threshold, refractory_s) and [addresses] (pressure, trajectory). SIGHUP reads it again.
+variables, these over the file. The file also takes [sensors.NAME] (grid, rotate, mirror, invert, clock,
+strictness), [gestures.NAME] (threshold, refractory_s) and [addresses] (pressure, trajectory). SIGHUP reads
+it again.
 
 exit status:
   0 ended as asked, 2 usage or invalid configuration, 3 a model that cannot be used and no fallback,
@@ -28,7 +30,8 @@ exit status:
 METAVARS = {
     "model": "MODEL", "fallback": "MODEL", "listen": "HOST:PORT", "publish": "osc://HOST:PORT",
     "socket": "PATH", "control": "PATH", "metrics": "HOST:PORT", "grid": "RxC", "gestures": "A,B",
-    "clock": "arrival|sensor", "allow": "CIDR", "flight_recorder": "MIB", "own_gestures": "FILE", "log_level": "LEVEL",
+    "strictness": "|".join(STRICTNESS), "clock": "arrival|sensor",
+    "allow": "CIDR", "flight_recorder": "MIB", "own_gestures": "FILE", "log_level": "LEVEL",
 }  # fmt: skip
 OF_TYPE: dict[object, str] = {bool: "true|false", int: "N", float: "SECONDS"}  # where no key is named above
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 
 from gestured import __version__
 from gestured.client.address import control_beside, default_socket
-from gestured.core.errors import SettingsError
+from gestured.core.errors import ModelError, SettingsError
 from gestured.core.scene import DOUBLE_TAP
 from gestured.core.timing import Timing
 from gestured.daemon.asked import open_ladder
@@ -95,6 +95,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
         "falls back on": rungs or ["nothing"],
         "listens to": listens,
         "publishes on": publishes,
+        "thresholds": list(_strictness(settings, ladder)),
         "computes per frame": [*computes, *_early(ladder)],
         "leaves out": [*leaves, *not_own, *_not_early(settings, ladder)],
         "set by": list(_keys(settings, sources)) or ["nothing, all defaults"],
@@ -134,6 +135,28 @@ def _keys(settings: Settings, sources: Mapping[str, str]) -> Iterator[str]:
         else:
             beside = key == "gestures" and sources.get("per_gesture") == source
             yield f"{'gestures.use' if beside else key}: {source}"
+
+
+def _strictness(settings: Settings, ladder: Ladder) -> Iterator[str]:
+    """Which operating points are taken, what each of them costs on each rung, and what holds before them."""
+    own = (f", {name} {sensor.strictness}" for name, sensor in settings.sensors.items() if sensor.strictness)
+    yield f"strictness {settings.strictness}{''.join(own)}"
+    for rung in ladder.rungs:
+        try:
+            model = rung.open()
+        except ModelError as error:
+            yield f"{rung.name} could not be used: {error}"
+            continue
+        if model.points is None:
+            yield f"{rung.name} has no operating points: {model.threshold:.2f} for all, whatever the strictness"
+        for name, point in () if model.points is None else model.points.points.items():
+            yield (
+                f"{rung.name} {name}: {100 * point.missed:.1f} % missed, {point.false_per_hour:.2g} false an hour, "
+                f"in {point.hours:g} hours that were judged"
+            )
+    told = [f"{name} {part.threshold:g}" for name, part in settings.per_gesture.items() if part.threshold is not None]
+    if told:
+        yield f"before these, thresholds of [gestures]: {', '.join(told)}"
 
 
 def _early(ladder: Ladder) -> list[str]:

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gestured.core.address import Address
+from gestured.core.points import USUAL, Strictness
 from gestured.core.scene import MOST_SENSORS, STALE_S, TAP_GAP_S
 from gestured.core.timing import Timing
 from gestured.core.wire import Addresses
@@ -38,13 +39,19 @@ class SensorSettings(Part):
     clock: Literal["arrival", "sensor"] | None = Field(
         default=None, description="where its frames' times come from; by default the general `clock`"
     )
+    strictness: Strictness | None = Field(
+        default=None, description="eager, normal or strict; by default the general `strictness`"
+    )
 
 
 class GestureSettings(Part):
     """`[gestures.NAME]`: when one gesture counts."""
 
     threshold: float | None = Field(
-        default=None, ge=0, le=1, description="confidence below which it is unknown; by default the model's own"
+        default=None,
+        ge=0,
+        le=1,
+        description="confidence below which it is unknown, whatever the `strictness`; by default the model's",
     )
     refractory_s: float = Field(
         default=0, ge=0, le=3600, description="seconds in which the same gesture is not published again"
@@ -102,6 +109,11 @@ class Settings(Part):
         default=None,
         description="the gestures in use; all of the model's unless set. A file with tables [gestures.NAME] "
         "names them as `use` under [gestures]",
+    )
+    strictness: Strictness = Field(
+        default=USUAL,
+        description="eager, normal or strict: how sure the model must be. The stricter, the fewer gestures that nobody "
+        "made, and the more that must be repeated",
     )
     clock: Literal["arrival", "sensor"] = Field(
         default="arrival",

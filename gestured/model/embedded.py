@@ -18,11 +18,12 @@ from gestured.core.events import Event
 from gestured.core.facts import events_of
 from gestured.core.frames import Frame, Touch
 from gestured.core.mounting import Mounting
+from gestured.core.points import USUAL, Strictness
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
 from gestured.core.timing import Timing
 from gestured.model import own_file
-from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, require_gestures
+from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, report_missing_points, require_gestures
 from gestured.model.own import Own
 from gestured.model.own_file import OwnFileError
 
@@ -100,6 +101,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     mirror: bool = False,
     invert: bool = False,
     gestures: Sequence[str] | None = None,
+    strictness: Strictness = USUAL,
     thresholds: Mapping[str, float] | None = None,
     own_gestures: str | Path | None = None,
     tap_gap_s: float = Timing().tap_gap_s,
@@ -109,8 +111,9 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
 
     `sensor` is the name in its events; `grid` its rows and columns as it sends them, the model's unless told; `rotate`
     (degrees clockwise: 0, 90, 180, 270) and `mirror` say how it is mounted, `invert` that its counts fall under
-    pressure; `gestures` are those to use, all unless told; `thresholds` the confidences, 0 to 1, from which a gesture
-    is one, the model's own unless told; `own_gestures` is a daemon's file of gestures that were enrolled; `tap_gap_s`
+    pressure; `gestures` are those to use, all unless told; `strictness` ("eager", "normal", "strict") is how sure
+    the model must be, by operating points of its own; `thresholds` are the confidences, 0 to 1, from which a gesture is
+    one, before those of the strictness; `own_gestures` is a daemon's file of gestures that were enrolled; `tap_gap_s`
     is how long a tap waits for a second one, 0.2 to 0.6 s. With `provisional` a contact's most probable gesture is
     said before it is over, where the model was made for that.
 
@@ -134,10 +137,12 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
             grid=(rows, columns),
             sensors={sensor: Setup(mounting=Mounting(rotate, mirror, invert))},
             tap_gap_s=tap_gap_s,
+            strictness=strictness,
             thresholds=_thresholds(ladder, {} if thresholds is None else thresholds),
         )
     except (TypeError, ValueError) as error:
         raise SettingsError(str(error)) from None
+    report_missing_points(ladder, (strictness,))
     found = Sensor(sensor, scene, ladder)
     found.foresee(asked=provisional)
     return Embedded(found, (*used, *ladder.own.gestures))

@@ -13,6 +13,7 @@ from gestured.core.certainty import Certainty
 from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError, SettingsError
 from gestured.core.frames import Segment
+from gestured.core.points import USUAL
 from gestured.model.model import Model
 from gestured.model.own import Own
 from gestured.model.rung import Rung
@@ -193,6 +194,12 @@ def ladder_for(source: str | Path, fallbacks: Sequence[str | Path] | None = None
         # By path: a file of that name in the working directory is not the shipped one.
         fallbacks = [shipped()[rung] for rung in below]
     return Ladder([source, *fallbacks], **settings)
+
+
+def report_missing_points(ladder: Ladder, strictness: Iterable[str | None]) -> None:
+    """Have the ladder report where a `strictness` is set that the model which answers does not have."""
+    if ladder.model.points is None and set(strictness) - {None, USUAL}:
+        ladder.report(f"{ladder.active} has no operating points: whatever the strictness, it takes its one threshold")
 
 
 def require_gestures(ladder: Ladder, names: Iterable[str]) -> None:

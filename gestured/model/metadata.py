@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from gestured.core.certainty import Certainty
+from gestured.core.points import OperatingPoints
 from gestured.core.window import Window
 from gestured.model.certainty import certainty
 from gestured.model.features import feature_names
 from gestured.model.file import SelfTest
+from gestured.model.points import operating_points
 from gestured.model.prototypes import Space
 
 MAX_TEXT = 2 << 20  # characters of one value; the longest is the self-test, some thousands
@@ -38,11 +40,12 @@ class Metadata:
     window: Window
     features: tuple[str, ...] | None  # names, where the model takes features instead of frames
     calibration: Mapping[str, Any]
-    threshold: float  # the confidence from which an answer is published, unless a setting says another
+    threshold: float  # the confidence from which an answer is published where there are no `points`
     training_data: str  # sha256
     quantiles: Mapping[str, Any]  # what the training data looked like
     self_test: SelfTest
     provisional: Certainty | None  # how sure it must be of a contact that is not over, where it was made for that
+    points: OperatingPoints | None  # thresholds by strictness, and what they cost
     own: Space | None  # where gestures of the user's own are compared; None for a model that cannot
 
     @classmethod
@@ -68,10 +71,14 @@ class Metadata:
             raise ValueError("metadata 'training_data': expected a sha256 in hexadecimal")
         with _naming("window"):
             window = Window.from_json(properties["window"])
-        provisional = own = None
+        provisional = own = points = None
         if "provisional" in properties:
             with _naming("provisional"):
                 provisional = certainty(properties["provisional"], gestures)
+        if "operating_points" in properties:
+            told = _json(properties["operating_points"], "operating_points", dict)
+            with _naming("operating_points"):
+                points = operating_points(told, gestures)
         if "own" in properties:
             told = _json(properties["own"], "own", dict)
             with _naming("own"):
@@ -93,6 +100,7 @@ class Metadata:
             quantiles=_json(properties["quantiles"], "quantiles", dict),
             self_test=SelfTest.from_json(_json(properties["self_test"], "self_test", dict)),
             provisional=provisional,
+            points=points,
             own=own,
         )
 

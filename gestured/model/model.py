@@ -43,6 +43,7 @@ class Model:
         self.rows = self.metadata.rows
         self.columns = self.metadata.columns
         self.threshold = self.metadata.threshold
+        self.points = self.metadata.points
         self.certainty = self.metadata.provisional
         self._input = self._session.check(self.metadata)
         self.embeds = "embedding" in self._session.outputs
@@ -67,7 +68,7 @@ class Model:
             scores, unknown = self.run(window[np.newaxis], RUN_S)
         except ValueError as error:
             raise ModelError(f"{self.name}: {error}") from error
-        return Scores(scores[0], float(unknown[0]), self.name, threshold=self.threshold)
+        return Scores(scores[0], float(unknown[0]), self.name, threshold=self.threshold, points=self.points)
 
     def preview(self, segment: Segment) -> Scores | None:
         """Scores of the beginning of a segment, None where that fails."""
@@ -116,6 +117,7 @@ class Model:
             "window": asdict(known.window),
             "calibration": dict(known.calibration),
             "provisional": known.provisional is not None,
+            "operating_points": None if known.points is None else asdict(known.points)["points"],
             "training_data": known.training_data,
             "self_test": {"largest_difference": self.self_test_error, "tolerance": TOLERANCE},
         }

@@ -19,6 +19,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, 
 from gestured.core.facts import Fault, events_of
 from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
+from gestured.core.points import OperatingPoints, Point
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.model.certainty import certainty
@@ -176,6 +177,19 @@ def test_what_the_configuration_asks_for_holds_where_it_is_more() -> None:
     low = Certainty(1, (0.0,), (0.3,))
     unsure = Seer(early=lambda segment: says("left", 0.45), certainty=low)  # the model's own threshold is 0.5
     assert "left?" not in names(run(recognizer(unsure), stream))
+
+
+@pytest.mark.parametrize(
+    ("floor", "least", "said"), [(None, 0.4, True), (0.44, 0.4, True), (0.46, 0.4, False), (0.2, 0.46, False)]
+)
+def test_an_operating_point_may_ask_for_more_than_the_rule(floor: float | None, least: float, said: bool) -> None:
+    point = Point(dict.fromkeys(GESTURES, least), floor, 0.0, 0.0, 1.0)
+    points = OperatingPoints({"strict": point, "normal": replace(point, provisional=1.0)}, ())
+    told = replace(says("left", 0.45), points=points)
+    seer = Seer(lambda segment: told, lambda segment: told, Certainty(1, (0.0,), (0.3,)))
+    found = names(run(recognizer(seer, strictness="strict"), frames(IDLE, SWIPE, PAUSE)))
+    assert ("left?" in found) == said
+    assert ("unknown" in found) == (least > 0.45)  # the floor is of provisional events alone
 
 
 def test_only_gestures_in_use_are_said() -> None:

@@ -21,7 +21,8 @@ from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unkn
 from gestured.core.facts import Decided, events_of
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown, Void
-from gestured.core.scene import Scene
+from gestured.core.points import STRICTNESS, OperatingPoints, Point
+from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
 from gestured.core.timing import Timing
 from gestured.core.window import Window
@@ -330,6 +331,32 @@ def test_the_best_gesture_counts_if_it_is_sure_enough(
     if isinstance(answer, Gesture):
         assert answer.gesture == best
     assert set(answer.scores) == set(GESTURES)
+
+
+LEAST = st.floats(0, 1)
+EACH = st.lists(LEAST, min_size=3, max_size=3)
+
+
+@given(
+    EACH, st.sampled_from([None, *STRICTNESS]), st.sampled_from(STRICTNESS), LEAST | st.none(),
+    st.dictionaries(st.sampled_from(GESTURES), LEAST),
+)  # fmt: skip
+def test_a_threshold_is_the_scenes_else_the_operating_points_else_the_calibrations(
+    by_strictness: list[float], one: str | None, usual: str, calibrated: float | None, own: dict[str, float]
+) -> None:
+    at = dict(zip(STRICTNESS, by_strictness, strict=True))
+    points = OperatingPoints(
+        {name: Point(dict.fromkeys(GESTURES, 0.0) | {"left": least}, None, 0, 0, 1) for name, least in at.items()}, ()
+    )
+    answer = says(0.1, 0.5, 0.4, threshold=0.0 if calibrated is None else calibrated)
+    sensors = {"armrest": Setup(strictness=one), "other": Setup(strictness="eager")}
+    subject = recognizer(
+        Fake([replace(answer, points=points if calibrated is None else None)]),
+        thresholds=own, strictness=usual, sensors=sensors,
+    )  # fmt: skip
+    (found,) = answers(run(subject, SWIPED))
+    needed = own.get("left", at[one or usual] if calibrated is None else calibrated)
+    assert isinstance(found, Gesture) == (needed <= 0.5)
 
 
 SWIPED = swipes(1)

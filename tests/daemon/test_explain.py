@@ -14,7 +14,9 @@ from gestured.core.timing import Timing
 from gestured.daemon.explain import explain
 from gestured.model import own_file
 from gestured.model.shipped import shipped
+from tests.daemon import tiny_model
 from tests.daemon.parts import settings_of
+from tests.small_model import operating_points
 
 RATE_HZ = 15.0
 JITTER_S = 0.003
@@ -70,3 +72,23 @@ def test_the_file_of_own_gestures_is_said_and_one_that_cannot_be_is_refused(
     for name in ("STATE_DIRECTORY", "XDG_STATE_HOME", "HOME"):
         monkeypatch.delenv(name, raising=False)
     assert "enrolling: there is no file for own gestures, since there is no home" in explained()
+
+
+def test_what_each_strictness_costs_is_said_for_each_rung_and_what_holds_before_it(model: Path, tmp_path: Path) -> None:
+    points = operating_points(tiny_model.GESTURES)
+    path = tiny_model.make(tmp_path / "mine.onnx", operating_points=points)
+    config = tmp_path / "gestured.toml"
+    config.write_text('strictness = "eager"\n[sensors.arm]\nstrictness = "strict"\n[gestures.one_tap]\nthreshold = 0.8')
+    flags = ("--model", path, "--fallback", model, "--config", config)
+    said = explain(*settings_of(*flags, env={"GESTURED_STRICTNESS": "normal"}))
+    lines = [line.strip() for line in said.split("thresholds:\n")[1].split("\n\n")[0].splitlines()]
+    assert lines == [
+        "strictness normal, arm strict",
+        "mine eager: 3.0 % missed, 2.8 false an hour, in 12 hours that were judged",
+        "mine normal: 6.0 % missed, 1.6 false an hour, in 12 hours that were judged",
+        "mine strict: 9.0 % missed, 0.4 false an hour, in 12 hours that were judged",
+        f"{model.stem} has no operating points: 0.50 for all, whatever the strictness",
+        "before these, thresholds of [gestures]: one_tap 0.8",
+    ]
+    assert "strictness eager, arm strict" in explain(*settings_of(*flags))
+    assert "strictness strict, arm strict" in explain(*settings_of(*flags, "--strictness", "strict"))

@@ -112,9 +112,10 @@ def test_a_tape_knows_everything_that_decides(model: Path, tmp_path: Path) -> No
     file = tmp_path / "gestured.toml"
     file.write_text(
         'grid = "7x8"\nclock = "sensor"\nstale_s = 2.5\ntap_gap_s = 0.3\nprovisional_taps = false\nmax_sensors = 7\n'
-        'allow = ["127.0.0.0/8", "fd00::/8"]\naddresses.pressure = "/skin/{sensor}"\n'
+        'strictness = "strict"\nallow = ["127.0.0.0/8", "fd00::/8"]\naddresses.pressure = "/skin/{sensor}"\n'
         'gestures.use = ["swipe_left", "one_tap"]\ngestures.one_tap = { threshold = 0.75, refractory_s = 1.5 }\n'
         'sensors.arm = { grid = "5x6", rotate = 90, mirror = true, invert = true, clock = "arrival" }\n'
+        'sensors.elbow = { strictness = "eager" }\n'
     )
     ladder = ladder_for(model)
     usual, odd = (load_settings({"model": str(model), **given}, {})[0] for given in ({}, {"config": str(file)}))

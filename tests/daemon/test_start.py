@@ -140,6 +140,8 @@ def unread(*flags: object, env: dict[str, str] | None = None) -> str:
         ),
         ((), {}, "[sensors.'arm rest']", ("'arm rest'", "expected a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -")),
         ((), {}, "[addresses]\npressure = 'x'", ("addresses", "pressure", "{sensor}")),
+        (("--strictness", "lax"), {}, "", ("strictness", "'lax'", "'eager', 'normal' or 'strict'", "command line")),
+        ((), {}, "[sensors.arm]\nstrictness = 3", ("sensors.arm.strictness", "3", "'eager', 'normal' or 'strict'")),
         ((), {}, "max_sensors = 0", ("max_sensors", "0", "greater than or equal to 1")),
         ((), {}, "listen = !", ("gestured.toml", "TOML", "line 1")),
         (("--config", "/no/such/file"), {}, "", ("config", "/no/such/file")),

@@ -109,7 +109,7 @@ class Foresight:
     def say(
         self, preview: Preview, certainty: Certainty, best: str, confidence: float, least: float
     ) -> Provisional | None:
-        """What is to be said now that a model has looked. `least`: the confidence that an answer would need."""
+        """What is to be said now that a model has looked. `least`: the confidence that is needed whatever the time."""
         needed = self._needed(preview, certainty, best)
         if needed is None or not confidence >= max(needed, least):  # NaN is not enough either
             self._row = 0
