@@ -1,4 +1,4 @@
-"""What a cell learns from: gestures, Algorithm 1's copies of them, and strangers on random sensors."""
+"""What a cell learns from: gestures, and Algorithm 1's copies of them."""
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -11,9 +11,9 @@ from gestured.lab.samples import Samples, join
 from gestured.lab.study.shifting import THRESHOLD, copies
 from gestured.simulator import GESTURES
 
-UNCHANGED, SHIFT, WIDE = "none", "shift", "wide"
-AUGMENTATIONS = (UNCHANGED, SHIFT, WIDE)
-STRANGER, JUDGE = -1, -2  # stand for a gesture's index: of other people, who teach alone or judge alone
+UNCHANGED, SHIFT = "none", "shift"
+AUGMENTATIONS = (UNCHANGED, SHIFT)
+JUDGE = -1  # stands for a gesture's index: of other people, who judge alone
 
 
 @dataclass(frozen=True)
@@ -23,14 +23,12 @@ class Data:
     key: str  # a digest of all of it
     name: str = field(compare=False)  # simulated, real or foreign
     gestures: Samples = field(compare=False)
-    wide: Samples | None = field(compare=False, default=None)  # other people on randomised sensors: to learn from only
     judges: Samples | None = field(compare=False, default=None)  # of another generator: they judge and teach nothing
 
     @classmethod
-    def of(cls, name: str, gestures: Samples, wide: Samples | None = None, judges: Samples | None = None) -> "Data":
+    def of(cls, name: str, gestures: Samples, judges: Samples | None = None) -> "Data":
         """With the key that belongs to it."""
-        more = "".join(part.digest()[:8] for part in (wide, judges) if part)
-        return cls(gestures.digest()[:16] + more, name, gestures, wide, judges)
+        return cls(gestures.digest()[:16] + (judges.digest()[:8] if judges else ""), name, gestures, judges)
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class Pool:
 
     samples: Samples
     labels: NDArray[np.int64]  # class of each
-    source: NDArray[np.int64]  # the gesture that it was made of; `STRANGER`, `JUDGE`
+    source: NDArray[np.int64]  # the gesture that it was made of, or `JUDGE`
     same: NDArray[np.bool_]  # whether it is that gesture itself, by a shift of zero
     gestures: int  # G
 
@@ -94,11 +92,10 @@ def pool(data: Data, augmentation: str, form: Form = NO_FORM, box: float = THRES
     if augmentation == SHIFT:
         made = copies(gestures, box)
         parts, source, same = [*parts, made.samples], np.append(source, made.source), np.append(same, made.same)
-    for others, mark in ((data.wide if augmentation == WIDE else None, STRANGER), (data.judges, JUDGE)):
-        if others is not None:
-            parts.append(others)
-            source = np.append(source, np.full(len(others), mark))
-            same = np.append(same, np.zeros(len(others), bool))
+    if data.judges is not None:
+        parts.append(data.judges)
+        source = np.append(source, np.full(len(data.judges), JUDGE))
+        same = np.append(same, np.zeros(len(data.judges), bool))
     samples = join(parts)
     if form.frames:
         samples = equal_length(samples, form.frames)

@@ -144,7 +144,7 @@ def _classical(
                 view,
                 partial(_estimate, build),
                 tuple({**v, **g} for v in variants for g in grid),
-                {"none": {**given, **plain}, "shift": {**given, **augmented}, "wide": {**given, **plain}},
+                {"none": {**given, **plain}, "shift": {**given, **augmented}},
                 dict(zip(("none", "shift"), published[kind], strict=True)),
                 published_online=0.71 if (prefix, kind) == ("tp", "rf") else None,
             )  # fmt: skip
@@ -169,7 +169,7 @@ def _net(
 
     return Method(
         kind, title, RECURRENT if published else BEYOND, what, FRAMES, partial(_train, make), tuple(grid),
-        dict.fromkeys(("none", "shift", "wide"), given) if published else None,
+        dict.fromkeys(("none", "shift"), given) if published else None,
         {"none": published[0], "shift": published[1]} if published else {},
         published_online=published[2] if published else None,
     )  # fmt: skip
@@ -212,7 +212,7 @@ METHODS: dict[str, Method] = {
             "mhi_cnn", "CNN on motion history images", MOTION_HISTORY,
             "Four convolutions with leaky ReLU and two fully connected layers on one image of the whole movement.",
             views.HISTORY, partial(_train, lambda classes, values: HistoryNet(classes, values["channels"])),
-            tuple(HISTORY_GRID), dict.fromkeys(("none", "shift", "wide"), HISTORY_GRID[2]),
+            tuple(HISTORY_GRID), dict.fromkeys(("none", "shift"), HISTORY_GRID[2]),
             {"none": 0.77, "shift": 0.81},
         ),
         _net("lstm", "LSTM", "An LSTM of 32 units on the 81 taxels of each frame (81 -> 32 -> 10).", (8e-3, 4e-3),

@@ -21,7 +21,6 @@ class Plan:
     new_people: int = 6  # participants whom nothing has learned from: they judge error against run time
     steps: int | None = None  # batches for every network; None: as its hyperparameters say
     tuning_steps: int = 250  # batches for networks while hyperparameters are compared
-    wide: int = 4_000  # takes of the wide stream to learn from; two thirds are gestures
     real: int | None = None  # gestures of each real subject; None: all
     timed: int = 60  # gestures that the run time is measured on, each cold (after 67 ms) and warm
     minutes: float = 20.0  # of continuous sessions for each model
@@ -30,7 +29,7 @@ class Plan:
     def small(cls, seed: int) -> "Plan":
         """What takes some minutes on two cores."""
         return cls(
-            seed, True, 1, folds=2, tuning_people=0, new_people=1, steps=40, tuning_steps=0, wide=0, real=40,
+            seed, True, 1, folds=2, tuning_people=0, new_people=1, steps=40, tuning_steps=0, real=40,
             timed=3, minutes=0.0,
         )  # fmt: skip
 

@@ -97,9 +97,7 @@ def splits(task: Task, of: Pool) -> Iterator[tuple[Indices, Indices]]:
     people = of.samples.people[: of.gestures]
     everybody = rng.permutation(np.unique(people))
     for fold in np.array_split(everybody, min(task.folds, len(everybody))):
-        others = everybody[~np.isin(everybody, fold)]
-        owner = np.where(of.source >= 0, people[of.source], others[0])  # strangers may always be learned from
-        yield np.flatnonzero(np.isin(owner, others)), np.flatnonzero(np.isin(people, fold))
+        yield np.flatnonzero(~np.isin(people[of.source], fold)), np.flatnonzero(np.isin(people, fold))
 
 
 def fitted(task: Task, inputs: Any, train: Indices, labels: NDArray[np.int64]) -> Scorer:
@@ -108,13 +106,13 @@ def fitted(task: Task, inputs: Any, train: Indices, labels: NDArray[np.int64]) -
 
 
 def run(task: Task, data: Data) -> Result:
-    """Every judged gesture of a cell: whose it was, what it was, what it was called and how surely.
+    """Every judged gesture of a cell: whose it was, what it was, and what it was called.
 
     `same` and `version` (protocols that augment before they split): whether the very same window, and whether any
         shifted version of the same gesture, was learned from.
     """
     of, inputs = material(task, data)
-    found: dict[str, list[Any]] = {n: [] for n in ("source", "person", "truth", "predicted", "confidence", "fold")}
+    found: dict[str, list[Any]] = {n: [] for n in ("source", "person", "truth", "predicted", "fold")}
     seen: dict[str, list[bool]] = {"same": [], "version": []}
     taught, seconds = 0, 0.0
     for fold, (train, test) in enumerate(splits(task, of)):
@@ -127,7 +125,6 @@ def run(task: Task, data: Data) -> Result:
         found["person"] += of.samples.people[test].tolist()
         found["truth"] += of.labels[test].tolist()
         found["predicted"] += scores.argmax(axis=1).tolist()
-        found["confidence"] += scores.max(axis=1).round(4).tolist()
         found["fold"] += [fold] * len(test)
         if task.protocol in LEAKY and task.augmentation == SHIFT:
             itself = of.source[train][of.same[train]]  # gestures that are learned from as they are

@@ -51,7 +51,7 @@ def measure(plan: Plan, tuned: Mapping[str, Values], judges: Cohort, data: Data)
             answers = [runner.answer(segment) for segment in segments]
             named, said = (np.array(column) for column in zip(*answers, strict=True))
             rows.append({
-                "method": runner.method, "settings": runner.settings, "precision": runner.precision,
+                "method": runner.method, "settings": runner.settings,
                 **summary(named == truth, people), **told(named, said, truth, people, judges.lost),
                 "cold_us": round(float(np.median(cold)) * 1e6, 1), "median_us": round(float(np.median(warm)) * 1e6, 1),
                 "p95_us": round(float(np.quantile(warm, 0.95)) * 1e6, 1),

@@ -1,7 +1,6 @@
 """What is timed: every method, run as well as it can here, and the models that ship.
 
-Networks, forests and boosting run in onnxruntime (one thread), as in the daemon, the rest in scikit-learn. int8 is
-onnxruntime's dynamic quantisation of matrix products and LSTMs.
+Networks, forests and boosting run in onnxruntime (one thread), as in the daemon, the rest in scikit-learn.
 """
 
 import pickle
@@ -35,7 +34,6 @@ class Runner(Protocol):
     """One model, from a segment to its answer; sent to another process to be weighed."""
 
     method: str
-    precision: str
     settings: str
 
     def answer(self, segment: Segment) -> tuple[int, bool]:
@@ -52,7 +50,6 @@ class Learned:
     """A method of the study, which rejects nothing."""
 
     method: str
-    precision: str
     values: Values
     model: Estimator | onnx_form.Graph
     from_frames: bool = False  # the graph takes the window itself
@@ -77,7 +74,6 @@ class Shipped:
 
     method: str
     path: Path
-    precision: str = "float32"
     settings: str = "shipped"
     _model: Model | None = None
 
@@ -99,7 +95,7 @@ class Shipped:
 
 
 def runners(plan: Plan, tuned: Mapping[str, Values], data: Data) -> list[Runner]:
-    """Every method, fitted to all gestures and their shifted copies, in each precision; then the shipped models."""
+    """Every method, fitted to all gestures and their shifted copies, then the shipped models."""
     out: list[Runner] = []
     for method in progress(METHODS.values(), len(METHODS), "models to be timed"):
         of_task = task(method, tuned[method.id], SHIFT, PARTICIPANTS, "simulated", plan)
@@ -107,17 +103,13 @@ def runners(plan: Plan, tuned: Mapping[str, Values], data: Data) -> list[Runner]
         model = fitted(of_task, inputs, np.arange(len(of.labels)), of.labels)
         values = dict(of_task.values)
         if isinstance(model, Net):
-            graph = onnx_form.of_net(model.module, images=not method.elapses)
-            out.append(Learned(method.id, "float32", values, graph))
-            smaller = onnx_form.quantised(graph)
-            if smaller is not None:
-                out.append(Learned(method.id, "int8", values, smaller))
+            out.append(Learned(method.id, values, onnx_form.of_net(model.module, images=not method.elapses)))
             continue
         assert isinstance(model, Estimator)
         if method.id.endswith("_rf"):
-            out.append(Learned(method.id, "float32", values, onnx_form.of_forest(model.fitted)))
+            out.append(Learned(method.id, values, onnx_form.of_forest(model.fitted)))
         elif method.id == "trajectory_gb":
-            out.append(Learned(method.id, "float32", values, onnx_form.of_boosting(model.fitted), from_frames=True))
+            out.append(Learned(method.id, values, onnx_form.of_boosting(model.fitted), from_frames=True))
         else:
-            out.append(Learned(method.id, "float64", values, model))
+            out.append(Learned(method.id, values, model))
     return out + [Shipped(method, shipped()[name]) for method, name in SHIPPED.items()]

@@ -13,10 +13,8 @@ import torch
 
 import gestured
 from gestured.core.errors import GesturedError
-from gestured.lab.dataset import simulated
 from gestured.lab.digest import file_digest
 from gestured.lab.made_of import made_of, renew
-from gestured.lab.samples import Samples
 from gestured.lab.study import cohort, recorded, tables
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.choices import choices
@@ -36,13 +34,12 @@ from gestured.lab.study.views import Values
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.record.files import PUBLIC, atomic_write
-from gestured.simulator import GESTURES, NONE
+from gestured.simulator import GESTURES
 
 PAPER_CITED = (
     "C. Fumelli, A. Dutta and M. Kaboli: Advancements in Tactile Hand Gesture Recognition for Enhanced Human-Machine "
     "Interaction"
 )
-WIDE_SEED = 1  # of the stream that the shipped models learn from as well
 
 
 def run(args: argparse.Namespace) -> int:
@@ -89,12 +86,11 @@ def compute(plan: Plan, schedule: Schedule, folder: Path | None, others: Path | 
     real = recorded.real(folder, plan.real)  # first, so that a wrong file is told of before half an hour of work
     foreign = recorded.judges(others) if others else None
     people = cohort.load_cohort(schedule.cache, plan.trials(), schedule.jobs)
-    wide = _strangers(plan, schedule)
-    sets = {"simulated": Data.of("simulated", people.samples, wide)}
+    sets = {"simulated": Data.of("simulated", people.samples)}
     if real:
-        sets["real"] = Data.of("real", real[0], wide)
+        sets["real"] = Data.of("real", real[0])
     if foreign:
-        sets["foreign"] = Data.of("foreign", people.samples, wide, foreign[0])
+        sets["foreign"] = Data.of("foreign", people.samples, foreign[0])
     tuned, tuning = tune(plan, _others(plan, schedule), schedule)
     cells = tables.wanted(plan, sets)
     tasks = {cell: tables.tasks_of(cell, tuned, plan) for cell in cells}
@@ -120,7 +116,6 @@ def compute(plan: Plan, schedule: Schedule, folder: Path | None, others: Path | 
         "cells": list(figures.values()),
         "copies": tables.copies(found),
         "tuning": tuning,
-        "calibration": tables.calibration(found),
         "choices": [] if plan.quick else choices(plan, tuned, people, sets, schedule),
     }  # fmt: skip
     # What is timed comes last and alone: nothing else of ours runs beside it.
@@ -153,14 +148,6 @@ def _others(plan: Plan, schedule: Schedule) -> Data | None:
         return None
     trials = plan.trials_of(plan.tuning_people)
     return Data.of(TUNING, cohort.load_cohort(schedule.cache, trials, schedule.jobs, cohort.TUNING_SEED).samples)
-
-
-def _strangers(plan: Plan, schedule: Schedule) -> Samples | None:
-    """Gestures of other people on randomised sensors."""
-    if not plan.wide:
-        return None
-    found = simulated(schedule.cache, "wide", WIDE_SEED, plan.wide, schedule.jobs)
-    return found.take(found.labels != NONE)
 
 
 def _about(name: str, tuned: Mapping[str, Values]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.lab.study.bootstrap import summary
-from gestured.lab.study.material import AUGMENTATIONS, SHIFT, UNCHANGED, WIDE, Data
+from gestured.lab.study.material import AUGMENTATIONS, SHIFT, UNCHANGED, Data
 from gestured.lab.study.methods import METHODS, Method
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import CLEAN, FOREIGN, PADDED, PAPER, PARTICIPANTS, REAL, Result, Task, values_of
@@ -16,7 +16,6 @@ from gestured.lab.study.views import Values
 from gestured.simulator import GESTURES
 
 GIVEN, TUNED = "paper", "tuned"
-BINS = 10  # of confidence, equally wide
 ASKED = {"real": (REAL,), "foreign": (FOREIGN,)}  # protocols of data that are not split as the paper does
 
 
@@ -39,15 +38,13 @@ def wanted(plan: Plan, sets: Mapping[str, Data]) -> list[Cell]:
             for data in sets.values():
                 for protocol in ASKED.get(data.name, (PAPER, PADDED, CLEAN, PARTICIPANTS)):
                     for augmentation in AUGMENTATIONS:
-                        if _skipped(plan, settings, protocol, augmentation, data):
+                        if _skipped(plan, settings, protocol, augmentation):
                             continue
                         cells.append(Cell(method.id, settings, augmentation, protocol, data.name))
     return cells
 
 
-def _skipped(plan: Plan, settings: str, protocol: str, augmentation: str, data: Data) -> bool:
-    if augmentation == WIDE:  # it leads to other people and other sensors: asked there alone
-        return data.wide is None or protocol not in (PARTICIPANTS, REAL, FOREIGN) or settings != TUNED
+def _skipped(plan: Plan, settings: str, protocol: str, augmentation: str) -> bool:
     if protocol == REAL and (augmentation == SHIFT or settings == GIVEN):
         return True
     if protocol == FOREIGN and settings == GIVEN:
@@ -134,15 +131,3 @@ def copies(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:
 
 def _mean(values: NDArray[np.bool_]) -> float | None:
     return round(float(values.mean()), 4) if len(values) else None
-
-
-def calibration(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:
-    """Confidence against truth, participants held out: expected calibration error (Naeini et al. 2015), equal bins."""
-    out = []
-    for cell, result in found.items():
-        if (cell.settings, cell.augmentation, cell.protocol, cell.data) == (TUNED, SHIFT, PARTICIPANTS, "simulated"):
-            sure = np.array(result["confidence"])
-            at = np.minimum((sure * BINS).astype(int), BINS - 1)
-            apart = np.bincount(at, sure - right(result))  # the sum over each bin
-            out.append({"method": cell.method, "error": round(float(np.abs(apart).sum() / len(sure)), 4)})
-    return out

@@ -14,10 +14,7 @@ from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
 from gestured.record.arrays import write
 
-SECTIONS = (
-    "about", "machine", "data", "methods", "cells", "copies", "tuning", "choices", "run_time", "calibration",
-    "online",
-)  # fmt: skip
+SECTIONS = ("about", "machine", "data", "methods", "cells", "copies", "tuning", "choices", "run_time", "online")
 LEFT = ("tp_knn", "tp_rf", "lstm", "cnn_lstm")  # the fastest, and those that ship
 
 

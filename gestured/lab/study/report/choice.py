@@ -22,7 +22,7 @@ HEAD = (
 
 def table(study: Study) -> list[str]:
     """Lines of Markdown; a model that was not timed is left out."""
-    rows = {(row["method"], row["settings"]): row for row in study["run_time"] if row["precision"] != "int8"}
+    rows = {(row["method"], row["settings"]): row for row in study["run_time"]}
     return [*HEAD, *(_line(study, rows[one], when) for one, when in CHOICES.items() if one in rows)]
 
 

@@ -13,7 +13,7 @@ PROTOCOLS = {
     "paper": "paper's protocol", "padded": "padded to the longest", "clean": "clean split",
     "participants": "participants held out", "real": "real, subjects held out", "foreign": "another generator",
 }  # fmt: skip
-AUGMENTATIONS = {"none": "no augmentation", "shift": "shifted (Algorithm 1)", "wide": "wide randomisation"}
+AUGMENTATIONS = {"none": "no augmentation", "shift": "shifted (Algorithm 1)"}
 SETTINGS = ("paper", "tuned", "shipped")
 SHORT = {" features, ": " ", "k nearest neighbours": "KNN", "support vector machine": "SVM", " (RBF)": ""}  # in figures
 
