@@ -7,6 +7,7 @@ was refused of the last one, and the memory that it took, as JSON.
 """
 
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -68,6 +69,22 @@ def wide(path: Path) -> object:
 KINDS: dict[str, Open] = {
     "npz": npz, "npz_alone": npz_alone, "mcap": mcap, "csv": csv, "wide": wide,
 }  # fmt: skip
+
+
+NO_FILES = ("missing", "directory", "fifo", "zero", "empty", "text", "nul")
+
+
+def no_file(kind: str, path: Path) -> Path:
+    """The path of what is no file of ours, one of NO_FILES: `path` itself where anything at all can stand there."""
+    if kind == "directory":
+        path.mkdir()
+    elif kind == "fifo":
+        os.mkfifo(path)
+    elif kind == "empty":
+        path.touch()
+    elif kind == "text":
+        path.write_text("something else\n" * 1000)
+    return {"zero": Path("/dev/zero"), "nul": Path(f"a\0b{path.suffix}")}.get(kind, path)
 
 
 def refused(kind: str, path: Path) -> str:

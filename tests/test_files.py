@@ -11,6 +11,7 @@ from gestured.core.errors import RecordingError
 from gestured.record import arrays as recording
 from gestured.record import tape_writer
 from gestured.record.files import PUBLIC, atomic_write, open_regular
+from tests.opening import no_file
 from tests.small_recording import example, session
 
 PACKAGE = Path(__file__).parent.parent / "gestured"
@@ -109,14 +110,7 @@ def test_there_is_one_place_that_puts_a_file_into_anothers_stead() -> None:
     assert found == {"record/files.py"}
 
 
-@pytest.mark.parametrize("kind", ["folder", "fifo", "device"])
+@pytest.mark.parametrize("kind", ["directory", "fifo", "zero"])
 def test_what_is_no_regular_file_is_not_opened(tmp_path: Path, kind: str) -> None:
-    path = tmp_path / "a"
-    if kind == "folder":
-        path.mkdir()
-    elif kind == "fifo":
-        os.mkfifo(path)
-    else:
-        path = Path("/dev/zero")
     with pytest.raises(OSError, match=r"not a regular file|[Ii]s a directory"):
-        open_regular(path)
+        open_regular(no_file(kind, tmp_path / "a"))

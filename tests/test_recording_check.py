@@ -12,6 +12,7 @@ import pytest
 from gestured.core.errors import RecordingError
 from gestured.record import arrays as recording
 from gestured.record.arrays import read, write
+from tests.opening import NO_FILES, no_file
 from tests.small_recording import FIELDS, archive_of, example, header, refusal, same, save, session
 
 
@@ -165,22 +166,13 @@ def test_text_that_is_no_text(tmp_path: Path) -> None:
     assert ": kinds: " in refusal(archive_of(tmp_path / "r.npz", **{"kinds.npy": data}))
 
 
-@pytest.mark.parametrize("kind", ["missing", "directory", "fifo", "zero", "empty", "text", "npy", "nul"])
+@pytest.mark.parametrize("kind", NO_FILES)
 def test_what_is_no_recording_file(tmp_path: Path, kind: str) -> None:
+    refusal(no_file(kind, tmp_path / "r.npz"))
+
+
+def test_a_single_array_is_no_recording(tmp_path: Path) -> None:
     path = tmp_path / "r.npz"
-    if kind == "directory":
-        path.mkdir()
-    elif kind == "fifo":
-        os.mkfifo(path)
-    elif kind == "zero":
-        path = Path("/dev/zero")
-    elif kind == "empty":
-        path.touch()
-    elif kind == "text":
-        path.write_text("no recording\n" * 100)
-    elif kind == "npy":
-        with path.open("wb") as file:
-            np.save(file, np.zeros(3))
-    elif kind == "nul":
-        path = Path("a\0b.npz")
+    with path.open("wb") as file:
+        np.save(file, np.zeros(3))
     refusal(path)

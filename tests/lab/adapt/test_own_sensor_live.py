@@ -32,7 +32,8 @@ from tests.daemon.harness import Daemon
 from tests.daemon.test_own import ask
 from tests.documents.blocks import blocks
 from tests.lab.adapt.recorded import unknown_sensor
-from tests.lab.recordings.person import Person
+from tests.sockets import free_address
+from tests.terminal import Terminal
 
 HERE = "tests/lab/adapt/test_own_sensor_live.py::test_the_live_steps_lead_to_an_own_gesture"
 IDLE_S = 1.2  # around a gesture
@@ -116,9 +117,7 @@ class Streaming:
 @pytest.fixture
 def place() -> Address:
     """A port that nobody has, where the document says 9000."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return Address(*probe.getsockname())
+    return free_address()
 
 
 @pytest.fixture
@@ -170,9 +169,8 @@ def started(folder: Path, *flags: object) -> Iterator[Daemon]:
 
 def collected(lines: Lines, place: Address, names: tuple[str, ...]) -> None:
     """Consent, one take, and an early end."""
-    person = Person(*lines.next("gestured-lab", "collect")[1:], "--countdown", "0")
     first = order("07", 0, list(names), 1)[0]
-    try:
+    with closing(Terminal("gestured.lab.cli", *lines.next("gestured-lab", "collect"), "--countdown", "0")) as person:
         person.sees("Do you agree?")
         person.types("yes\n")
         with closing(Streaming(place)) as sensor:
@@ -186,8 +184,6 @@ def collected(lines: Lines, place: Address, names: tuple[str, ...]) -> None:
             person.sees("kept, ")
             person.types("q")
             assert person.ends() == 0
-    finally:
-        person.leave()
 
 
 @pytest.mark.slow

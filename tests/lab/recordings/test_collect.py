@@ -2,10 +2,10 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,22 +17,31 @@ from gestured.lab.cli import main
 from gestured.lab.recordings.collect import already
 from gestured.lab.recordings.protocol import order
 from gestured.record.arrays import read, write
-from tests.lab.recordings.person import KEYS, Person
 from tests.small_recording import example
+from tests.sockets import free_address
+from tests.terminal import Terminal
+
+KEYS = "r repeat  d discard"
+GOOD = "Enter keep  " + KEYS
 
 
-def person_at(folder: Path, port: int, *more: str) -> Person:
-    """Collects taps."""
-    flags = ("--participant", "07", "--out", str(folder), "--listen", f"127.0.0.1:{port}")
-    return Person(*flags, "--gestures", "one_tap", "--countdown", "0", *more)
+def collect(folder: Path, port: int, *more: str) -> "closing[Terminal]":
+    """Somebody in front of `gestured-lab collect`, who performs taps."""
+    flags = ("--participant", "07", "--out", folder, "--listen", f"127.0.0.1:{port}", "--gestures", "one_tap")
+    return closing(Terminal("gestured.lab.cli", "collect", *flags, "--countdown", "0", *more))
+
+
+def keeps_one(person: Terminal) -> None:
+    """Repeats until a take is good, as a person does."""
+    while person.sees(GOOD, "  " + KEYS) != GOOD:
+        person.types("r")
+    person.types("\n")
+    person.sees("kept, ")
 
 
 @pytest.fixture
 def port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        number: int = probe.getsockname()[1]
-        return number
+    return free_address().port
 
 
 @pytest.fixture
@@ -47,14 +56,13 @@ def sensor(port: int) -> Iterator[None]:
 def test_a_session_that_is_ended_and_goes_on(tmp_path: Path, port: int, sensor: None) -> None:
     trials = order("07", 0, ["one_tap"], 1)
     path = tmp_path / "07.npz"
-    person = person_at(tmp_path, port)
-    try:
+    with collect(tmp_path, port) as person:
         person.sees("Do you agree?")
         person.types("yes\n")
         person.sees("Enter when it is in place")
         person.types("\n")
         person.sees(f"1/9  {trials[0]}")
-        person.keeps_one()
+        keeps_one(person)
         assert read(path).labels.tolist() == ["one_tap"]  # on disk before the next prompt
         person.sees(f"2/9  {trials[1]}")
         person.types("p")
@@ -67,28 +75,23 @@ def test_a_session_that_is_ended_and_goes_on(tmp_path: Path, port: int, sensor: 
         person.sees(KEYS)
         person.types("d")
         person.sees(f"2/9  {trials[2]}")  # the one that was discarded comes later
-        person.keeps_one()
+        keeps_one(person)
         person.sees(f"3/9  {trials[1]}")
         person.types("q")
         person.sees("the same command goes on from here")
         assert person.ends() == 0
-    finally:
-        person.leave()
 
-    person = person_at(tmp_path, port)
-    try:
+    with collect(tmp_path, port) as person:
         person.sees("gave consent on")
         person.sees("2 of 9 are done already")
         person.sees("Enter when it is in place")
         person.types("\n")
         person.sees(f"3/9  {trials[1]}")
-        person.keeps_one()
+        keeps_one(person)
         person.sees("Enter when it is in place")  # another inclination
         person.process.send_signal(signal.SIGTERM)
         person.sees("Ended with 3 recordings")
         assert person.ends() == 0
-    finally:
-        person.leave()
 
     kept = read(path)
     assert kept.speeds is not None and kept.inclinations is not None and kept.consents is not None
@@ -107,27 +110,21 @@ def test_a_session_that_is_ended_and_goes_on(tmp_path: Path, port: int, sensor: 
 
 
 def test_without_consent_nothing_is_recorded(tmp_path: Path, port: int) -> None:
-    person = person_at(tmp_path, port)
-    try:
+    with collect(tmp_path, port) as person:
         person.sees("Do you agree?")
         person.types("no\n")
         person.sees("nothing is recorded")
         assert person.ends() == 0
-    finally:
-        person.leave()
     assert os.listdir(tmp_path) == []
 
 
 def test_a_silent_sensor_is_told_and_ctrl_c_leaves_the_terminal_as_it_was(tmp_path: Path, port: int) -> None:
-    person = person_at(tmp_path, port, "--sensor", "door")
-    try:
+    with collect(tmp_path, port, "--sensor", "door") as person:
         person.sees("Do you agree?")
         person.types("yes\n")
         person.sees(f"no frames of door arrive on 127.0.0.1:{port}")
         person.process.send_signal(signal.SIGINT)
         assert person.ends() == 130
-    finally:
-        person.leave()
 
 
 def test_without_a_terminal_it_says_what_it_needs(

@@ -13,16 +13,14 @@ from gestured.core.errors import GesturedError
 from gestured.lab.recordings.live import LiveSensor
 from gestured.model.opening import open_model
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, gesture_take, session
+from tests.sockets import free_address
 
 Send = Callable[..., None]
 
 
 @pytest.fixture
 def live() -> Iterator[LiveSensor]:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = probe.getsockname()
-    sensor = LiveSensor(Address(*address), (9, 9), None, open_model("lstm"))
+    sensor = LiveSensor(free_address(), (9, 9), None, open_model("lstm"))
     yield sensor
     sensor.close()
 
