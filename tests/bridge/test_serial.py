@@ -168,17 +168,6 @@ def test_a_slow_host_gets_the_latest_frames(bridge, line, udp):
         assert (arrival.values == arrival.counter - 1).all()
 
 
-def test_garbage_costs_no_more_than_the_frame_that_it_hit(bridge, line, udp):
-    out = Out(udp)
-    begin(bridge, line, "flexitac", udp)
-    line.say(written("flexitac", frame(1)))
-    assert (out.next().values == 1).all()
-    line.say(written("flexitac", frame(2))[:40] + b"\x07" * 13)
-    line.say(written("flexitac", frame(3)) + written("flexitac", frame(4)))
-    assert (out.next().values == 3).all()
-    assert (out.next().values == 4).all()
-
-
 def test_an_unplugged_sensor_is_waited_for(bridge, line, udp):
     out = Out(udp)
     process = begin(bridge, line, "flexitac", udp)
@@ -217,13 +206,6 @@ def test_bytes_of_another_protocol_are_recognised(bridge, line, udp, protocol):
     assert process.end() == 1
     said = process.said().splitlines()[-1]
     assert f"no {asked} frame of 9x9" in said and f"these bytes look like {protocol}" in said
-
-
-def test_another_grid_is_recognised(bridge, line, udp):
-    process = begin(bridge, line, "flexitac", udp, "--grid", "8x8")
-    line.flood(process, b"".join(written("flexitac", frame(n)) for n in range(1, 40)))
-    assert process.end() == 1
-    assert "these bytes look like flexitac with frames of 81 taxels" in process.said()
 
 
 def test_nobody_who_listens_is_said_and_heals(bridge, line):

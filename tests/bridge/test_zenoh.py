@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-from unittest.mock import ANY
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from gestured.bridge import forward
 from gestured.bridge.counts import Counts
 from gestured.core.address import Address
 from tests.bridge.conftest import Process, emit, page, wait
-from tests.bridge.test_mqtt import MAD, STATUS, gesture
+from tests.bridge.test_mqtt import STATUS, gesture
 from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, counted
 from tests.sockets import HELLO, FakeDaemon, free_address
 
@@ -119,15 +118,6 @@ def test_other_types_and_unknown_keys_are_passed_on(bridge, site, fake):
     assert site.event()[0] == "gestured/car/armrest/provisional"
     key, event = site.event()  # its answer comes unasked
     assert (key, event["provisional"]) == ("gestured/car/armrest/gesture", "confirmed")
-
-
-def test_lines_of_a_mad_daemon_are_passed_over(bridge, site, fake):
-    process = begin(bridge, site, fake)
-    fake.accept()
-    process.ready()
-    fake.say(*MAD, gesture(2))
-    assert site.event() == ("gestured/car/armrest/gesture", ANY)
-    assert process.said().count("passed over") == 1
 
 
 def test_tokens_live_as_daemon_and_sensors_do(bridge, site, fake):

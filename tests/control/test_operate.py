@@ -69,7 +69,7 @@ def test_status_says_one_thing_of_the_shift() -> None:
 
 
 def test_without_a_daemon_each_says_so_in_one_line(run, tmp_path: Path) -> None:
-    for command in (["status"], ["emit", "one_tap"], ["reload"], ["record", tmp_path / "x.mcap"]):
+    for command in (["status"], ["listen"], ["emit", "one_tap"], ["reload"], ["record", tmp_path / "x.mcap"]):
         status, out, err = run(*command, "--control", tmp_path / "none.ctl")
         assert status == 1 and out == "" and err.count("\n") == 1
         assert "no daemon on" in err and "--control" in err

@@ -119,6 +119,7 @@ def test_a_recording_whose_daemon_goes_is_good_and_says_so(start, serve, tmp_pat
     assert recorder.returncode == 1 and b"the daemon closed the connection" in err
     found = tape_reader.read(path)
     assert found.whole and "swipe_left" in {e.get("gesture") for e in found.events}
+    assert len(found.packets) == 30 + 7 + 15  # all that came before it went
 
 
 def test_flag_keeps_the_flight_recorder(ctl, run, daemon: Daemon, tmp_path: Path) -> None:

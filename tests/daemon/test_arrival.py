@@ -1,6 +1,5 @@
 """Other people's OSC clients, in real time: frames count when they arrive."""
 
-import json
 import select
 import shutil
 import subprocess
@@ -8,8 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from pythonosc.osc_message_builder import OscMessageBuilder
-from pythonosc.udp_client import SimpleUDPClient, UDPClient
+from pythonosc.udp_client import SimpleUDPClient
 
 from tests.daemon.harness import Client, Daemon, Frame, Hand
 
@@ -54,19 +52,3 @@ def test_oscsend(start) -> None:
     assert (event["type"], event.get("gesture")) == ("gesture", "swipe_right")
     # Each came from another port, or nearly: the kernel may give one port out again at once.
     assert daemon.metric("gestured_dropped_total", reason="second_source") <= 3
-
-
-def test_a_plain_message_without_a_bundle_can_be_a_blob(start) -> None:
-    daemon: Daemon = start()
-    sender = UDPClient(*daemon.address)
-    count = 0
-
-    def send(frame: Frame) -> None:
-        nonlocal count
-        count += 1
-        message = OscMessageBuilder("/arm/pressure")
-        message.add_arg(count, "i")
-        message.add_arg(frame.astype("u1").tobytes(), "b")
-        sender.send(message.build())
-
-    assert json.dumps(stream(daemon.client(), send, "arm")["gesture"]) == '"swipe_right"'

@@ -1,6 +1,5 @@
 """The control socket of a real daemon: who may, what is refused, and what each verb does."""
 
-import base64
 import json
 import os
 import re
@@ -23,7 +22,7 @@ from gestured.client.lines import Refused, Unreachable
 from gestured.daemon.operations import Operations
 from gestured.daemon.request import Parameter, Refusal, Verb, parse_request
 from tests.daemon import tiny_model
-from tests.daemon.harness import Daemon, Hand, Sensor
+from tests.daemon.harness import Daemon, Sensor
 
 SLOW = ("--stale-s", 30)  # on a busy machine no sensor is stale
 
@@ -200,51 +199,6 @@ def test_a_reload_names_what_only_a_restart_changes_until_it_is_as_before(start,
         ):
             config.write_text(text)
             assert control.ask("reload")["awaiting_restart"] == named
-
-
-def test_a_tap_shows_packets_as_they_came_and_events(daemon: Daemon) -> None:
-    with Control(Path(daemon.ready["control"])) as control:
-        scene = control.ask("tap")
-        assert scene["model"]["name"] == "tiny" and scene["settings"]["clock"] == "sensor"
-        sensor = Sensor(daemon, "tapped")
-        sent = [sensor.packet(frame) for frame in [*sensor.hand.idle(2.0), *sensor.hand.swipe("up")]]
-        sent += [b"rubbish!"] + [sensor.packet(frame) for frame in sensor.hand.idle(1.0)]
-        for packet in sent:
-            sensor.sock.send(packet)
-        packets, events, times = [], [], []
-        for line in control.lines():
-            if line["type"] == "packet":
-                packets.append(base64.b64decode(line["data"]))
-                times.append(line["t_ns"])
-            else:
-                events.append(line["type"])
-            if len(packets) == len(sent) and "release" in events:
-                break
-    assert packets == sent and times == sorted(times)
-    assert events == ["onset", "gesture", "release"]
-
-
-def test_a_tap_is_sent_all_that_came_before_the_daemon_ended(start) -> None:
-    daemon = start("--clock", "sensor")
-    with Control(Path(daemon.ready["control"])) as control:
-        control.ask("tap")
-        sensor = Sensor(daemon, "arm").begin().send(Hand().swipe("up"))
-        assert daemon.stop() == 0
-        lines = list(control.lines())
-    assert sum(line["type"] == "packet" for line in lines) == sensor.count
-    assert "onset" in [line["type"] for line in lines]
-
-
-def test_who_ends_a_tap_is_sent_all_that_led_to_what_was_published(daemon: Daemon) -> None:
-    client = daemon.client()
-    with Control(Path(daemon.ready["control"])) as control:
-        control.ask("tap")
-        sensor = Sensor(daemon, "ended").begin().perform("left")
-        client.events("gesture", "ended")
-        control.finish()
-        lines = list(control.lines())
-    assert "gesture" in [line["type"] for line in lines if line.get("sensor") == "ended"]
-    assert 0 < sum(line["type"] == "packet" for line in lines) <= sensor.count
 
 
 def test_the_flight_recorder_gives_what_it_held(daemon: Daemon, start) -> None:

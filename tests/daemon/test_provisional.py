@@ -81,16 +81,6 @@ def test_it_comes_before_the_answer_which_confirms_it(daemon: Daemon) -> None:
     assert (first, second) == (answer, lines[6]) and first["provisional"] == "confirmed"
 
 
-def test_what_turns_out_otherwise_is_revoked(daemon: Daemon) -> None:
-    client = daemon.client().subscribe(*ALL, sensors=["revoked"])
-    sensor = Sensor(daemon, "revoked").begin()
-    two_taps(sensor)
-    assert said(client, "revoked") == ["onset", "one_tap?", "double_tap revoked", "release"]
-    lines = swipe(sensor, client, "left", [sensor.hand.frame(1.0) for _ in range(90)])
-    assert words(lines, "revoked") == ["onset", "swipe_left?"]
-    assert said(client, "revoked", 2) == ["cancelled revoked", "release"]
-
-
 def test_whoever_was_sent_it_is_sent_the_answer(daemon: Daemon) -> None:
     only = daemon.client().subscribe("provisional", sensors=["owed"])
     taps = daemon.client().subscribe("provisional", gestures=["one_tap"])
@@ -125,44 +115,6 @@ def test_nobody_asks_and_nothing_is_said(daemon: Daemon) -> None:
     assert answer["provisional"] is None
     assert daemon.metric("gestured_provisional_total", result="given") == before
     other.close()
-
-
-def test_answers_are_the_same_whether_or_not_anybody_asks(
-    start: Callable[..., Daemon], early: Path, tmp_path: Path
-) -> None:
-    told, times = [], []
-    for types in (TYPES, ALL):
-        daemon = start("--clock", "sensor", "--socket", tmp_path / f"{len(types)}.sock", model=early)
-        client = daemon.client().subscribe(*types)
-        sensor = Sensor(daemon, "arm").begin().perform("left", "tap", "up")
-        two_taps(sensor)
-        sensor.send([sensor.hand.frame(4.0) for _ in range(30)], sensor.hand.idle(1.0)).perform("down")
-        lines = client.until(lambda line: line["type"] == "release" and line["id"] == 6)
-        assert violations(lines) == [] and (words(lines, "arm").count("one_tap?") == 2) == (types == ALL)
-        answers = [line for line in lines if line["type"] != "provisional"]
-        felt = [line.pop(key) for line in answers for key in ("onset", "offset", "decided") if key in line]
-        times.append([t - felt[0] for t in felt])
-        told.append([{key: value for key, value in line.items() if key != "provisional"} for line in answers])
-    assert told[0] == told[1] and times[0] == pytest.approx(times[1], abs=1e-5)
-
-
-def test_a_request_that_names_what_there_is_not_changes_nothing(daemon: Daemon) -> None:
-    client = daemon.client().subscribe("gesture", sensors=["asked"], gestures=["swipe_left"])
-    for request, what in (
-        (
-            {"types": ["provisional", "gestures"]},
-            'subscribe.types: unknown "gestures", expected any of onset, provisional',
-        ),
-        (
-            {"gestures": ["swipe_left", "zigzag"]},
-            'subscribe.gestures: unknown "zigzag", expected any of one_tap, double',
-        ),
-    ):
-        (error,) = client.ask({"subscribe": request}).until(lambda line: True)
-        assert error["type"] == "error" and error["reason"].startswith(what)
-    Sensor(daemon, "asked").begin().perform("up", "left")
-    (first,) = client.until(lambda line: True)
-    assert first["gesture"] == "swipe_left"
 
 
 def test_it_is_counted(daemon: Daemon) -> None:
@@ -241,21 +193,6 @@ def test_without_the_setting_osc_says_only_what_it_said_before(
     while "/gestured/arm/gesture" not in addresses:
         addresses.add(OscMessage(udp.recv(9999)).address)
     assert addresses <= {"/gestured/arm/gesture", "/gestured/status"}
-
-
-def test_a_tap_waits_as_long_as_it_is_set(start: Callable[..., Daemon], early: Path, tmp_path: Path) -> None:
-    config = tmp_path / "gestured.toml"
-    config.write_text("tap_gap_s = 0.25\n")
-    daemon = start("--clock", "sensor", "--config", config, model=early)
-    client = daemon.client().subscribe("gesture")
-    sensor = Sensor(daemon, "arm").begin().perform("tap")
-    waited = [line["decided"] - line["offset"] for line in client.events("gesture", "arm")]
-    config.write_text("tap_gap_s = 0.55\n")
-    with Control(daemon.socket.with_suffix(".ctl")) as control:
-        control.ask("reload")
-    sensor.begin().perform("tap")
-    waited += [line["decided"] - line["offset"] for line in client.events("gesture", "arm")]
-    assert waited == [pytest.approx(1 / 15 + 0.25, abs=0.01), pytest.approx(1 / 15 + 0.55, abs=0.01)]
 
 
 def test_in_a_process_of_ones_own(early: Path) -> None:

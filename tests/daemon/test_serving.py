@@ -53,24 +53,6 @@ def test_an_answer_waits_for_no_frame(shared: Daemon) -> None:
     assert event["decided"] - event["offset"] == pytest.approx(1 / harness.RATE_HZ + 0.1, abs=1e-3)
 
 
-def test_every_onset_has_one_answer_and_one_release(shared: Daemon) -> None:
-    client = shared.client().subscribe("gesture", "unknown", "cancelled", "onset", "release", sensors=["grammar"])
-    sensor = Sensor(shared, "grammar").begin().perform("tap", "up", "down")
-    sensor.send([sensor.hand.frame(4.0) for _ in range(30)], sensor.hand.idle(1.0))  # pressed for two seconds
-    lines = client.until(lambda line: line["type"] == "release" and line["id"] == 4)
-    kinds = {i: [line["type"] for line in lines if line["id"] == i] for i in (1, 2, 3, 4)}
-    recognised, pressed = ["onset", "gesture", "release"], ["onset", "unknown", "release"]
-    assert kinds == {1: recognised, 2: recognised, 3: recognised, 4: pressed}
-    assert [line["gesture"] for line in lines if line["type"] == "gesture"] == [
-        "one_tap",
-        "swipe_up",
-        "swipe_down",
-    ]
-    assert [line["sequence"] for line in lines if line["type"] == "gesture"] == [1, 2, 3]
-    unknown = next(line for line in lines if line["type"] == "unknown")
-    assert "gesture" not in unknown and "sequence" not in unknown
-
-
 def test_all_forms_of_a_frame_give_the_same_events(shared: Daemon) -> None:
     client = shared.client().subscribe("gesture", sensors=[])
     forms = {

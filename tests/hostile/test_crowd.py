@@ -131,24 +131,3 @@ def test_clients_that_send_rubbish_without_end_hold_nobody_up(start) -> None:
         assert client.line()["sequence"] == n
     for sock in rude:
         sock.close()
-
-
-@pytest.mark.hostile
-def test_nine_hundred_clients_that_send_rubbish_hold_nobody_up(start, descriptors) -> None:
-    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0")
-    client = daemon.client()
-    rude = [connect(daemon) for _ in range(900)]
-    sensor = Sensor(daemon, "arm").begin()
-    for sock in rude:
-        sock.setblocking(False)
-    n = 0
-    while daemon.metric("gestured_clients_evicted_total", reason="rubbish") < 900:
-        for sock in rude:
-            with suppress(OSError):
-                sock.send(b"?\n" * 4000)
-        n += 1
-        sensor.begin().perform("left")
-        assert client.line()["sequence"] == n
-        assert daemon.get("/healthz")[0] == 200
-    for sock in rude:
-        sock.close()

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from gestured.client.control import Control
-from gestured.client.lines import Refused
 from gestured.core.errors import ModelError
 from gestured.model.opening import open_model
 from tests.daemon.harness import Daemon, Sensor, counted, lines_of
@@ -190,21 +189,6 @@ def test_the_end_does_not_wait_for_an_answer_that_never_comes(start, model: Path
         pass
     assert daemon.stop() == 1
     assert "ended by force" in daemon.stderr()
-
-
-@pytest.mark.hostile
-def test_a_model_whose_opening_never_ends_changes_nothing(start, model: Path, tmp_path: Path) -> None:
-    path = tmp_path / "mine.onnx"
-    path.write_bytes(model.read_bytes())
-    daemon = start("--clock", "sensor", model=path)
-    bad_models.endless(model, tmp_path / "bad.onnx").replace(path)
-    with Control(Path(daemon.ready["control"])) as control:
-        with pytest.raises(Refused, match="could not be opened within"):
-            control.ask("reload")
-    client = daemon.client()
-    Sensor(daemon, "arm").begin().perform("left")
-    assert client.line()["gesture"] == "swipe_left"
-    assert daemon.stop() == 0
 
 
 def trial_of(daemon: Daemon) -> int:

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
 from experiments.unseen import GROUPS, Said, group_of, rejected, untaught, without_kinds
-from gestured.lab.augment import symmetry_table, turned
+from gestured.lab.augment import symmetry_table
 from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
 from gestured.lab.fit import CLASSES, targets
 from gestured.lab.samples import Samples, collect
@@ -35,18 +34,6 @@ def test_no_symmetry_makes_a_kind_that_was_left_out(number: int) -> None:
     for k in set(group_of(number)) - set(left):  # and none stays in that could be left out
         assert CLASSES[k].startswith("two_finger_swipe")
     assert len(left) >= 10
-
-
-def test_a_swipe_to_the_right_is_one_upward_turned() -> None:
-    """Why two fingers to the right cannot be left out alone."""
-    up = torch.zeros(1, 5, 9, 9)
-    for t in range(5):
-        up[0, t, 7 - t, 3:6:2] = 1.0
-    right = turned(up, 1)
-    columns = right[0].amax(1).argmax(1)
-    assert columns.tolist() == sorted(columns.tolist()) and columns[0] < columns[-1]
-    up_class, right_class = CLASSES.index("swipe_up_two_fingers"), CLASSES.index("two_finger_swipe_right")
-    assert symmetry_table(CLASSES)[1, up_class] == right_class and right_class not in untaught([right_class])
 
 
 def test_what_is_left_out_teaches_and_calibrates_nothing_and_still_judges(samples: Samples) -> None:

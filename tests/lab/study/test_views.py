@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import pywt
 from scipy import stats
 from sklearn.svm import SVC
 
@@ -71,12 +70,6 @@ def test_statistics_against_a_second_opinion() -> None:
     found = band_statistics(band)
     expected = [np.abs(band).sum(0), np.linalg.norm(band, axis=0), stats.skew(band), stats.kurtosis(band), band.std(0)]
     assert np.allclose(found, expected)
-
-
-def test_wavelets_keep_the_energy_of_a_gesture() -> None:
-    signals = gestures()["swipe_up"][:8].reshape(8, -1).astype(float)
-    bands = pywt.wavedec(signals, "haar", level=3, axis=0)
-    assert np.isclose(sum((band**2).sum() for band in bands), (signals**2).sum())
 
 
 def test_a_motion_history_is_brightest_where_the_finger_was_last() -> None:
