@@ -4,7 +4,6 @@ import argparse
 import dataclasses
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,10 @@ from gestured.client.program import Commands
 from gestured.client.say import say, say_json
 from gestured.control.diff import Recorded
 from gestured.control.labelled import Labelled
-from gestured.control.tuning import ENOUGH, THRESHOLDS, Counts, Played, counted, for_each, proposed
+from gestured.control.tuning import ENOUGH, Counts, Played, Tuned, tune
 from gestured.core import messages
 from gestured.core.errors import GesturedError, RecordingError
+from gestured.core.points import USUAL
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.record.replay import Replay
@@ -31,14 +31,18 @@ def add(commands: Commands) -> None:
         description="Play recordings through the daemon's own code, and print for every threshold which share of the\n"
         "gestures is missed and wrong, and how many events an hour nobody meant. An .npz says what was\n"
         'performed; a tape of gesturectl record counts as "other things": whatever is published in it is\n'
-        "false. A performance before the sensor was known is left out.",
+        "false. A performance before the sensor was known is left out. With a budget it proposes only what\n"
+        "your hours show to keep it, at 95 %: none in 6 hours shows 0.5 an hour.",
         epilog="examples:\n  gesturectl tune recordings/07.npz recordings/08.npz\n"
-        "  gesturectl tune recordings/07.npz evening.mcap --model my.onnx",
+        "  gesturectl tune recordings/07.npz evening.mcap --model my.onnx\n"
+        "  gesturectl tune monday.mcap tuesday.mcap --budget 0.5",
     )
     parser.add_argument("recordings", type=Path, nargs="+", metavar="FILE", help="an .npz with labels, or a tape")
     parser.add_argument("--model", default="cnn_lstm", metavar="MODEL", help="shipped, or a file (default: cnn_lstm)")
     parser.add_argument("--wrong-costs", type=float, default=3.0, metavar="X",
                         help="a wrong or a false event is as bad as X missed gestures (default: 3)")  # fmt: skip
+    parser.add_argument("--budget", type=float, metavar="PER_HOUR",
+                        help="how many false gestures an hour there may be at most")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     parser.set_defaults(run=run)
 
@@ -47,34 +51,20 @@ def run(args: argparse.Namespace) -> int:
     """Play all, count, propose."""
     if not 0.1 <= args.wrong_costs <= 100:
         raise GesturedError(f"--wrong-costs {args.wrong_costs:g}: expected 0.1 to 100")
+    if args.budget is not None and not 0.001 <= args.budget <= 100:
+        raise GesturedError(f"--budget {args.budget:g}: expected 0.001 to 100 false gestures an hour")
     model = open_model(Path(args.model) if "/" in args.model or args.model.endswith(".onnx") else args.model)
     played = Played()
     for path in args.recordings:
         play(path, model, played)
     if not played.performed and played.seconds < SHORTEST_S:
         raise RecordingError(f"{args.recordings[0]}: expected gestures, or a minute of something else")
-    rows = [counted(played, threshold) for threshold in THRESHOLDS]
-    best = proposed(rows, played, args.wrong_costs, model.threshold)
-    tuned = Tuned(
-        model, played, rows, counted(played, model.threshold), best, for_each(played, args.wrong_costs, best.threshold)
-    )
+    tuned = tune(model, played, args.wrong_costs, args.budget)
     if args.json:
         say_json(_figures(tuned))
     else:
         say(*_words(tuned))
     return 0
-
-
-@dataclass(frozen=True)
-class Tuned:
-    """All that is told."""
-
-    model: Model
-    played: Played
-    rows: list[Counts]
-    now: Counts  # at the model's own threshold
-    best: Counts  # the row that is proposed
-    each: dict[str, Counts]  # what is proposed for single gestures
 
 
 def play(path: Path, model: Model, played: Played) -> None:
@@ -102,47 +92,64 @@ def _knew(replay: Replay, t: float) -> bool:
 
 
 def _figures(tuned: Tuned) -> dict[str, Any]:
-    played = tuned.played
+    played, best = tuned.played, tuned.best
     return {
         "model": tuned.model.name, "gestures": len(played.performed), "non_gestures": played.others,
-        "skipped": played.skipped, "hours": round(played.seconds / 3600, 4),
+        "skipped": played.skipped, "hours": round(played.hours, 4), "missed_by": tuned.missed_by,
         "thresholds": [_row(played, row) for row in tuned.rows],
-        "now": _row(played, tuned.now), "proposed": _row(played, tuned.best),
+        "operating_points": {name: _row(played, row) for name, row in tuned.points.items()},
+        "now": _row(played, tuned.now), "proposed": best and _row(played, best), "strictness": tuned.strictness,
+        "budget": tuned.budget, "most": tuned.most,
         "each": {name: _row(played, row) for name, row in tuned.each.items()},
     }  # fmt: skip
 
 
 def _row(played: Played, counts: Counts) -> dict[str, Any]:
-    hours = played.seconds / 3600
-    return dataclasses.asdict(counts) | {"false_an_hour": round(counts.false / hours, 2) if hours else None}
+    false = round(counts.false / played.hours, 2) if played.hours else None
+    return dataclasses.asdict(counts) | {"false_an_hour": false}
 
 
 def _words(tuned: Tuned) -> Iterator[str]:
     """The table, a picture of it, and the settings."""
-    played, rows, best, now = tuned.played, tuned.rows, tuned.best, tuned.now
-    total, hours = max(len(played.performed), 1), max(played.seconds / 3600, 1e-9)
-    performed = f"{len(played.performed)} gestures, {played.others} non-gestures"
-    yield f"{performed}, {60 * hours:.1f} minutes; {tuned.model.name}"
+    played, best, name = tuned.played, tuned.best, tuned.model.name
+    total, hours = max(played.meant, 1e-9), max(played.hours, 1e-9)
+    yield f"{len(played.performed)} gestures, {played.others} non-gestures, {60 * hours:.1f} minutes; {name}"
     if played.skipped:
         yield f"left out, since the sensor was not known yet: {played.skipped}"
+    if tuned.missed_by == "model":
+        yield "nobody performed a gesture: missed is what the model missed where it was judged"
     yield f"threshold  missed   wrong  false/h   {'░ missed':<10}{'█ wrong and false'}"
-    worst = max(row.missed + row.wrong + row.false for row in rows) or 1
-    for row in rows:
-        bars = "█" * round(BAR * (row.wrong + row.false) / worst) + "░" * round(BAR * row.missed / worst)
-        mark = "<" if row is best else " "
+    rows = [*((f"{row.threshold:.2f}", row) for row in tuned.rows), *tuned.points.items()]
+    worst = max((row.missed or 0) + row.wrong + row.false for _, row in rows) or 1
+    for title, row in rows:
+        bars = "█" * round(BAR * (row.wrong + row.false) / worst) + "░" * round(BAR * (row.missed or 0) / worst)
+        chosen = best and (row is best or (row.threshold is not None and row.threshold == best.threshold))
+        missed = "    -" if row.missed is None else f"{100 * row.missed / total:5.1f}"
         yield (
-            f"   {row.threshold:4.2f} {mark} {100 * row.missed / total:5.1f} % {100 * row.wrong / total:5.1f} % "
+            f"{title:>7} {'<' if chosen else ' '} {missed} % {100 * row.wrong / total:5.1f} % "
             f"{row.false / hours:8.1f}   {bars}"
         ).rstrip()
-    yield f"now      {now.threshold:.2f}: {_said(now)}"
-    yield f"proposed {best.threshold:.2f}: {_said(best)}"
+    if tuned.budget:
+        yield f"budget   {tuned.budget:g} an hour: at most {tuned.most} in {hours:.3g} hours show that, at 95 %"
+    yield f"now      {_said(tuned, tuned.now, USUAL)}"
+    if best is None:
+        yield "proposed nothing: nobody performed a gesture, and the model does not say what it misses"
+        return
+    yield f"proposed {_said(tuned, best, tuned.strictness)}"
+    if tuned.strictness:
+        yield from ("for the configuration file, above its tables:", f'strictness = "{tuned.strictness}"')
+        return
     yield "for the configuration file:"
-    for name in tuned.model.gestures:
-        yield from (f"[gestures.{name}]", f"threshold = {tuned.each.get(name, best).threshold:.2f}")
+    for gesture in tuned.model.gestures:
+        yield from (f"[gestures.{gesture}]", f"threshold = {tuned.each.get(gesture, best).threshold:.2f}")
     few = len(tuned.model.gestures) - len(tuned.each)
     if few:
         yield f"# {few} were performed less than {ENOUGH} times: they have what suits all"
 
 
-def _said(counts: Counts) -> str:
-    return f"{counts.missed} missed, {counts.wrong} wrong, {counts.false} false"
+def _said(tuned: Tuned, counts: Counts, name: str | None) -> str:
+    title = name if counts.threshold is None else f"{counts.threshold:.2f}"
+    if tuned.played.performed:
+        return f"{title}: {counts.missed:g} missed, {counts.wrong} wrong, {counts.false} false"
+    missed = "" if counts.missed is None else f"{100 * counts.missed / max(tuned.played.meant, 1e-9):.1f} % missed, "
+    return f"{title}: {missed}{counts.false} false"

@@ -3,16 +3,24 @@
 A recording is played once; at every threshold it is only counted again.
 """
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
+from gestured.core.errors import GesturedError
+from gestured.core.points import USUAL, OperatingPoints
+from gestured.model.model import Model
 from gestured.record.judge import NONE, Performed, owners, verdict
 
 THRESHOLDS = tuple(round(0.05 * k, 2) for k in range(1, 20))
+CANDIDATES = (*THRESHOLDS, 0.96, 0.97, 0.98, 0.99)  # that may be proposed
 ENOUGH = 20  # performances of a gesture before anything is proposed for it alone
-FALSE_AN_HOUR = 1.0  # false gestures that a proposal may cost at most, where recordings hold no gestures to lose
+GESTURES_AN_HOUR = 20  # assumed where nobody performed any, to hold what a model misses against what is false
+DOUBT = 0.05  # probability that hours show so few false ones although more come
 
 
 @dataclass(frozen=True)
@@ -34,6 +42,16 @@ class Played:
     skipped: int = 0  # performed before the sensor was known
     seconds: float = 0.0
 
+    @property
+    def hours(self) -> float:
+        """How long all recordings take."""
+        return self.seconds / 3600
+
+    @property
+    def meant(self) -> float:
+        """How many gestures were performed; where none were, how many are assumed."""
+        return len(self.performed) or GESTURES_AN_HOUR * self.hours
+
     def add(self, performed: Iterable[Performed], events: Iterable[Mapping[str, Any]]) -> None:
         """What one recording holds, and its events in their order, published from no confidence at all."""
         asked = sorted(performed, key=lambda one: one.onset)
@@ -47,56 +65,146 @@ class Played:
 
 @dataclass(frozen=True)
 class Counts:
-    """What a threshold costs."""
+    """What thresholds cost."""
 
-    threshold: float
+    threshold: float | None  # of all gestures alike; None where each has its own
     right: int
     wrong: int
-    missed: int
+    missed: float | None  # None where nobody knows
     false: int
+    unmeant: int  # of the false ones, those that were not said of a non-gesture which was performed
 
     def cost(self, each: float) -> float:
         """In gestures that are missed; a wrong or a false one costs as much as `each` of them."""
-        return self.missed + each * (self.wrong + self.false)
+        return (self.missed or 0.0) + each * (self.wrong + self.false)
 
 
-def counted(played: Played, threshold: float, gesture: str | None = None) -> Counts:
-    """Count the answers that are right, wrong, missed or false at one threshold.
+def counted(played: Played, least: float | Mapping[str, float], gesture: str | None = None) -> Counts:
+    """Count the answers that are right, wrong, missed or false at a threshold, or at one for each gesture.
 
     With `gesture`, performances of that gesture can be right or missed, and answers that name it wrong or false.
     """
     answered: dict[int, bool] = {}  # performed -> whether rightly
-    wrong = false = 0
+    wrong = false = provoked = 0
     for said in played.said:
-        if said.confidence < threshold:
+        if said.confidence < (least[said.gesture] if isinstance(least, Mapping) else least):
             continue
         found = verdict(said.gesture, said.performed, answered=id(said.performed) in answered)
         if found != "false":
             answered[id(said.performed)] = found == "right"
         if gesture in (None, said.gesture):
             wrong, false = wrong + (found == "wrong"), false + (found == "false")
+            provoked += said.performed is not None and said.performed.label == NONE
     own = [one for one in played.performed if gesture in (None, one.label)]
     right = sum(answered.get(id(one), False) for one in own)
     lost = len(own) - right if gesture else sum(id(one) not in answered for one in own)
-    return Counts(threshold, right, wrong, lost, false)
+    return Counts(None if isinstance(least, Mapping) else least, right, wrong, lost, false, false - provoked)
 
 
-def proposed(rows: Sequence[Counts], played: Played, each: float, now: float) -> Counts:
-    """The row that costs least; of equal ones that nearest to what is set `now`.
+def estimated(played: Played, least: float | Mapping[str, float], share: float | None) -> Counts:
+    """What `counted` counts; where nobody performed a gesture, the share of them that is missed, None if unknown."""
+    found = counted(played, least)
+    return found if played.performed else replace(found, missed=None if share is None else share * played.meant)
 
-    Without gestures there is nothing to lose: then the lowest with few enough false ones, or the highest.
+
+def share_missed(points: OperatingPoints | None, threshold: float) -> float | None:
+    """What a model misses at a threshold of all gestures alike, by its curve; None for one that has none."""
+    if points is None:
+        return None
+    thresholds, missed, _ = zip(*points.curve, (1.0, 1.0, 0.0), strict=True)  # nobody is surer than sure
+    return float(np.interp(threshold, thresholds, missed))
+
+
+def allowed(per_hour: float, hours: float) -> int | None:
+    """The most false gestures in so many hours that show, at 95 %, that no more than `per_hour` come in an hour.
+
+    Events that come by chance (Poisson): none in three times as long as one may take. None where no count shows it.
     """
-    if not played.performed:
-        quiet = [row for row in rows if row.false <= FALSE_AN_HOUR * played.seconds / 3600]
-        return (quiet or rows[-1:])[0]  # their thresholds rise
-    return min(rows, key=lambda row: (row.cost(each), abs(row.threshold - now)))
+    mean, chance, count = per_hour * hours, 0.0, -1
+    while True:
+        chance += math.exp((count + 1) * math.log(mean) - mean - math.lgamma(count + 2))
+        if chance > DOUBT:
+            return count if count >= 0 else None
+        count += 1
 
 
-def for_each(played: Played, each: float, now: float) -> dict[str, Counts]:
-    """What is proposed for single gestures: those that were performed often enough."""
+def proposed(rows: Sequence[Counts], each: float, now: float, most: int | None = None) -> Counts | None:
+    """The row that costs least, of those with at most `most` unmeant; of equal ones that nearest to what is set `now`.
+
+    Where nobody knows what is missed it is the first with so few (their thresholds rise). None where there is none.
+    """
+    few = [row for row in rows if most is None or row.unmeant <= most]
+    if any(row.missed is None for row in few):
+        return few[0] if most is not None else None
+    return min(few, key=lambda row: (row.cost(each), abs((row.threshold or now) - now)), default=None)
+
+
+def for_each(played: Played, each: float, now: float, *, no_more: bool = False) -> dict[str, Counts]:
+    """What is proposed for single gestures: those that were performed often enough.
+
+    With `no_more`, none of them says more that nobody meant than at the threshold that is set `now`.
+    """
     performed = Counter(one.label for one in played.performed)
-    return {
-        name: proposed([counted(played, t, name) for t in THRESHOLDS], played, each, now)
-        for name, count in sorted(performed.items())
-        if count >= ENOUGH
-    }
+    found = {}
+    for name, count in sorted(performed.items()):
+        most = counted(played, now, name).unmeant if no_more else None
+        best = proposed([counted(played, t, name) for t in CANDIDATES], each, now, most) if count >= ENOUGH else None
+        if best is not None:
+            found[name] = best
+    return found
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """All that is told."""
+
+    model: Model
+    played: Played
+    rows: Sequence[Counts]  # a threshold each
+    points: Mapping[str, Counts]  # by strictness, where the model has operating points
+    now: Counts  # at the model's usual strictness, or its own threshold
+    budget: float | None  # false ones an hour
+    most: int | None  # false ones in all, which show that
+    best: Counts | None  # what is proposed; its threshold is of the gestures that are not in `each`
+    each: Mapping[str, Counts]  # what is proposed for single gestures
+
+    @property
+    def strictness(self) -> str | None:
+        """The strictness that is proposed in place of thresholds."""
+        return next((name for name, row in self.points.items() if row is self.best), None)
+
+    @property
+    def missed_by(self) -> str | None:
+        """Who says what is missed: the recordings, the model, or nobody."""
+        return "recordings" if self.played.performed else "model" if self.points else None
+
+
+def tune(model: Model, played: Played, each: float, budget: float | None) -> Tuned:
+    """Count what thresholds cost, and propose. Raises GesturedError for a budget that cannot be shown, or kept."""
+    most = None if budget is None else allowed(budget, played.hours)
+    if budget is not None and most is None:
+        raise GesturedError(
+            f"--budget {budget:g}: {played.hours:.3g} hours cannot show it, even if nothing false was said in them, "
+            f"expected at least {math.ceil(30 / budget) / 10:g} hours"
+        )
+    alike = [estimated(played, t, share_missed(model.points, t)) for t in CANDIDATES]
+    stored = {} if model.points is None else model.points.points
+    points = {name: estimated(played, point.thresholds, point.missed) for name, point in stored.items()}
+    best, single = proposed(alike, each, model.threshold, most), dict[str, Counts]()
+    if best is not None and best.threshold is not None and played.performed:
+        single = for_each(played, each, best.threshold, no_more=most is not None)
+        together = counted(played, {name: single.get(name, best).threshold or 0.0 for name in model.gestures})
+        if together.cost(each) <= best.cost(each) and (most is None or together.unmeant <= most):
+            best = replace(together, threshold=best.threshold)
+        else:
+            single = {}
+    rows = (points.get(USUAL), *points.values(), best)  # of those that cost the same the first is taken
+    best = proposed([row for row in rows if row is not None], each, model.threshold, most)
+    if best is None and most is not None:
+        left = {name: counted(played, CANDIDATES[-1], name).unmeant for name in model.gestures}
+        raise GesturedError(
+            f"--budget {budget:g}: at {CANDIDATES[-1]} there are still {sum(left.values())} false ones in "
+            f"{played.hours:.3g} hours, expected at most {most}; most of them are {max(left, key=left.__getitem__)}"
+        )
+    now = points.get(USUAL) or estimated(played, model.threshold, None)
+    return Tuned(model, played, alike[: len(THRESHOLDS)], points, now, budget, most, best, single)

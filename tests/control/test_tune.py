@@ -1,19 +1,26 @@
 """`gesturectl tune`: what thresholds cost is counted rightly, and what it proposes costs least."""
 
 import json
+import math
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.control.cli import main
-from gestured.control.tuning import THRESHOLDS, Counts, Played, counted, for_each, proposed
+from gestured.control.tuning import THRESHOLDS, Counts, Played, allowed, counted, for_each, proposed, tune
+from gestured.core.errors import GesturedError
+from gestured.model.model import Model
+from gestured.model.opening import open_model
 from gestured.record.arrays import write
 from gestured.record.judge import Performed
 from gestured.simulator import GESTURES
+from tests.daemon import tiny_model
 from tests.lab.adapt.recorded import whole_session
+from tests.small_model import operating_points
 
 NAMES = ("one_tap", "swipe_left", "swipe_right")
 
@@ -39,10 +46,12 @@ def evening() -> Played:
 def test_each_threshold_is_counted() -> None:
     played = evening()
     assert (len(played.performed), played.others) == (5, 1)
-    assert counted(played, 0.05) == Counts(0.05, right=3, wrong=1, missed=1, false=3)
-    assert counted(played, 0.45) == Counts(0.45, right=3, wrong=0, missed=2, false=2)
-    assert counted(played, 0.85) == Counts(0.85, right=1, wrong=0, missed=4, false=0)
-    assert counted(played, 0.05, "swipe_left") == Counts(0.05, right=1, wrong=1, missed=1, false=1)
+    assert counted(played, 0.05) == Counts(0.05, right=3, wrong=1, missed=1, false=3, unmeant=2)
+    assert counted(played, 0.45) == Counts(0.45, right=3, wrong=0, missed=2, false=2, unmeant=1)
+    assert counted(played, 0.85) == Counts(0.85, right=1, wrong=0, missed=4, false=0, unmeant=0)
+    assert counted(played, 0.05, "swipe_left") == Counts(0.05, right=1, wrong=1, missed=1, false=1, unmeant=0)
+    each = {"one_tap": 0.75, "swipe_left": 0.55, "swipe_right": 0.05}
+    assert counted(played, each) == Counts(None, right=3, wrong=0, missed=2, false=0, unmeant=0)
 
 
 @given(st.lists(st.tuples(st.sampled_from(NAMES), st.floats(0, 1)), max_size=12), st.floats(0.5, 9))
@@ -51,21 +60,73 @@ def test_what_is_proposed_costs_least(said: list[tuple[str, float]], each: float
     performed = [Performed(NAMES[k % 3], "", 2.0 * k, 2.0 * k + 0.3) for k in range(8)]
     played.add(performed, [event(name, 2.0 * k, confidence) for k, (name, confidence) in enumerate(said)])
     rows = [counted(played, threshold) for threshold in THRESHOLDS]
-    for row in rows:
-        assert row.right + row.wrong + row.missed == 8
-        assert row.right + row.wrong + row.false == sum(confidence >= row.threshold for _, confidence in said)
-    best = proposed(rows, played, each, 0.5)
-    assert all(best.cost(each) <= row.cost(each) for row in rows)
+    for threshold, row in zip(THRESHOLDS, rows, strict=True):
+        assert row.right + row.wrong + (row.missed or 0) == 8
+        assert row.right + row.wrong + row.false == sum(confidence >= threshold for _, confidence in said)
+    best = proposed(rows, each, 0.5)
+    assert best is not None and all(best.cost(each) <= row.cost(each) for row in rows)
     assert not for_each(played, each, 0.5)  # of each there are too few
 
 
-def test_without_gestures_the_lowest_that_is_quiet_enough_is_proposed() -> None:
-    played = Played(seconds=3600.0)
-    played.add([], [event("one_tap", 100.0 * k, 0.1 * k) for k in range(1, 8)])
-    rows = [counted(played, threshold) for threshold in THRESHOLDS]
-    assert proposed(rows, played, 3.0, 0.5).threshold == 0.65
-    played.seconds = 60.0
-    assert proposed(rows, played, 3.0, 0.5).threshold == 0.75
+# Upper 95 % limits of a Poisson mean by count, as any table of them has it.
+@pytest.mark.parametrize(
+    ("count", "limit"), [(0, 2.996), (1, 4.744), (2, 6.296), (3, 7.754), (5, 10.513), (10, 16.962)]
+)
+@pytest.mark.parametrize("per_hour", [0.01, 0.5, 20.0])
+def test_a_budget_is_shown_where_its_upper_limit_is(count: int, limit: float, per_hour: float) -> None:
+    assert allowed(per_hour, 1.001 * limit / per_hour) == count
+    assert allowed(per_hour, 0.999 * limit / per_hour) == (count - 1 if count else None)
+
+
+def model_of(path: Path, **metadata: str) -> Model:
+    return open_model(tiny_model.make(path, **metadata))
+
+
+POINTS = operating_points(tiny_model.GESTURES)
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory: pytest.TempPathFactory) -> dict[bool, Model]:
+    """Without operating points, and with them."""
+    folder = tmp_path_factory.mktemp("models")
+    return {False: model_of(folder / "plain.onnx"), True: model_of(folder / "points.onnx", operating_points=POINTS)}
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from(NAMES), st.floats(0, 1)), max_size=30), st.booleans(), st.booleans(),
+    st.sampled_from([None, 0.25, 0.5, 1.0]),
+)  # fmt: skip
+def test_what_is_proposed_keeps_the_budget_and_nothing_that_costs_less_does(
+    models: dict[bool, Model], said: list[tuple[str, float]], with_points: bool, performs: bool, budget: float | None
+) -> None:
+    played = Played(seconds=13 * 3600.0)
+    acts = [Performed(NAMES[k % 2], "", 9.0 * k, 9.0 * k + 0.3) for k in range(44 if performs else 0)]
+    meant = [event(act.label, act.onset, k % 20 / 20) for k, act in enumerate(acts)]
+    played.add(acts, meant + [event(name, 900.0 + 9 * k, confidence) for k, (name, confidence) in enumerate(said)])
+    most = 999 if budget is None else {0.25: 0, 0.5: 2, 1.0: 7}[budget]
+    model = models[with_points]
+    least_possible = min(
+        counted(played, one).unmeant
+        for one in (0.99, *(point.thresholds for point in (model.points.points.values() if model.points else ())))
+    )
+    if budget is not None and least_possible > most:
+        with pytest.raises(
+            GesturedError, match=f"--budget {budget}: at 0.99 there are still .* expected at most {most}"
+        ):
+            tune(model, played, 3.0, budget)
+        return
+    tuned = tune(model, played, 3.0, budget)
+    if not (with_points or performs or budget):
+        assert tuned.best is None
+        return
+    assert tuned.best is not None and tuned.best.unmeant <= most
+    if tuned.best.missed is not None:
+        costs = [row.cost(3.0) for row in (*tuned.rows, *tuned.points.values()) if row.unmeant <= most]
+        assert tuned.best.cost(3.0) <= min(costs, default=math.inf)
+    settings = {name: tuned.each.get(name, tuned.best).threshold for name in model.gestures}
+    if tuned.strictness is None:  # what is to be pasted costs what is said of it
+        found = counted(played, {name: least or 0.0 for name, least in settings.items()})
+        assert (found.unmeant, found.right, found.wrong) == (tuned.best.unmeant, tuned.best.right, tuned.best.wrong)
 
 
 @pytest.fixture
@@ -102,8 +163,49 @@ def test_what_cannot_be_tuned_on_is_one_sentence(
         ([tmp_path / "text.npz"], "text.npz: cannot be read as a recording"),
         ([tmp_path / "none.mcap"], "none.mcap"),
         ([recorded, "--wrong-costs", "0"], "--wrong-costs 0: expected"),
+        ([recorded, "--budget", "0"], "--budget 0: expected 0.001 to 100"),
+        ([recorded, "--budget", "nan"], "--budget nan: expected 0.001 to 100"),
+        ([recorded, "--budget", "0.5"], "hours cannot show it, even if nothing false was said in them, expected at"),
+        ([recorded, "--budget", "0.7"], "expected at least 4.3 hours"),
         ([recorded, "--model", "nobody"], "nobody: no shipped model"),
     ):
         assert main(["tune", *map(str, arguments)]) == 1
         err = capsys.readouterr().err
         assert reason in err and err.count("\n") == 1
+
+
+def test_a_day_on_which_nobody_performed_anything_is_not_given_thresholds_that_miss_nothing(
+    models: dict[bool, Model], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def day(path: Path, model: Model, played: Played) -> None:
+        played.seconds += 7 * 3600.0
+        played.add([], [event("one_tap", 60.0 * k, 0.90 + k / 1000) for k in range(60)])
+
+    monkeypatch.setattr("gestured.control.tune.play", day)
+    paths = {has: tmp_path / f"{has}.onnx" for has in models}
+    for has, path in paths.items():
+        tiny_model.make(path, **({"operating_points": POINTS} if has else {}))
+
+    def said(has: bool, *more: str) -> tuple[str, dict[str, Any]]:
+        assert main(["tune", "day.mcap", "--model", str(paths[has]), *more]) == 0
+        words = capsys.readouterr().out
+        assert main(["tune", "day.mcap", "--model", str(paths[has]), "--json", *more]) == 0
+        return words, json.loads(capsys.readouterr().out)
+
+    words, found = said(False)
+    assert "proposed nothing: nobody performed a gesture" in words and "0.0 %    0.0 %" not in words
+    assert (found["proposed"], found["missed_by"], found["thresholds"][0]["missed"]) == (None, None, None)
+    words, found = said(False, "--budget", "0.5")
+    assert "proposed 0.96: 0 false" in words and "[gestures.one_tap]\nthreshold = 0.96" in words
+    words, found = said(True)
+    # By its curve the model misses a tenth of what the threshold is.
+    assert "missed is what the model missed where it was judged" in words and found["missed_by"] == "model"
+    rows = {row["threshold"]: row["missed"] / (20 * 7) for row in found["thresholds"]}
+    assert rows == pytest.approx({t: t / 10 for t in rows}) and found["proposed"]["missed"] > 0
+    assert found["operating_points"]["strict"]["missed"] / 140 == pytest.approx(0.09)
+    assert found["proposed"]["threshold"] == 0.96
+    assert "[gestures.one_tap]\nthreshold = 0.96" in words
+    # Where one threshold for all misses much more than the model's own ones, a strictness is proposed.
+    tiny_model.make(paths[True], operating_points=operating_points(tiny_model.GESTURES, curve=[[0.05, 0.6, 9]]))
+    words, found = said(True, "--wrong-costs", "0.1")
+    assert found["strictness"] == "eager" and words.endswith('above its tables:\nstrictness = "eager"\n')
