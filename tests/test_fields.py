@@ -7,10 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.client.fields import wrong_field
-from gestured.core.events import Cancelled, Gesture, Onset, Provisional, Release, Status, Unknown
+from gestured.core.events import Cancelled, Gesture, Onset, Place, Provisional, Release, Status, Unknown, Where
 from gestured.core.messages import gestures_json, hello_json, lost_json, quoted, to_json
 
-SAID = {"model": "m", "degraded": False, "scores": {"one_tap": 0.5}}
+WHERE = Where(Place(0.2, 0.5), Place(0.8, 0.5), 0.6, 1e60, 30.0, 1, 0)  # a sensor's counts may be any
+SAID = {"model": "m", "degraded": False, "scores": {"one_tap": 0.5}, "where": WHERE}
 EVENTS = [
     Onset("a", 1, 1.0),
     Provisional("a", 1, "one_tap", 0.9, 1.0, 1.5),
@@ -48,6 +49,13 @@ WRONG = {str: 3, int: "3", float: "soon", bool: 1, list: "one_tap", dict: ["a"],
 def test_another_type_of_a_field_is_named(line):
     for key in line.keys() - {"protocol"}:  # whoever greets looks at that
         assert (wrong_field(line | {key: WRONG[type(line[key])]}) or "").startswith(f"{key} "), key
+
+
+def test_a_place_that_is_none_is_named():
+    gesture = LINES[2]
+    for wrong in ({"start": {"x": 0.5}}, {"end": 0.5}, {"snr": float("nan")}, {"zone": 3}, {"contacts": None}):
+        words = wrong_field(gesture | {"where": gesture["where"] | wrong})
+        assert words is not None and words.startswith("where {") and "expected an object with start" in words
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400, -1e11, True])

@@ -11,7 +11,19 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "gestured"
 
-CORE_MAY = {"numpy", "dataclasses", "enum", "math", "struct", "json", "base64", "typing", "collections", "ipaddress"}
+CORE_MAY = {
+    "numpy",
+    "dataclasses",
+    "enum",
+    "math",
+    "struct",
+    "json",
+    "base64",
+    "typing",
+    "collections",
+    "functools",
+    "ipaddress",
+}
 LAYERS = {"core": 0, "daemon": 2, "control": 2, "bridge": 2, "lab": 2}  # everything else is between them
 LAB_ONLY = {"torch", "sklearn", "onnx", "joblib", "scipy"}
 OUTSIDE = {"experiments", "tests", "benchmarks"}  # they use the package, never the other way round

@@ -4,9 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
 from typing import Any, get_args, get_type_hints
 
-from gestured.core.events import Event
+from gestured.core.events import Event, Place, Where
 from gestured.core.messages import quoted
 
+LARGEST = 1e300  # counts of a sensor may be nearly any
 LONGEST_S = 6e10  # the largest number in a line: Python's calendar knows no time further from 1970, some 1900 years
 
 
@@ -22,6 +23,22 @@ def _object(of: Callable[[Any], bool]) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, dict) and all(map(of, value.values()))
 
 
+def _is_place(value: Any) -> bool:
+    return isinstance(value, dict) and _is_number(value.get("x")) and _is_number(value.get("y"))
+
+
+def _is_where(value: Any) -> bool:
+    """Whether a value is an object with the fields of `Where`; counts of a sensor may be any that are finite."""
+    return isinstance(value, dict) and all(_WHERE[kind](value.get(name)) for name, kind in _WHERE_FIELDS.items())
+
+
+_WHERE: dict[Any, Callable[[Any], bool]] = {
+    Place: _is_place,
+    float: lambda value: type(value) in (int, float) and abs(value) < LARGEST,  # neither NaN nor infinite
+    int: _is(int),
+    str | None: _is(str, type(None)),
+}
+_WHERE_FIELDS = get_type_hints(Where)
 # How a field is annotated -> whether a value is one, and what it is called.
 _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
     str: (_is(str), "a text"),
@@ -29,6 +46,7 @@ _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
     float: (_is_number, "a number"),
     bool: (_is(bool), "true or false"),
     str | None: (_is(str, type(None)), "a text or null"),
+    Where | None: (_is_where, "an object with start, end, way, pressure, snr, contacts, bridged and zone"),
     list[str]: (lambda value: isinstance(value, list) and all(map(_is(str), value)), "a list of texts"),
     Mapping[str, float]: (_object(_is_number), "an object of numbers"),
     Mapping[str, str]: (_object(_is(str)), "an object of texts"),

@@ -81,7 +81,8 @@ def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
     if kind in ("gesture", "unknown"):
         number = f"#{event['sequence']}" if kind == "gesture" else ""
         waited = 1000 * (event["decided"] - event["offset"])
-        tail = f"  by {event['model']}, degraded" if event["degraded"] else ""
+        tail = f"  {went(where)}" if (where := event.get("where")) else ""
+        tail += f"  by {event['model']}, degraded" if event["degraded"] else ""
         if early is not None and event.get("provisional"):
             when = said_when(early["decided"], event["offset"])
             tail += f"  {event['provisional']}: {early['gesture']}, {when}"
@@ -103,6 +104,13 @@ def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
     if kind == "release":
         return f"{head}release (the finger left at this time)"
     return f"{head}{kind}"
+
+
+def went(where: dict[str, Any]) -> str:
+    """Where a contact was, in fractions of the sensor to the right and upward, for a person."""
+    start, end = (f"{where[key]['x']:.2f},{where[key]['y']:.2f}" for key in ("start", "end"))
+    zone = f" ({where['zone']})" if where.get("zone") else ""
+    return f"from {start}{zone} to {end}" if where["way"] else f"at {start}{zone}"
 
 
 def _greet(hello: dict[str, Any], args: argparse.Namespace) -> None:

@@ -163,7 +163,8 @@ class Cutter:
         last = int(np.searchsorted(times, offset))
         frames = np.clip(conditioner.taxels.bridge(stack), -LARGEST, LARGEST).astype(np.float32)
         lost = sum(frame.lost for frame in kept[first + 1 : last + 1])
-        segment = Segment(frames, times, first, last, conditioner.idle.level, lost)
+        bad = conditioner.taxels.bad.reshape(frames.shape[1:])
+        segment = Segment(frames, times, first, last, conditioner.idle.level, lost, bad)
         return segment, stack
 
 

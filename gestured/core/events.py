@@ -31,6 +31,28 @@ class Provisional:
 
 
 @dataclass(frozen=True, slots=True)
+class Place:
+    """A place on a sensor as a person in front of it sees it, in fractions of it."""
+
+    x: float  # 0..1, from left to right
+    y: float  # 0..1, upward
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """Where a contact was, how far it went and how hard it pressed; of two fingers, their middle."""
+
+    start: Place
+    end: Place
+    way: float  # length of the path in sides of the shorter edge; 0 where it stayed within the noise
+    pressure: float  # counts of the strongest taxel above the idle sensor
+    snr: float  # the same over the noise
+    contacts: int  # 1 or 2 fingers at the same time
+    bridged: int  # bad taxels under the way
+    zone: str | None = None  # where it began
+
+
+@dataclass(frozen=True, slots=True)
 class Gesture:
     """A segment was recognised."""
 
@@ -49,6 +71,7 @@ class Gesture:
     scores: Mapping[str, float]  # of each of the model's gestures that is in use
     provisional: str | None = None
     own: bool = False  # whether it is a gesture of the user's own
+    where: Where | None = None  # None only where nothing is known of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +91,7 @@ class Unknown:
     scores: Mapping[str, float]
     reason: str = "confidence"  # confidence (below the threshold), hole (frames were lost), rate (too slow or too fast)
     provisional: str | None = None
+    where: Where | None = None
 
 
 @dataclass(frozen=True, slots=True)

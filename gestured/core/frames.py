@@ -38,6 +38,7 @@ class Segment:
     last: int  # index of the last touched frame
     noise: float  # counts, one standard deviation of an idle taxel
     lost: int = 0  # frames that went missing between `first` and `last`
+    bad: NDArray[np.bool_] | None = None  # (R, C) taxels that are bridged from their neighbours; None is none
 
     @property
     def onset(self) -> float:

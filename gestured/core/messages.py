@@ -5,12 +5,12 @@ A request that is none is a ProtocolError with the reason `subscription`.
 
 import json
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from typing import Any, get_args
 
 from gestured.core.address import is_sensor
 from gestured.core.errors import ProtocolError
-from gestured.core.events import Event, Gesture, Provisional, Status
+from gestured.core.events import Event, Gesture, Provisional, Status, Where
 
 MAX_LINE = 4096  # bytes of a client's request
 LONGEST = 60  # characters of what a peer sent, in an answer to it
@@ -40,8 +40,8 @@ def to_json(event: Event, epoch: float, *, test: bool = False) -> bytes:
     line: dict[str, Any] = {"type": event_type(event)}
     for field in fields(event):
         value = getattr(event, field.name)
-        if value is False and field.name == "own":
-            continue  # lines of the model's own gestures have no key `own`
+        if (field.name, value) in (("own", False), ("where", None)):
+            continue  # lines of the model's own gestures have no key `own`, those of which no place is known no `where`
         line[field.name] = value + epoch if field.name in _STREAM_TIMES else value
     if test:
         line["test"] = True
@@ -89,7 +89,9 @@ def _line(value: dict[str, Any]) -> bytes:
 
 
 def _plain_value(value: Any) -> Any:
-    """What JSON knows in place of a mapping of any kind, or of one of numpy's numbers."""
+    """What JSON knows in place of a mapping of any kind, of `Where`, or of one of numpy's numbers."""
+    if isinstance(value, Where):
+        return asdict(value)
     return dict(value) if isinstance(value, Mapping) else value.item()
 
 

@@ -21,6 +21,7 @@ from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown
 from gestured.core.owner import Owner, Source
 from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
+from gestured.core.where import where
 from gestured.core.wire import Arrival
 
 ABSENT_S = 60.0  # of silence, after which a sensor that sends only while it is touched counts as stale
@@ -161,12 +162,15 @@ class Sensor:
         )  # fmt: skip
         if not known and own is None:
             why = reason(self.front_end.rate_hz, whole=seen)
-            return [self._foresight.judged(Unknown(name, self.segments, confidence, *what, reason=why)), decided]
+            unknown = Unknown(name, self.segments, confidence, *what, reason=why, where=where(segment))
+            return [self._foresight.judged(unknown), decided]
         if decision.too_early(best, segment):
             return [self._cancelled("refractory"), decided]
         decision.published(best, segment)
         self.sequence += 1
-        gesture = Gesture(name, self.segments, best, confidence, self.sequence, *what, own=own is not None)
+        gesture = Gesture(
+            name, self.segments, best, confidence, self.sequence, *what, own=own is not None, where=where(segment)
+        )
         return [self._foresight.judged(gesture), decided]
 
     def _cancelled(self, why: str) -> Cancelled:

@@ -7,7 +7,7 @@ from itertools import chain
 
 from gestured.core.address import is_sensor
 from gestured.core.beside.reading import Reading
-from gestured.core.events import Gesture, Onset, Provisional, Release
+from gestured.core.events import Gesture, Onset, Place, Provisional, Release, Where
 from gestured.core.hub import Hub
 from gestured.daemon.caller import Connection
 from gestured.daemon.desk import Desk
@@ -22,6 +22,8 @@ from gestured.daemon.views import Views
 TEST_SENSORS = 64  # the most names of sensors that were never heard which tests may use
 TEST_S = 0.4  # how long a made-up gesture took
 TEST_FRAMES = 6  # touched frames of a made-up gesture, at 15 Hz
+MIDDLE = Place(0.5, 0.5)
+TEST_WHERE = Where(MIDDLE, MIDDLE, 0.0, 100.0, 50.0, 1, 0)  # a made-up gesture is a touch in the middle
 
 SENSOR = Parameter(
     (str, type(None)), "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", check=lambda name: name is None or is_sensor(name)
@@ -115,7 +117,7 @@ class Operations:
         self.publisher.publish(Onset(sensor, number, onset), test=True)
         if foreseen:
             self.publisher.publish(Provisional(sensor, number, gesture, 1.0, onset, now), test=True)
-        self.publisher.publish(Gesture(sensor, number, gesture, 1.0, *answer, verdict, own), test=True)
+        self.publisher.publish(Gesture(sensor, number, gesture, 1.0, *answer, verdict, own, TEST_WHERE), test=True)
         self.publisher.publish(Release(sensor, number, now), test=True)
         return {"sensor": sensor, "gesture": gesture, "sequence": sequence}
 

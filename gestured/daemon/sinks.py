@@ -64,9 +64,9 @@ class OscSink:
             log.error("publish: no such destination", destination=str(destination), error=error.strerror)
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
-        """Send a gesture, the status, or where asked for a provisional event; others do not travel by OSC.
+        """Send a gesture and where it was, the status, or where asked for a provisional event; others do not travel.
 
-        A test's gesture stands in a bundle behind `/gestured/test ,s sensor`; its own arguments are the usual ones.
+        A test's messages stand in a bundle behind `/gestured/test ,s sensor`; their arguments are the usual ones.
         """
         if isinstance(event, Gesture | Unknown | Cancelled):
             self._judge(event)
@@ -76,9 +76,13 @@ class OscSink:
             self._send(self._out.message(f"/gestured/{event.sensor}/provisional", "sfi", said).dgram)
         elif isinstance(event, Gesture):
             args = (event.gesture, event.confidence, event.sequence, event.onset + epoch, event.offset + epoch)
-            gesture = self._out.message(f"/gestured/{event.sensor}/gesture", "sfidd", args)
-            mark = self._out.message("/gestured/test", "s", (event.sensor,)) if test else None
-            self._send(self._out.bundle(mark, gesture).dgram if mark else gesture.dgram)
+            messages = [self._out.message(f"/gestured/{event.sensor}/gesture", "sfidd", args)]
+            if (at := event.where) is not None:
+                place = (event.sequence, at.start.x, at.start.y, at.end.x, at.end.y, at.way, at.pressure, at.contacts)
+                messages.append(self._out.message(f"/gestured/{event.sensor}/where", "iffffffi", place))
+            mark = self._out.message("/gestured/test", "s", (event.sensor,))
+            for packet in [self._out.bundle(mark, *messages)] if test else messages:
+                self._send(packet.dgram)
         elif isinstance(event, Status):
             heard = sum(state not in SILENT for state in event.sensors.values())
             self._send(self._out.message("/gestured/status", "si", (event.state, heard)).dgram)

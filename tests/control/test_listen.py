@@ -11,6 +11,10 @@ from gestured.client.stream import Stream
 from tests.sockets import GESTURE
 
 STATUS = {"type": "status", "model": "m", "time": 1.0}
+WHERE = {
+    "start": {"x": 0.21, "y": 0.5}, "end": {"x": 0.84, "y": 0.52}, "way": 0.64,
+    "pressure": 212.0, "snr": 31.5, "contacts": 1, "bridged": 0, "zone": "volume",
+}  # fmt: skip
 UNKNOWN = {key: value for key, value in GESTURE.items() if key not in ("gesture", "sequence")} | {"type": "unknown"}
 
 
@@ -20,6 +24,8 @@ def test_every_type_has_its_line(start, fake):
         (GESTURE | {"degraded": True, "model": "lstm"}, "by lstm, degraded"),
         (UNKNOWN | {"reason": "hole"}, "unknown (hole)"),
         (UNKNOWN, "unknown  "),
+        (GESTURE | {"where": WHERE}, "  from 0.21,0.50 (volume) to 0.84,0.52"),
+        (UNKNOWN | {"where": WHERE | {"way": 0.0, "zone": None}}, "  at 0.21,0.50"),
         ({"type": "onset", "sensor": "armrest", "id": 4, "onset": 1000.0}, "onset"),
         ({"type": "cancelled", "sensor": "armrest", "id": 4, "reason": "held"}, "cancelled: held"),
         ({"type": "release", "sensor": "armrest", "id": 4, "offset": 1000.0}, "release"),

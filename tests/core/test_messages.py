@@ -4,7 +4,7 @@ import json
 import math
 import typing
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from types import MappingProxyType
 from typing import Any, get_args
 
@@ -14,16 +14,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.core import events, messages
-from gestured.core.events import Event, Gesture, Onset, Status
+from gestured.core.events import Event, Gesture, Onset, Place, Status, Where
 
 word = st.text(min_size=1, max_size=12)
 number = st.floats(-1e6, 1e6)
+PLACES = st.builds(Place, st.floats(0, 1), st.floats(0, 1))
 BY_TYPE: dict[object, st.SearchStrategy] = {
     str: word,
     int: st.integers(0, 2**31 - 1),
     float: number,
     bool: st.booleans(),
     str | None: st.none() | word,
+    Where | None: st.none()
+    | st.builds(Where, PLACES, PLACES, number, number, number, st.integers(1, 2), st.integers(0, 9), st.none() | word),
     Mapping[str, float]: st.dictionaries(word, number),
     Mapping[str, str]: st.dictionaries(word, word),
 }
@@ -44,6 +47,8 @@ def test_every_event_survives_its_json_line(event: Event, epoch: float) -> None:
         if key in got:
             assert got[key] == getattr(event, key) + epoch
             got[key] = getattr(event, key)
+    if (where := got.get("where")) is not None:
+        got["where"] = Where(**where | {end: Place(**where[end]) for end in ("start", "end")})
     assert type(event)(**got) == event
 
 
@@ -58,6 +63,11 @@ def test_a_gesture_looks_as_the_contract_says() -> None:
         b'{"type":"gesture","sensor":"armrest","id":41,"gesture":"swipe_up","confidence":0.98,"sequence":17,'
         b'"onset":1010.0,"offset":1010.5,"decided":1010.6,"frames":12,"lost":0,"model":"cnn_lstm",'
         b'"degraded":false,"scores":{"swipe_up":0.5,"circle":0.5},"provisional":null}\n'
+    )
+    where = Where(Place(0.21, 0.5), Place(0.84, 0.52), 0.64, 212.0, 31.5, 1, 0, "volume")
+    assert messages.to_json(replace(GESTURE, where=where), 1000.0).endswith(
+        b'"provisional":null,"where":{"start":{"x":0.21,"y":0.5},"end":{"x":0.84,"y":0.52},"way":0.64,'
+        b'"pressure":212.0,"snr":31.5,"contacts":1,"bridged":0,"zone":"volume"}}\n'
     )
     status = Status("ok", {"armrest": "ok"}, "cnn_lstm", 1234.5)
     assert messages.to_json(status, 1000.0) == (

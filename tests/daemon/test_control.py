@@ -140,11 +140,12 @@ def test_a_test_event_is_marked_on_every_output_and_keeps_the_numbers(start, udp
         ("onset", 1, True), ("gesture", 1, True), ("release", 1, True),
     ]  # fmt: skip
     found: list[OscMessage] = []
-    while len(found) < 2:
+    while len(found) < 3:
         messages = [timed.message for timed in OscPacket(udp.recv(9999)).messages]
         found += [message for message in messages if message.address != "/gestured/status"]
     assert (found[0].address, found[0].params) == ("/gestured/test", ["arm"])
     assert found[1].address == "/gestured/arm/gesture" and found[1].params[:3] == ["swipe_up", 1.0, 1]
+    assert (found[2].address, found[2].params[:5]) == ("/gestured/arm/where", [1, 0.5, 0.5, 0.5, 0.5])
     assert daemon.client().hello["sensors"] == {"arm": 1}
     Sensor(daemon, "arm").begin().perform("left")  # the sensor comes: its gestures are numbered on, unmarked
     (event,) = client.events("gesture", "arm")

@@ -33,8 +33,11 @@ def test_a_swipe_is_one_gesture_with_all_fields(shared: Daemon) -> None:
     (event,) = client.events("gesture", "fields")
     assert list(event) == [
         "type", "sensor", "id", "gesture", "confidence", "sequence", "onset", "offset", "decided", "frames",
-        "lost", "model", "degraded", "scores", "provisional",
+        "lost", "model", "degraded", "scores", "provisional", "where",
     ]  # fmt: skip
+    where = event["where"]
+    assert list(where) == ["start", "end", "way", "pressure", "snr", "contacts", "bridged", "zone"]
+    assert where["start"]["x"] > 0.7 and where["end"]["x"] < 0.3 and where["way"] > 0.4
     assert event["provisional"] is None
     assert (event["gesture"], event["sequence"], event["frames"], event["lost"]) == ("swipe_left", 1, 7, 0)
     assert 0.5 < event["confidence"] <= 1 and event["degraded"] is False and event["model"] == "tiny"
@@ -183,9 +186,14 @@ def test_osc_goes_out_to_every_destination(start) -> None:
     (event,) = client.events("gesture", "arm")
     for out in outs:
         seen: dict[str, list[Any]] = {}
-        while len(seen) < 2:
+        while len(seen) < 3:
             message = OscMessage(out.recv(9999))
             seen[message.address] = message.params
+        assert [address for address in seen if "arm" in address] == ["/gestured/arm/gesture", "/gestured/arm/where"]
+        where = event["where"]
+        told = [where["start"]["x"], where["start"]["y"], where["end"]["x"], where["end"]["y"], where["way"]]
+        told += [where["pressure"], where["contacts"]]
+        assert seen["/gestured/arm/where"] == [1, *(pytest.approx(value, rel=1e-6) for value in told)]
         assert seen["/gestured/status"] in (["no_data", 0], ["ok", 1])
         label, confidence, sequence, onset, offset = seen["/gestured/arm/gesture"]
         assert (label, sequence) == ("swipe_up", 1)

@@ -9,7 +9,7 @@ from typing import Any, get_args
 import pytest
 
 from gestured.core import messages
-from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
+from gestured.core.events import Cancelled, Event, Gesture, Place, Provisional, Unknown, Where
 from gestured.core.messages import parse_subscription
 from gestured.daemon.explain import explain
 from gestured.model.shipped import shipped
@@ -55,10 +55,11 @@ def test_the_schema_has_each_reason(event: type):
 
 def test_lines_of_every_kind_are_valid(valid: Any):
     scores = {"one_tap": 0.3, "swipe_left": 0.7}
+    where = Where(Place(0.0, 1.0), Place(0.5, 0.5), 0.5, 212.0, 31.5, 2, 0, "volume")
     for event in (
-        Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores),
-        Gesture("a", 1, "swipe_left", 1.0, 1, 0.1, 0.2, 0.4, 3, 0, "m", True, scores),
-        Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores, "hole", "revoked"),
+        Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores, where=where),
+        Gesture("a", 1, "swipe_left", 1.0, 1, 0.1, 0.2, 0.4, 3, 0, "m", True, scores, where=where),
+        Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores, "hole", "revoked", where),
         Cancelled("a", 1, "held"),
         Provisional("a", 1, "swipe_left", 0.9, 0.1, 0.2),
     ):

@@ -90,6 +90,9 @@ def _sensor(name: str, state: str, reading: Reading) -> Line:
 def as_line(event: Event) -> Line:
     """An event with the keys that the tapes know: nobody asks for provisional events, or has gestures of his own."""
     line = {"type": type(event).__name__} | asdict(event)
+    if isinstance(event, Gesture | Unknown):
+        where = line.pop("where")
+        assert all(0 <= where[end][axis] <= 1 for end in ("start", "end") for axis in "xy") and where["zone"] is None
     if isinstance(event, Gesture | Unknown | Cancelled):
         assert line.pop("provisional") is None
     if isinstance(event, Gesture):

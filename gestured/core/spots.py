@@ -1,0 +1,108 @@
+"""The fingers of one frame: where each presses, to a fraction of a taxel, how hard, and on how many taxels.
+
+Each position is a least-squares fit of a Gaussian spot on a flat base to the taxels around a peak, found in a table of
+spots (offset and width) and refined by a parabola through the best one's neighbours. A fit takes only the taxels that
+are there, so the border pulls no position inwards, as it would pull a centroid.
+"""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+REACH = 2  # taxels on each side of a peak that a fit looks at
+WIDTHS = (0.5, 0.7, 1.0, 1.4)  # pitches, one standard deviation: fingertips on taxels of 4 to 8 mm, blurred
+STEP, STEPS = 0.25, 3  # pitches from one offset of the table to the next, and how many on each side of the peak
+BASE = 0.5  # variance of the flat base in units of a taxel's noise: crosstalk and a palm lift what is around a finger
+SIDE = 2 * STEPS + 1
+TABLES = 64  # tables that are kept: one for each way in which the border cuts the taxels around a peak
+SECOND = 0.4  # of the first finger's peak: a second one is at least as strong, since a palm and crosstalk are not
+VALLEY = 0.85  # of the second peak: what lies between two fingers is at most so high
+NOISE = 4.0  # noise units: a lower peak is no second finger
+APART = 2 * REACH  # taxels: fingers that are nearer are fitted to their own taxels alone
+
+
+class Spot(NamedTuple):
+    """One finger in one frame."""
+
+    row: float  # taxel pitches from the top, as mounted; within the grid
+    column: float  # from the left
+    peak: float  # counts of its strongest taxel
+    area: int  # taxels above half of that
+
+
+def spots(frame: Array, noise: float) -> list[Spot]:
+    """The fingers in (R, C) counts above the baseline, the strongest first: one, or two that can be told apart."""
+    columns = frame.shape[1]
+    first = divmod(int(frame.argmax()), columns)
+    second = _second(frame, first, noise)
+    if second is None:
+        return [_spot(frame, first, REACH, int(np.count_nonzero(frame > frame[first] / 2)))]
+    near = max(abs(first[0] - second[0]), abs(first[1] - second[1])) <= APART
+    rows, across = np.indices(frame.shape)
+    nearer = np.hypot(rows - first[0], across - first[1]) < np.hypot(rows - second[0], across - second[1])
+    return [
+        _spot(frame, peak, 1 if near else REACH, int(np.count_nonzero((frame > frame[peak] / 2) & own)))
+        for peak, own in ((first, nearer), (second, ~nearer))
+    ]
+
+
+def _second(frame: Array, first: tuple[int, int], noise: float) -> tuple[int, int] | None:
+    """The peak of a second finger; None where there is none, or it cannot be told from the first."""
+    row, column = first
+    others = frame.copy()
+    others[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = 0.0
+    down, across = divmod(int(others.argmax()), frame.shape[1])
+    peak = float(others[down, across])
+    if peak < SECOND * frame[first] or peak < NOISE * noise:
+        return None
+    if peak < frame[max(down - 1, 0) : down + 2, max(across - 1, 0) : across + 2].max():
+        return None
+    steps = np.linspace(0.0, 1.0, 2 * max(abs(down - row), abs(across - column)) + 1)[1:-1]
+    between = frame[
+        np.rint(row + steps * (down - row)).astype(int), np.rint(column + steps * (across - column)).astype(int)
+    ]
+    return (down, across) if between.min() <= VALLEY * peak else None
+
+
+def _spot(frame: Array, peak: tuple[int, int], reach: int, area: int) -> Spot:
+    (row, column), (rows, columns) = peak, frame.shape
+    above, below = min(reach, row), min(reach, rows - 1 - row)
+    left, right = min(reach, column), min(reach, columns - 1 - column)
+    around = frame[row - above : row + below + 1, column - left : column + right + 1].ravel()
+    fits = _table(above, below, left, right).dot(around)
+    best = int(fits.argmax())
+    down, across = divmod(best % SIDE**2, SIDE)
+    dy = 0.0 if down in (0, SIDE - 1) else _summit(*fits[best - SIDE : best + SIDE + 1 : SIDE].tolist())
+    dx = 0.0 if across in (0, SIDE - 1) else _summit(*fits[best - 1 : best + 2].tolist())
+    return Spot(
+        min(max(row + (down - STEPS + dy) * STEP, 0.0), rows - 1.0),
+        min(max(column + (across - STEPS + dx) * STEP, 0.0), columns - 1.0),
+        float(frame[peak]),
+        area,
+    )
+
+
+def _summit(before: float, top: float, after: float) -> float:
+    """Where a parabola through three values is highest, in steps from the middle one."""
+    bend = before - 2 * top + after
+    return 0.5 * (before - after) / bend if bend < 0 else 0.0
+
+
+@lru_cache(TABLES)
+def _table(above: int, below: int, left: int, right: int) -> Array:
+    """(W * SIDE * SIDE, n) weights: their product with the n taxels around a peak is greatest for the best fit.
+
+    For a spot s of unit height, noise that is white and a base of variance `BASE`, with K the inverse of their joint
+    covariance, the residual of the best height is least where s K z / sqrt(s K s) is greatest (z: the taxels).
+    """
+    y, x = (axis.ravel().astype(np.float64) for axis in np.mgrid[-above : below + 1, -left : right + 1])
+    inverse = np.eye(y.size) - BASE / (1.0 + BASE * y.size)
+    at = np.arange(-STEPS, STEPS + 1) * STEP
+    width, down, across = (axis.ravel()[:, None] for axis in np.meshgrid(WIDTHS, at, at, indexing="ij"))
+    shapes = np.exp(-((y - down) ** 2 + (x - across) ** 2) / (2 * width**2))
+    weights = shapes @ inverse
+    return np.asarray(weights / np.sqrt((weights * shapes).sum(axis=1, keepdims=True)))

@@ -1,0 +1,81 @@
+"""Where a contact was, how far it went and how hard it pressed: what is said of a segment beside its name."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.beside.reading import SMALLEST
+from gestured.core.cutter import RESTS
+from gestured.core.events import Place, Where
+from gestured.core.frames import Segment
+from gestured.core.spots import Spot, spots
+
+Array = NDArray[np.float64]
+
+MOST = 100  # frames of a segment that are looked at, evenly spread: a finger is followed at 20 Hz for its longest 5 s
+SEEN = 0.3  # of the segment's peak: a frame as strong as that says where the finger is
+BOTH = 0.5  # of the segment's peak: such frames say whether there are two fingers, in more than half of them
+SHAKE = 4.0  # pitches by which a place of a peak as high as the noise is uncertain; less with a higher peak
+UNDER = 1.0  # pitches from the way within which a bad taxel counts as under it
+
+
+def where(segment: Segment) -> Where:
+    """Where a segment was; its zone is left open. Any segment has an answer, whatever its taxels show."""
+    touched = segment.frames[segment.first : segment.last + 1]
+    peaks = touched.max(axis=(1, 2)).astype(np.float64)
+    top = float(peaks.max())
+    seen = np.flatnonzero(peaks >= SEEN * top) if top > 0 else np.arange(len(touched))
+    if len(seen) > MOST:
+        seen = seen[np.rint(np.linspace(0, len(seen) - 1, MOST)).astype(int)]
+    found = [(peaks[k], spots(touched[k].astype(np.float64), segment.noise)) for k in seen]
+    two = [len(fingers) == 2 for peak, fingers in found if peak >= BOTH * top] or [False]
+    contacts = 2 if 2 * sum(two) > len(two) else 1
+    places = np.array([middle(fingers[:contacts]) for _, fingers in found if len(fingers) >= contacts])
+    rows, columns = touched.shape[1:]
+    snr = top / max(segment.noise, SMALLEST)
+    way = _way(places, RESTS + SHAKE / max(snr, 1.0))
+    start, end = (place(rows, columns, row, column) for row, column in places[[0, -1]].tolist())
+    return Where(
+        start,
+        end,
+        round(way / (min(rows, columns) - 1), 4),
+        _digits(top),
+        _digits(snr),
+        contacts,
+        0 if segment.bad is None else _under(segment.bad, places),
+    )
+
+
+def middle(fingers: list[Spot]) -> tuple[float, float]:
+    """The row and column half-way between fingers."""
+    return sum(one.row for one in fingers) / len(fingers), sum(one.column for one in fingers) / len(fingers)
+
+
+def place(rows: int, columns: int, row: float, column: float) -> Place:
+    """A row and a column of a grid as fractions of it, to the right and upward."""
+    return Place(round(column / (columns - 1), 4), round(1.0 - row / (rows - 1), 4))
+
+
+def _way(places: Array, rests: float) -> float:
+    """The length of a path (n, 2), 0 where it never goes as far as `rests` from where it was; in pitches."""
+    length, (last, *rest) = 0.0, places.tolist()
+    for each in rest:
+        step = math.dist(last, each)
+        if step >= rests:
+            length, last = length + step, each
+    return length + math.dist(last, places[-1]) if length else 0.0
+
+
+def _under(bad: NDArray[np.bool_], places: Array) -> int:
+    """How many of (R, C) bad taxels lie within `UNDER` of a path (n, 2)."""
+    taxels = np.argwhere(bad)[:, None].astype(np.float64)  # (B, 1, 2)
+    begin, step = places, np.diff(places, axis=0, append=places[-1:])
+    along = ((taxels - begin) * step).sum(axis=2) / np.maximum((step**2).sum(axis=1), 1e-12)
+    nearest = begin + np.clip(along, 0.0, 1.0)[..., None] * step
+    return int(np.count_nonzero((np.hypot(*(taxels - nearest).transpose(2, 0, 1)) <= UNDER).any(axis=1)))
+
+
+def _digits(value: float) -> float:
+    """A number to six digits: more of them would only make each line longer."""
+    return float(f"{value:.6g}")
