@@ -438,6 +438,19 @@ def test_the_classifier_may_be_replaced_between_frames() -> None:
     assert isinstance(answer, Gesture) and answer.gesture == "right" and answer.sequence == 1
 
 
+def test_another_strictness_holds_from_the_next_answer_on() -> None:
+    at = {"eager": 0.2, "strict": 0.95}
+    points = OperatingPoints(
+        {name: Point(dict.fromkeys(GESTURES, least), None, 0, 0, 1) for name, least in at.items()}, ()
+    )
+    subject = recognizer(classifier := Fake([replace(SURE, points=points)]), strictness="eager")
+    stream = swipes(1)
+    middle = next(n for n, frame in enumerate(stream) if frame.t > 1.7)
+    assert [type(event) for event in run(subject, stream[:middle])] == [Onset]
+    subject.change(Scene(GESTURES, (9, 9), strictness="strict"), classifier, 1.7, [])
+    assert [type(event) for event in run(subject, stream[middle:])] == [Unknown, Release]  # the contact goes on
+
+
 def test_a_classifier_that_is_replaced_while_a_second_tap_is_waited_for_is_asked_anew() -> None:
     first = Fake()
     subject = recognizer(first)
