@@ -2,23 +2,28 @@
 
     python -m experiments.everyday --hours 20
     python -m experiments.everyday --hours 20 --document docs/figures.md
+    python -m experiments.everyday --hours 10 --foreign nominal
 
 Each hour is of another simulated person, at one place after the other (life.py); its frames pass through the daemon's
 own path. A gesture that is said where none was meant is false. A tap that is said of a contact which was a tap, though
 nobody meant it, is counted apart: no model can know better there. With --document the table is written into a page.
+With --foreign the hours are those of another generator (experiments/foreign/life.py), from which nothing learns.
 """
 
 import argparse
 import json
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from experiments.everyday.life import PLACES, Day, day
+import experiments.foreign.life as foreign
+from experiments.everyday.life import PLACES, day
+from experiments.foreign import LEVELS
 from gestured.core.classifier import Classifier
 from gestured.core.events import Event, Gesture, Provisional
 from gestured.core.facts import events_of
@@ -39,6 +44,18 @@ TAPS = ("one_tap", "double_tap")
 
 
 @dataclass
+class Stretch:
+    """One person at one place, from whichever generator: frames (N, R, C) counts at times (N,) s, and the truth."""
+
+    place: str
+    times: NDArray[np.float64]
+    frames: NDArray[np.generic]
+    contacts: int
+    meant: list[Performed]
+    taps: list[Performed]  # which nobody meant, but which are taps in truth
+
+
+@dataclass
 class Hours:
     """What was said in some hours, and how it went."""
 
@@ -47,6 +64,7 @@ class Hours:
     contacts: int = 0
     said: Counter[str] = field(default_factory=Counter)  # right, wrong, missed, false, apart, provisional
     names: Counter[str] = field(default_factory=Counter)  # of what was false
+    meant_in: Counter[tuple[str, bool]] = field(default_factory=Counter)  # what a gesture was meant in, whether right
     each: list[tuple[float, int]] = field(default_factory=list)  # by person: hours, and false gestures
 
     def __iadd__(self, other: "Hours") -> "Hours":
@@ -54,6 +72,7 @@ class Hours:
         self.contacts += other.contacts
         self.said += other.said
         self.names += other.names
+        self.meant_in += other.meant_in
         self.each += other.each
         return self
 
@@ -75,9 +94,22 @@ class Hours:
         return float(low), float(high)
 
 
-def heard(life: Day, classifier: Classifier) -> tuple[list[Event], float]:
-    """The events of a day, provisional ones among them, and for how many seconds the idle sensor was not known."""
-    times, frames = life.take.times, life.take.frames
+def lived(args: argparse.Namespace) -> Iterator[Stretch]:
+    """So many hours of everyday life, person after person."""
+    for n in range(0 if args.foreign else args.hours):
+        life = day(args.seed + n, PLACES[n % len(PLACES)], HOUR_S)
+        acts = [Performed(act.label, act.kind, act.onset_s, act.offset_s) for act in life.take.events]
+        taps = [Performed(NONE, act.kind, act.onset_s, act.offset_s) for act in life.like]
+        meant = [act for act in acts if act.label != NONE]
+        yield Stretch(life.place, life.take.times, life.take.frames, life.contacts, meant, taps)
+    for n in range(2 * args.hours if args.foreign else 0):
+        half = foreign.live(args.seed + n, args.foreign)
+        yield Stretch(half.place, half.times, half.frames, len(half.contacts), half.meant, half.taps)
+
+
+def heard(life: Stretch, classifier: Classifier) -> tuple[list[Event], float]:
+    """The events of a stretch, provisional ones among them, and for how many seconds the idle sensor was not known."""
+    times, frames = life.times, life.frames
     sensor = Sensor("lab", Scene(classifier.gestures, frames.shape[1:]), classifier)
     sensor.foresee(asked=True)
     found: list[Any] = []
@@ -89,11 +121,10 @@ def heard(life: Day, classifier: Classifier) -> tuple[list[Event], float]:
     return events_of(found), deaf * float(times[-1]) / len(times)
 
 
-def judged(life: Day, events: Iterable[Event], deaf_s: float) -> Hours:
+def judged(life: Stretch, events: Iterable[Event], deaf_s: float) -> Hours:
     """How it went."""
-    meant = [Performed(act.label, act.kind, act.onset_s, act.offset_s) for act in life.take.events if act.label != NONE]
-    alone = [Performed(NONE, act.kind, act.onset_s, act.offset_s) for act in life.like]
-    hours = Hours(float(life.take.times[-1]), deaf_s, life.contacts)
+    meant = life.meant
+    hours = Hours(float(life.times[-1]), deaf_s, life.contacts)
     for event in events:
         if isinstance(event, Provisional):
             hours.said["provisional"] += whose(event.onset, event.decided, meant) is None
@@ -103,12 +134,16 @@ def judged(life: Day, events: Iterable[Event], deaf_s: float) -> Hours:
         found = verdict(event.gesture, act, answered=act is not None and act.answered)
         if act is not None:
             act.answered = True
-        elif event.gesture in TAPS and whose(event.onset, event.offset, alone) is not None:
+        elif event.gesture in TAPS and whose(event.onset, event.offset, life.taps) is not None:
             found = "apart"
         hours.said[found] += 1
+        if act is not None and found != "false":
+            hours.meant_in[act.kind, found == "right"] += 1
         if found == "false":
             hours.names[event.gesture] += 1
-    hours.said["missed"] += sum(not act.answered for act in meant)
+    missed = [act for act in meant if not act.answered]
+    hours.said["missed"] += len(missed)
+    hours.meant_in.update((act.kind, False) for act in missed)
     hours.each.append((hours.seconds / HOUR_S, hours.said["false"]))
     return hours
 
@@ -118,14 +153,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", default="cnn_lstm", help="a shipped model, or a file (default: cnn_lstm)")
     parser.add_argument("--hours", type=int, default=20, help="of simulated life, in turn at each place (default: 20)")
+    parser.add_argument("--foreign", choices=LEVELS, help="of the other generator, on such sensors")
     parser.add_argument("--seed", type=int, default=FIRST, help=f"of the first hour (default: {FIRST})")
     parser.add_argument("--json", action="store_true", help="print the table as JSON")
     parser.add_argument("--document", type=Path, help="a page whose table `everyday` is written anew")
     args = parser.parse_args()
-    model, names = open_model(args.model), list(PLACES)
-    places: dict[str, Hours] = {name: Hours() for name in names}
-    for n in progress(range(args.hours), args.hours, "hours"):
-        life = day(args.seed + n, names[n % len(names)], HOUR_S)
+    model = open_model(args.model)
+    places: dict[str, Hours] = {name: Hours() for name in PLACES}
+    for life in progress(lived(args), args.hours * (2 if args.foreign else 1), "people"):
+        places.setdefault(life.place, Hours())
         places[life.place] += judged(life, *heard(life, model))
     every = Hours()
     for one in places.values():
@@ -134,7 +170,12 @@ def main() -> None:
             "right", "wrong", "missed", "deaf s an hour")  # fmt: skip
     rows = [_row(name, one) for name, one in (*places.items(), ("all", every)) if one.seconds]
     falsely = "False gestures: " + ", ".join(f"{name} {count}" for name, count in every.names.most_common()) + "."
-    table = Table(f"Everyday contact, simulated: {args.model}", head, rows, (falsely,))
+    notes = [falsely]
+    if args.foreign:
+        counts = {how: (every.meant_in[how, True], every.meant_in[how, False]) for how in foreign.HOW}
+        shares = (f"{how} {good / max(good + bad, 1):.3f} of {good + bad}" for how, (good, bad) in counts.items())
+        notes.append(f"Right by what a gesture was meant in: {', '.join(shares)}.")
+    table = Table(f"Everyday contact, {args.foreign or 'simulated'}: {args.model}", head, rows, tuple(notes))
     if args.document:
         made = made_of("python -m experiments.everyday", [shipped().get(args.model, Path(args.model))])
         renew(args.document, "everyday", [made, "", str(table)])

@@ -101,7 +101,7 @@ def _between(rng: Rng, low: float, high: float, median: float, sigma: float) -> 
     return float(np.clip(median * np.exp(rng.normal(0.0, sigma)), low, high))
 
 
-def _fingertip(rng: Rng, person: Person, count: int = 19) -> tuple[Array, Array]:
+def fingertip(rng: Rng, person: Person, count: int = 19) -> tuple[Array, Array]:
     """Points of a fingertip: a sunflower in a leaning ellipse, pressed most in the middle."""
     k = np.arange(count) + 0.5
     r, a = np.sqrt(k / count), k * 2.399963
@@ -113,7 +113,7 @@ def _fingertip(rng: Rng, person: Person, count: int = 19) -> tuple[Array, Array]
     return points, weights / weights.sum()
 
 
-def _spline(control: Array) -> Array:
+def spline(control: Array) -> Array:
     """A Catmull-Rom curve through the control points (N, 2), 24 steps a piece, even in arc length."""
     ends = np.concatenate([2 * control[:1] - control[1:2], control, 2 * control[-1:] - control[-2:-1]])
     u = np.linspace(0.0, 1.0, 24, endpoint=False)[:, None]
@@ -133,7 +133,7 @@ def _corners(control: Array, round_off: float) -> Array:
     return np.asarray(points)
 
 
-def _ramp(u: Array) -> Array:
+def ramp(u: Array) -> Array:
     return 0.5 - 0.5 * np.cos(np.pi * np.clip(u, 0.0, 1.0))
 
 
@@ -143,7 +143,7 @@ def _force(rng: Rng, person: Person, t: Array, duration: float, attack: float, d
     level = max(level, 0.55 if person.light else 0.7)
     attack, decay = min(attack, duration * 0.45), min(decay, duration * 0.45)
     waver = np.interp(t, np.linspace(0, duration, 6), 1 + rng.normal(0, 0.08 * person.sloppy, 6))
-    return level * _ramp(t / attack) * _ramp((duration - t) / decay) * np.clip(waver, 0.5, 1.6)
+    return level * ramp(t / attack) * ramp((duration - t) / decay) * np.clip(waver, 0.5, 1.6)
 
 
 def _walk(rng: Rng, path: Array, t: Array, begin: float, end: float, power: float = 0.0) -> tuple[Array, Array]:
@@ -168,14 +168,14 @@ def _place(rng: Rng, path: Array, over: float) -> Array:
     return path + middle + half * rng.uniform(-1.0, 1.0, 2) * 0.9
 
 
-def _stroke(rng: Rng, person: Person, path: Array, move: float, *, rest: float = 0.0, power: float = 0.0) -> Pad:
+def stroke(rng: Rng, person: Person, path: Array, move: float, *, rest: float = 0.0, power: float = 0.0) -> Pad:
     """One finger along one path: lands, perhaps waits, moves, perhaps rests, lifts (often while moving)."""
     wait = float(rng.uniform(0.0, 0.06))
     lift = float(rng.uniform(0.02, 0.08))
     duration = wait + move + rest + 0.02
     t = np.arange(0.0, duration + STEP_S, STEP_S)
     x, y = _walk(rng, path, t, wait, wait + move, power)
-    points, weights = _fingertip(rng, person)
+    points, weights = fingertip(rng, person)
     force = _force(rng, person, t, duration, float(rng.uniform(0.02, 0.06)), lift)
     return Pad(t, x, y, force, points, weights, 0.3)
 
@@ -188,11 +188,11 @@ def _delayed(pad: Pad, by: float) -> Pad:
     return Pad(pad.t + by, pad.x, pad.y, pad.force, pad.points, pad.weights, pad.half)
 
 
-def _press(rng: Rng, person: Person, at: Array, duration: float, slide: float) -> Pad:
+def press(rng: Rng, person: Person, at: Array, duration: float, slide: float) -> Pad:
     """A press in one place, with a little slide (taxels)."""
     t = np.arange(0.0, duration + STEP_S, STEP_S)
     drift = rng.normal(0.0, slide, 2)
-    points, weights = _fingertip(rng, person)
+    points, weights = fingertip(rng, person)
     force = _force(rng, person, t, duration, float(rng.uniform(0.02, 0.08)), float(rng.uniform(0.03, 0.1)))
     u = t / duration
     return Pad(t, at[0] + drift[0] * u, at[1] + drift[1] * u, force, points, weights, 0.3)
@@ -223,14 +223,14 @@ def _swipe_time(rng: Rng, person: Person) -> tuple[float, float]:
 def _swipe(rng: Rng, person: Person, kind: str, heading: float, tilt_limit: float = 18.0) -> Performance:
     move, rest = _swipe_time(rng, person)
     length = float(rng.uniform(3.0, 8.0) if person.light else rng.uniform(4.0, 8.0))
-    path = _place(rng, _spline(_line(rng, person, heading, tilt_limit, length)), 0.4)
-    return _performed(kind, [_stroke(rng, person, path, move, rest=rest)])
+    path = _place(rng, spline(_line(rng, person, heading, tilt_limit, length)), 0.4)
+    return _performed(kind, [stroke(rng, person, path, move, rest=rest)])
 
 
 def _two_fingers(rng: Rng, person: Person, kind: str, heading: float) -> Performance:
     move, rest = _swipe_time(rng, person)
     length = float(rng.uniform(3.0, 7.0) if person.light else rng.uniform(3.5, 7.0))
-    path = _spline(_line(rng, person, heading, 16.0, length))
+    path = spline(_line(rng, person, heading, 16.0, length))
     space = float(rng.uniform(1.5, 4.0))
     # Side by side as two fingers of one hand are: nearly square to the way, one a little ahead.
     side = np.radians(heading + 90.0 + rng.normal(0.0, 12.0))
@@ -240,8 +240,8 @@ def _two_fingers(rng: Rng, person: Person, kind: str, heading: float) -> Perform
     both = _place(rng, np.concatenate([path, path + offset]), 0.4)
     first, second = both[: len(path)], both[len(path) :]
     seed = int(rng.integers(2**32))
-    a = _stroke(np.random.default_rng(seed), person, first, move, rest=rest)
-    b = _stroke(np.random.default_rng(seed), person, second, move, rest=rest)  # one hand: the same timing
+    a = stroke(np.random.default_rng(seed), person, first, move, rest=rest)
+    b = stroke(np.random.default_rng(seed), person, second, move, rest=rest)  # one hand: the same timing
     b = Pad(b.t, b.x, b.y, b.force * rng.uniform(0.65, 1.35), b.points, b.weights, b.half)
     late = float(np.abs(rng.normal(0.0, 0.03 if person.light else 0.015)))
     return _performed(kind, [_delayed(a, 0.0), _delayed(b, min(late, 0.08))])
@@ -257,28 +257,28 @@ def _circle(rng: Rng, person: Person, kind: str, turn: int) -> Performance:
     a = rng.uniform(0.0, np.pi)
     u, v = r * np.cos(angle - a), flat * r * np.sin(angle - a)
     path = np.stack([u * np.cos(a) - v * np.sin(a), u * np.sin(a) + v * np.cos(a)], axis=1)
-    path = _place(rng, _spline(path), 0.3)
+    path = _place(rng, spline(path), 0.3)
     move = _between(rng, 0.6, 3.0, 1.15 * person.haste, 0.35)
     rest = float(rng.uniform(0.05, 0.3)) if rng.random() < 0.2 else 0.0
-    return _performed(kind, [_stroke(rng, person, path, move, rest=rest, power=0.05)])
+    return _performed(kind, [stroke(rng, person, path, move, rest=rest, power=0.05)])
 
 
 def _one_tap(rng: Rng, person: Person) -> Performance:
     duration = _between(rng, 0.05 if person.light else 0.08, 0.3, 0.14, 0.4)
-    return _performed("one_tap", [_press(rng, person, _spot(rng), duration, 0.08 * person.sloppy)])
+    return _performed("one_tap", [press(rng, person, _spot(rng), duration, 0.08 * person.sloppy)])
 
 
 def _double_tap(rng: Rng, person: Person) -> Performance:
     at = _spot(rng)
-    first = _press(rng, person, at, _between(rng, 0.06, 0.25, 0.11, 0.3), 0.05)
+    first = press(rng, person, at, _between(rng, 0.06, 0.25, 0.11, 0.3), 0.05)
     gap = _between(rng, 0.1, 0.4, 0.19, 0.4)
     again = at + rng.normal(0.0, 0.15 * person.sloppy, 2)
-    second = _press(rng, person, again, _between(rng, 0.06, 0.3, 0.12, 0.3), 0.05)
+    second = press(rng, person, again, _between(rng, 0.06, 0.3, 0.12, 0.3), 0.05)
     return _performed("double_tap", [first, _delayed(second, float(first.t[-1]) + gap)])
 
 
 def _long_press(rng: Rng, person: Person) -> Performance:
-    return _performed("long_press", [_press(rng, person, _spot(rng), float(rng.uniform(0.9, 3.5)), 0.15)])
+    return _performed("long_press", [press(rng, person, _spot(rng), float(rng.uniform(0.9, 3.5)), 0.15)])
 
 
 def _palm(rng: Rng, person: Person) -> Performance:
@@ -299,7 +299,7 @@ def _palm(rng: Rng, person: Person) -> Performance:
     pads = [Pad(t, centre[0] + roll[0] * u, centre[1] + roll[1] * u, force, points, weights / weights.sum(), 0.45)]
     for _ in range(int(rng.integers(0, 4))):
         at = centre + rng.uniform(2.0, 4.0) * np.array([np.cos(c := rng.uniform(0, 2 * np.pi)), np.sin(c)])
-        pad = _press(rng, person, at, duration * rng.uniform(0.5, 0.85), 0.2)
+        pad = press(rng, person, at, duration * rng.uniform(0.5, 0.85), 0.2)
         pads.append(_delayed(pad, duration * 0.08))
     return _performed("palm", pads)
 
@@ -311,9 +311,9 @@ def _scribble(rng: Rng, person: Person) -> Performance:
         new = _spot(rng)
         if np.hypot(*(new - control[-1])) > 2.5:
             control.append(new)
-    path = _spline(np.asarray(control))
+    path = spline(np.asarray(control))
     move = float(rng.uniform(0.22, 0.4)) * number
-    return _performed("scribble", [_stroke(rng, person, path, move, power=0.15)])
+    return _performed("scribble", [stroke(rng, person, path, move, power=0.15)])
 
 
 def _zigzag(rng: Rng, person: Person) -> Performance:
@@ -325,7 +325,7 @@ def _zigzag(rng: Rng, person: Person) -> Performance:
     a = np.radians(a)
     points = points @ np.array([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]])
     path = _place(rng, _corners(points, float(rng.uniform(0.05, 0.3))), 0.3)
-    return _performed("zigzag", [_stroke(rng, person, path, float(rng.uniform(0.16, 0.4)) * legs)])
+    return _performed("zigzag", [stroke(rng, person, path, float(rng.uniform(0.16, 0.4)) * legs)])
 
 
 def _check_mark(rng: Rng, person: Person) -> Performance:
@@ -335,7 +335,7 @@ def _check_mark(rng: Rng, person: Person) -> Performance:
     low = short * np.array([np.cos(down), np.sin(down)])
     points = np.stack([np.zeros(2), low, low + long * np.array([np.cos(up), np.sin(up)])])
     path = _place(rng, _corners(points, 0.08), 0.3)
-    return _performed("check_mark", [_stroke(rng, person, path, float(rng.uniform(0.4, 1.1)))])
+    return _performed("check_mark", [stroke(rng, person, path, float(rng.uniform(0.4, 1.1)))])
 
 
 def _pinch(rng: Rng, person: Person) -> Performance:
@@ -350,7 +350,7 @@ def _pinch(rng: Rng, person: Person) -> Performance:
     for side in (-1.0, 1.0):
         ends = centre + side * way * np.array([[begin], [end]])
         middle = ends.mean(axis=0) + rng.normal(0.0, 0.2, 2)
-        pads.append(_stroke(rng, person, _spline(np.stack([ends[0], middle, ends[1]])), move))
+        pads.append(stroke(rng, person, spline(np.stack([ends[0], middle, ends[1]])), move))
     return _performed("pinch", [pads[0], _delayed(pads[1], float(rng.uniform(0.0, 0.04)))])
 
 
@@ -359,7 +359,7 @@ def _two_finger_tap(rng: Rng, person: Person) -> Performance:
     a = rng.normal(0.0, 0.4)
     space = rng.uniform(1.8, 4.0) * np.array([np.cos(a), np.sin(a)])
     both = _place(rng, np.stack([np.zeros(2), space]), -0.3)
-    pads = [_press(rng, person, spot, duration * rng.uniform(0.9, 1.1), 0.08) for spot in both]
+    pads = [press(rng, person, spot, duration * rng.uniform(0.9, 1.1), 0.08) for spot in both]
     return _performed("two_finger_tap", [pads[0], _delayed(pads[1], float(rng.uniform(0.0, 0.03)))])
 
 
@@ -376,7 +376,7 @@ def _object(rng: Rng, person: Person) -> Performance:
         points = (rng.random((48, 2)) - 0.5) * size
     heavy = rng.normal(0.0, 0.25, 2)
     weights = np.clip(1 + points @ heavy, 0.15, None) * rng.uniform(0.6, 1.4, len(points))
-    force = rng.uniform(2.0, 6.0) * _ramp(t / rng.uniform(0.05, 0.2)) * _ramp((duration - t) / 0.08)
+    force = rng.uniform(2.0, 6.0) * ramp(t / rng.uniform(0.05, 0.2)) * ramp((duration - t) / 0.08)
     still = np.full(len(t), 1.0)
     return _performed(
         "object", [Pad(t, centre[0] * still, centre[1] * still, force, points, weights / weights.sum(), 0.35)]

@@ -5,7 +5,7 @@ Each pressure point loads a small square; a taxel's load is the exact area that 
 squeeze follows slowly.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -167,10 +167,15 @@ def _disturb(sensor: Sensor, rng: Rng, capacitance: Array, performed: Performanc
 
 
 def record(
-    sensor: Sensor, rng: Rng, performances: Sequence[tuple[float, Performance]], length: float
+    sensor: Sensor,
+    rng: Rng,
+    performances: Sequence[tuple[float, Performance]],
+    length: float,
+    warming: Callable[[Array], Array] | None = None,
 ) -> tuple[NDArray[np.uint16] | NDArray[np.float32], Array, Array]:
     """Record `length` seconds in which the performances begin at the given times.
 
+    The sensor drifts by its `drift` times what `warming` says of the times (s), which without one are the times.
     Returns frames (N, R, C), times (N,) in seconds, and what is to be seen in each frame (N,): the
     strongest true signal of a living taxel in units of all its noise together.
     """
@@ -207,7 +212,8 @@ def record(
     counts += rng.normal(0.0, sensor.noise, counts.shape)
     if sensor.pink > 0.0:
         counts += sensor.pink * _pink(rng, len(times), cells).reshape(counts.shape)
-    counts += sensor.drift * times[:, None, None] * rng.uniform(0.5, 1.5, counts.shape[1:])
+    aged = times if warming is None else warming(times)
+    counts += sensor.drift * aged[:, None, None] * rng.uniform(0.5, 1.5, counts.shape[1:])
     when = times[:, None] + sensor.scan / sensor.rate_hz * np.arange(sensor.rows) / sensor.rows
     wave = np.sin(2 * np.pi * sensor.hum_hz * when + rng.uniform(0, 2 * np.pi))[:, :, None]
     counts += sensor.hum * wave * rng.uniform(0.5, 1.5, sensor.columns)
