@@ -11,8 +11,8 @@ from gestured.client.say import tell
 from gestured.core.errors import RecordingError
 from gestured.core.frames import Frame
 from gestured.record import arrays as recording
-from gestured.record.check import FINGERS, SESSION
-from gestured.record.recordings import Recordings
+from gestured.record.check import SESSION
+from gestured.record.recordings import Recordings, touch_arrays
 from gestured.record.replay import frames_used, opened
 from gestured.record.tape import Tape
 
@@ -62,11 +62,7 @@ def _count(labels: Any) -> int:
 
 def _recordings(sessions: dict[str, list[Frame]], found: Tape) -> Recordings:
     frames = [frame for each in sessions.values() for frame in each]
-    touches = np.full((len(frames), FINGERS, 2), np.nan, np.float32)
-    ids = np.full((len(frames), FINGERS), -1, np.int32)
-    for n, frame in enumerate(frames):
-        for k, touch in enumerate(frame.touches[:FINGERS]):
-            touches[n, k], ids[n, k] = (touch.x, touch.y), touch.id
+    touches, ids = touch_arrays(frames)
     spans = {name: (each[0].t, each[-1].t) for name, each in sessions.items()}
     events = [
         (list(sessions).index(e["sensor"]), e["gesture"], e["onset"], e["offset"])

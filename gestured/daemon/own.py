@@ -60,7 +60,7 @@ class OwnGestures:
             except OwnFileError as error:
                 unkept = str(error)
         read = own_file.load(path, self._read)
-        return Ready(keeper, read, _compared(read, ladder), unkept)
+        return Ready(keeper, read, ladder.compared(read.gestures), unkept)
 
     def follow(self, ladder: Ladder, ready: Ready) -> None:
         """Use what was read for these models: at the start, and after a reload."""
@@ -210,7 +210,7 @@ class OwnGestures:
         async with self.writing:
             ladder = self._ladder
             read = await asyncio.to_thread(self._keeper.change, self._read, change, ladder.model.sha256)
-            self._use(read, await asyncio.to_thread(_compared, read, ladder))
+            self._use(read, await asyncio.to_thread(ladder.compared, read.gestures))
         self._changed()
 
     def _check(self, name: str, gestures: Examples) -> None:
@@ -235,10 +235,3 @@ class OwnGestures:
     def _end(self, connection: Connection) -> None:
         connection.streams = False
         self._open = None
-
-
-def _compared(read: OwnFile, ladder: Ladder) -> Own:
-    """The gestures of a file as the ladder's model sees them, which takes up to a second."""
-    own = Own(read.gestures, ladder.gestures)
-    own.make(ladder.model)
-    return own

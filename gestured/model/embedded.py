@@ -157,9 +157,7 @@ def _own(ladder: Ladder, path: Path) -> Own:
         raise OwnFileError(found.fault)
     if ladder.model.space is None and not ladder.degraded:
         raise SettingsError(f"own_gestures: {ladder.name} has no embedding, expected a model that was made for them")
-    own = Own(found.gestures, ladder.gestures)
-    own.make(ladder.model)
-    return own
+    return ladder.compared(found.gestures)
 
 
 def _thresholds(ladder: Ladder, told: Mapping[str, float]) -> Mapping[str, float]:

@@ -13,6 +13,7 @@ from gestured.core.certainty import Certainty
 from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError, SettingsError
 from gestured.core.frames import Segment
+from gestured.core.own import Examples
 from gestured.core.points import USUAL
 from gestured.model.model import Model
 from gestured.model.own import Own
@@ -59,6 +60,12 @@ class Ladder:
         self.rows, self.columns = opened.rows, opened.columns
         for rung in self.rungs:
             self._check_gestures(rung)
+
+    def compared(self, examples: Examples) -> Own:
+        """Gestures of the user's own as the model that answers sees their examples, which takes up to a second."""
+        own = Own(examples, self.gestures)
+        own.make(self.model)
+        return own
 
     @property
     def name(self) -> str:

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.model.metadata import GESTURE_NAME
-from gestured.record.recordings import EVENT, Recordings
+from gestured.record.recordings import EVENT, FINGERS, Recordings
 
 SESSION = "session"  # the label of a recording that holds many gestures, and marks for each
 UNNAMED = "other"  # the label of what was performed without anybody knowing which gesture it is
-FINGERS = 3
 MAX_FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; checking their times takes a multiple of their size
 RECORDINGS = 1 << 20  # of a file, and as many events; each of their texts is checked alone
 CHARACTERS = 1024  # of one text

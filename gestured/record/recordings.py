@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gestured.core.frames import Frame, Touch
 
+FINGERS = 3  # of a frame at most
 EVENT = "event_"  # begins the name of each field that is about what was performed in a session
 
 
@@ -82,6 +83,17 @@ class Recordings:
         if not -len(self) <= i < len(self):
             raise IndexError(f"recording {i} of {len(self)}")
         return slice(int(self.offsets[i % len(self)]), int(self.offsets[i % len(self) + 1]))
+
+
+def touch_arrays(frames: Sequence[Frame]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """The fields `touches` and `touch_ids` of (N,) frames: what `touches_of` takes, for all of them."""
+    touches = np.full((len(frames), FINGERS, 2), np.nan, np.float32)
+    ids = np.full((len(frames), FINGERS), -1, np.int32)
+    for n, frame in enumerate(frames):
+        for k, touch in enumerate(frame.touches[:FINGERS]):
+            if touch.id >= 0:
+                touches[n, k], ids[n, k] = (touch.x, touch.y), touch.id
+    return touches, ids
 
 
 def touches_of(ids: NDArray[np.int32], places: NDArray[np.float32]) -> tuple[Touch, ...]:

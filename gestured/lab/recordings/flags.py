@@ -52,7 +52,6 @@ def add_recordings(command: Add) -> None:
     bring.formatter_class = argparse.RawDescriptionHelpFormatter
     bring.description = IMPORT
     bring.add_argument("files", type=Path, nargs="+", metavar="FILE", help="one recording each")
-    bring.add_argument("--format", choices=("csv",), default="csv", help="their form (csv)")
     bring.add_argument("--out", type=Path, required=True, metavar="F.npz", help="a new file for all of them")
     bring.add_argument("--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="rows and columns (9x9)")
     bring.add_argument("--time-unit", choices=("s", "ms", "us"), default="s", help="of the first column (s)")

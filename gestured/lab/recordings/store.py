@@ -11,8 +11,8 @@ from gestured.core.errors import RecordingError
 from gestured.lab.dataset import cuts, with_idle
 from gestured.lab.recordings.protocol import Exercise
 from gestured.lab.recordings.quality import Captured
-from gestured.record.check import EVENT_FIELDS, FINGERS
-from gestured.record.recordings import Recordings
+from gestured.record.check import EVENT_FIELDS
+from gestured.record.recordings import FINGERS, Recordings, touch_arrays
 
 TOGETHER = ("onsets", "releases")  # are left out where one set does not know them
 
@@ -93,17 +93,11 @@ def touched(frames: NDArray[Any], times: NDArray[np.float64]) -> tuple[int, int]
 def recording(take: Captured, trial: Exercise, participant: str, consent: str) -> Recordings:
     """A take in the contract's form, times counted from its first frame."""
     times = take.times()
-    n = len(times)
-    touches = np.full((n, FINGERS, 2), np.nan, np.float32)
-    ids = np.full((n, FINGERS), -1, np.int32)
-    for i, frame in enumerate(take.frames):
-        for k, touch in enumerate(frame.touches[:FINGERS]):
-            if touch.id >= 0:
-                touches[i, k], ids[i, k] = (touch.x, touch.y), touch.id
+    touches, ids = touch_arrays(take.frames)
     return Recordings(
         frames=compact(np.array([frame.values for frame in take.frames])),
         times=times - times[0],
-        offsets=np.array([0, n], np.int64),
+        offsets=np.array([0, len(times)], np.int64),
         labels=np.array([trial.gesture]),
         subjects=np.array([participant]),
         speeds=np.array([trial.speed]),
