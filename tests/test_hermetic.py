@@ -18,9 +18,8 @@ FEW = (
     "tests/daemon/test_start.py::test_explain_says_what_is_loaded_and_what_is_left_out",
     "tests/daemon/test_start.py::test_a_fallback_must_know_the_same_gestures",
     "tests/control/test_address.py",
-    "tests/control/test_listen.py::test_prints_a_gesture_for_a_person",
-    "tests/control/test_listen.py::test_a_daemon_that_is_not_there_is_one_sentence",
-    "tests/control/test_listen.py::test_the_default_socket_is_the_sessions",
+    "tests/control/test_listen.py::test_every_type_has_its_line",
+    "tests/control/test_operate.py::test_without_a_daemon_each_says_so_in_one_line",
     "tests/lab/recordings/test_collect.py::test_a_silent_sensor_is_told_and_ctrl_c_leaves_the_terminal_as_it_was",
 )
 
