@@ -16,7 +16,6 @@ from tests.daemon.harness import RATE_HZ, Daemon, Frame, Hand, Sensor, floats
 from tests.daemon.parts import SOURCE, Parts
 
 NEVER = {"torch", "sklearn", "pywt", "matplotlib", "scipy", "onnx", "mcap"}
-EVERYTHING = ("--metrics", "127.0.0.1:0", "--publish", "osc://127.0.0.1:9", "--flight-recorder", "1")
 Used = Callable[[str], Daemon]
 
 
@@ -58,9 +57,6 @@ SCENES: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "all but OSC out": (("--metrics", "127.0.0.1:0", "--flight-recorder", "1"), {"make": Fingers}),
     "OSC out": (("--publish", "osc://127.0.0.1:9"), {}),
     "forest only": ((), {"model": "touch_pattern_rf"}),
-    "trajectories": ((), {"make": Fingers}),
-    "everything": (EVERYTHING, {"make": Fingers}),
-    "swipes only": (("--gestures", "swipe_left,swipe_right"), {}),
 }
 
 
@@ -105,16 +101,13 @@ def test_numpy_brings_no_threads_no_random_numbers_and_no_masked_arrays(used: Us
     assert "numpy.random" not in daemon.stderr() and "numpy.ma.core" not in daemon.stderr()
 
 
-def test_the_metrics_library_comes_with_metrics_alone(used: Used) -> None:
-    assert "prometheus_client" not in imported(used("OSC out"))
-
-
 def test_python_osc_comes_with_osc_output_alone(used: Used) -> None:
     assert "pythonosc" not in imported(used("all but OSC out"))
     assert "pythonosc" in imported(used("OSC out"))
 
 
 def test_the_metrics_library_comes_with_the_first_scrape(used: Used) -> None:
+    assert "prometheus_client" not in imported(used("OSC out"))
     daemon = used("metrics")
     assert "prometheus_client" not in imported(daemon)
     daemon.get("/metrics")

@@ -42,10 +42,3 @@ def test_what_deals_with_a_fault_and_what_shows_it_are_there(row: list[str]) -> 
             assert (SCENARIOS / name).is_file()
         else:
             assert f"def {name}(" in TESTS
-
-
-def test_what_is_not_there_is_noticed() -> None:
-    with pytest.raises(AttributeError):
-        test_what_deals_with_a_fault_and_what_shows_it_are_there(["x", "`idle.Nothing`", "", "`clipped.txt`"])
-    with pytest.raises(AssertionError):
-        test_what_deals_with_a_fault_and_what_shows_it_are_there(["x", "`idle.Idle`", "", "`nothing.txt`"])

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gestured.lab.made_of import LINE, OLDER, kept, made_of, renew, stale
+from gestured.lab.made_of import LINE, OLDER, made_of, stale
 from gestured.lab.recordings.origin import said
 from gestured.model.shipped import shipped
 from tests.documents.blocks import ROOT, documents
@@ -52,15 +52,6 @@ def test_a_card_is_its_models(name: str) -> None:
     assert re.findall(r"SHA-256 \| `([0-9a-f]{12})", card) == [of.split()[-2]]
     learned = "real development recordings of CapFingerId" in card
     assert learned == any("capfingerid" in one.file for one in said(shipped()[name]) or [])
-
-
-def test_what_was_renewed_between_marks_is_kept(tmp_path: Path) -> None:
-    card = tmp_path / "lstm.md"
-    assert kept(card, "judged") == ""
-    card.write_text("# lstm\n<!-- judged: begin --><!-- judged: end -->\nbelow\n")
-    renew(card, "judged", ["| right | 0.990 |"])
-    assert kept(card, "judged") == "<!-- judged: begin -->\n| right | 0.990 |\n<!-- judged: end -->"
-    assert kept(card, "figures") == ""
 
 
 @pytest.mark.parametrize("name", sorted(shipped()))

@@ -10,7 +10,6 @@ from torch import Tensor
 from gestured.lab.augment import MIRROR, TURN, symmetry_table, turned, varied
 from gestured.lab.dataset import from_take
 from gestured.lab.fit import CLASSES
-from gestured.model.features import ACTIVE
 from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
 from tests.lab.made import direction, direction_of, gestures
 
@@ -69,14 +68,6 @@ def test_names_compose_as_the_turns_do() -> None:
     assert torch.equal(TABLE[0], torch.arange(len(CLASSES)))
 
 
-def test_each_symmetry_can_be_undone() -> None:
-    x = torch.rand(1, 2, 5, 5, generator=torch.Generator().manual_seed(4))
-    for symmetry in SYMMETRIES:
-        back = [s for s in SYMMETRIES if torch.equal(turned(turned(x, symmetry), s), x)]
-        assert len(back) == 1
-        assert torch.equal(TABLE[back[0]][TABLE[symmetry]], torch.arange(len(CLASSES)))
-
-
 def padded_batch(tail: int = 6) -> Tensor:
     made = list(gestures().values())
     time = max(map(len, made)) + tail
@@ -87,7 +78,7 @@ def padded_batch(tail: int = 6) -> Tensor:
     return x
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(40))
 def test_variation_keeps_the_scale_and_leaves_padding_alone(seed: int) -> None:
     x = padded_batch()
     y = varied(x, torch.Generator().manual_seed(seed))
@@ -96,17 +87,7 @@ def test_variation_keeps_the_scale_and_leaves_padding_alone(seed: int) -> None:
     assert float(y.min()) >= 0
     assert torch.allclose(y.amax((1, 2, 3)), torch.ones(len(y)))
     for row, frames in enumerate(gestures().values()):
-        padding = y[row, len(frames) :]
-        assert float(padding[1:].max()) == 0.0
-        assert float(padding[0].max()) < ACTIVE  # "bridged" from the last frame at most
-
-
-def test_variation_leaves_the_first_padded_frame_silent() -> None:
-    x = padded_batch()
-    for seed in range(40):
-        y = varied(x, torch.Generator().manual_seed(seed))
-        for row, frames in enumerate(gestures().values()):
-            assert float(y[row, len(frames) :].max()) == 0.0
+        assert float(y[row, len(frames) :].max()) == 0.0
 
 
 def test_variation_is_the_generators_alone() -> None:

@@ -108,11 +108,6 @@ class Method:
         """Whether it is trained in batches."""
         return "steps" in self.grid[0]
 
-    @property
-    def elapses(self) -> bool:
-        """Whether it can answer after every frame."""
-        return self.network and self.family != MOTION_HISTORY
-
 
 KINDS = {
     "knn": ("k nearest neighbours", _nearest, [{"neighbours": k} for k in (1, 4, 7, 15)]),

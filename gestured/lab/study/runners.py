@@ -16,7 +16,7 @@ from gestured.lab.progress import progress
 from gestured.lab.samples import WINDOW
 from gestured.lab.study import onnx_form
 from gestured.lab.study.material import SHIFT, Data
-from gestured.lab.study.methods import METHODS, Estimator
+from gestured.lab.study.methods import METHODS, MOTION_HISTORY, Estimator
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import PARTICIPANTS, fitted, material
 from gestured.lab.study.tables import TUNED, task
@@ -103,7 +103,9 @@ def runners(plan: Plan, tuned: Mapping[str, Values], data: Data) -> list[Runner]
         model = fitted(of_task, inputs, np.arange(len(of.labels)), of.labels)
         values = dict(of_task.values)
         if isinstance(model, Net):
-            out.append(Learned(method.id, values, onnx_form.of_net(model.module, images=not method.elapses)))
+            out.append(
+                Learned(method.id, values, onnx_form.of_net(model.module, images=method.family == MOTION_HISTORY))
+            )
             continue
         assert isinstance(model, Estimator)
         if method.id.endswith("_rf"):
