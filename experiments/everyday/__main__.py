@@ -3,11 +3,13 @@
     python -m experiments.everyday --hours 20
     python -m experiments.everyday --hours 20 --document docs/figures.md
     python -m experiments.everyday --hours 10 --foreign nominal
+    python -m experiments.everyday --recordings session.npz
 
 Each hour is of another simulated person, at one place after the other (life.py); its frames pass through the daemon's
 own path. A gesture that is said where none was meant is false. A tap that is said of a contact which was a tap, though
 nobody meant it, is counted apart: no model can know better there. With --document the table is written into a page.
 With --foreign the hours are those of another generator (experiments/foreign/life.py), from which nothing learns.
+With --recordings they are those of files; in one that does not tell what was performed all that is said is false.
 """
 
 import argparse
@@ -35,6 +37,8 @@ from gestured.lab.progress import progress
 from gestured.lab.table import Table
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
+from gestured.record.arrays import read
+from gestured.record.check import SESSION
 from gestured.record.judge import NONE, Performed, verdict, whose
 
 HOUR_S = 3600.0
@@ -95,16 +99,37 @@ class Hours:
 
 
 def lived(args: argparse.Namespace) -> Iterator[Stretch]:
-    """So many hours of everyday life, person after person."""
-    for n in range(0 if args.foreign else args.hours):
-        life = day(args.seed + n, PLACES[n % len(PLACES)], HOUR_S)
-        acts = [Performed(act.label, act.kind, act.onset_s, act.offset_s) for act in life.take.events]
-        taps = [Performed(NONE, act.kind, act.onset_s, act.offset_s) for act in life.like]
+    """So many hours of everyday life, or those that were recorded, person after person."""
+    for path in args.recordings:
+        yield from recorded(path)
+    if args.foreign:
+        for n in range(2 * args.hours):
+            half = foreign.live(args.seed + n, args.foreign)
+            yield Stretch(half.place, half.times, half.frames, len(half.contacts), half.meant, half.taps)
+    elif not args.recordings:
+        for n in range(args.hours):
+            life = day(args.seed + n, list(PLACES)[n % len(PLACES)], HOUR_S)
+            acts = [Performed(act.label, act.kind, act.onset_s, act.offset_s) for act in life.take.events]
+            taps = [Performed(NONE, act.kind, act.onset_s, act.offset_s) for act in life.like]
+            meant = [act for act in acts if act.label != NONE]
+            yield Stretch(life.place, life.take.times, life.take.frames, life.contacts, meant, taps)
+
+
+def recorded(path: Path) -> Iterator[Stretch]:
+    """Each recording of a file as a stream; what was performed in it counts as meant, as far as the file tells."""
+    found = read(path)
+    events = (found.event_recording, found.event_labels, found.event_onsets, found.event_offsets)
+    told = [] if any(field is None for field in events) else list(zip(*events, strict=True))  # type: ignore[arg-type]
+    for i, whole in enumerate(found.labels):
+        start, end = found.times_of(i)[[0, -1]]
+        times = found.times_of(i) - start
+        acts = [
+            Performed(str(label), "", float(on - start), float(off - start)) for n, label, on, off in told if n == i
+        ]
+        if whole not in (NONE, SESSION):
+            acts.append(Performed(str(whole), "", 0.0, float(end - start)))
         meant = [act for act in acts if act.label != NONE]
-        yield Stretch(life.place, life.take.times, life.take.frames, life.contacts, meant, taps)
-    for n in range(2 * args.hours if args.foreign else 0):
-        half = foreign.live(args.seed + n, args.foreign)
-        yield Stretch(half.place, half.times, half.frames, len(half.contacts), half.meant, half.taps)
+        yield Stretch(path.stem, times, found.frames_of(i), len(acts), meant, [])
 
 
 def heard(life: Stretch, classifier: Classifier) -> tuple[list[Event], float]:
@@ -153,14 +178,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", default="cnn_lstm", help="a shipped model, or a file (default: cnn_lstm)")
     parser.add_argument("--hours", type=int, default=20, help="of simulated life, in turn at each place (default: 20)")
-    parser.add_argument("--foreign", choices=LEVELS, help="of the other generator, on such sensors")
+    source = parser.add_mutually_exclusive_group()
+    source.add_argument("--foreign", choices=LEVELS, help="hours of the other generator, on such sensors")
+    source.add_argument("--recordings", type=Path, nargs="+", default=[], metavar="FILE", help="recordings (.npz)")
     parser.add_argument("--seed", type=int, default=FIRST, help=f"of the first hour (default: {FIRST})")
     parser.add_argument("--json", action="store_true", help="print the table as JSON")
     parser.add_argument("--document", type=Path, help="a page whose table `everyday` is written anew")
     args = parser.parse_args()
+    if args.document and (args.foreign or args.recordings):
+        parser.error("--document: expected neither --foreign nor --recordings, the page's table is of the own hours")
     model = open_model(args.model)
     places: dict[str, Hours] = {name: Hours() for name in PLACES}
-    for life in progress(lived(args), args.hours * (2 if args.foreign else 1), "people"):
+    total = len(args.recordings) or args.hours * (2 if args.foreign else 1)
+    for life in progress(lived(args), total, "people"):
         places.setdefault(life.place, Hours())
         places[life.place] += judged(life, *heard(life, model))
     every = Hours()
@@ -175,7 +205,8 @@ def main() -> None:
         counts = {how: (every.meant_in[how, True], every.meant_in[how, False]) for how in foreign.HOW}
         shares = (f"{how} {good / max(good + bad, 1):.3f} of {good + bad}" for how, (good, bad) in counts.items())
         notes.append(f"Right by what a gesture was meant in: {', '.join(shares)}.")
-    table = Table(f"Everyday contact, {args.foreign or 'simulated'}: {args.model}", head, rows, tuple(notes))
+    kind = "recorded" if args.recordings else f"of the other generator, {args.foreign}" if args.foreign else "simulated"
+    table = Table(f"Everyday contact, {kind}: {args.model}", head, rows, tuple(notes))
     if args.document:
         made = made_of("python -m experiments.everyday", [shipped().get(args.model, Path(args.model))])
         renew(args.document, "everyday", [made, "", str(table)])
@@ -188,8 +219,9 @@ def main() -> None:
 def _row(name: str, one: Hours) -> tuple[str | int | float, ...]:
     low, high = one.interval()
     hours = one.seconds / HOUR_S
+    shown = round(hours) if hours > 10 else round(hours, 2)
     return (
-        name, round(hours), round(one.contacts / hours), one.per_hour("false"), f"{low:.1f} to {high:.1f}",
+        name, shown, round(one.contacts / hours), one.per_hour("false"), f"{low:.1f} to {high:.1f}",
         one.per_hour("apart"), one.per_hour("provisional"), f"{one.share('right'):.3f}", f"{one.share('wrong'):.3f}",
         f"{one.share('missed'):.3f}", one.deaf_s / hours,
     )  # fmt: skip
