@@ -112,7 +112,7 @@ async def _subscribers() -> Row:
         listener.bind(str(Path(folder) / "events.sock"))
         listener.listen(CLIENTS)
         listener.setblocking(False)
-        server = EventServer(listener, lambda: b"{}\n", Metrics(), gestures=tuple, changed=lambda: None)
+        server = EventServer(listener, lambda: b"{}\n", Metrics(), known=dict, changed=lambda: None)
         clients = []
         for _ in range(CLIENTS):
             client = socket.socket(socket.AF_UNIX)

@@ -5,7 +5,15 @@ import textwrap
 from dataclasses import dataclass
 from typing import Any
 
-from gestured.daemon.settings import TABLES, AddressSettings, GestureSettings, Part, SensorSettings, Settings
+from gestured.daemon.settings import (
+    TABLES,
+    AddressSettings,
+    GestureSettings,
+    Part,
+    SensorSettings,
+    Settings,
+    ZoneSettings,
+)
 
 # Values to show for keys that have none unless set, or whose default explains nothing.
 SHOWN: dict[str, Any] = {
@@ -23,6 +31,8 @@ SHOWN: dict[str, Any] = {
     "sensors.mirror": True,
     "sensors.clock": "sensor",
     "sensors.strictness": "strict",
+    "zones.at": [0.0, 0.5, 1.0, 1.0],
+    "zones.gestures": ["swipe_left", "swipe_right"],
     "gestures.threshold": 0.8,
     "gestures.refractory_s": 0.5,
 }
@@ -53,7 +63,7 @@ def keys(part: type[Part], prefix: str = "", leave_out: tuple[str, ...] = ()) ->
         if name in leave_out:
             continue
         default = field.default
-        unset = default is None or default == ()
+        unset = field.is_required() or default is None or default == ()
         shown = {prefix + name: field.examples[0]} if field.examples else SHOWN
         value = shown[prefix + name] if unset else shown.get(prefix + name, default)
         text = field.description or ""
@@ -69,7 +79,8 @@ def tables() -> dict[str, list[Key]]:
     return {
         "": keys(Settings, leave_out=(*TABLES, "gestures")),
         "[gestures]": [Key(f"use = {use}", Settings.model_fields["gestures"].description or "")],
-        "[sensors.armrest]": keys(SensorSettings, "sensors."),
+        "[sensors.armrest]": keys(SensorSettings, "sensors.", leave_out=("zones",)),
+        "[sensors.armrest.zones.volume]": keys(ZoneSettings, "zones."),
         "[gestures.one_tap]": keys(GestureSettings, "gestures."),
         "[addresses]": keys(AddressSettings),
     }

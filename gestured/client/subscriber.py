@@ -43,6 +43,7 @@ class Subscriber:
         types: Sequence[str] | None = None,
         sensors: Sequence[str] | None = None,
         gestures: Sequence[str] | None = None,
+        zones: Sequence[str] | None = None,
         timeout: float | None = None,
         reconnect: bool = True,
         say: Callable[[str], None] = LOG.warning,
@@ -61,7 +62,7 @@ class Subscriber:
         self.hello: dict[str, Any] = {}
         self.path = Path(paths[0])
         self._sources = [_Source(Path(path)) for path in paths]
-        wanted = {"types": types, "sensors": sensors, "gestures": gestures}
+        wanted = {"types": types, "sensors": sensors, "gestures": gestures, "zones": zones}
         # A text is passed on: what the daemon says of it is clearer than what it would say of its letters.
         given = {key: v if isinstance(v, str) else list(v) for key, v in wanted.items() if v is not None}
         self._request = json.dumps({"subscribe": given}).encode() + b"\n" if given else b""

@@ -31,6 +31,7 @@ def add(commands: Commands) -> None:
     parser.add_argument("--types", type=some_of(EVENT_TYPES), help=text)
     parser.add_argument("--sensor", action="append", metavar="NAME", help="only this sensor; may be repeated")
     parser.add_argument("--gesture", action="append", metavar="NAME", help="only this gesture; may be repeated")
+    parser.add_argument("--zone", action="append", metavar="NAME", help="only what began in this zone; may be repeated")
     parser.add_argument("--count", type=int, metavar="N", help="end after N events")
     parser.add_argument("--reconnect", action="store_true", help="wait for a daemon that is not there (any more)")
     parser.add_argument("--json", action="store_true", help="print the daemon's own lines, the hello among them")
@@ -48,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _listen(args: argparse.Namespace) -> int:
     path = event_path(args)
-    wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture}
+    wanted = {"types": args.types, "sensors": args.sensor, "gestures": args.gesture, "zones": args.zone}
     left = args.count
     early: dict[str, dict[str, Any]] = {}  # for `readable`
 

@@ -23,17 +23,30 @@ class Decision:
         self._in_use = frozenset(scene.gestures)
         self._thresholds, self._refractory = scene.thresholds, scene.refractory
         self._strictness = scene.strictness_of(sensor)
+        zones = scene.setup(sensor).zones.items()
+        self.restricted = {name: frozenset(zone.gestures) for name, zone in zones if zone.gestures is not None}
         self._last_offset: dict[str, float] = {}  # s, of the last time that each gesture was published
 
-    def best(self, gestures: Sequence[str], answer: Scores) -> tuple[dict[str, float], str, float]:
-        """The scores of those of the classifier's `gestures` that are in use, the best of them, and how sure it is."""
+    def may(self, gesture: str, zone: str | None) -> bool:
+        """Whether a contact that began in that zone of the sensor may be that gesture."""
+        allowed = self.restricted.get(zone or "")
+        return allowed is None or gesture in allowed
+
+    def best(
+        self, gestures: Sequence[str], answer: Scores, zone: str | None = None
+    ) -> tuple[dict[str, float], str, float]:
+        """The scores of those of the classifier's `gestures` that are in use, the best of them, and how sure it is.
+
+        A gesture that may not begin in `zone` cannot be the best; where none may, nothing is sure at all.
+        """
         scores = {
             gesture: float(value)
             for gesture, value in zip(gestures, answer.values, strict=True)
             if gesture in self._in_use
         }
-        best = max(scores, key=scores.__getitem__)
-        return scores, best, scores[best] * (1.0 - answer.unknown)
+        possible = [name for name in scores if self.may(name, zone)]
+        best = max(possible or scores, key=scores.__getitem__)
+        return scores, best, scores[best] * (1.0 - answer.unknown) if possible else 0.0
 
     def threshold(self, gesture: str, answer: Scores) -> float:
         """The confidence from which an answer is that gesture: the scene's, else that of the model which answers."""
@@ -49,9 +62,9 @@ class Decision:
     def _point(self, answer: Scores) -> Point | None:
         return None if answer.points is None else answer.points.points[self._strictness]
 
-    def is_own(self, match: Match | None, *, known: bool) -> bool:
+    def is_own(self, match: Match | None, zone: str | None = None, *, known: bool) -> bool:
         """Whether a gesture of the user's own may have a segment; `known`: the model would have it, too."""
-        if match is None or (known and not match.nearer):
+        if match is None or (known and not match.nearer) or not self.may(match.name, zone):
             return False
         return match.confidence >= self._thresholds.get(match.name, NEAR)
 

@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 from gestured.core.address import is_sensor
 from gestured.core.errors import ProtocolError
-from gestured.core.events import Event, Gesture, Provisional, Status, Where
+from gestured.core.events import Event, Gesture, Provisional, Status, Unknown, Where
 
 MAX_LINE = 4096  # bytes of a client's request
 LONGEST = 60  # characters of what a peer sent, in an answer to it
@@ -105,6 +105,7 @@ class Subscription:
     types: frozenset[str] = frozenset(("gesture",))
     sensors: frozenset[str] | None = None
     gestures: frozenset[str] | None = None
+    zones: frozenset[str] | None = None
 
     @property
     def foresees(self) -> bool:
@@ -112,18 +113,24 @@ class Subscription:
         return "provisional" in self.types
 
     def matches(self, event: Event) -> bool:
-        """`sensors` filters what is one sensor's, `gestures` what has a gesture's name; the rest passes."""
+        """`sensors` filters what is one sensor's, `gestures` what has a gesture's name, `zones` what has a place.
+
+        The rest passes.
+        """
         if event_type(event) not in self.types:
             return False
         if self.sensors is not None and not isinstance(event, Status) and event.sensor not in self.sensors:
             return False
+        if self.zones is not None and isinstance(event, Gesture | Unknown):
+            if event.where is None or event.where.zone not in self.zones:
+                return False
         return self.gestures is None or not isinstance(event, Gesture | Provisional) or event.gesture in self.gestures
 
 
-def parse_subscription(line: bytes, gestures: Collection[str]) -> Subscription:
+def parse_subscription(line: bytes, known: Mapping[str, Collection[str]]) -> Subscription:
     """A client's request, `{"subscribe": {...}}`; raises ProtocolError whose text says what was expected.
 
-    `gestures` are those that a client may name. A sensor may be named before it comes.
+    `known` are the `gestures` and `zones` that a client may name. A sensor may be named before it comes.
     """
     if len(line) > MAX_LINE:
         raise _refused(f"a request has at most {MAX_LINE} bytes, found {len(line)}")
@@ -136,21 +143,23 @@ def parse_subscription(line: bytes, gestures: Collection[str]) -> Subscription:
     wanted = request.get("subscribe") if isinstance(request, dict) and len(request) == 1 else None
     if not isinstance(wanted, dict):
         raise _refused('expected one key "subscribe" with an object, as {"subscribe":{"types":["gesture"]}}')
-    return Subscription(**{key: _names(key, value, gestures) for key, value in wanted.items()})
+    keys = {"types": EVENT_TYPES, "sensors": (), **known}
+    return Subscription(**{key: _names(key, value, keys) for key, value in wanted.items()})
 
 
-def _names(key: str, value: object, gestures: Collection[str]) -> frozenset[str]:
-    """One filter of a request. Raises ProtocolError."""
-    if key not in ("types", "sensors", "gestures"):
-        raise _refused(f"subscribe: unknown key {quoted(key)}, expected types, sensors or gestures")
+def _names(key: str, value: object, known: Mapping[str, Collection[str]]) -> frozenset[str]:
+    """One filter of a request, of what is `known` by its key. Raises ProtocolError."""
+    if key not in known:
+        raise _refused(f"subscribe: unknown key {quoted(key)}, expected types, sensors, gestures or zones")
     if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
         raise _refused(f"subscribe.{key}: expected a list of strings")
     for item in value:
         if key == "sensors":
             if not is_sensor(item):
                 raise _refused(f"subscribe.sensors: {quoted(item)} cannot be a sensor's name")
-        elif item not in (known := EVENT_TYPES if key == "types" else gestures):
-            raise _refused(f"subscribe.{key}: unknown {quoted(item)}, expected any of {', '.join(known)}")
+        elif item not in known[key]:
+            expected = f"any of {', '.join(known[key])}" if known[key] else f"none, since no {key} are configured"
+            raise _refused(f"subscribe.{key}: unknown {quoted(item)}, expected {expected}")
     return frozenset(value)
 
 

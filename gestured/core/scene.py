@@ -16,6 +16,7 @@ from gestured.core.mounting import Mounting
 from gestured.core.points import STRICTNESS, USUAL, Strictness
 from gestured.core.timing import Timing
 from gestured.core.wire import Addresses
+from gestured.core.zones import Zone, zones_of
 
 ONE_TAP, DOUBLE_TAP = "one_tap", "double_tap"
 TAP_GAP_S = (0.2, 0.6)  # least, most: no hand taps twice faster (at 15 Hz), and taps further apart are two
@@ -34,6 +35,7 @@ class Setup:
     mounting: Mounting = Mounting()
     clock: Clock | None = None
     strictness: Strictness | None = None
+    zones: Mapping[str, Zone] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,4 +151,6 @@ def _grid(value: Any) -> tuple[int, int]:
 def _setup(own: Mapping[str, Any]) -> Setup:
     grid = own.get("grid")
     mounting = Mounting(own.get("rotate", 0), own.get("mirror", False), own.get("invert", False))
-    return Setup(grid and _grid(grid), mounting, own.get("clock"), own.get("strictness"))
+    return Setup(
+        grid and _grid(grid), mounting, own.get("clock"), own.get("strictness"), zones_of(own.get("zones", {}))
+    )

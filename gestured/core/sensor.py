@@ -56,6 +56,7 @@ class Sensor:
         self.sequence, self.segments = numbers
         self.front_end = _front_end(name, scene)
         self._scene, self._decision = scene, Decision(scene, name)
+        self._zones = scene.setup(name).zones
         self._stamper = Stamper(scene.clock_of(name))
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # last; no scores where it failed
         self._foresight = Foresight(name, taps=scene.provisional_taps)
@@ -149,11 +150,12 @@ class Sensor:
         self._asked = None
         if answer is None:
             return [self._cancelled("model")]
-        scores, best, confidence = decision.best(self.classifier.gestures, answer)
+        at = where(segment, self._zones)
+        scores, best, confidence = decision.best(self.classifier.gestures, answer, at.zone)
         seen = whole(cut.hole_s, self.front_end.interval_s)
         known = seen and confidence >= decision.threshold(best, answer)
         decided = Decided(name, segment, answer, known)
-        own = answer.own if seen and decision.is_own(answer.own, known=known) else None
+        own = answer.own if seen and decision.is_own(answer.own, at.zone, known=known) else None
         if own is not None:
             best, confidence = own.name, own.confidence
         what = (
@@ -162,15 +164,13 @@ class Sensor:
         )  # fmt: skip
         if not known and own is None:
             why = reason(self.front_end.rate_hz, whole=seen)
-            unknown = Unknown(name, self.segments, confidence, *what, reason=why, where=where(segment))
+            unknown = Unknown(name, self.segments, confidence, *what, reason=why, where=at)
             return [self._foresight.judged(unknown), decided]
         if decision.too_early(best, segment):
             return [self._cancelled("refractory"), decided]
         decision.published(best, segment)
         self.sequence += 1
-        gesture = Gesture(
-            name, self.segments, best, confidence, self.sequence, *what, own=own is not None, where=where(segment)
-        )
+        gesture = Gesture(name, self.segments, best, confidence, self.sequence, *what, own=own is not None, where=at)
         return [self._foresight.judged(gesture), decided]
 
     def _cancelled(self, why: str) -> Cancelled:
@@ -199,9 +199,10 @@ class Sensor:
         answer = self._ask(preview.segment) if preview.drafted else classifier.preview(preview.segment)
         if answer is None:
             return []
-        _, best, confidence = decision.best(classifier.gestures, answer)
+        zone = where(preview.segment, self._zones).zone if decision.restricted else None
+        _, best, confidence = decision.best(classifier.gestures, answer, zone)
         least = decision.threshold(best, answer)
-        held = decision.too_early(best, preview.segment) or decision.is_own(answer.own, known=confidence >= least)
+        held = decision.too_early(best, preview.segment) or decision.is_own(answer.own, zone, known=confidence >= least)
         needed = math.inf if held else decision.early(best, answer)
         said = foresight.say(preview, certainty, best, confidence, needed)
         return [] if said is None else [said]
@@ -291,6 +292,7 @@ class Sensor:
         if another_clock:
             self._stamper = Stamper(scene.clock_of(self.name))
         self.classifier, self._decision, self._asked = classifier, Decision(scene, self.name), None
+        self._zones = scene.setup(self.name).zones
         self._foresight.taps = scene.provisional_taps
 
     def foresee(self, *, asked: bool, later: bool = False) -> None:

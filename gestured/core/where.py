@@ -1,6 +1,7 @@
 """Where a contact was, how far it went and how hard it pressed: what is said of a segment beside its name."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from gestured.core.cutter import RESTS
 from gestured.core.events import Place, Where
 from gestured.core.frames import Segment
 from gestured.core.spots import Spot, spots
+from gestured.core.zones import Zone, zone_at
 
 Array = NDArray[np.float64]
 
@@ -20,8 +22,8 @@ SHAKE = 4.0  # pitches by which a place of a peak as high as the noise is uncert
 UNDER = 1.0  # pitches from the way within which a bad taxel counts as under it
 
 
-def where(segment: Segment) -> Where:
-    """Where a segment was; its zone is left open. Any segment has an answer, whatever its taxels show."""
+def where(segment: Segment, zones: Mapping[str, Zone]) -> Where:
+    """Where a segment was, and in which of the sensor's zones. Any segment has an answer, whatever its taxels show."""
     touched = segment.frames[segment.first : segment.last + 1]
     peaks = touched.max(axis=(1, 2)).astype(np.float64)
     top = float(peaks.max())
@@ -44,6 +46,7 @@ def where(segment: Segment) -> Where:
         _digits(snr),
         contacts,
         0 if segment.bad is None else _under(segment.bad, places),
+        zone_at(zones, start),
     )
 
 

@@ -47,12 +47,14 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
         ladder.report(sentence)
     report_missing_points(ladder, (settings.strictness, *(own.strictness for own in settings.sensors.values())))
     gestures_in_use(ladder, settings.gestures)
-    require_gestures(ladder, (name for name in settings.per_gesture if not _may_be_own(name, settings, ladder)))
+    zones = [zone for sensor in settings.sensors.values() for zone in sensor.zones.values()]
+    named = (*settings.per_gesture, *(name for zone in zones for name in zone.gestures or ()))
+    require_gestures(ladder, (name for name in named if not _may_be_own(name, settings, ladder)))
     return ladder
 
 
 def _may_be_own(name: str, settings: Settings, ladder: Ladder) -> bool:
-    """Whether [gestures.NAME] may be for a gesture of the user's own, which may be enrolled at any time."""
+    """Whether a name in the settings may be that of a gesture of the user's own, which may be enrolled at any time."""
     from difflib import get_close_matches
 
     possible = name not in ladder.gestures and own_file.where(settings.own_gestures, os.environ) is not None

@@ -19,7 +19,7 @@ example:
            --socket /run/gestured/events.sock --metrics 127.0.0.1:9108 --config gestured.toml
 
 Each flag is a variable (GESTURED_MODEL=...) and a key of the TOML file (model = "...") too; flags win over
-variables, these over the file. The file also takes [sensors.NAME] (grid, rotate, mirror, invert, clock,
+variables, these over the file. The file also takes [sensors.NAME] (grid, rotate, mirror, invert, clock, zones,
 strictness), [gestures.NAME] (threshold, refractory_s) and [addresses] (pressure, trajectory). SIGHUP reads
 it again.
 

@@ -9,7 +9,7 @@ import asyncio
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import Protocol
 
 from gestured.core import messages
@@ -28,7 +28,7 @@ class Server(Protocol):
 
     loop: asyncio.AbstractEventLoop
     metrics: Metrics
-    gestures: Callable[[], Collection[str]]  # the gestures that a client may ask for
+    known: Callable[[], Mapping[str, Collection[str]]]  # the `gestures` and `zones` that a client may ask for
 
     def subscribe(self, client: "Client", subscription: Subscription) -> None:
         """Change what a client wants."""
@@ -130,7 +130,7 @@ class Client:
         """Answer the oldest line that waits for it."""
         self.turns -= 1
         try:
-            self._server.subscribe(self, parse_subscription(self._asked.popleft(), self._server.gestures()))
+            self._server.subscribe(self, parse_subscription(self._asked.popleft(), self._server.known()))
             self._rubbish = 0
         except ProtocolError as error:
             self.send(messages.error_json(str(error)))

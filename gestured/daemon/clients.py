@@ -8,7 +8,7 @@ import select
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 
 from gestured.core import messages
 from gestured.core.events import Event
@@ -29,7 +29,8 @@ DRAINED_S = 0.01  # at the end, the pause between two looks at what still waits
 class EventServer:
     """Accepts clients on a listening Unix socket, greets them with `hello()` and sends them events.
 
-    `gestures()` are those that a client may ask for; `changed()` is called when they ask for other provisional events.
+    `known()` are the `gestures` and `zones` that a client may ask for; `changed()` is called when they ask for other
+    provisional events.
     """
 
     def __init__(
@@ -38,10 +39,10 @@ class EventServer:
         hello: Callable[[], bytes],
         metrics: Metrics,
         *,
-        gestures: Callable[[], Collection[str]],
+        known: Callable[[], Mapping[str, Collection[str]]],
         changed: Callable[[], None],
     ) -> None:
-        self.gestures, self._changed = gestures, changed
+        self.known, self._changed = known, changed
         self.loop = asyncio.get_running_loop()
         self.metrics = metrics
         self._listener, self._hello, self._throttle = listener, hello, Throttle()

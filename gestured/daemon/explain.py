@@ -56,6 +56,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
         *(
             f"sensor {name}: {sensor.grid or grid}, rotated by {sensor.rotate}, "
             f"{'mirrored' if sensor.mirror else 'not mirrored'}, clock {sensor.clock or settings.clock}"
+            + (f", zones {', '.join(sensor.zones)}" if sensor.zones else "")
             for name, sensor in settings.sensors.items()
         ),
     ]

@@ -13,7 +13,15 @@ from typing import Any
 from pydantic import ValidationError
 
 from gestured.core.errors import SettingsError
-from gestured.daemon.settings import FLAGS, AddressSettings, GestureSettings, Part, SensorSettings, Settings
+from gestured.daemon.settings import (
+    FLAGS,
+    AddressSettings,
+    GestureSettings,
+    Part,
+    SensorSettings,
+    Settings,
+    ZoneSettings,
+)
 from gestured.record.files import open_regular
 
 ENVIRONMENT = "GESTURED_"
@@ -104,7 +112,8 @@ def _keys_at(place: tuple[Any, ...]) -> tuple[str, ...]:
         "per_gesture": GestureSettings,
         "addresses": AddressSettings,
     }
-    return tuple(parts[place[0]].model_fields)
+    part = ZoneSettings if "zones" in place[2:] else parts[place[0]]
+    return tuple(part.model_fields)
 
 
 def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:

@@ -14,6 +14,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 NAMED_SENSORS = 8  # further sensors are counted together as "other"
 NAMED_MODELS = 3
 NAMED_GESTURES = 12
+NAMED_ZONES = 12
 OTHER = "other"
 # Upper bounds of histograms' buckets. A segment takes some milliseconds; an answer waits at least `release_s`.
 INFERENCE_S = (0.0005, 0.001, 0.005, 0.025, 0.1)
@@ -70,6 +71,13 @@ class Metrics:
         self.dropped = Counter("gestured_dropped", "Packets and messages that were dropped", "reason", dated=True)
         self.implausible = Counter("gestured_implausible_time_tags", "Time tags replaced by the arrival time")
         self.gestures = Counter("gestured_gestures", "Recognised gestures", "gesture", most=NAMED_GESTURES)
+        self.zones = Counter(
+            "gestured_zone_gestures",
+            "Recognised gestures by the zone they began in",
+            "sensor",
+            "zone",
+            most=NAMED_ZONES,
+        )
         self.unknown = Counter("gestured_unknown", "Segments that are none of the gestures")
         self.cancelled = Counter("gestured_cancelled", "Segments that were not answered", "reason")
         self.provisional = Counter("gestured_provisional", "Provisional events by what became of them", "result")
@@ -118,6 +126,8 @@ class Metrics:
         if isinstance(event, Gesture):
             self.gestures.add(event.gesture)
             self.confidence.observe(event.confidence)
+            if event.where is not None and event.where.zone is not None:
+                self.zones.add(event.sensor, event.where.zone)
         elif isinstance(event, Unknown):
             self.unknown.add()
         elif isinstance(event, Cancelled):

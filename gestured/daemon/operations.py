@@ -9,6 +9,7 @@ from gestured.core.address import is_sensor
 from gestured.core.beside.reading import Reading
 from gestured.core.events import Gesture, Onset, Place, Provisional, Release, Where
 from gestured.core.hub import Hub
+from gestured.core.zones import zone_at
 from gestured.daemon.caller import Connection
 from gestured.daemon.desk import Desk
 from gestured.daemon.own import OwnGestures
@@ -22,8 +23,7 @@ from gestured.daemon.views import Views
 TEST_SENSORS = 64  # the most names of sensors that were never heard which tests may use
 TEST_S = 0.4  # how long a made-up gesture took
 TEST_FRAMES = 6  # touched frames of a made-up gesture, at 15 Hz
-MIDDLE = Place(0.5, 0.5)
-TEST_WHERE = Where(MIDDLE, MIDDLE, 0.0, 100.0, 50.0, 1, 0)  # a made-up gesture is a touch in the middle
+MIDDLE = Place(0.5, 0.5)  # of a sensor: there a made-up gesture begins and ends
 
 SENSOR = Parameter(
     (str, type(None)), "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", check=lambda name: name is None or is_sensor(name)
@@ -114,10 +114,12 @@ class Operations:
         foreseen = self.hub.foreseen(sensor)
         answer = (sequence, onset, now, now, TEST_FRAMES, 0, model, False, scores)
         verdict = "confirmed" if foreseen else None
+        zone = zone_at(self.hub.scene.setup(sensor).zones, MIDDLE)
+        where = Where(MIDDLE, MIDDLE, 0.0, 100.0, 50.0, 1, 0, zone)
         self.publisher.publish(Onset(sensor, number, onset), test=True)
         if foreseen:
             self.publisher.publish(Provisional(sensor, number, gesture, 1.0, onset, now), test=True)
-        self.publisher.publish(Gesture(sensor, number, gesture, 1.0, *answer, verdict, own, TEST_WHERE), test=True)
+        self.publisher.publish(Gesture(sensor, number, gesture, 1.0, *answer, verdict, own, where), test=True)
         self.publisher.publish(Release(sensor, number, now), test=True)
         return {"sensor": sensor, "gesture": gesture, "sequence": sequence}
 

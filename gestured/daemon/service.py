@@ -62,7 +62,7 @@ class Service:
             bound.events.sock,
             self._hello,
             self._metrics,
-            gestures=self._gestures,
+            known=self._known,
             changed=self._foresee,
         )
         self._outputs = asked.outputs
@@ -130,6 +130,11 @@ class Service:
     def _gestures(self) -> tuple[str, ...]:
         """The gestures that a client may hear of: the model's in use, and the user's own."""
         return (*self._hub.scene.gestures, *self._own.gestures)
+
+    def _known(self) -> dict[str, tuple[str, ...]]:
+        """What a client may name in a subscription."""
+        zones = dict.fromkeys(name for setup in self._hub.scene.sensors.values() for name in setup.zones)
+        return {"gestures": self._gestures(), "zones": tuple(zones)}
 
     def _own_changed(self) -> None:
         """One of the user's own gestures came or went: whatever was asked about a contact is asked again."""

@@ -10,6 +10,7 @@ from gestured.core.points import USUAL, Strictness
 from gestured.core.scene import MOST_SENSORS, STALE_S, TAP_GAP_S
 from gestured.core.timing import Timing
 from gestured.core.wire import Addresses
+from gestured.core.zones import zones_of
 from gestured.daemon.values import (
     AddressField,
     DestinationField,
@@ -27,6 +28,17 @@ class Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, arbitrary_types_allowed=True)
 
 
+class ZoneSettings(Part):
+    """`[sensors.NAME.zones.ZONE]`: one zone of a sensor."""
+
+    at: tuple[float, float, float, float] = Field(
+        description="left, bottom, right and top edge in fractions of the sensor as a person in front of it sees it"
+    )
+    gestures: Annotated[tuple[str, ...], Listed] | None = Field(
+        default=None, description="the gestures that may begin there; all in use unless set"
+    )
+
+
 class SensorSettings(Part):
     """`[sensors.NAME]`: how one sensor is built and mounted."""
 
@@ -42,6 +54,14 @@ class SensorSettings(Part):
     strictness: Strictness | None = Field(
         default=None, description="eager, normal or strict; by default the general `strictness`"
     )
+    zones: dict[SensorNameField, ZoneSettings] = Field(
+        default={}, description="tables `[sensors.NAME.zones.ZONE]`, in the file only"
+    )
+
+    @model_validator(mode="after")
+    def _apart(self) -> "SensorSettings":
+        zones_of({name: zone.model_dump() for name, zone in self.zones.items()})  # raises ValueError naming the zones
+        return self
 
 
 class GestureSettings(Part):

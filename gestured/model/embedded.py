@@ -7,6 +7,7 @@ import operator
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +23,7 @@ from gestured.core.points import USUAL, Strictness
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
 from gestured.core.timing import Timing
+from gestured.core.zones import zones_of
 from gestured.model import own_file
 from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, report_missing_points, require_gestures
 from gestured.model.own import Own
@@ -106,6 +108,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     own_gestures: str | Path | None = None,
     tap_gap_s: float = Timing().tap_gap_s,
     provisional: bool = False,
+    zones: Mapping[str, Any] | None = None,
 ) -> Embedded:
     """The recogniser of one sensor with a model: the name of one that ships, or the path of an .onnx file.
 
@@ -115,7 +118,8 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     the model must be, by operating points of its own; `thresholds` are the confidences, 0 to 1, from which a gesture is
     one, before those of the strictness; `own_gestures` is a daemon's file of gestures that were enrolled; `tap_gap_s`
     is how long a tap waits for a second one, 0.2 to 0.6 s. With `provisional` a contact's most probable gesture is
-    said before it is over, where the model was made for that.
+    said before it is over, where the model was made for that. `zones` are parts of the sensor by name, each as its four
+    edges `(left, bottom, right, top)` in fractions, or as a mapping with `at` and the `gestures` that may begin there.
 
     Recognisers of one model share it. Below a shipped model stand its fallbacks, as in the daemon; where one of them
     answers, the logger `gestured` gets a warning. Raises ModelError for a model that cannot be used, SettingsError or
@@ -135,7 +139,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
         scene = Scene(
             gestures=used,
             grid=(rows, columns),
-            sensors={sensor: Setup(mounting=Mounting(rotate, mirror, invert))},
+            sensors={sensor: Setup(mounting=Mounting(rotate, mirror, invert), zones=zones_of(zones or {}))},
             tap_gap_s=tap_gap_s,
             strictness=strictness,
             thresholds=_thresholds(ladder, {} if thresholds is None else thresholds),
@@ -143,6 +147,8 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     except (TypeError, ValueError) as error:
         raise SettingsError(str(error)) from None
     report_missing_points(ladder, (strictness,))
+    named = (name for zone in scene.setup(sensor).zones.values() for name in zone.gestures or ())
+    require_gestures(ladder, (name for name in named if name not in ladder.own.gestures))
     found = Sensor(sensor, scene, ladder)
     found.foresee(asked=provisional)
     return Embedded(found, (*used, *ladder.own.gestures))

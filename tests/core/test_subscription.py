@@ -1,18 +1,19 @@
 """What a client asks to hear: a filter, or an error that says what was expected."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.core.errors import ProtocolError
-from gestured.core.events import Gesture, Onset, Release, Status
+from gestured.core.events import Gesture, Onset, Place, Release, Status, Where
 from gestured.core.messages import Subscription, error_json, parse_subscription
 
 GESTURE = Gesture("armrest", 41, "swipe_up", 0.98, 17, 10.0, 10.5, 10.6, 12, 0, "cnn_lstm", False, {"swipe_up": 1.0})
 
-KNOWN = ("swipe_up", "circle")
+KNOWN = {"gestures": ("swipe_up", "circle"), "zones": ("volume",)}
 
 
 def request(**wanted: object) -> bytes:
@@ -38,6 +39,16 @@ def test_subscriptions_filter() -> None:
     assert not parse_subscription(request(types=[]), KNOWN).matches(GESTURE)
 
 
+def test_a_zone_is_asked_for_where_something_has_a_place() -> None:
+    chosen = parse_subscription(request(types=["gesture", "onset"], zones=["volume"]), KNOWN)
+    begun = Where(Place(0, 0), Place(1, 1), 1.4, 200.0, 40.0, 1, 0)
+    assert chosen.matches(replace(GESTURE, where=replace(begun, zone="volume")))
+    assert not chosen.matches(replace(GESTURE, where=begun)) and not chosen.matches(GESTURE)
+    assert chosen.matches(Onset("armrest", 1, 0.0))  # nobody knows yet where it began
+    with pytest.raises(ProtocolError, match="expected none, since no zones are configured"):
+        parse_subscription(request(zones=["volume"]), {"gestures": ("circle",), "zones": ()})
+
+
 @pytest.mark.parametrize(
     ("line", "says"),
     [
@@ -52,12 +63,13 @@ def test_subscriptions_filter() -> None:
         (b"{}", '"subscribe"'),
         (b'{"subscribe":[]}', '"subscribe"'),
         (b'{"subscribe":{},"x":1}', '"subscribe"'),
-        (request(type=["gesture"]), '"type", expected types, sensors or gestures'),
+        (request(type=["gesture"]), '"type", expected types, sensors, gestures or zones'),
         (request(types="gesture"), "subscribe.types: expected a list of strings"),
         (request(gestures=[1]), "subscribe.gestures: expected a list of strings"),
         (request(sensors=None), "subscribe.sensors: expected a list of strings"),
         (request(types=["tap"]), '"tap", expected any of onset, provisional, gesture'),
         (request(gestures=["swipe_up", "zigzag"]), '"zigzag", expected any of swipe_up, circle'),
+        (request(zones=["volum"]), '"volum", expected any of volume'),
         (request(sensors=["a b"]), '"a b" cannot be a sensor'),
         (
             b'{"subscribe":{"types":' + b"[" * 300 + b"]" * 300 + b"}}",

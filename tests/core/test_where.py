@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,12 +19,13 @@ from gestured.core.mounting import Mounting
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
 from gestured.core.spots import spots
-from gestured.core.where import where
+from gestured.core.where import where as where_in
 from tests.core.test_sensor import SWIPE, TAP, Fake, says
 from tests.scenario import frames
 
 Array = NDArray[np.float64]
 Path = list[tuple[float, float]]
+where = partial(where_in, zones={})
 
 
 def drawn(

@@ -79,7 +79,7 @@ def connect(listener: socket.socket) -> socket.socket:
 
 def serve(listener: socket.socket, metrics: Metrics | None = None, hello: bytes = b"") -> EventServer:
     """The event stream of a daemon without gestures."""
-    return EventServer(listener, lambda: hello, metrics or Metrics(), gestures=tuple, changed=lambda: None)
+    return EventServer(listener, lambda: hello, metrics or Metrics(), known=dict, changed=lambda: None)
 
 
 async def turn() -> None:
@@ -185,7 +185,7 @@ def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> None:
     turn_of: list[int] = []  # in which turn of the loop each line was looked at
     now = 0
 
-    def parse(line: bytes, gestures: object) -> Subscription:
+    def parse(line: bytes, known: object) -> Subscription:
         turn_of.append(now)
         raise ProtocolError("subscription", "rubbish")
 

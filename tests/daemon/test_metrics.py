@@ -13,7 +13,7 @@ import pytest
 
 from gestured.core.beside.reading import STATES, Reading, Vitals
 from gestured.core.classifier import Scores
-from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
+from gestured.core.events import Cancelled, Event, Gesture, Place, Provisional, Unknown, Where
 from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
@@ -38,6 +38,8 @@ def everything() -> Iterator[Event]:
     for number in range(100):
         for model in ("cnn_lstm", "lstm", "forest", "mine", "yours"):
             yield Gesture("s", 1, f"gesture_{number}", number / 100, 1, 0, 1, 2, 3, 0, model, True, {})
+        where = Where(Place(0.5, 0.5), Place(0.5, 0.5), 0.0, 1.0, 1.0, 1, 0, f"zone_{number}")
+        yield Gesture(f"s_{number}", 1, "left", 0.9, 1, 0, 1, 2, 3, 0, "lstm", False, {}, where=where)
     yield Provisional("s", 1, "left", 0.9, 0, 1)
     yield Gesture("s", 1, "left", 0.9, 1, 0, 1, 2, 3, 0, "lstm", False, {}, "confirmed")
     yield Cancelled("s", 1, "held", "revoked")

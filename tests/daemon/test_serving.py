@@ -204,6 +204,21 @@ def test_osc_goes_out_to_every_destination(start) -> None:
     assert daemon.metric("gestured_osc_messages_total", result="sent") > 0
 
 
+def test_a_subscriber_of_one_zone_hears_what_began_there(start, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text("[sensors.arm.zones]\nright = {at = [0.5, 0.0, 1.0, 1.0]}\nleft = {at = [0.0, 0.0, 0.5, 1.0]}\n")
+    daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", "--config", config)
+    client = daemon.client().subscribe("gesture", zones=["right"])
+    everything = daemon.client()
+    Sensor(daemon, "arm").begin().perform("right", "left", "right", "left")
+    told = [(event["gesture"], event["where"]["zone"]) for event in everything.events("gesture", "arm", 4)]
+    assert told == [("swipe_right", "left"), ("swipe_left", "right")] * 2
+    assert [event["sequence"] for event in client.events("gesture", "arm", 2)] == [2, 4]
+    assert daemon.metric("gestured_zone_gestures_total", sensor="arm", zone="right") == 2
+    client.ask({"subscribe": {"zones": ["rigth"]}})
+    assert client.line() == {"type": "error", "reason": 'subscribe.zones: unknown "rigth", expected any of right, left'}
+
+
 def test_metrics_count_what_happened(shared: Daemon) -> None:
     client = shared.client()
     before = shared.metric("gestured_gestures_total", gesture="swipe_left")

@@ -34,6 +34,7 @@ PHRASES = {
     "measure()",
     "HEADER",
     "np.load",
+    "zones=zones",
     "gestured.Hub",
     'sensors=["armrest"]) as events',
     "was_shown",
@@ -189,6 +190,16 @@ def test_one_sensor_in_a_process_of_ones_own(place: Place):
     done = subprocess.run(command, cwd=place.folder, env=environment, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     assert [line.split()[0] for line in done.stdout.splitlines()] == ["swipe_left", "swipe_up"]
+
+
+def test_one_sensor_with_several_zones(place: Place):
+    command = [sys.executable, "-c", example("zones=zones").text]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=place.folder, env=environment, capture_output=True, text=True, timeout=60)
+    said = {tuple(line.split()[:2]) for line in done.stdout.splitlines()}
+    assert {zone for zone, _ in said} == {"volume", "lamp", "window"}, done.stderr
+    assert {gesture for zone, gesture in said if zone == "volume"} == {"swipe_left", "swipe_right"}
+    assert ("lamp", "one_tap") in said
 
 
 def test_many_sensors_in_a_process_of_ones_own(place: Place):

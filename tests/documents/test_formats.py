@@ -93,7 +93,7 @@ def test_the_lines_in_the_documents_are_valid(valid: Any, block: Block):
 @pytest.mark.parametrize("block", blocks("checked", "the daemon's own parser"), ids=str)
 def test_the_requests_in_the_documents_are_valid(block: Block):
     for line in block.text.splitlines():
-        parse_subscription(line.encode(), GESTURES)
+        parse_subscription(line.encode(), {"gestures": GESTURES, "zones": ("volume",)})
 
 
 @pytest.mark.parametrize("block", blocks("checked", "gestured --explain"), ids=str)

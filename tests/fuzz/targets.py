@@ -124,7 +124,7 @@ def request(data: bytes) -> None:
     for line in lines:
         try:
             if line.strip():
-                wanted.append(parse_subscription(line, GESTURES))
+                wanted.append(parse_subscription(line, {"gestures": GESTURES}))
         except ProtocolError as error:
             assert error.reason == "subscription"
             refused.append(str(error))
