@@ -14,7 +14,7 @@ from gestured.lab.dataset import cuts
 from gestured.lab.made_of import made_of
 from gestured.lab.samples import WINDOW
 from gestured.lab.stability.decisions import decisions_table
-from gestured.lab.stability.extremes import parts_table, whole_path_table
+from gestured.lab.stability.extremes import whole_path_table
 from gestured.lab.stability.path import simulated_series
 from gestured.lab.stability.relaxation import filters_table
 from gestured.lab.table import Table
@@ -25,7 +25,6 @@ from gestured.model.shipped import LADDER, shipped
 def all_tables(quick: bool) -> Iterator[Table]:
     """One after the other, as they are done."""
     yield filters_table(quick)
-    yield parts_table(quick)
     yield whole_path_table(open_model(LADDER[0]), quick)
     streams = [stream for _, stream in simulated_series(10 if quick else 60)]
     windows = [WINDOW.apply(segment) for stream in streams for segment in cuts(stream.frames, stream.times)]

@@ -41,7 +41,7 @@ class GatherElements(OpRun):  # type: ignore[misc, unused-ignore]
 
 def extreme_windows(quick: bool) -> Windows:
     """The windows of segments that no sensor should give, one of each that are the same; every fifth if quick."""
-    made = (WINDOW.apply(segment) for _, segment in segment_cases(quick))
+    made = (WINDOW.apply(segment) for segment in segment_cases(quick))
     kept = {window.tobytes(): window for window in made if 0 < len(window) <= LONGEST}
     return list(kept.values())[:: 5 if quick else 1]
 

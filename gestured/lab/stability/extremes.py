@@ -1,30 +1,16 @@
 """What no sensor should send, through the very code that the daemon runs: does anything not finite come out?
 
-Windows and features are given segments; the whole path is given streams of a finger that swipes to the
-right. Every warning counts as a fault.
+The path is given streams of a finger that swipes to the right. Every warning counts as a fault.
 """
 
 import warnings
 
-import numpy as np
-
 from gestured.core.classifier import Classifier
 from gestured.core.events import Gesture
-from gestured.core.frames import Segment
-from gestured.core.window import Window
-from gestured.lab.samples import WINDOW
 from gestured.lab.stability.path import events, fault, labels
-from gestured.lab.stability.segments import segment_cases
 from gestured.lab.stability.streams import Case, streams
 from gestured.lab.table import Table, Value
-from gestured.model.features import touch_pattern
 
-WINDOWS = (
-    WINDOW,
-    Window(9, 9, 15.0, 3, 1 / 15, 1 / 15, 4.0),
-    Window(5, 7, 60.0, 1, 1 / 15, 1 / 15, 4.0),
-    Window(27, 15, 5.0, 1, 1 / 15, 1 / 15, 0.0),
-)
 FOUND = "swipe_right"  # what all swipes of `swipes` are
 
 
@@ -65,36 +51,3 @@ def whole_path_table(classifier: Classifier, quick: bool) -> Table:
             "other answer.",
         ),
     )
-
-
-def parts_table(quick: bool) -> Table:
-    """Windows and features of segments: cases, and what went wrong."""
-    kept: dict[str, list[str]] = {}
-    for family, segment in segment_cases(quick):
-        kept.setdefault(family, []).append(_parts(segment))
-    rows: list[tuple[Value, ...]] = [
-        (family, len(found), sum(map(bool, found)), next(filter(None, found), "")) for family, found in kept.items()
-    ]
-    return Table(
-        "Extremes: windows and features",
-        ("segments", "how many", "faults", "the first"),
-        rows,
-        (
-            f"Each segment through {len(WINDOWS)} windows, and their features. Faults: a warning, a window outside 0",
-            "to 1, anything not finite.",
-        ),
-    )
-
-
-def _parts(segment: Segment) -> str:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        try:
-            for window in WINDOWS:
-                made = window.apply(segment)
-                values = touch_pattern(made, window.rate_hz)
-                if not (len(made) and np.isfinite(values).all() and made.min() >= 0.0 and made.max() <= 1.0 + 1e-6):
-                    return "out of range"
-        except (Warning, ArithmeticError, ValueError) as error:
-            return f"{type(error).__name__}: {error}"
-    return ""
