@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from gestured.lab.cli import main
 from tests.opening import in_bounds, refused
 
 MIB = 128
@@ -61,12 +60,3 @@ def test_numbers_beyond_what_a_frame_can_hold_are_no_frames(tmp_path: Path, line
     path = tmp_path / "a.csv"
     path.write_text("\n".join(lines) + "\n")
     assert "expected" in refused("csv", path)
-
-
-def test_a_fifo_is_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    import os
-
-    os.mkfifo(tmp_path / "a.csv")
-    assert "not a regular file" in refused("csv", tmp_path / "a.csv")
-    status = main(["import", "--participant", "07", str(tmp_path / "a.csv"), "--out", "b.npz"])
-    assert status == 1 and "a.csv" in capsys.readouterr().out

@@ -14,7 +14,6 @@ from gestured.record.arrays import read, write
 from gestured.record.recordings import Recordings
 from tests.small_recording import example, same, session
 
-DATA = Path(__file__).parent.parent.parent / "shared" / "data"
 FRAMES = (np.uint8, np.uint16, np.int16, np.int32, np.float16, np.float32, np.float64, np.dtype(">u2"))
 
 
@@ -82,18 +81,3 @@ def test_stream_gives_what_the_front_end_takes() -> None:
     np.testing.assert_array_equal(frames[0].values, example().frames[4])
     without = replace(example(), touches=None, touch_ids=None)
     assert all(frame.touches == () for frame in without.stream(1))
-
-
-@pytest.mark.parametrize(("name", "count"), [("gestures", 4985), ("sessions", 10)])
-def test_real_recordings(tmp_path: Path, name: str, count: int) -> None:
-    path = DATA / f"capfingerid_{name}_dev.npz"
-    if not path.exists():
-        pytest.skip(f"the real recordings are not here: {path}")
-    recordings = read(path)
-    assert len(recordings) == count
-    write(tmp_path / "again.npz", recordings)
-    same(read(tmp_path / "again.npz"), recordings)
-    for i in range(0, count, max(count // 5, 1)):
-        times = recordings.times_of(i)
-        np.testing.assert_array_equal(recordings.frames_of(i), [frame.values for frame in recordings.stream(i)])
-        assert times[-1] > times[0]

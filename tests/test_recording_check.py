@@ -110,11 +110,6 @@ def test_wrong_recordings_are_not_written(tmp_path: Path) -> None:
     assert os.listdir(tmp_path) == ["r.npz"]
 
 
-def test_place_that_cannot_be_written(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"nowhere.r\.npz: cannot be written"):
-        write(tmp_path / "nowhere" / "r.npz", example())
-
-
 def test_members_that_are_not_known_are_left_alone(tmp_path: Path) -> None:
     same(read(save(tmp_path / "r.npz", example(), temperature=np.array([20.5]))), example())
 

@@ -1,4 +1,4 @@
-"""The consumers of docs/connect.md, but for the addresses, and what gesturectl doctor says of bridges."""
+"""The consumers of docs/connect.md and docs/fleet.md, but for the addresses; what gesturectl doctor says of bridges."""
 
 import os
 import subprocess
@@ -20,18 +20,35 @@ def consumer(phrase: str) -> str:
     return found
 
 
-def first_line(code: str, daemon: Daemon) -> str:
-    """What a consumer prints first, while somebody swipes again and again."""
+def heard(code: str, *daemons: Daemon) -> set[str]:
+    """What a consumer prints first of each daemon, while somebody swipes again and again."""
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    lines: set[str] = set()
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=environment) as process:
         os.set_blocking(process.stdout.fileno(), False)
         try:
-            while not (line := process.stdout.readline()):
+            while len(lines) < len(daemons):
                 assert process.poll() is None
-                emit(daemon, "swipe_left")
+                for daemon in daemons:
+                    emit(daemon, "swipe_left")
+                lines |= set(iter(process.stdout.readline, ""))
         finally:
             process.kill()
-    return line
+    return lines
+
+
+def test_one_subscriber_hears_several_daemons(model: Path, tmp_path: Path):
+    (code,) = [block.text for block in blocks(document="docs/fleet.md") if "gestured.Subscriber" in block.text]
+    daemons = {}
+    try:
+        for name in ("gestured-left", "gestured-right"):
+            (tmp_path / name).mkdir()
+            daemons[name] = Daemon.start(tmp_path / name, model)
+        found = heard(code.replace("/run/", f"{tmp_path}/"), *daemons.values())
+        assert found == {f"{name} armrest swipe_left\n" for name in daemons}
+    finally:
+        for daemon in daemons.values():
+            daemon.stop()
 
 
 def test_the_mqtt_consumer(bridge, broker, daemon: Daemon):
@@ -39,7 +56,7 @@ def test_the_mqtt_consumer(bridge, broker, daemon: Daemon):
     at = broker()
     begin(bridge, at, daemon).ready()
     code = consumer("paho.mqtt").replace("192.168.7.2", "127.0.0.1").replace("1883", str(at.port))
-    assert first_line(code, daemon) == "armrest swipe_left\n"
+    assert heard(code, daemon) == {"armrest swipe_left\n"}
 
 
 def test_the_zenoh_consumer(bridge, daemon: Daemon):
@@ -50,7 +67,7 @@ def test_the_zenoh_consumer(bridge, daemon: Daemon):
     try:
         test_zenoh.begin(bridge, site, daemon).ready()
         code = consumer("declare_subscriber").replace("tcp/192.168.7.2:7447", site.endpoint)
-        assert first_line(code, daemon) == "armrest swipe_left\n"
+        assert heard(code, daemon) == {"armrest swipe_left\n"}
     finally:
         site.close()
 

@@ -41,8 +41,10 @@ def test_a_recording_holds_every_packet_and_replays_to_the_same_events(recorded,
     twins = [json.loads(line) for line in out.splitlines()]
     assert [(e["type"], e["id"]) for e in twins] == [(e["type"], e["id"]) for e in found.events]
     for event, twin in zip(found.events, twins, strict=True):
-        for key, value in event.items():
-            assert twin[key] == (value if isinstance(value, str) else pytest.approx(value, abs=1e-3)), key
+        for one, other in ((event, twin), (event.get("where", {}), twin.get("where", {}))):
+            for key in one.keys() - {"where"}:
+                close = one[key] if isinstance(one[key], str | None) else pytest.approx(one[key], abs=1e-3)
+                assert other[key] == close, key
     status, out, err = run("replay", path, "--diff", "--model", model)
     assert (status, out) == (0, "") and "3 recorded answers, 0 differences" in err
 
@@ -175,17 +177,6 @@ def test_a_scene_that_says_something_else_is_one_sentence(capsys, tmp_path: Path
         out, err = capsys.readouterr()
         assert out == ""
     assert said in err and err.startswith("gesturectl: ") and err.count("\n") == 1
-
-
-def test_what_is_no_recording_is_one_sentence(capsys, tmp_path: Path) -> None:
-    path = tmp_path / "x.mcap"
-    for data in (b"", b"hello", b"\x89MCAP0\r\n", os.urandom(5000)):
-        path.write_bytes(data)
-        assert main(["replay", str(path)]) == 1
-        out, err = capsys.readouterr()
-        assert out == "" and err.count("\n") == 1 and str(path) in err
-    assert main(["replay", str(tmp_path / "none.mcap")]) == 1
-    assert "No such file" in capsys.readouterr().err
 
 
 def test_differences_match_contacts_by_sensor_and_onset() -> None:
