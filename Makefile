@@ -3,7 +3,8 @@
 # Two environments: .venv holds the runtime alone (what a vehicle gets), .venv-dev what tests and training need.
 # A stamp in each says that it is complete, so that the second run asks pip for nothing and works offline.
 
-.PHONY: help demo bridges test golden lint bench lab hostile fuzz soak install uninstall system-test clean
+.PHONY: help demo bridges test golden lint bench lab hostile fuzz soak install uninstall system-test \
+	dist deb release package-test lock clean
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
 MAKEFLAGS += --no-builtin-rules
@@ -15,6 +16,7 @@ SECONDS = 60
 MODEL = cnn_lstm
 PYTHON =
 ARGS =
+ARCH =
 DESTDIR =
 PREFIX = /usr
 # The same version everywhere; the extra index has the build without CUDA, which is a tenth of the size.
@@ -86,6 +88,31 @@ uninstall:  ## remove what `make install` has put there; settings and account st
 system-test: .venv-dev/.dev  ## install, boot a real systemd (root, systemd-nspawn), and treat the daemon badly
 	@.venv-dev/bin/python -m pytest -rs -s tests/systemd/fleet.py tests/systemd/system.py
 
+dist: build/tools/.tools  ## the wheel and the sdist into dist/, built twice and compared
+	@build/tools/bin/python -m deploy.release build dist
+	@build/tools/bin/twine check --strict dist/gestured-*
+
+deb: PYTHON := $(or $(PYTHON),/usr/bin/python3)
+deb:  ## a Debian package for this Debian or Ubuntu into dist/: ARCH=arm64 puts one together for another machine
+	@rm -rf build/deb && mkdir -p build
+	$(call venv,build/deb)
+	@deploy/deb.sh build/deb dist "$(ARCH)"
+
+release: build/tools/.tools  ## what a tagged commit publishes into an empty dist/: wheel, sdist, .deb, SHA256SUMS
+	@build/tools/bin/python -m deploy.release ready
+	@rm -rf dist
+	@$(MAKE) -s --no-print-directory dist
+	@$(MAKE) -s --no-print-directory deb
+	@build/tools/bin/python -m deploy.release sums dist
+	@echo "next: git push --tags; build/tools/bin/twine upload dist/gestured-*; publish the .deb and SHA256SUMS beside them"
+
+package-test: .venv-dev/.dev build/tools/.tools  ## the wheel and the .deb as a stranger uses them (root, mmdebstrap, systemd-nspawn)
+	@.venv-dev/bin/python -m pytest -rs -s tests/systemd/package.py $(ARGS)
+
+lock: build/tools/.tools  ## the newest versions of what a package brings and is built with, with hashes, into deploy/locks
+	@echo 'build setuptools>=77 shtab>=1.9' | tr ' ' '\n' | $(LOCK) - --output-file deploy/locks/build.txt
+	@$(LOCK) pyproject.toml --extra mqtt --extra zenoh --extra serial --output-file deploy/locks/runtime.txt
+
 clean:  ## remove the environments and what tools left behind
 	rm -rf .venv .venv-dev build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
@@ -126,6 +153,17 @@ endef
 .venv-dev/.dev: pyproject.toml
 	$(call venv,.venv-dev)
 	$(call install,.venv-dev,the test tools,-e '.[dev]')
+	@touch $@
+
+LOCK = build/tools/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
+	--custom-compile-command "make lock"
+
+# What builds is pinned, as a wheel says what built it; what only looks at it is not.
+build/tools/.tools: deploy/locks/build.txt
+	@mkdir -p build
+	$(call venv,build/tools)
+	$(call install,build/tools,what builds packages,--require-hashes -r deploy/locks/build.txt)
+	$(call install,build/tools,what tries packages,pipx twine uv)
 	@touch $@
 
 .venv-dev/.lab: .venv-dev/.dev

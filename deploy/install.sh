@@ -2,6 +2,7 @@
 # What `make install` runs in the project's folder: deploy/install.sh VENV DESTDIR PREFIX. VENV was made by the
 # interpreter that the installed programs run under; it is used to build, and nothing of it is installed.
 # The packages get a folder of their own below PREFIX/lib, made beside the one of before, whose place it then takes.
+# For a Debian package deploy/deb.sh has put all that VENV lacks into the folder WHEELS, and nothing is asked of an index.
 set -eu
 umask 022
 venv=$1 root=$2 prefix=$3
@@ -11,6 +12,11 @@ share=$prefix/share
 doc=$share/doc/gestured
 units=$prefix/lib/systemd/system
 new=$root$lib.new old=$root$lib.old
+
+if [ -z "$root" ] && dpkg-query --show --showformat='${db:Status-Status}' gestured 2>/dev/null | grep -q '^installed$'; then
+    echo "gestured is installed as a Debian package: sudo apt remove gestured (settings and own gestures stay) first" >&2
+    exit 1
+fi
 work=$(mktemp -d)
 trap 'rm -rf "$work" "$new"' EXIT
 
@@ -43,12 +49,18 @@ mkdir "$work/source"
 cp -RP pyproject.toml README.md LICENSE NOTICE gestured models gestured_models "$work/source"
 rm -rf "$new" "$old"
 mkdir -p "$(dirname "$new")"
-pip shtab  # makes the completions
-pip --no-compile --target "$new" "$work/source[mqtt,zenoh,serial]"
+if [ -n "${WHEELS-}" ]; then
+    # shellcheck disable=SC2046,SC2086 # one argument for each wheel; a name of a wheel has no blanks
+    pip --no-compile --target "$new" --no-index --no-deps --only-binary :all: $PLATFORM $(echo "$WHEELS"/*.whl)
+    pip --no-compile --target "$new" --no-index --no-deps --no-build-isolation "$work/source"
+else
+    pip shtab  # makes the completions
+    pip --no-compile --target "$new" "$work/source[mqtt,zenoh,serial]"
+fi
 rm -rf "${new:?}/bin"
 find "$new" -name __pycache__ -type d -prune -exec rm -rf {} +
-"$python" -m compileall -q -j 0 -s "$new" -p "$lib" "$new"
-PYTHONPATH=$new PYTHONDONTWRITEBYTECODE=1 "$venv/bin/python" -m deploy.generate install "$work/share"
+"$python" -m compileall -q -j 0 ${WHEELS:+--invalidation-mode unchecked-hash} -s "$new" -p "$lib" "$new"
+PYTHONPATH=${WHEELS:-$new} PYTHONDONTWRITEBYTECODE=1 "$venv/bin/python" -m deploy.generate install "$work/share"
 if [ -e "$root$lib" ]; then mv "$root$lib" "$old"; fi
 mv "$new" "$root$lib"
 rm -rf "$old"

@@ -1,4 +1,4 @@
-"""A booted systemd in a container: this machine's /usr, read-only, and above it what `make install` has made."""
+"""A booted systemd in a container: a whole system, or this machine's /usr below what `make install` has made."""
 
 import ctypes
 import os
@@ -39,23 +39,29 @@ def wait(what: str, condition: Callable[[], Any], found_instead: Callable[[], ob
 
 
 class Container:
-    """`installed` is a folder that `make install DESTDIR=` has filled; it becomes the root. A context manager."""
+    """A folder that `make install DESTDIR=` has filled, or a `whole` system, becomes the root. A context manager."""
 
-    def __init__(self, installed: Path) -> None:
-        self.root = installed
-        self._usr = installed.with_name("usr")
-        self._log = installed.with_name("console.txt")
+    def __init__(self, root: Path, whole: bool = False) -> None:
+        self.root = root
+        self._whole = whole
+        self._usr = root.with_name("usr")
+        self._log = root.with_name("console.txt")
 
-    def __enter__(self) -> "Container":
+    def _borrow(self) -> None:
+        """Take this machine's programs and libraries, where there are only the installed ones."""
         (self.root / "usr").rename(self._usr)
         for name in ("usr", "dev", "proc", "sys", "run", "tmp", "var"):
             (self.root / name).mkdir(exist_ok=True)
         for name in ("bin", "sbin", "lib", "lib64"):
             (self.root / name).symlink_to(f"usr/{name}")
         shutil.copy("/usr/lib/os-release", self.root / "etc")
-        (self.root / "etc" / "machine-id").write_text(uuid.uuid4().hex + "\n")  # no first boot: nothing is preset
         lower = f"lowerdir={self._usr}:/usr"
         subprocess.run(["mount", "-t", "overlay", "overlay", "-o", lower, self.root / "usr"], check=True)
+
+    def __enter__(self) -> "Container":
+        if not self._whole:
+            self._borrow()
+        (self.root / "etc" / "machine-id").write_text(uuid.uuid4().hex + "\n")  # no first boot: nothing is preset
         command = [
             "systemd-nspawn", "--boot", f"--directory={self.root}", f"--machine=gestured-{os.getpid()}",
             "--register=no", "--keep-unit", "--private-network", "--console=pipe",
@@ -80,7 +86,8 @@ class Container:
         except subprocess.TimeoutExpired:
             self._nspawn.kill()
             self._nspawn.wait()
-        subprocess.run(["umount", self.root / "usr"], check=True)
+        if not self._whole:
+            subprocess.run(["umount", self.root / "usr"], check=True)
 
     def _leader(self) -> int | None:
         assert self._nspawn.poll() is None, self._log.read_text()

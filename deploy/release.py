@@ -1,0 +1,145 @@
+"""`python -m deploy.release build OUT` makes the wheel and the sdist; `... ready` says what keeps them from a release.
+
+It runs in the project's folder, with build and setuptools as deploy/locks/build.txt names them. It needs nothing else.
+"""
+
+import gzip
+import hashlib
+import io
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import tempfile
+import zipfile
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+BESIDE = {"LICENSE", "MANIFEST.in", "NOTICE", "README.md", "pyproject.toml"}  # what the sdist holds beside the packages
+
+
+def version(root: Path) -> str:
+    """The one place that says it."""
+    (found,) = re.findall(r'^__version__ = "(.+)"$', (root / "gestured" / "__init__.py").read_text(), re.MULTILINE)
+    return str(found)
+
+
+def faults(number: str, changelog: str, changed: str, head: str, tagged: str) -> list[str]:
+    """What keeps a commit from being the release of this version; `tagged` is the commit of its tag, or empty."""
+    found = []
+    heading = (re.findall(r"^## (.+)$", changelog, re.MULTILINE) or ["nothing"])[0]
+    if not re.fullmatch(rf"{re.escape(number)} - \d{{4}}-\d\d-\d\d", heading):
+        found.append(f'CHANGELOG.md begins with "{heading}", not with "{number} - DATE"')
+    if changed:
+        found.append(f"not committed: {' '.join(line[3:] for line in changed.splitlines())}")
+    if not tagged:
+        found.append(f"no tag: git tag --annotate v{number} --message 'gestured {number}'")
+    elif tagged != head:
+        found.append(f"v{number} is the tag of another commit: raise the version in gestured/__init__.py")
+    return found
+
+
+def git(*arguments: str) -> str:
+    """What git says; nothing, where it fails."""
+    return subprocess.run(["git", *arguments], capture_output=True, text=True, check=False).stdout.strip("\n")
+
+
+def run(command: Sequence[str | Path], environment: dict[str, str]) -> None:
+    """Run it, silently where it works."""
+    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{done.stdout}{' '.join(map(str, command))} failed")
+
+
+def same_bytes(sdist: Path, epoch: int) -> None:
+    """Write an sdist anew without what the machine and the moment put into it: times, owners, an order of files."""
+    with tarfile.open(sdist) as before:
+        members = sorted(before.getmembers(), key=lambda member: member.name)
+        packed = io.BytesIO()
+        with tarfile.open(fileobj=packed, mode="w", format=tarfile.PAX_FORMAT) as after:
+            for member in members:
+                member.mtime, member.uid, member.gid, member.uname, member.gname = epoch, 0, 0, "", ""
+                member.mode = 0o755 if member.isdir() else 0o644
+                member.pax_headers = {}
+                after.addfile(member, before.extractfile(member) if member.isfile() else None)
+    with sdist.open("wb") as raw, gzip.GzipFile(filename="", mode="wb", fileobj=raw, mtime=epoch) as file:
+        file.write(packed.getvalue())
+
+
+def build(out: Path, epoch: int) -> list[Path]:
+    """Build the sdist of what git knows, and the wheel of that sdist."""
+    environment = {**os.environ, "SOURCE_DATE_EPOCH": str(epoch)}
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / "source"
+        run(["deploy/source.sh", source], environment)
+        call: list[str | Path] = [sys.executable, "-m", "build", "--no-isolation", "--outdir", out]
+        run([*call, "--sdist", source], environment)
+        (sdist,) = out.glob("*.tar.gz")
+        same_bytes(sdist, epoch)
+        with tarfile.open(sdist) as archive:
+            archive.extractall(folder, filter="data")
+        (unpacked,) = Path(folder).glob("gestured-*")
+        run([*call, "--wheel", unpacked], environment)
+    (wheel,) = out.glob("*.whl")
+    return [wheel, sdist]
+
+
+def shipped(tracked: Iterable[str]) -> set[str]:
+    """The files of the packages, as the wheel names them, among the files that git knows."""
+    models = {
+        f"gestured_models/{name[7:]}" for name in tracked if re.fullmatch(r"models/[^/]+\.(py|md|onnx|json)", name)
+    }
+    return models | {name for name in tracked if name.startswith("gestured/")}
+
+
+def strange(wheel: Path, sdist: Path, tracked: list[str]) -> list[str]:
+    """What is missing in either, or has no business there."""
+    ours = shipped(tracked)
+    with zipfile.ZipFile(wheel) as archive:
+        in_wheel = {name for name in archive.namelist() if ".dist-info/" not in name}
+        licences = {name.rsplit("/", 1)[1] for name in archive.namelist() if "/licenses/" in name}
+    with tarfile.open(sdist) as tar:
+        in_sdist = {member.name.split("/", 1)[1] for member in tar.getmembers() if member.isfile()}
+    in_sdist = {name for name in in_sdist if not name.startswith("gestured.egg-info/")} - {"PKG-INFO", "setup.cfg"}
+    found = [f"{wheel.name}: {name}" for name in sorted(in_wheel ^ ours)]
+    found += [f"{wheel.name}: no {name}" for name in sorted({"LICENSE", "NOTICE"} - licences)]
+    return found + [f"{sdist.name}: {name}" for name in sorted(in_sdist ^ (ours | BESIDE))]
+
+
+def sums(files: Iterable[Path]) -> str:
+    """Their digests, as `sha256sum --check` reads them."""
+    return "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in sorted(files))
+
+
+def main(arguments: list[str]) -> int | str:
+    """Run the command; what is wrong, or 0."""
+    match arguments:
+        case ["ready"]:
+            number = version(Path())
+            tagged = git("rev-parse", "--verify", "--quiet", f"v{number}^{{commit}}")
+            changelog, changed = Path("CHANGELOG.md").read_text(), git("status", "--porcelain")
+            return "\n".join(faults(number, changelog, changed, git("rev-parse", "HEAD"), tagged)) or 0
+        case ["build", out]:
+            os.umask(0o022)
+            epoch = int(os.environ.get("SOURCE_DATE_EPOCH") or git("log", "-1", "--format=%ct"))
+            with tempfile.TemporaryDirectory() as once, tempfile.TemporaryDirectory() as again:
+                files, others = build(Path(once), epoch), build(Path(again), epoch)
+                if differ := [
+                    one.name for one, other in zip(files, others, strict=True) if sums([one]) != sums([other])
+                ]:
+                    return f"built twice, and not equal: {' '.join(differ)}"
+                if found := strange(files[0], files[1], git("ls-files").splitlines()):
+                    return "missing there, or too much:\n" + "\n".join(found)
+                Path(out).mkdir(exist_ok=True)
+                for path in files:
+                    (Path(out) / path.name).write_bytes(path.read_bytes())
+            return 0
+        case ["sums", out]:
+            (Path(out) / "SHA256SUMS").write_text(sums(path for path in Path(out).glob("gestured[-_]*")))
+            return 0
+    return "usage: python -m deploy.release build OUT | sums OUT | ready"
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
