@@ -16,6 +16,7 @@ from tests import encoding
 from tests.control.conftest import asked
 from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor, counted, floats
 from tests.sockets import free_address
+from tests.swipes import swipes
 
 
 def test_simulate_to_where_nobody_listens_ends_at_once(run) -> None:
@@ -130,18 +131,6 @@ def test_a_rate_outside_the_range_is_told_with_the_range(ctl, daemon: Daemon, ra
     assert [f["level"] for f in words] == ([level] if level == "warn" else [])
     (line,) = [line for line in ctl("status")[1].splitlines() if name in line]
     assert ("5 to 1000 Hz" in line) == (level == "warn")
-
-
-def swipes(rows: int, columns: int) -> np.ndarray:
-    """(T, R, C) counts: a sensor of that grid, touched by a finger that moves along its rows five times."""
-    random = np.random.default_rng(0)
-    y, x = np.mgrid[:rows, :columns]
-    frames = [np.zeros((rows, columns))] * 30
-    for row in np.linspace(1, rows - 2, 5):
-        ways = np.linspace(1, columns - 2, 7)
-        frames += [200 * np.exp(-((y - row) ** 2 + (x - column) ** 2) / 1.6) for column in ways]
-        frames += [np.zeros((rows, columns))] * 15
-    return np.rint(20 + np.array(frames) + random.normal(0, 1, (len(frames), rows, columns)))
 
 
 def test_rows_and_columns_that_are_exchanged(run, own) -> None:

@@ -16,6 +16,7 @@ from gestured.daemon.merge import load_settings
 from tests import encoding
 from tests.daemon.harness import Hand, blob, counted, floats, ints
 from tests.sockets import free_address
+from tests.swipes import swipes
 
 
 def seen(packets, rate: float = 15.0) -> Sight:
@@ -27,18 +28,6 @@ def seen(packets, rate: float = 15.0) -> Sight:
 
 def counted_ints(address: str, frame, n: int) -> bytes:
     return encoding.message(address, "i" * (frame.size + 1), (np.concatenate([[1000 + n], frame.ravel()]),))
-
-
-def touched(rows: int, columns: int, sign: float = 1.0) -> list[np.ndarray]:
-    """An idle second and a half, and two swipes along the rows, of a sensor with that grid."""
-    random = np.random.default_rng(1)
-    y, x = np.mgrid[:rows, :columns]
-    frames = [np.zeros((rows, columns))] * 25
-    for row in (rows // 3, 2 * rows // 3):
-        for column in np.linspace(1, columns - 2, 8):
-            frames.append(200 * np.exp(-((y - row) ** 2 + (x - column) ** 2) / 1.6))
-        frames += [np.zeros((rows, columns))] * 10
-    return [np.rint(300 + sign * f + random.normal(0, 1, f.shape)) for f in frames]
 
 
 def valid(proposed: list[str], tmp_path) -> dict[str, Any]:
@@ -53,10 +42,10 @@ def valid(proposed: list[str], tmp_path) -> dict[str, Any]:
 def test_a_counter_before_ints_is_told_from_a_taxel(tmp_path) -> None:
     fits = seen(counted_ints("/arm/pressure", Hand().frame(), n) for n in range(8))
     assert propose(fits.rows()) == ["the defaults fit what arrives"]
-    larger = seen(counted_ints("/arm/pressure", frame, n) for n, frame in enumerate(touched(16, 12)))
+    larger = seen(counted_ints("/arm/pressure", frame, n) for n, frame in enumerate(swipes(16, 12)))
     assert valid(propose(larger.rows()), tmp_path) == {"arm": ((16, 12), False)}
     without = seen(
-        encoding.message("/arm/pressure", "i" * 192, (frame.ravel(),)) for n, frame in enumerate(touched(12, 16))
+        encoding.message("/arm/pressure", "i" * 192, (frame.ravel(),)) for n, frame in enumerate(swipes(12, 16))
     )
     assert valid(propose(without.rows()), tmp_path) == {"arm": ((12, 16), False)}
 
@@ -71,14 +60,14 @@ def test_a_grid_is_proposed_whether_or_not_somebody_touched_it(tmp_path) -> None
 
 def test_both_mistakes_are_mended_at_once(tmp_path) -> None:
     """Rows and columns are exchanged, and counts fall."""
-    frames = (frame.reshape(12, 6) for frame in touched(6, 12, -1.0))
+    frames = (frame.reshape(12, 6) for frame in swipes(6, 12, -1.0))
     sight = seen(floats("/arm/pressure", frame, n) for n, frame in enumerate(frames))
     known = Known(grid=(12, 6), told=True)
     assert valid(propose(sight.rows(), known), tmp_path) == {"arm": ((6, 12), True)}
 
 
 def test_nothing_is_proposed_where_the_daemon_is_set_to_what_arrives() -> None:
-    sight = seen(floats("/x/arm/y", frame, n) for n, frame in enumerate(touched(27, 15)))
+    sight = seen(floats("/x/arm/y", frame, n) for n, frame in enumerate(swipes(27, 15)))
     assert propose(sight.rows())
     known = Known(pressure="/x/{sensor}/y", grid=(9, 9), sensors={"arm": ((27, 15), False)}, told=True)
     assert propose(sight.rows(), known) == ["the settings of the daemon fit what arrives"]
@@ -91,7 +80,7 @@ def test_nothing_is_proposed_where_the_daemon_is_set_to_what_arrives() -> None:
 
 
 def test_rows_and_columns_the_other_way_round(tmp_path) -> None:
-    sight = seen(floats("/arm/pressure", frame, n) for n, frame in enumerate(touched(12, 6)))
+    sight = seen(floats("/arm/pressure", frame, n) for n, frame in enumerate(swipes(12, 6)))
     known = Known(sensors={"arm": ((6, 12), False)})
     proposed = propose(sight.rows(), known)
     assert valid(proposed, tmp_path) == {"arm": ((12, 6), False)} and "rows and columns" in "\n".join(proposed)
@@ -99,7 +88,7 @@ def test_rows_and_columns_the_other_way_round(tmp_path) -> None:
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_counts_that_fall(tmp_path, sign: float) -> None:
-    sight = seen(counted("/arm/pressure", frame, n) for n, frame in enumerate(touched(9, 9, sign)))
+    sight = seen(counted("/arm/pressure", frame, n) for n, frame in enumerate(swipes(9, 9, sign)))
     proposed = propose(sight.rows())
     if sign > 0:
         assert proposed == ["the defaults fit what arrives"]

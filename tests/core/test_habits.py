@@ -9,21 +9,7 @@ from gestured.core.mounting import Mounting
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
 from gestured.record.replay import Mute
-
-RATE_HZ = 15.0
-
-
-def session(rows: int, columns: int, sign: float = 1.0, contacts: int = 4, seed: int = 0) -> np.ndarray:
-    """(T, R, C) counts: an idle second and a half, then swipes across with a quiet second after each."""
-    rng = np.random.default_rng(seed)
-    y, x = np.mgrid[:rows, :columns]
-    frames = [np.zeros((rows, columns))] * 22
-    for n in range(contacts):
-        row = (n + 1) * (rows - 1) / (contacts + 1)
-        for column in np.linspace(1, columns - 2, 7):
-            frames.append(sign * 300 * np.exp(-((y - row) ** 2 + (x - column) ** 2) / 1.6))
-        frames += [np.zeros((rows, columns))] * 15
-    return 500 + np.array(frames) + rng.normal(0, 2, (len(frames), rows, columns))
+from tests.swipes import RATE_HZ, swipes
 
 
 def played(frames: np.ndarray, mounting: Mounting | None = None) -> Sensor:
@@ -42,10 +28,10 @@ def seen(sensor: Sensor) -> tuple[bool, bool]:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_counts_that_fall_under_a_finger_are_noticed_and_inverting_them_helps(seed: int) -> None:
-    falling = played(session(9, 9, -1.0, seed=seed))
+    falling = played(swipes(9, 9, -1.0, seed=seed))
     assert seen(falling)[0] and falling.segments == 0
-    assert not seen(played(session(9, 9, 1.0, seed=seed)))[0]
-    mended = played(session(9, 9, -1.0, seed=seed), mounting=Mounting(invert=True))
+    assert not seen(played(swipes(9, 9, 1.0, seed=seed)))[0]
+    mended = played(swipes(9, 9, -1.0, seed=seed), mounting=Mounting(invert=True))
     assert mended.segments == 4 and not seen(mended)[0]
 
 
@@ -60,7 +46,7 @@ def test_inverted_counts_are_read_as_if_they_rose() -> None:
 @pytest.mark.parametrize(("rows", "columns"), [(6, 12), (12, 6), (27, 15), (8, 10)])
 @pytest.mark.parametrize("mounting", [Mounting(), Mounting(90), Mounting(270, True)])
 def test_exchanged_rows_and_columns_are_noticed(rows: int, columns: int, mounting: Mounting) -> None:
-    frames = session(rows, columns, contacts=5)
+    frames = swipes(rows, columns, contacts=5)
     right = played(frames, mounting=mounting)
     assert right.segments == 5 and not seen(right)[1]
     wrong = played(frames.reshape(-1, columns, rows), mounting=mounting)
@@ -69,14 +55,14 @@ def test_exchanged_rows_and_columns_are_noticed(rows: int, columns: int, mountin
 
 @pytest.mark.parametrize(("rows", "columns"), [(6, 12), (12, 6)])
 def test_rows_and_columns_that_are_exchanged_are_noticed_where_counts_fall_as_well(rows: int, columns: int) -> None:
-    frames = session(rows, columns, -1.0, contacts=5)
+    frames = swipes(rows, columns, -1.0, contacts=5)
     right, wrong = (seen(played(each)) for each in (frames, frames.reshape(-1, columns, rows)))
     assert right == (True, False)
     assert wrong == (True, True)
 
 
 def test_what_was_noticed_is_forgotten_when_the_sensor_is_learned_anew() -> None:
-    falling = played(session(9, 9, -1.0))
+    falling = played(swipes(9, 9, -1.0))
     falling.reset()
     assert not seen(falling)[0]
 

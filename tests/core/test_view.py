@@ -12,7 +12,7 @@ from gestured.core.front_end import FrontEnd
 from gestured.core.mounting import Mounting
 from gestured.core.segmenter import CONTACT, GAP, IDLE, RELEASING, SPENT, Signal
 from gestured.core.timing import Timing
-from tests.core.test_habits import RATE_HZ, session
+from tests.swipes import RATE_HZ, swipes
 
 
 @given(
@@ -34,7 +34,7 @@ def test_the_thresholds_that_are_shown_are_those_that_decide(phase, peak: float,
 def test_before_and_after_the_sensor_is_learned() -> None:
     front_end = FrontEnd(9, 9)
     assert view_of(front_end, raw=False) is None
-    frames = session(9, 9)
+    frames = swipes(9, 9)
     front_end.push(Frame(0.0, frames[0]))
     shown = view_of(front_end, raw=True)
     assert shown is not None and shown.values is None and np.array_equal(shown.raw, frames[0])
@@ -50,7 +50,7 @@ def test_before_and_after_the_sensor_is_learned() -> None:
 
 def test_a_bad_taxel_is_marked_and_shows_what_it_is_bridged_with() -> None:
     rng = np.random.default_rng(0)
-    frames = session(9, 9)
+    frames = swipes(9, 9)
     frames[:, 2, 3] += rng.normal(0, 100, len(frames))
     front_end = FrontEnd(9, 9, mounting=Mounting(90))
     for n, values in enumerate(frames):
