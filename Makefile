@@ -4,7 +4,7 @@
 # A stamp in each says that it is complete, so that the second run asks pip for nothing and works offline.
 
 .PHONY: help demo bridges test golden lint bench lab hostile fuzz soak install uninstall system-test \
-	dist deb release package-test lock clean
+	dist deb release package-test lock site clean
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
 MAKEFLAGS += --no-builtin-rules
@@ -112,6 +112,9 @@ package-test: .venv-dev/.dev build/tools/.tools  ## the wheel and the .deb as a 
 lock: build/tools/.tools  ## the newest versions of what a package brings and is built with, with hashes, into deploy/locks
 	@echo 'build setuptools>=77 shtab>=1.9' | tr ' ' '\n' | $(LOCK) - --output-file deploy/locks/build.txt
 	@$(LOCK) pyproject.toml --extra mqtt --extra zenoh --extra serial --output-file deploy/locks/runtime.txt
+
+site: .venv-dev/.dev  ## the documents as a searchable site in build/site/html
+	@deploy/site/build.sh .venv-dev/bin/python build/site
 
 clean:  ## remove the environments and what tools left behind
 	rm -rf .venv .venv-dev build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache
