@@ -5,9 +5,10 @@
     python -m experiments.everyday --hours 10 --foreign nominal
     python -m experiments.everyday --recordings session.npz
 
-Each hour is of another simulated person, at one place after the other (life.py); its frames pass through the daemon's
-own path. A gesture that is said where none was meant is false. A tap that is said of a contact which was a tap, though
-nobody meant it, is counted apart: no model can know better there. With --document the table is written into a page.
+Each hour is of another simulated person, at one place after the other (gestured/simulator/everyday.py); its frames
+pass through the daemon's own path. A gesture that is said where none was meant is false. A tap that is said of a
+contact which was a tap, though nobody meant it, is counted apart: no model can know better there. With --document the
+table is written into a page.
 With --foreign the hours are those of another generator (experiments/foreign/life.py), from which nothing learns.
 With --recordings they are those of files; in one that does not tell what was performed all that is said is false.
 """
@@ -24,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import experiments.foreign.life as foreign
-from experiments.everyday.life import PLACES, day
 from experiments.foreign import LEVELS
 from gestured.core.classifier import Classifier
 from gestured.core.events import Event, Gesture, Provisional
@@ -40,6 +40,7 @@ from gestured.model.shipped import shipped
 from gestured.record.arrays import read
 from gestured.record.check import SESSION
 from gestured.record.judge import NONE, Performed, verdict, whose
+from gestured.simulator.everyday import PLACES, day
 
 HOUR_S = 3600.0
 FIRST = 5000  # the first day's seed; no training has drawn it
@@ -109,9 +110,8 @@ def lived(args: argparse.Namespace) -> Iterator[Stretch]:
     elif not args.recordings:
         for n in range(args.hours):
             life = day(args.seed + n, list(PLACES)[n % len(PLACES)], HOUR_S)
-            acts = [Performed(act.label, act.kind, act.onset_s, act.offset_s) for act in life.take.events]
             taps = [Performed(NONE, act.kind, act.onset_s, act.offset_s) for act in life.like]
-            meant = [act for act in acts if act.label != NONE]
+            meant = [Performed(act.label, lay, act.onset_s, act.offset_s) for act, lay in life.meant]
             yield Stretch(life.place, life.take.times, life.take.frames, life.contacts, meant, taps)
 
 
@@ -201,10 +201,11 @@ def main() -> None:
     rows = [_row(name, one) for name, one in (*places.items(), ("all", every)) if one.seconds]
     falsely = "False gestures: " + ", ".join(f"{name} {count}" for name, count in every.names.most_common()) + "."
     notes = [falsely]
-    if args.foreign:
-        counts = {how: (every.meant_in[how, True], every.meant_in[how, False]) for how in foreign.HOW}
+    if not args.recordings:
+        hows = sorted({how for how, _ in every.meant_in})
+        counts = {how: (every.meant_in[how, True], every.meant_in[how, False]) for how in hows}
         shares = (f"{how} {good / max(good + bad, 1):.3f} of {good + bad}" for how, (good, bad) in counts.items())
-        notes.append(f"Right by what a gesture was meant in: {', '.join(shares)}.")
+        notes.append(f"Right by what lay on the sensor: {', '.join(shares)}.")
     kind = "recorded" if args.recordings else f"of the other generator, {args.foreign}" if args.foreign else "simulated"
     table = Table(f"Everyday contact, {kind}: {args.model}", head, rows, tuple(notes))
     if args.document:

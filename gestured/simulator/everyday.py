@@ -3,7 +3,7 @@
 A day is drawn for a place and a person. Postures follow one another, each for a while: an arm, an elbow, a hand, a body
 that leans, a thing that lies there, nobody. Whatever rests breathes, is re-seated now and then, and is shaken by the
 road. Beside that, things happen at rates an hour: sleeves, wiping, bumps, things put down, fingers that play. Gestures
-are meant at known times, after quiet, in the middle of it, or beside what rests.
+are meant at known times: after quiet, soon after something has left, or beside what rests and does not cover them.
 
 `POSTURES`, `PLACES` and `FINGERS` are one table: each number has its source, or is assumed. Whoever changes one prints
 the figures with both.
@@ -30,6 +30,9 @@ RESEAT_S = 9.0  # between two shifts of what rests; assumed
 TAP_S = 0.3  # what is longer is no tap, whatever was meant (99.7 % of intended touches: Matero and Colley, DIS 2012)
 TAP_TRAVEL = 0.15  # of the pad's shorter side
 APART_S = 0.3  # a gesture that is meant keeps so far from the next thing that the same hand does
+COVERS = 1.6  # standard deviations around the middle of what rests: nobody aims a gesture at a place under an arm
+AIMS = 6  # places that a person looks for beside what rests, before the gesture is given up; assumed
+SOON = 0.12  # share of all that leaves after which a gesture is meant within a second; assumed
 
 
 @dataclass(frozen=True)
@@ -68,31 +71,31 @@ class Place:
 PLACES: Mapping[str, Place] = {
     "armrest": Place(
         {NOBODY: 3.0, "forearm": 3.0, "elbow": 1.5, HAND: 1.5, "push_off": 0.5},
-        {"sleeve_brush": 30.0, "wipe": 2.0, "bump": 25.0, "object_put_down": 3.0, "wrinkle": 3.0},
+        {"sleeve_brush": 30.0, "wipe": 2.0, "bump": 25.0, "object_put_down": 3.0, "wrinkle": 3.0, "idle_tap": 8.0},
         0.06,
         45.0,
     ),
     "door": Place(
         {NOBODY: 4.0, "elbow": 3.0, "forearm": 2.0, "push_off": 1.0, HAND: 1.0},
-        {"sleeve_brush": 30.0, "bump": 30.0, "wipe": 2.0, "palm": 6.0},
+        {"sleeve_brush": 30.0, "bump": 30.0, "wipe": 2.0, "palm": 6.0, "idle_tap": 8.0},
         0.09,
         45.0,
     ),
     "seat": Place(
         {"body": 6.0, NOBODY: 1.0, HAND: 0.5, THING: 1.0},
-        {"bump": 25.0, "wrinkle": 25.0, "sleeve_brush": 6.0, "wipe": 3.0},
+        {"bump": 25.0, "wrinkle": 25.0, "sleeve_brush": 6.0, "wipe": 3.0, "idle_tap": 4.0},
         0.12,
         20.0,
     ),
     "skin": Place(
         {NOBODY: 6.0, HAND: 1.5, "body": 0.5},
-        {"bump": 25.0, "palm": 10.0, "sleeve_brush": 15.0, "wipe": 5.0, "object_put_down": 3.0},
+        {"bump": 25.0, "palm": 10.0, "sleeve_brush": 15.0, "wipe": 5.0, "object_put_down": 3.0, "idle_tap": 12.0},
         0.02,
         90.0,
     ),
     "table": Place(
         {NOBODY: 4.0, "forearm": 2.0, HAND: 2.0, THING: 3.0},
-        {"object_put_down": 25.0, "wipe": 6.0, "sleeve_brush": 20.0, "bump": 10.0, "rubbing": 4.0},
+        {"object_put_down": 25.0, "wipe": 6.0, "sleeve_brush": 20.0, "bump": 10.0, "rubbing": 4.0, "idle_tap": 12.0},
         0.0,
         60.0,
     ),
@@ -115,7 +118,11 @@ class Day:
     person: int
     take: Take
     contacts: int  # that nobody meant
+    meant: tuple[tuple[Act, str], ...]  # gestures, each with what lay on the sensor (`NOTHING`, `LEFT` or a posture)
     like: tuple[Act, ...]  # contacts that are a tap in truth, though nobody meant one
+
+
+NOTHING, LEFT = "nothing", "just left"
 
 
 def day(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = None) -> Day:
@@ -124,13 +131,13 @@ def day(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = 
     person = Participant(int(rng.integers(1 << 40)) + 2_000_000)
     sensor = sensor or SimulatedSensor.nominal(day=person.seed)
     lived = _Life(where, person, sensor, rng, seconds)
-    life = list(lived.unmeant())
-    everything = sorted([*life, *lived.meant(life)], key=lambda one: one[0])
+    life = [one for one in lived.unmeant() if one[0] < seconds]
+    meant = list(lived.meant(life))
+    everything = sorted([*life, *((at, made) for at, made, _ in meant)], key=lambda one: one[0])
     take = sensor.record(everything, seconds, rng)
-    begun = [(start, one) for start, one in life if start < seconds]
-    alone = [_truth(start, one) for start, one in begun if _like_a_tap(start, one, everything, sensor)]
-    contacts = sum(len(one.contacts) for _, one in begun)
-    return Day(place, person.seed, take, contacts, tuple(alone))
+    alone = [_truth(start, one) for start, one in life if _like_a_tap(start, one, everything, sensor)]
+    contacts = sum(len(one.contacts) for _, one in life)
+    return Day(place, person.seed, take, contacts, tuple((_truth(at, one), lay) for at, one, lay in meant), tuple(alone))
 
 
 Happening = tuple[float, Performance]  # when it begins (s), and what it is
@@ -162,19 +169,36 @@ class _Life:
         for kind, rate in self.where.rates.items():
             yield from ((at, self._happen(kind)) for at in self._times(rate, self.seconds))
 
-    def meant(self, life: list[Happening]) -> Iterator[Happening]:
-        """Gestures that somebody means, with a free hand: nothing else that moves is in their time."""
+    def meant(self, life: list[Happening]) -> Iterator[tuple[float, Performance, str]]:
+        """Gestures that somebody means with a free hand, each with what lay on the sensor.
+
+        Nothing else that moves is in their time, and nothing that rests covers their way.
+        """
+        resting = [(at, at + one.duration_s, one) for at, one in life if one.kind in POSTURES]
         moving = [(at, at + one.duration_s) for at, one in life if one.kind not in POSTURES]
+        soon = [end + float(self.rng.uniform(0.1, 1.0)) for _, end, _ in resting if self.rng.random() < SOON]
         last = 2.0
-        for at in self._times(self.where.meant, self.seconds):
-            kind = GESTURES[int(self.rng.integers(len(GESTURES)))]
-            made = perform(
-                kind, self.person, self.rng, any_speed(self.rng), int(self.rng.integers(3)), self.sensor.extent
-            )
+        for at in sorted([*self._times(self.where.meant, self.seconds), *soon]):
+            under = [one for a, b, one in resting if a - APART_S < at < b + 0.05]
+            made = self._beside(under)
+            if made is None:
+                continue
             begin, end = at - APART_S, at + made.duration_s + APART_S
-            if begin > last and end < self.seconds and not any(a < end and b > begin for a, b in moving):
+            changes = any(begin < a < end or at < b < end for a, b, _ in resting)
+            if begin > last and end < self.seconds and not changes and not any(a < end and b > begin for a, b in moving):
                 last = end
-                yield at, made
+                left = any(b < at <= b + 1.0 for _, b, _ in resting)
+                yield at, made, under[0].kind if under else LEFT if left else NOTHING
+
+    def _beside(self, under: list[Performance]) -> Performance | None:
+        """A gesture whose way nothing that rests covers; None where this person finds no place for one."""
+        kind = GESTURES[int(self.rng.integers(len(GESTURES)))]
+        for _ in range(AIMS):
+            speed, inclination = any_speed(self.rng), int(self.rng.integers(3))
+            made = perform(kind, self.person, self.rng, speed, inclination, self.sensor.extent)
+            if not any(_covers(one.contacts[0], press) for one in under for press in made.contacts):
+                return made
+        return None
 
     def _times(self, rate: float, seconds: float) -> list[float]:
         """Moments of a Poisson process of so many an hour, in order."""
@@ -232,6 +256,14 @@ def _reseated(t: Array, rng: np.random.Generator) -> Array:
     for moment, step in zip(moments, rng.normal(0.0, 1.0, moments.size), strict=True):
         way += step * np.clip((t - moment) / 0.33, 0.0, 1.0)
     return np.asarray(np.tanh(way))
+
+
+def _covers(rest: Press, press: Press) -> bool:
+    """Whether any of a finger's way lies under what rests: within `COVERS` standard deviations of its middle."""
+    dx, dy = press.x - float(np.median(rest.x)), press.y - float(np.median(rest.y))
+    c, s = math.cos(rest.angle), math.sin(rest.angle)
+    far = np.hypot((dx * c + dy * s) / (rest.length + press.length), (dy * c - dx * s) / (rest.width + press.width))
+    return bool((far < COVERS).any())
 
 
 def _truth(start: float, one: Performance) -> Act:
