@@ -10,14 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.activity import Activity, hardly_ever
-from gestured.core.contact import AfterEffect
+from gestured.core.contact import ON_SHARE, AfterEffect
 from gestured.core.idle import Idle
+from gestured.core.quantiles import median
 from gestured.core.taxels import Inspection, Taxels
 
 Array = NDArray[np.float64]
 
 LEAST_SIGMA = 0.2  # of the sensor's noise: a taxel that hardly moves counts for at most five times a usual one
 BELOW_SHARE = 0.3  # of the highest taxel: taxels less deep than that share may come with a firm finger
+DRIFTED = 0.1  # of the activity of what rested: so far the bare sensor may have drifted meanwhile
+WIDE_PEAK = 0.5  # of the highest taxel: the taxels above it tell how wide a contact is
+WIDE, WIDE_TAXELS = 0.1, 6  # share of all taxels, and taxels at least, from which on that is no finger, nor two of them
 SHIFTED, SHIFTED_OF = 3, 20  # taxels: where so many of so many lie far below the baseline, no touch does that
 
 
@@ -50,6 +54,9 @@ class Conditioner:
         """What (N,) counts at `t` s show. `after` says how far textile may still swing below its baseline."""
         if self.idle.learns_step(raw):
             self._review()
+        return self._look(t, raw, after)
+
+    def _look(self, t: float, raw: Array, after: AfterEffect) -> Look:
         above = raw - self.idle.counts
         scaled = above * self._weight
         activity, lowest = self.activity.measure(scaled)
@@ -59,6 +66,25 @@ class Conditioner:
         burst = lowest < -level
         return Look(t, raw, above, activity, True, burst, burst and _shifted(scaled, level))
 
+    def unloaded(self, look: Look, after: AfterEffect) -> Look | None:
+        """The frame anew, where what rested on the sensor has left, which the baseline does not know yet.
+
+        The sensor is then known as it was before the rest, and its textile comes back from that. None where the frame
+        does not show the sensor as it was.
+        """
+        idle, bare = self.idle, self.idle.bare
+        if bare is None:
+            return None
+        weight = self._weigh(bare.sigma)
+        left = (look.raw - bare.counts) * weight
+        rested = self.activity.measure((idle.counts - bare.counts) * weight)[0]
+        if left.min() < -max(self._deep, DRIFTED * rested) or self.activity.measure(left)[0] > ON_SHARE * rested:
+            return None  # it lies there, is about to leave, or another thing has happened
+        idle.unload(bare, look.raw)
+        self._review()
+        after.leave(rested, look.t)
+        return self._look(look.t, look.raw, after)
+
     def fallen(self, look: Look) -> float:
         """The activity that the frame would have, were its counts inverted."""
         return self.activity.measure(-look.above * self._weight)[0]
@@ -67,9 +93,18 @@ class Conditioner:
         """Where a frame is pressed, its centroid (row, column); bad taxels are left out."""
         return self.activity.place(np.where(self._weight > 0, look.above, 0.0), self.idle.level)
 
-    def settle(self, t: float, raw: Array) -> bool:
-        """Offer a frame that may be idle; true when the sensor was learned from the second that ends here."""
-        learned = self.idle.settle(t, raw)
+    def wide(self, look: Look) -> bool:
+        """Whether what presses is wider than fingers: an arm, a hand, a body, a thing."""
+        pressed = look.above * (self._weight > 0)
+        return int(np.count_nonzero(pressed >= WIDE_PEAK * pressed.max())) >= max(WIDE_TAXELS, WIDE * pressed.size)
+
+    def settle(self, t: float, raw: Array, *, rests: bool = False, wide: bool = False) -> bool:
+        """Offer a frame that may be idle; true when the sensor was learned from the second that ends here.
+
+        `rests`: something lies on the sensor that was not there when it was learned; `wide`: no finger, so that it is
+        learned with its movements where it never lies still.
+        """
+        learned = self.idle.settle(t, raw, rests=rests, restless=wide)
         if learned is None:
             return False
         self.taxels.stuck.learn(learned.constant)
@@ -126,8 +161,12 @@ class Conditioner:
         idle = self.idle
         self.taxels.review(idle.sigma, idle.level)
         self.activity.review()
-        sigma = self.activity.scale * np.maximum(idle.sigma, LEAST_SIGMA * idle.level)
-        self._weight = np.where(self.taxels.bad, 0.0, 1.0 / sigma)
+        self._weight = self._weigh(idle.sigma)
+
+    def _weigh(self, sigma: Array) -> Array:
+        """(N,) what a count weighs in noise units, by each taxel's standard deviation; nothing where it is bad."""
+        least = LEAST_SIGMA * float(median(sigma))
+        return np.where(self.taxels.bad, 0.0, 1.0 / (self.activity.scale * np.maximum(sigma, least)))
 
 
 def _shifted(scaled: Array, level: float) -> bool:

@@ -65,6 +65,12 @@ class AfterEffect:
         if self._over == math.inf:
             self._over = t
 
+    def leave(self, activity: float, t: float) -> None:
+        """What had rested on the sensor, as active as that in noise units, is gone at `t` s."""
+        self.begin()
+        self.peak = self._next = activity
+        self._over = t
+
     def recovering(self, t: float) -> bool:
         """Whether a contact has ended just before `t` s, so that what is left on the sensor is its after-effect."""
         return t - self._over < RECOVERY_S

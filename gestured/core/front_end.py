@@ -14,7 +14,8 @@ from gestured.core.conditioning import Conditioner, Look
 from gestured.core.cutter import Cutter
 from gestured.core.frames import Frame, Segment
 from gestured.core.mounting import Mounting
-from gestured.core.segmenter import Action, Deed, Segmenter
+from gestured.core.segmenter import IDLE, Action, Deed, Segmenter
+from gestured.core.taxels import RUBBISH_S
 from gestured.core.timing import Pace, Timing
 
 DRAFT_S = 0.085  # quiet for so long, all that a window takes in is there; the wait goes on to see the finger stay off
@@ -139,6 +140,9 @@ class FrontEnd:
         if t >= conditioner.idle.glance and conditioner.idle.mistaken(t, raw) and segmenter.phase.pending:
             return found + self._restart(keep=False)
         self.look = look = conditioner.look(t, raw, segmenter.after)
+        if conditioner.idle.bare is not None and (bared := conditioner.unloaded(look, segmenter.after)) is not None:
+            found += self._left()
+            self.look = look = bared
         if look.shifted:
             return found + self._shift(look)
         self._below_since = None
@@ -152,7 +156,7 @@ class FrontEnd:
             return found
         cutter.trim(t)
         if segmenter.phase.touched:
-            conditioner.settle(t, raw)  # what stays on the sensor becomes part of its baseline
+            conditioner.settle(t, raw, rests=True, wide=conditioner.wide(look))  # what stays becomes the baseline's
         else:
             conditioner.untouched(look, recovering=segmenter.after.recovering(t))
         return found
@@ -163,6 +167,12 @@ class FrontEnd:
         if len(self._cutter) > self.timing.limit_frames:
             return self.give_up(look.t)
         self.conditioner.touched(look)
+        flickering = self.conditioner.taxels.flickering.rubbish or look.t - segmenter.onset < RUBBISH_S
+        if self.conditioner.wide(look) and not flickering:
+            if self.conditioner.settle(look.t, look.raw, rests=True, wide=True):
+                return self.give_up(look.t)  # an arm that lies still is no gesture, and something else may be
+        else:
+            self.conditioner.idle.unsettle()
         if not segmenter.phase.let_go or look.t - segmenter.last_touched < DRAFT_S or self.fleeting:
             return ()
         segment = self._cutter.draft(segmenter.onset, segmenter.last_touched)
@@ -239,9 +249,18 @@ class FrontEnd:
         found: list[Found] = []
         if self._below_since is None:
             self._below_since = look.t
-        if look.t - self._below_since >= self.timing.shift_s:
+        leaving = self.conditioner.idle.bare is not None  # then `unloaded` will know the sensor when it has left
+        if look.t - self._below_since >= (self.timing.stale_s if leaving else self.timing.shift_s):
             found = self._restart(keep=True)
         self.conditioner.settle(look.t, look.raw)
+        return found
+
+    def _left(self) -> list[Found]:
+        """What rested on the sensor and had become part of its baseline has left; a contact until then was its own."""
+        found = self._cancel("held") if self.touched else []
+        self.segmenter.phase = IDLE
+        self._cutter.clear()
+        self._forget_rubbish()
         return found
 
     def _restart(self, *, keep: bool) -> list[Found]:

@@ -4,6 +4,7 @@ That is learned from a second in which nothing moved, then followed while the se
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,16 @@ REVIEW_S = 0.5  # the pause between two looks at the noise; they would cost too 
 UNSEEN_S = 4.0  # the most that one look counts of the time under a contact or in silence
 OUTLIER = 4.0  # times a taxel's noise: the furthest that it counts as off its baseline, since one outlier must not rule
 QUIETER = 10.0  # where frames move so many times less than the noise that was learned, that was no idle sensor's
+LOADED = 10.0  # times a taxel's noise: where no taxel is further above the bare sensor, nothing rests on it any more
 GLANCE_S = 0.19  # the pause between two glances at how much frames move
 GLANCE, GLANCE_REPEATED, GLANCES = 3, 1, 9  # weights of a quieter frame and of a repeated one; the sum that tells
+
+
+class Bare(NamedTuple):
+    """What the sensor showed before something was laid on it that has since become part of the baseline."""
+
+    counts: Array  # (N,)
+    sigma: Array  # (N,) counts, each taxel's standard deviation
 
 
 class Idle:
@@ -39,6 +48,7 @@ class Idle:
         self.known = False  # whether an idle second was learned
         self.provisional = False  # whether what was learned is in doubt, and the next stable second replaces it
         self.glance = math.inf  # s, when `mistaken` is to be asked next
+        self.bare: Bare | None = None  # what the sensor showed before something was laid on it that was learned
         self._settling = Settling()
         self._followed: float | None = None  # s, the last idle frame; None after a contact or a silence
         self._reviewed = 0.0  # s, when the noise was last looked at
@@ -47,10 +57,15 @@ class Idle:
         self._smallest = 0.0  # counts, the smallest change of a sensor that stood still when it was learned; else 0
         self._shown: Array = np.zeros(taxels)  # the last raw counts, as far as they are needed
 
-    def settle(self, t: float, raw: Array) -> Learned | None:
-        """Offer (N,) counts that may be idle; what was learned, if a stable second ends here."""
-        learned = self._settling.push(t, raw, patience=not self.known)
+    def settle(self, t: float, raw: Array, *, rests: bool = False, restless: bool = False) -> Learned | None:
+        """Offer (N,) counts that may be idle; what was learned, if a stable second ends here.
+
+        `rests`: something lies on the sensor that was not there when it was learned; `restless`: it may never lie still.
+        """
+        learned = self._settling.push(t, raw, patience=restless or not self.known)
         if learned is not None:
+            bare = Bare(self.counts, self.sigma) if rests and self.bare is None else self.bare
+            self.bare = bare if bare is not None and _loaded(learned.baseline, bare) else None
             self.counts, self.step, self.lively = learned.baseline, learned.step, learned.lively
             self.known, self.provisional = True, not learned.stable
             self._followed = self._reviewed = t
@@ -131,15 +146,22 @@ class Idle:
     def hold(self) -> None:
         """The sensor is touched: what passes now is not followed."""
         self._followed = None
-        self._settling.clear()
 
     def doubt(self) -> None:
         """Put what was learned in doubt: it holds until the next stable second replaces it."""
         self.provisional, self._followed = True, None
 
+    def unload(self, bare: Bare, raw: Array) -> None:
+        """What rested has left, as (N,) counts show: the sensor is as it was before, until the next stable second."""
+        self.counts, self.bare = np.minimum(bare.counts, raw), None
+        self._set(bare.sigma)
+        self._settling.clear()
+        self.doubt()
+
     def forget(self, *, keep: bool) -> None:
         """Learn the next stable second. `keep`: the frames that `settle` was offered count for it."""
         self.known = self.provisional = False
+        self.bare = None
         self._followed = None
         if not keep:
             self._settling.clear()
@@ -147,3 +169,8 @@ class Idle:
     def _set(self, sigma: Array) -> None:
         self.sigma = sigma
         self.level = float(median(sigma))
+
+
+def _loaded(baseline: Array, bare: Bare) -> bool:
+    """Whether (N,) counts of a stable second show that something still lies on the sensor."""
+    return bool((baseline - bare.counts > LOADED * bare.sigma).any())
