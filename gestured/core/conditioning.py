@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gestured.core.activity import Activity, hardly_ever
 from gestured.core.contact import ON_SHARE, AfterEffect
-from gestured.core.idle import Idle
+from gestured.core.idle import LOADED, Idle
 from gestured.core.quantiles import median
 from gestured.core.taxels import Inspection, Taxels
 
@@ -84,6 +84,14 @@ class Conditioner:
         self._review()
         after.leave(rested, look.t)
         return self._look(look.t, look.raw, after)
+
+    def resting(self) -> tuple[float, float]:
+        """On which share of the taxels something rests that has become part of the baseline, and how hard, in noise."""
+        bare = self.idle.bare
+        if bare is None:
+            return 0.0, 0.0
+        load = (self.idle.counts - bare.counts) * self._weigh(bare.sigma)
+        return float(np.count_nonzero(load > LOADED)) / load.size, self.activity.measure(load)[0]
 
     def fallen(self, look: Look) -> float:
         """The activity that the frame would have, were its counts inverted."""

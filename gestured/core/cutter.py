@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gestured.core.conditioning import Conditioner, Look
 from gestured.core.contact import Place
-from gestured.core.frames import Segment
+from gestured.core.frames import UNDISTURBED, Before, Segment
 from gestured.core.taxels import Inspection
 
 LARGEST = float(np.finfo(np.float32).max)  # counts; the largest that a frame on the wire can hold
@@ -71,6 +71,7 @@ class Cutter:
         self._travel = travel
         self._kept: deque[Kept] = deque()
         self._made: Made | None = None
+        self._before = UNDISTURBED  # what went on before the contact that goes on, or before the last one
         self._settled = -math.inf  # s, the last frame of the second from which the idle sensor was learned
         self._shown = b""  # raw counts of the last frame
         self._new = 0.0  # s, since when the frames show just these counts
@@ -105,6 +106,10 @@ class Cutter:
         kept = self._kept
         while kept[0].t < t - LEAD_S or len(kept) > LEAD_FRAMES:
             kept.popleft()
+
+    def begin(self, before: Before) -> None:
+        """A contact begins, after what went on before it."""
+        self._before = before
 
     def draft(self, onset: float, offset: float) -> Segment | None:
         """The segment of a contact that may be over; None where it has been asked for already."""
@@ -164,7 +169,7 @@ class Cutter:
         frames = np.clip(conditioner.taxels.bridge(stack), -LARGEST, LARGEST).astype(np.float32)
         lost = sum(frame.lost for frame in kept[first + 1 : last + 1])
         bad = conditioner.taxels.bad.reshape(frames.shape[1:])
-        segment = Segment(frames, times, first, last, conditioner.idle.level, lost, bad)
+        segment = Segment(frames, times, first, last, conditioner.idle.level, lost, self._before, bad)
         return segment, stack
 
 

@@ -1,9 +1,12 @@
 """The values that a front end works on: a frame, its touches, and the segment that is cut out of frames."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+QUIET_S = 10.0  # a contact further ago says nothing of the next one
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +28,19 @@ class Frame:
     lost: int = 0  # frames that the sensor's own counter says went missing just before this one
 
 
+class Before(NamedTuple):
+    """What went on at a sensor before a contact began."""
+
+    quiet_s: float = QUIET_S  # since the last contact, at most `QUIET_S`
+    recent: int = 0  # contacts that began in the last `QUIET_S`
+    length_s: float = 0.0  # of the last contact, if one was so recent
+    covered: float = 0.0  # share of the taxels on which something rests that has become part of the baseline
+    rest: float = 0.0  # how hard, in noise units
+
+
+UNDISTURBED = Before()  # how cut gestures and the start of a stream are judged
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Segment:
     """The frames of one gesture: conditioned, at the sensor's own grid and rate.
@@ -38,6 +54,7 @@ class Segment:
     last: int  # index of the last touched frame
     noise: float  # counts, one standard deviation of an idle taxel
     lost: int = 0  # frames that went missing between `first` and `last`
+    before: Before = UNDISTURBED
     bad: NDArray[np.bool_] | None = None  # (R, C) taxels that are bridged from their neighbours; None is none
 
     @property

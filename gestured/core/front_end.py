@@ -14,6 +14,7 @@ from gestured.core.conditioning import Conditioner, Look
 from gestured.core.cutter import Cutter
 from gestured.core.frames import Frame, Segment
 from gestured.core.mounting import Mounting
+from gestured.core.past import Past
 from gestured.core.segmenter import IDLE, Action, Deed, Segmenter
 from gestured.core.taxels import RUBBISH_S
 from gestured.core.timing import Pace, Timing
@@ -80,6 +81,7 @@ class FrontEnd:
         self.frame: Frame | None = None  # the last frame that was taken
         self.look: Look | None = None  # what `frame` shows; None before the idle sensor is known
         self.pace = Pace()
+        self._past = Past()
         self._below_since: float | None = None  # s, since when the frames lie far below the baseline
 
     @property
@@ -142,6 +144,7 @@ class FrontEnd:
         self.look = look = conditioner.look(t, raw, segmenter.after)
         if conditioner.idle.bare is not None and (bared := conditioner.unloaded(look, segmenter.after)) is not None:
             found += self._left()
+            self._past.end(t)
             self.look = look = bared
         if look.shifted:
             return found + self._shift(look)
@@ -282,7 +285,7 @@ class FrontEnd:
                 found.append(Void("held"))
             elif action is Action.LEFT:
                 self._forget_rubbish()
-                found.append(Ended(offset))
+                found.append(self._end(offset))
             else:
                 found += self._close(onset, offset, decided, min(seen, decided))
                 if action is Action.SPLIT:
@@ -290,18 +293,23 @@ class FrontEnd:
         return found
 
     def _open(self, onset: float) -> Opened:
+        self._cutter.begin(self._past.begin(onset, *self.conditioner.resting()))
         self.conditioner.taxels.flickering.begin(onset)
         return Opened(onset)
 
     def _close(self, onset: float, offset: float, t: float, seen: float) -> list[Found]:
         """A segment is over, as decided at `t` s: it is cut, unless it was no finger's."""
         if self.pace.longest_s(onset, offset) < self.timing.glitch_s:
-            return [Void("glitch"), Ended(offset)]
+            return [Void("glitch"), self._end(offset)]
         made = self._cutter.cut(onset, offset)
         nothing = made.peak < self.segmenter.off * made.segment.noise  # is left without its bad taxels
         if self._forget_rubbish() or nothing:
-            return [Void("stuck"), Ended(offset)]
-        return [Cut(made.segment, t, self._cutter.hole(onset, offset, seen)), Ended(offset)]
+            return [Void("stuck"), self._end(offset)]
+        return [Cut(made.segment, t, self._cutter.hole(onset, offset, seen)), self._end(offset)]
+
+    def _end(self, offset: float) -> Ended:
+        self._past.end(offset)
+        return Ended(offset)
 
     def _forget_rubbish(self) -> bool:
         """Whether the contact that is over was rubbish, which leaves no after-effect behind."""
@@ -311,5 +319,5 @@ class FrontEnd:
 
     def _cancel(self, reason: str) -> list[Found]:
         """The contact that goes on has no answer, and ends."""
-        ended = Ended(self.segmenter.last_touched)
+        ended = self._end(self.segmenter.last_touched)
         return [Void(reason), ended] if self.segmenter.phase.pending else [ended]  # else it was given up already

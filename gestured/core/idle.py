@@ -60,7 +60,7 @@ class Idle:
     def settle(self, t: float, raw: Array, *, rests: bool = False, restless: bool = False) -> Learned | None:
         """Offer (N,) counts that may be idle; what was learned, if a stable second ends here.
 
-        `rests`: something lies on the sensor that was not there when it was learned; `restless`: it may never lie still.
+        `rests`: something lies there that was not when it was learned; `restless`: it may never lie still.
         """
         learned = self._settling.push(t, raw, patience=restless or not self.known)
         if learned is not None:

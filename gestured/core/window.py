@@ -58,13 +58,16 @@ class Window:
 
     def apply(self, segment: Segment) -> NDArray[np.float32]:
         """(T, R, C) segment -> (T', rows, columns) float32, from 0 to 1 at the segment's own peak."""
+        return np.maximum(self.signed(segment), np.float32(0.0))
+
+    def signed(self, segment: Segment) -> NDArray[np.float32]:
+        """As `apply`, but what lies below the baseline is negative: there something was let go."""
         start, end = self.span(segment)
         frames, times = segment.frames[start:end].astype(np.float64), segment.times[start:end]
         frames = self._regrid(frames, segment)
         frames = self._retime(frames, times, float(median(np.diff(segment.times))) if len(times) > 1 else 0.0)
         if self.smooth_frames > 1:
             frames = running_mean(frames, self.smooth_frames)
-        frames = np.maximum(frames, 0.0)
         peak = max(float(frames.max()), self.floor * segment.noise, LEAST_PEAK)
         return (frames / peak).astype(np.float32)
 

@@ -7,7 +7,7 @@ matched with what was performed. Simulated sets are cached, keyed by everything 
 import multiprocessing
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,9 +20,10 @@ from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
 from gestured.lab.digest import code_digest
 from gestured.lab.progress import progress
-from gestured.lab.samples import WINDOW, Sample, Samples, collect, sample
+from gestured.lab.samples import EVERYDAY, LIKE_A_TAP, PART, WINDOW, Sample, Samples, collect, sample
 from gestured.record.check import UNNAMED
 from gestured.record.files import PUBLIC, atomic_write
+from gestured.record.judge import whose
 from gestured.record.recordings import Recordings
 from gestured.simulator import (
     NON_GESTURES,
@@ -37,10 +38,15 @@ from gestured.simulator import (
     gesture_take,
     wide,
 )  # fmt: skip
+from gestured.simulator.everyday import PLACES, Day, day
+from gestured.simulator.variety import any_sensor
 
 T = TypeVar("T")
 
 IDLE = 20  # frames that are put on each side of a cut recording
+DAY_S = 720.0  # of one person's everyday life
+ANY_SENSOR = 0.5  # share of the days on any sensor; the others are on the nominal one
+FASTEST_HZ = 40.0  # of a day's sensor: faster ones cost more and show the same
 OVERLAP = 0.5  # of a performed gesture must lie in a segment for it to carry its label
 
 
@@ -97,6 +103,38 @@ OTHER_TRIALS = tuple(
 )  # the same people do something else
 
 
+def from_day(life: Day) -> list[Sample]:
+    """The samples of some everyday life: all that was cut out of it, and what of it was meant.
+
+    What nobody meant is of the kind EVERYDAY; a tap in truth, and what holds less than half of a gesture, are of kinds
+    from which nothing learns.
+    """
+    meant = [Truth(act.label, lay, act.participant, act.onset_s, act.offset_s) for act, lay in life.meant]
+    like = [Truth(act.label, act.kind, act.participant, act.onset_s, act.offset_s) for act in life.like]
+    found = []
+    for segment in cuts(life.take.frames, life.take.times):
+        of = next(matched([segment], meant), None)
+        if of is None:
+            alone = whose(segment.onset, segment.offset, like) is not None
+            part = whose(segment.onset, segment.offset, meant) is not None
+            of = sample(segment, NONE, LIKE_A_TAP if alone else PART if part else EVERYDAY, life.person)
+        found.append(of)
+    return found
+
+
+def _day(seed: int, index: int) -> list[Sample]:
+    """Some minutes of somebody's everyday life, on the nominal sensor or on any other."""
+    rng = generator(seed, 0xDA7A, index)
+    if rng.random() >= ANY_SENSOR:
+        return _nominal_day(seed, index)
+    sensor = any_sensor(rng, float(rng.random()))
+    return _nominal_day(seed, index, replace(sensor, rate_hz=min(sensor.rate_hz, FASTEST_HZ)))
+
+
+def _nominal_day(seed: int, index: int, sensor: SimulatedSensor | None = None) -> list[Sample]:
+    return from_day(day(seed * 1_000_000 + index, list(PLACES)[index % len(PLACES)], DAY_S, sensor))
+
+
 def _wide(seed: int, index: int) -> list[Sample]:
     return from_take(wide(seed, index))
 
@@ -115,13 +153,13 @@ def _cohort(seed: int, index: int) -> list[Sample]:
     return from_take(cohort_take(TRIALS[index], seed))
 
 
-STREAMS = {"wide": _wide, "cohort": _cohort, "others": _others}
+STREAMS = {"days": _day, "nominal_days": _nominal_day, "wide": _wide, "cohort": _cohort, "others": _others}
 
 
 def in_processes(make: Callable[[int], T], todo: Sequence[int], jobs: int, title: str) -> Iterator[T]:
     """What is made of each number, in order, by so many processes; an interruption ends all of them."""
     with multiprocessing.get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
-        yield from progress(pool.imap(make, todo, chunksize=50), len(todo), title)
+        yield from progress(pool.imap(make, todo, chunksize=max(1, min(50, len(todo) // (4 * jobs)))), len(todo), title)
 
 
 def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:

@@ -20,12 +20,16 @@ from gestured.lab.checkpoints import restore, store
 from gestured.lab.nets import CnnGru, CnnLstm, Lstm, Opinion
 from gestured.lab.prefixes import askable, drawn, floors, shortened
 from gestured.lab.progress import progress
-from gestured.lab.samples import WINDOW, Samples
+from gestured.lab.samples import EVERYDAY, WINDOW, Samples
 from gestured.lab.trajectory import TrajectoryNet, trajectory_features
 from gestured.simulator import GESTURES, NON_GESTURES, NONE
 
 REAL_KINDS = {"tap_hold": "long_press", "drag_diagonal": "diagonal_swipe"}  # what real non-gestures are
-CLASSES: list[str] = [*GESTURES, *NON_GESTURES]  # non-gestures are classes of their own: they reject better so
+CLASSES: list[str] = [
+    *GESTURES,
+    *NON_GESTURES,
+    EVERYDAY,
+]  # non-gestures are classes of their own: they reject better so
 LONGEST = 80  # frames that a network is shown: five seconds and their context
 
 

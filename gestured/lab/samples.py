@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from gestured.core.frames import Segment
 from gestured.core.window import Window
+from gestured.model.context import NAMES, context
 from gestured.model.features import touch_pattern
 
+EVERYDAY, LIKE_A_TAP, PART = "everyday", "like_a_tap", "part"  # kinds of what is cut out of everyday life
 # How every model sees a segment.
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 
@@ -28,6 +30,7 @@ class Samples:
     strength: NDArray[np.float64]  # (G,) peak in units of the sensor's noise
     first: NDArray[np.int64]  # (G,) index of the first touched frame in its window
     last: NDArray[np.int64]  # (G,) and of the last one
+    context: NDArray[np.float32]  # (G, K) what surrounded each (`gestured.model.context`)
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -77,15 +80,17 @@ class Sample(NamedTuple):
     strength: float
     first: int
     last: int
+    context: NDArray[np.float32]
 
 
 def sample(segment: Segment, label: str, kind: str, person: int, window: Window = WINDOW) -> Sample:
     """What was cut, through a window."""
-    frames = window.apply(segment).astype(np.float16)
+    signed = window.signed(segment)
+    frames = np.maximum(signed, 0.0).astype(np.float16)
     strength = float(segment.frames[segment.first : segment.last + 1].max()) / max(segment.noise, 1e-30)
     begin = segment.times[window.span(segment)[0]]
     first, last = (min(round((t - begin) * window.rate_hz), len(frames) - 1) for t in (segment.onset, segment.offset))
-    return Sample(frames, label, kind, person, strength, first, last)
+    return Sample(frames, label, kind, person, strength, first, last, context(segment, signed, window))
 
 
 def collect(samples: Iterable[Sample]) -> Samples:
@@ -99,6 +104,7 @@ def collect(samples: Iterable[Sample]) -> Samples:
         np.array([s[4] for s in found], dtype=np.float64),
         np.array([s[5] for s in found], dtype=np.int64),
         np.array([s[6] for s in found], dtype=np.int64),
+        np.array([s[7] for s in found], dtype=np.float32).reshape(len(found), len(NAMES)),
     )
 
 

@@ -49,6 +49,9 @@ class TrainingPlan:
     """How much is simulated; the numbers behind the shipped models are the defaults."""
 
     wide: int = 60_000
+    days: int = 500  # of everyday life, twelve minutes of a person each
+    days_calibrate: int = 500  # days to learn the verifier from
+    days_points: int = 300  # days on the nominal sensor to choose the operating points by
     wide_calibrate: int = 12_000  # takes to calibrate
     wide_check: int = 4_000  # takes to test
     wide_early: int = 60_000  # takes for provisional events: the fewer people, the safer a threshold has to be
@@ -61,16 +64,28 @@ class TrainingPlan:
     def quick(cls) -> "TrainingPlan":
         """A run of some minutes, to try the pipeline; its models are worth nothing."""
         fit = FitConfig(epochs=3, real_epochs=1, real_samples=1_000)
-        return cls(wide=1_500, wide_calibrate=400, wide_check=400, wide_early=400, forest=2_000, fit=fit)
+        return cls(
+            days=10,
+            days_calibrate=10,
+            days_points=10,
+            wide=1_500,
+            wide_calibrate=400,
+            wide_check=400,
+            wide_early=400,
+            forest=2_000,
+            fit=fit,
+        )
 
 
 @dataclass(frozen=True, slots=True)
 class TrainingData:
     """Everything that is learned from or judged on, split by participant."""
 
-    teach: Samples  # the wide stream, then the cohort
+    teach: Samples  # the wide stream, everyday life, then the cohort
     nominal: int  # how many of them are the cohort's
     calibrate: Samples
+    lived: Samples  # everyday life of people of whom no network knows
+    judged: Samples  # the same, of further people on the nominal sensor
     tests: dict[str, Samples]  # by name
     performed: dict[str, int]  # gestures that were performed in each test, cut out or not
     real: Samples | None
@@ -86,6 +101,7 @@ def load_data(
         simulated(cache, "wide", seed, count, jobs)
         for seed, count in ((1, plan.wide), (2, plan.wide_calibrate), (3, plan.wide_check))
     )
+    days = simulated(cache, "days", 1, plan.days, jobs)
     cohort = simulated(cache, "cohort", 0, plan.cohort, jobs)
     others = simulated(cache, "others", 0, plan.others, jobs)
     both = join([cohort, others])
@@ -94,9 +110,11 @@ def load_data(
     own = both.take(person < 24)
     performed = _performed(real) if found else {}
     return TrainingData(
-        join([teach, own]),
+        join([teach, days, own]),
         len(own),
         join([check, both.take((person >= 24) & (person < 28))]),
+        simulated(cache, "days", 2, plan.days_calibrate, jobs),
+        simulated(cache, "nominal_days", 3, plan.days_points, jobs),
         {"nominal": both.take(person >= 28), "wide": test},
         {
             "nominal": int((plans >= 28).sum()),

@@ -137,7 +137,9 @@ def day(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = 
     take = sensor.record(everything, seconds, rng)
     alone = [_truth(start, one) for start, one in life if _like_a_tap(start, one, everything, sensor)]
     contacts = sum(len(one.contacts) for _, one in life)
-    return Day(place, person.seed, take, contacts, tuple((_truth(at, one), lay) for at, one, lay in meant), tuple(alone))
+    return Day(
+        place, person.seed, take, contacts, tuple((_truth(at, one), lay) for at, one, lay in meant), tuple(alone)
+    )
 
 
 Happening = tuple[float, Performance]  # when it begins (s), and what it is
@@ -185,7 +187,12 @@ class _Life:
                 continue
             begin, end = at - APART_S, at + made.duration_s + APART_S
             changes = any(begin < a < end or at < b < end for a, b, _ in resting)
-            if begin > last and end < self.seconds and not changes and not any(a < end and b > begin for a, b in moving):
+            if (
+                begin > last
+                and end < self.seconds
+                and not changes
+                and not any(a < end and b > begin for a, b in moving)
+            ):
                 last = end
                 left = any(b < at <= b + 1.0 for _, b, _ in resting)
                 yield at, made, under[0].kind if under else LEFT if left else NOTHING

@@ -1,0 +1,50 @@
+"""What surrounds a contact, as numbers for a model: the input `context` of its graph.
+
+What went on before the contact comes from the sensor's past (`core.frames.Before`); the rest are measures of the
+segment that its window does not hold, since a window is scaled by its own peak and cut off at the baseline.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.frames import Before, Segment
+from gestured.core.window import Window
+
+NAMES = (
+    "quiet", "recent", "length", "covered", "rest",  # before the contact
+    "strength", "lowest", "below", "first", "last",  # of the segment
+)  # fmt: skip
+BELOW = 0.15  # of the peak: so far below the baseline a taxel was let go
+DEEPEST = 3.0  # times the peak: deeper than that says no more
+STRONGEST = 2000.0  # times the noise, and longest rests in s; more says no more
+LONGEST_S = 60.0
+
+
+def context(segment: Segment, signed: NDArray[np.float32], window: Window) -> NDArray[np.float32]:
+    """(K,) the values of `NAMES` for a segment and its signed window (T, R, C)."""
+    start = window.span(segment)[0]
+    first = max(int(np.searchsorted(segment.times, segment.onset)) - start, 0)
+    touched = segment.frames[segment.first : segment.last + 1]
+    strength = float(touched.max()) / max(segment.noise, 1e-30)
+    values = [
+        *past(segment.before),
+        math.log(min(max(strength, 1.0), STRONGEST)),
+        max(float(signed.min()), -DEEPEST),
+        float((signed < -BELOW).mean()),
+        float(signed[:first].max()) if 0 < first <= len(signed) else 0.0,
+        float(signed[-1].max()),
+    ]
+    return np.array(values, np.float32)
+
+
+def past(before: Before) -> tuple[float, ...]:
+    """The values that come from what went on before a contact."""
+    return (
+        math.log(0.05 + max(before.quiet_s, 0.0)),
+        math.log1p(before.recent),
+        math.log1p(min(before.length_s, LONGEST_S)),
+        before.covered,
+        math.log1p(min(before.rest, STRONGEST)),
+    )
