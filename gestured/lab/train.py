@@ -84,12 +84,12 @@ class TrainingData:
     teach: Samples  # the wide stream, everyday life, then the cohort
     nominal: int  # how many of them are the cohort's
     calibrate: Samples
-    lived: Samples  # everyday life of people of whom no network knows
-    judged: Samples  # the same, of further people on the nominal sensor
     tests: dict[str, Samples]  # by name
     performed: dict[str, int]  # gestures that were performed in each test, cut out or not
     real: Samples | None
     real_judged: int = 0  # of them, the first ones: cut gestures, whose touches the sessions behind them hold again
+    lived: Samples | None = None  # everyday life of people of whom no network knows; None: no verifier
+    spoken: Samples | None = None  # the same of further people, on the nominal sensor: operating points are of them
 
 
 def load_data(
@@ -113,8 +113,6 @@ def load_data(
         join([teach, days, own]),
         len(own),
         join([check, both.take((person >= 24) & (person < 28))]),
-        simulated(cache, "days", 2, plan.days_calibrate, jobs),
-        simulated(cache, "nominal_days", 3, plan.days_points, jobs),
         {"nominal": both.take(person >= 28), "wide": test},
         {
             "nominal": int((plans >= 28).sum()),
@@ -123,6 +121,8 @@ def load_data(
         },
         found and found[0],
         found[1] if found else 0,
+        simulated(cache, "days", 2, plan.days_calibrate, jobs),
+        simulated(cache, "nominal_days", 3, plan.days_points, jobs),
     )
 
 

@@ -237,7 +237,17 @@ def test_what_is_measured_is_what_the_lab_measures_of_its_training_data() -> Non
     labels, people = np.array(["one_tap"] * len(windows)), np.zeros(len(windows), np.int64)
     strength = np.array([s["strength"] for s in seen])
     ends = np.array([len(w) - 1 for w in windows], np.int64)
-    samples = Samples(np.concatenate(windows), offsets, labels, labels, people, strength, people, ends)
+    samples = Samples(
+        np.concatenate(windows),
+        offsets,
+        labels,
+        labels,
+        people,
+        strength,
+        people,
+        ends,
+        np.zeros((len(windows), 1), np.float32),
+    )
     ours = train.quantiles(samples)
     for name in ("strength", *MEASURES):
         expected = np.quantile([s[name] for s in seen], train.QUANTILES)

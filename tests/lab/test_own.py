@@ -12,7 +12,7 @@ from gestured.lab.own import command
 from gestured.lab.own.learn import Seen, learn, played_through
 from gestured.lab.own.play import PLAN, REPETITIONS, repeated
 from gestured.lab.own.signs import JUDGED, LEARNED, SIGNS, sign
-from gestured.lab.samples import Sample, Samples, collect
+from gestured.lab.samples import CALM, Sample, Samples, collect
 from gestured.model.model import Model
 from gestured.model.prototypes import Prototype
 from gestured.simulator import GESTURES, Participant, generator
@@ -89,7 +89,7 @@ def drawn() -> Samples:
     for person in range(4):
         for k, kind in enumerate(kinds):
             label = kind if kind in GESTURES else PLAN
-            rows += [Sample(window(rng, 0.4 * k), label, kind, person, 50.0, 0, 8) for _ in range(REPETITIONS)]
+            rows += [Sample(window(rng, 0.4 * k), label, kind, person, 50.0, 0, 8, CALM) for _ in range(REPETITIONS)]
     return collect(rows)
 
 

@@ -74,6 +74,6 @@ def copies(samples: Samples, threshold: float = THRESHOLD) -> Copies:
     made = Samples(
         frames.reshape(-1, *frames.shape[2:]),
         np.append(starts, edges * samples.offsets[-1]).astype(np.int64),
-        *(np.tile(getattr(samples, name), edges) for name in OF_EACH),
+        *(np.concatenate([getattr(samples, name)] * edges) for name in OF_EACH),
     )
     return Copies(made, np.tile(np.arange(count), edges), same.ravel())

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gestured.lab.samples import Sample, Samples, collect
+from gestured.lab.samples import CALM, Sample, Samples, collect
 from gestured.lab.study.material import Data
 from gestured.simulator import GESTURES
 from tests.lab.made import gestures
@@ -20,7 +20,7 @@ def samples(people: int = 6) -> Samples:
                 frames = np.concatenate([frames, np.zeros((turn, 9, 9), np.float32)])
                 window = (frames / frames.max()).astype(np.float16)
                 touched = np.flatnonzero(frames.max(axis=(1, 2)) > 0.3)
-                made.append(Sample(window, name, name, person, 20.0, int(touched[0]), int(touched[-1])))
+                made.append(Sample(window, name, name, person, 20.0, int(touched[0]), int(touched[-1]), CALM))
     return collect(made)
 
 
