@@ -24,6 +24,7 @@ from gestured.core.errors import ModelError
 from gestured.core.window import Window
 from gestured.lab.forest_graph import OPSET, around_thresholds, forest_graph, forest_outputs
 from gestured.lab.recordings import origin
+from gestured.model.context import CALM, calm, chosen
 from gestured.model.file import SelfTest, sealed
 from gestured.model.model import Model
 from gestured.record.files import PUBLIC, atomic_write
@@ -47,13 +48,16 @@ class Facts:
     training_data: str  # sha256
     quantiles: Mapping[str, Any]
     classes: Sequence[str] | None = None  # all that the nets tell apart, gestures first
+    context: Sequence[str] | None = None  # names of what surrounds a segment that the graph takes in, too
+    operating_points: Mapping[str, Any] | None = None  # thresholds by strictness, and what they cost
     provisional: Mapping[str, Any] | None = None  # when an answer may be given before the end (`early`)
     learned_from: Sequence[Mapping[str, Any]] | None = None  # `origins`; None where nobody knows
 
     def metadata(self) -> dict[str, str]:
         """As it stands in the file."""
         people = {} if self.learned_from is None else {origin.KEY: json.dumps([dict(one) for one in self.learned_from])}
-        more: dict[str, Any] = {"classes": self.classes, "provisional": self.provisional}
+        told = ("classes", "context", "operating_points", "provisional")
+        more: dict[str, Any] = {name: getattr(self, name) for name in told}
         known = {key: json.dumps(value, allow_nan=False) for key, value in more.items() if value is not None}
         return (
             people
@@ -81,10 +85,15 @@ def export_net(module: torch.nn.Module, path: Path, facts: Facts) -> None:
     """
     module = module.eval()
     rows, columns = facts.window.rows, facts.window.columns
+    takes = ["frames"] if facts.context is None else ["frames", "context"]
 
-    def truth(frames: NDArray[np.float32]) -> Outputs:
+    def given(frames: NDArray[np.float32], beside: NDArray[np.float32] | None) -> tuple[torch.Tensor, ...]:
+        around = calm(len(frames), facts.context or ()) if beside is None else beside
+        return tuple(torch.from_numpy(array) for array in (frames, around)[: len(takes)])
+
+    def truth(frames: NDArray[np.float32], beside: NDArray[np.float32] | None = None) -> Outputs:
         with torch.no_grad():
-            return tuple(output.numpy() for output in module(torch.from_numpy(frames)))
+            return tuple(output.numpy() for output in module(*given(frames, beside)))
 
     example = np.round(_windows(2, 12, rows, columns), 3)
     names = ["scores", "unknown", "embedding"][: len(truth(example))]
@@ -96,13 +105,13 @@ def export_net(module: torch.nn.Module, path: Path, facts: Facts) -> None:
         # An example batch of 2, so that no dimension is taken for a constant 1.
         torch.onnx.export(
             module,
-            (torch.from_numpy(_windows(2, 5, rows, columns)),),
+            given(_windows(2, 5, rows, columns), None),
             traced,
             dynamo=False,
             opset_version=OPSET,
-            input_names=["frames"],
+            input_names=takes,
             output_names=names,
-            dynamic_axes={"frames": {0: "B", 1: "T"}} | {name: {0: "B"} for name in names},
+            dynamic_axes={"frames": {0: "B", 1: "T"}} | {name: {0: "B"} for name in (*takes[1:], *names)},
         )
         proto = onnx.load(traced)
     inputs = [_windows(b, t, rows, columns) for b in BATCHES for t in CHECKED_LENGTHS]
@@ -164,6 +173,8 @@ def _compare(
     def outputs(batch: NDArray[np.float32]) -> Outputs:
         return (*model.run(batch), model.embed(batch)) if model.embeds else model.run(batch)
 
+    if model.metadata.context is not None:
+        _compare_beside(model, truth, inputs)
     for batch in inputs:
         found, expected = outputs(batch), truth(batch)
         alone = [outputs(batch[k : k + 1]) for k in range(min(len(batch), 7))]
@@ -177,6 +188,16 @@ def _compare(
                     f"outputs differ by {difference:.3g} from the trained model's, or a batch's from its "
                     f"members', for an input of shape {batch.shape}; expected {PARITY} at most"
                 )
+
+
+def _compare_beside(model: Model, truth: Callable[..., Outputs], inputs: Sequence[NDArray[np.float32]]) -> None:
+    """ValueError where the file and the trained model answer differently to what surrounds a segment."""
+    rng = np.random.default_rng(0)
+    for batch in inputs:
+        beside = np.tile(CALM, (len(batch), 1)) + rng.normal(0.0, 1.0, (len(batch), len(CALM))).astype(np.float32)
+        found, expected = model.run(batch, beside=beside), truth(batch, beside[:, chosen(model.metadata.context or ())])
+        if not max(float(np.abs(a - b).max()) for a, b in zip(found, expected, strict=False)) <= PARITY:
+            raise ValueError(f"outputs differ from the trained model's in other surroundings by more than {PARITY}")
 
 
 def _windows(batch: int, length: int, rows: int, columns: int) -> NDArray[np.float32]:

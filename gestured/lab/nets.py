@@ -203,20 +203,51 @@ class Decision(nn.Module):
         return scores.exp(), torch.sigmoid((cues * self.weight).sum(1) + self.bias)
 
 
+class Verifier(nn.Module):
+    """What both opinions say and remember, and what surrounded the segment -> the log-odds that nothing was meant."""
+
+    mean: Tensor
+    scale: Tensor
+
+    def __init__(self, cues: int, embedding: int, context: int, units: int = 64) -> None:
+        super().__init__()
+        inputs = cues + embedding + context
+        self.register_buffer("mean", torch.zeros(inputs))
+        self.register_buffer("scale", torch.ones(inputs))
+        self.layers = nn.Sequential(nn.Linear(inputs, units), nn.ReLU(), nn.Dropout(0.2), nn.Linear(units, 1))
+
+    def fit_scale(self, values: Tensor) -> None:
+        """Learn the standardisation from (N, inputs)."""
+        self.mean.copy_(values.mean(0))
+        self.scale.copy_(values.std(0).clamp(min=1e-3))
+
+    def forward(self, cues: Tensor, embedding: Tensor, context: Tensor) -> Tensor:
+        """(B, cues), (B, E), (B, C) -> (B,) log-odds."""
+        values = (torch.cat([cues, embedding, context], 1) - self.mean) / self.scale
+        logit: Tensor = self.layers(values.clamp(-6, 6))
+        return logit[:, 0]
+
+
 class Judged(nn.Module):
     """What is exported: a recurrent net, the trajectory net as its second opinion, and the decision."""
 
-    def __init__(self, net: Opinion, trajectory: Opinion, decision: Decision) -> None:
+    def __init__(self, net: Opinion, trajectory: Opinion, decision: Decision, verifier: Verifier | None = None) -> None:
         super().__init__()
         self.net = net
         self.trajectory = trajectory
         self.decision = decision
+        self.verifier = verifier
 
-    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """(B, T, R, C) -> scores (B, G) given that it is a gesture, unknown (B,), embedding (B, E).
+    def forward(self, frames: Tensor, context: Tensor | None = None) -> tuple[Tensor, Tensor, Tensor]:
+        """(B, T, R, C), perhaps (B, C) -> scores (B, G) given that it is a gesture, unknown (B,), embedding (B, E).
 
         The embedding is what the two heads see: the recurrent net's state, then the trajectory net's hidden layer.
+        Where there is a verifier, it has the last word on `unknown`, and needs the context.
         """
         state, hidden = self.net.embed(frames), self.trajectory.embed(frames)
-        scores, unknown = self.decision(self.net.judge(state), self.trajectory.judge(hidden))
-        return scores, unknown, torch.cat([state, hidden], 1)
+        first, second = self.net.judge(state), self.trajectory.judge(hidden)
+        embedding = torch.cat([state, hidden], 1)
+        scores, unknown = self.decision(first, second)
+        if self.verifier is not None and context is not None:
+            unknown = torch.sigmoid(self.verifier(self.decision.cues(first, second)[1], embedding, context))
+        return scores, unknown, embedding

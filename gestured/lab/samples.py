@@ -8,13 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.frames import UNDISTURBED, Segment
+from gestured.core.frames import Segment
 from gestured.core.window import Window
-from gestured.model.context import NAMES, context, past
+from gestured.model.context import NAMES, context
 from gestured.model.features import touch_pattern
 
 EVERYDAY, LIKE_A_TAP, PART = "everyday", "like_a_tap", "part"  # kinds of what is cut out of everyday life
-CALM = np.array([*past(UNDISTURBED), *np.zeros(len(NAMES) - 5)], np.float32)  # context of which nothing is known
 # How every model sees a segment.
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 

@@ -5,21 +5,48 @@ segment that its window does not hold, since a window is scaled by its own peak 
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.frames import Before, Segment
+from gestured.core.frames import UNDISTURBED, Before, Segment
 from gestured.core.window import Window
 
 NAMES = (
     "quiet", "recent", "length", "covered", "rest",  # before the contact
     "strength", "lowest", "below", "first", "last",  # of the segment
 )  # fmt: skip
+PAST = 5  # of these come from what went on before the contact
 BELOW = 0.15  # of the peak: so far below the baseline a taxel was let go
 DEEPEST = 3.0  # times the peak: deeper than that says no more
 STRONGEST = 2000.0  # times the noise, and longest rests in s; more says no more
 LONGEST_S = 60.0
+
+
+def past(before: Before) -> tuple[float, ...]:
+    """The values that come from what went on before a contact."""
+    return (
+        math.log(0.05 + max(before.quiet_s, 0.0)),
+        math.log1p(before.recent),
+        math.log1p(min(before.length_s, LONGEST_S)),
+        before.covered,
+        math.log1p(min(before.rest, STRONGEST)),
+    )
+
+
+# Of a clear gesture on an undisturbed sensor: what a model is given of a window that comes alone.
+CALM = np.array([*past(UNDISTURBED), 4.0, -0.05, 0.0, 0.05, 0.1], np.float32)
+
+
+def calm(batch: int, names: Sequence[str]) -> NDArray[np.float32]:
+    """(B, K) `CALM` for so many windows, of the values of these names."""
+    return np.tile(CALM[chosen(names)], (batch, 1))
+
+
+def chosen(names: Sequence[str]) -> list[int]:
+    """Which of `NAMES` these are; ValueError for another one."""
+    return [NAMES.index(name) for name in names]
 
 
 def context(segment: Segment, signed: NDArray[np.float32], window: Window) -> NDArray[np.float32]:
@@ -37,14 +64,3 @@ def context(segment: Segment, signed: NDArray[np.float32], window: Window) -> ND
         float(signed[-1].max()),
     ]
     return np.array(values, np.float32)
-
-
-def past(before: Before) -> tuple[float, ...]:
-    """The values that come from what went on before a contact."""
-    return (
-        math.log(0.05 + max(before.quiet_s, 0.0)),
-        math.log1p(before.recent),
-        math.log1p(min(before.length_s, LONGEST_S)),
-        before.covered,
-        math.log1p(min(before.rest, STRONGEST)),
-    )

@@ -15,6 +15,7 @@ from gestured.core.certainty import Certainty
 from gestured.core.points import OperatingPoints
 from gestured.core.window import Window
 from gestured.model.certainty import certainty
+from gestured.model.context import NAMES as CONTEXT
 from gestured.model.features import feature_names
 from gestured.model.file import SelfTest
 from gestured.model.points import operating_points
@@ -39,6 +40,7 @@ class Metadata:
     rate_hz: float
     window: Window
     features: tuple[str, ...] | None  # names, where the model takes features instead of frames
+    context: tuple[str, ...] | None  # names of what surrounds a segment that the model takes in, too
     calibration: Mapping[str, Any]
     threshold: float  # the confidence from which an answer is published where there are no `points`
     training_data: str  # sha256
@@ -83,6 +85,7 @@ class Metadata:
             told = _json(properties["own"], "own", dict)
             with _naming("own"):
                 own = Space.from_json(told, len(gestures))
+        context = _context(properties) if "context" in properties else None
         _check_grid(properties, window)
         calibration = _json(properties["calibration"], "calibration", dict)
         return cls(
@@ -94,6 +97,7 @@ class Metadata:
             rate_hz=window.rate_hz,
             window=window,
             features=_features(properties, window) if "features" in properties else None,
+            context=context,
             calibration=calibration,
             threshold=_threshold(calibration),
             training_data=properties["training_data"],
@@ -158,6 +162,14 @@ def _features(properties: Mapping[str, str], window: Window) -> tuple[str, ...]:
             f"{window.rows} x {window.columns} grid in their order"
         )
     return expected
+
+
+def _context(properties: Mapping[str, str]) -> tuple[str, ...]:
+    """The names of what surrounds a segment, all of which this version can tell."""
+    names = _names(properties, "context", 1, len(CONTEXT))
+    if odd := [name for name in names if name not in CONTEXT]:
+        raise ValueError(f"metadata 'context': {odd[0]!r} is unknown, expected some of {', '.join(CONTEXT)}")
+    return names
 
 
 def _json(text: str, key: str, kind: type) -> Any:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError
 from gestured.core.frames import Segment
+from gestured.model.context import calm, chosen, context
 from gestured.model.features import touch_pattern
 from gestured.model.file import check_alone, has_digest
 from gestured.model.metadata import Metadata
@@ -46,6 +47,7 @@ class Model:
         self.points = self.metadata.points
         self.certainty = self.metadata.provisional
         self._input = self._session.check(self.metadata)
+        self._beside = chosen(self.metadata.context or ())
         self.embeds = "embedding" in self._session.outputs
         self.space = self.metadata.own if self.embeds else None
         self.self_test_error = self._self_test()
@@ -56,8 +58,10 @@ class Model:
         Raises ModelError where the model fails or does not give probabilities.
         """
         with np.errstate(all="ignore"):  # counts near the limits of float32 overflow; checked below
-            window = self.metadata.window.apply(segment)
-            usable = len(window) > 0 and all(np.isfinite(a).all() for a in (segment.frames, window))
+            signed = self.metadata.window.signed(segment)
+            window = np.maximum(signed, np.float32(0.0))
+            usable = len(window) > 0 and all(np.isfinite(a).all() for a in (segment.frames, signed))
+            beside = context(segment, signed, self.metadata.window) if usable and self._beside else None
             if usable and self._input == "features":
                 window = touch_pattern(window, self.metadata.rate_hz)
                 usable = bool(np.isfinite(window).all())
@@ -65,7 +69,8 @@ class Model:
             count = len(self.gestures)
             return Scores(np.full(count, 1.0 / count, np.float32), 1.0, self.name)
         try:
-            scores, unknown = self.run(window[np.newaxis], RUN_S)
+            told = None if beside is None else beside[np.newaxis]
+            scores, unknown = self.run(window[np.newaxis], RUN_S, told)
         except ValueError as error:
             raise ModelError(f"{self.name}: {error}") from error
         return Scores(scores[0], float(unknown[0]), self.name, threshold=self.threshold, points=self.points)
@@ -78,13 +83,14 @@ class Model:
             return None
 
     def run(
-        self, batch: NDArray[np.float32], limit_s: float = BATCH_S
+        self, batch: NDArray[np.float32], limit_s: float = BATCH_S, beside: NDArray[np.float32] | None = None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """(B, T, R, C) windows or (B, F) features -> scores (B, G), unknown (B,).
 
+        `beside` (B, K) is what surrounded them, the values of `context.NAMES`; without it they count as undisturbed.
         ValueError where the model fails, takes longer than `limit_s`, or what it gives are no probabilities.
         """
-        scores, unknown = self._session.run(("scores", "unknown"), {self._input: batch}, limit_s)
+        scores, unknown = self._session.run(("scores", "unknown"), self._inputs(batch, beside), limit_s)
         expected = (len(batch), len(self.gestures))
         if scores.shape != expected or unknown.shape != expected[:1]:
             found = f"{scores.shape} and {unknown.shape}"
@@ -96,9 +102,16 @@ class Model:
             raise ValueError("outputs are not probabilities: expected 0 to 1, scores that add up to 1")
         return np.clip(scores, 0.0, 1.0), np.clip(unknown, 0.0, 1.0)
 
+    def _inputs(self, batch: NDArray[np.float32], beside: NDArray[np.float32] | None) -> dict[str, NDArray[np.float32]]:
+        names = self.metadata.context
+        if names is None:
+            return {self._input: batch}
+        told = calm(len(batch), names) if beside is None else beside[:, self._beside]
+        return {self._input: batch, "context": told}
+
     def embed(self, batch: NDArray[np.float32], limit_s: float = BATCH_S) -> NDArray[np.float32]:
         """(B, T, R, C) windows -> (B, E) embedding, of a model that has one (`embeds`). ValueError as for `run`."""
-        (embedding,) = self._session.run(("embedding",), {self._input: batch}, limit_s)
+        (embedding,) = self._session.run(("embedding",), self._inputs(batch, None), limit_s)
         if embedding.ndim != 2 or len(embedding) != len(batch) or not np.isfinite(embedding).all():
             raise ValueError(f"embedding has the shape {embedding.shape}, expected ({len(batch)}, E), all finite")
         return embedding

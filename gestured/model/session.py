@@ -53,8 +53,9 @@ class Session:
         inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
         names = [i.name for i in inputs]
         takes = "frames" if metadata.features is None else "features"
-        if names != [takes]:
-            raise ValueError(f"has inputs {names}, expected ['{takes}'] as its metadata say")
+        told = [takes] if metadata.context is None else [takes, "context"]
+        if names != told:
+            raise ValueError(f"has inputs {names}, expected {told} as its metadata say")
         if self.outputs not in (["scores", "unknown"], ["scores", "unknown", "embedding"]):
             raise ValueError(f"has outputs {self.outputs}, expected 'scores', 'unknown' and perhaps 'embedding'")
         count = len(metadata.gestures)
@@ -62,13 +63,20 @@ class Session:
         if metadata.features is not None:
             own = (len(metadata.features),)
         free = 1 if takes == "features" else 2  # the dimensions that must be open: B, or B and T
-        shapes = {takes: (None,) * free + own, "scores": (None, count), "unknown": (None,), "embedding": (None, None)}
+        beside = (None, len(metadata.context or ()))
+        shapes = {
+            takes: (None,) * free + own,
+            "context": beside,
+            "scores": (None, count),
+            "unknown": (None,),
+            "embedding": (None, None),
+        }
         for value in (*inputs, *outputs):
             expected = shapes[value.name]
             if value.type != "tensor(float)":
                 raise ValueError(f"{value.name!r} is {value.type}, expected tensor(float)")
             # What the file leaves open is a name or None; outputs are held to their size when it runs.
-            loose = value.name != takes
+            loose = value.name not in names
             found = [d if isinstance(d, int) else None for d in value.shape]
             if len(found) != len(expected) or not all(
                 f == e or (loose and (f is None or e is None)) for f, e in zip(found, expected, strict=True)

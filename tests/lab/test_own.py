@@ -12,7 +12,8 @@ from gestured.lab.own import command
 from gestured.lab.own.learn import Seen, learn, played_through
 from gestured.lab.own.play import PLAN, REPETITIONS, repeated
 from gestured.lab.own.signs import JUDGED, LEARNED, SIGNS, sign
-from gestured.lab.samples import CALM, Sample, Samples, collect
+from gestured.lab.samples import Sample, Samples, collect
+from gestured.model.context import CALM
 from gestured.model.model import Model
 from gestured.model.prototypes import Prototype
 from gestured.simulator import GESTURES, Participant, generator

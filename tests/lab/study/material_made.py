@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from gestured.lab.samples import CALM, Sample, Samples, collect
+from gestured.lab.samples import Sample, Samples, collect
 from gestured.lab.study.material import Data
+from gestured.model.context import CALM
 from gestured.simulator import GESTURES
 from tests.lab.made import gestures
 

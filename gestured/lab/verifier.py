@@ -1,0 +1,102 @@
+"""The verifier: a last look at a segment and at what surrounded it, which says whether a gesture was meant.
+
+It sees what both networks remember of the segment, what they say, and its context. It learns on people of whom the
+networks know nothing, and its context alone from sessions in which gestures and everyday life are mixed: a take of one
+performance is given the past of some segment of such a session, so that nothing can be learned of takes by their past.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from gestured.lab.decide import Answers
+from gestured.lab.fit import batch_of
+from gestured.lab.nets import Decision, Opinion, Verifier
+from gestured.lab.samples import Samples
+from gestured.model.context import PAST
+
+EPOCHS = 40
+BATCH = 256
+RATE, DECAY = 2e-3, 3e-2
+EVERYDAY_COST = 1.0  # what all that nobody meant in everyday life counts, beside 1 for all gestures together
+OTHERS_COST = 0.5  # and all non-gestures that were performed one by one
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What a network, and the trajectory net beside it, make of G samples."""
+
+    first: Tensor  # (G, K) logits of the network
+    second: Tensor  # (G, K) of the trajectory net
+    embedding: Tensor  # (G, E), as the exported model gives it
+    context: Tensor  # (G, C)
+
+    @classmethod
+    def of(cls, nets: nn.ModuleDict, name: str, samples: Samples) -> "Heard":
+        """Ask both networks."""
+        net, trajectory = nets[name], nets["trajectory"]
+        assert isinstance(net, Opinion)
+        assert isinstance(trajectory, Opinion)
+        net.eval()
+        trajectory.eval()
+        order = np.argsort(samples.lengths(), kind="stable")
+        found: list[tuple[Tensor, Tensor, Tensor]] = []
+        with torch.no_grad():
+            for i in range(0, len(order), 256):
+                x, lengths = batch_of(samples, order[i : i + 256])
+                state, hidden = net.embed(x, lengths), trajectory.embed(x, lengths)
+                found.append((net.judge(state), trajectory.judge(hidden), torch.cat([state, hidden], 1)))
+        back = torch.from_numpy(np.argsort(order, kind="stable"))
+        first, second, embedding = (torch.cat(parts)[back] for parts in zip(*found, strict=True))
+        return cls(first, second, embedding, torch.from_numpy(samples.context))
+
+    def answers(self, decision: Decision, verifier: Verifier) -> Answers:
+        """What both say together, after the verifier."""
+        with torch.no_grad():
+            scores, cues = decision.cues(self.first, self.second)
+            unknown = torch.sigmoid(verifier(cues, self.embedding, self.context))
+        return scores.exp().numpy(), unknown.numpy()
+
+
+def with_past_of(samples: Samples, lived: Samples, seed: int) -> NDArray[np.float32]:
+    """(G, C) the samples' context, each with the past of some sample of everyday life, whatever that was."""
+    rng = np.random.default_rng([seed, 0xFA57])
+    context = samples.context.copy()
+    context[:, :PAST] = lived.context[rng.integers(len(lived), size=len(samples)), :PAST]
+    return context
+
+
+def fit_verifier(decision: Decision, parts: list[tuple[Heard, NDArray[np.float32]]], seed: int) -> Verifier:
+    """Learn from parts of (what was heard, (G,) classes: 0 a gesture, 1 everyday life, 2 another non-gesture, -1 none).
+
+    Each of the three counts as a whole, however many there are of it.
+    """
+    y = torch.from_numpy(np.concatenate([kind for _, kind in parts]))
+    with torch.no_grad():
+        cues = torch.cat([decision.cues(heard.first, heard.second)[1] for heard, _ in parts])
+    embedding, context = (torch.cat([getattr(heard, name) for heard, _ in parts]) for name in ("embedding", "context"))
+    usable = torch.nonzero(y >= 0)[:, 0]
+    counts = torch.bincount(y[usable], minlength=3).clamp(min=1)
+    weight = torch.tensor([1.0, EVERYDAY_COST, OTHERS_COST]) / counts * len(usable)
+    torch.manual_seed(seed)
+    verifier = Verifier(cues.shape[1], embedding.shape[1], context.shape[1])
+    verifier.fit_scale(torch.cat([cues, embedding, context], 1)[usable])
+    optimiser = torch.optim.AdamW(verifier.parameters(), lr=RATE, weight_decay=DECAY)
+    steps = EPOCHS * -(-len(usable) // BATCH)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, RATE, total_steps=steps, pct_start=0.1)
+    verifier.train()
+    for _ in range(EPOCHS):
+        order = usable[torch.randperm(len(usable))]
+        for start in range(0, len(order), BATCH):
+            some = order[start : start + BATCH]
+            raw = verifier(cues[some], embedding[some], context[some])
+            losses = nn.functional.binary_cross_entropy_with_logits(raw, (y[some] > 0).float(), reduction="none")
+            loss = (losses * weight[y[some]]).mean()
+            optimiser.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call]
+            optimiser.step()
+            schedule.step()
+    return verifier.eval()
