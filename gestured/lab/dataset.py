@@ -38,7 +38,7 @@ from gestured.simulator import (
     gesture_take,
     wide,
 )  # fmt: skip
-from gestured.simulator.everyday import PLACES, Day, day
+from gestured.simulator.everyday import PLACES, Day, day, planned
 from gestured.simulator.variety import any_sensor
 
 T = TypeVar("T")
@@ -129,6 +129,11 @@ def _day(seed: int, index: int) -> list[Sample]:
         return _nominal_day(seed, index)
     sensor = any_sensor(rng, float(rng.random()))
     return _nominal_day(seed, index, replace(sensor, rate_hz=min(sensor.rate_hz, FASTEST_HZ)))
+
+
+def meant_on(seed: int, index: int) -> int:
+    """How many gestures are meant on that day of the stream "nominal_days", cut out or not."""
+    return len(planned(seed * 1_000_000 + index, list(PLACES)[index % len(PLACES)], DAY_S).meant)
 
 
 def _nominal_day(seed: int, index: int, sensor: SimulatedSensor | None = None) -> list[Sample]:

@@ -5,31 +5,30 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import nn
 
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP
-from gestured.lab.decide import Answers, decided
+from gestured.lab.decide import Answers
 from gestured.lab.early import Asked, at_release, calibrated, published, tap_threshold
-from gestured.lab.fit import logits
-from gestured.lab.nets import Decision
+from gestured.lab.nets import Judged
 from gestured.lab.prefixes import prefixes
 from gestured.lab.samples import WINDOW, Samples, join
+from gestured.lab.verifier import Heard
 from gestured.simulator import GESTURES, NONE
 
-Logits = Mapping[str, Tensor]  # (N, K) of each network
+Hearing = Mapping[str, Heard]  # by network, each with the trajectory net beside it
 OTHERS = 0.2  # share of non-gestures among what is performed, as in `gestured-lab online`'s sessions
 
 
 @dataclass(frozen=True, slots=True)
 class Foretold:
-    """Samples of people who were held out, with the logits of each network over them."""
+    """Samples of people who were held out, with what each network makes of them."""
 
     samples: Samples
-    whole: Logits
-    released: Logits  # when the finger has left for the first time
-    prefixes: Logits  # at every touched frame
+    whole: Hearing
+    released: Hearing  # when the finger has left for the first time
+    prefixes: Hearing  # at every touched frame
     contact: NDArray[np.int64]  # (N,) whose prefix each is
     since: NDArray[np.int64]  # (N,) frames since its onset
     second: NDArray[np.bool_]  # (N,) whether the finger had left and come back
@@ -42,15 +41,15 @@ class Foretold:
     @classmethod
     def of(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]]) -> "Foretold":
         """Ask each part's networks about its samples."""
-        whole: list[Logits] = []
-        released: list[Logits] = []
-        early: list[Logits] = []
+        whole: list[Hearing] = []
+        released: list[Hearing] = []
+        early: list[Hearing] = []
         contact, since, second, before = [], [], [], 0
         for nets, samples in parts:
             cut, of, frames = prefixes(samples, np.arange(len(samples)))
-            whole.append(logits(nets, samples))
-            released.append(logits(nets, at_release(samples)))
-            early.append(logits(nets, cut))
+            whole.append(_heard(nets, samples))
+            released.append(_heard(nets, at_release(samples)))
+            early.append(_heard(nets, cut))
             contact.append(of + before)
             since.append(frames)
             asked_before = np.arange(len(of)) - np.searchsorted(of, of)
@@ -60,10 +59,10 @@ class Foretold:
         contacts = np.concatenate(contact), np.concatenate(since), np.concatenate(second)
         return cls(together, _joined(whole), _joined(released), _joined(early), *contacts)
 
-    def rule(self, name: str, decision: Decision, least: float) -> dict[str, Any]:
+    def rule(self, name: str, module: Judged, least: float) -> dict[str, Any]:
         """The metadata `provisional` of a network with its decision, that publishes from `least` on."""
-        scores, unknown = _said(self.prefixes, name, decision)
-        final = published(_said(self.whole, name, decision), least)
+        scores, unknown = _said(self.prefixes, name, module)
+        final = published(_said(self.whole, name, module), least)
         best, confidence = scores.argmax(axis=1), scores.max(axis=1).astype(np.float64) * (1 - unknown)
         # As the run time has it: no tap while the finger is down, and in a second contact two taps or nothing.
         tap, two_taps = GESTURES.index(ONE_TAP), best == GESTURES.index(DOUBLE_TAP)
@@ -71,19 +70,23 @@ class Foretold:
         asked = Asked(self.contact, self.since / WINDOW.rate_hz, best, confidence, final, self.samples.people)
         # Where the finger comes back nobody can know it at the release: that depends on how often people do so.
         single = at_release(self.samples).lengths() == self.samples.lengths()
-        scores, unknown = _said(self.released, name, decision)
+        scores, unknown = _said(self.released, name, module)
         people = self.samples.people[single]
         released = tap_threshold((scores[single], unknown[single]), final[single], people, tap)
         return calibrated(asked, GESTURES, released)
 
 
-def _said(of: Logits, name: str, decision: Decision) -> Answers:
+def _said(of: Hearing, name: str, module: Judged) -> Answers:
     """What a network and its second opinion answer together."""
-    return decided(decision, of[name], of["trajectory"])
+    return of[name].answers(module.decision, module.verifier)
 
 
-def _joined(parts: Sequence[Logits]) -> Logits:
-    return {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
+def _heard(nets: nn.ModuleDict, samples: Samples) -> Hearing:
+    return {name: Heard.of(nets, name, samples) for name in nets if name != "trajectory"}
+
+
+def _joined(parts: Sequence[Hearing]) -> Hearing:
+    return {name: Heard.join([part[name] for part in parts]) for name in parts[0]}
 
 
 def as_in_sessions(samples: Samples) -> NDArray[np.int64]:

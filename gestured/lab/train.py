@@ -22,7 +22,7 @@ from torch import Tensor, nn
 import gestured
 from gestured.lab.adapt.material import own_recordings
 from gestured.lab.checkpoints import save_nets
-from gestured.lab.dataset import OTHER_TRIALS, TRIALS, recorded, simulated
+from gestured.lab.dataset import DAY_S, OTHER_TRIALS, TRIALS, meant_on, recorded, simulated
 from gestured.lab.decide import calibration_of, confidence, decided, fit_decision, threshold
 from gestured.lab.digest import code_digest
 from gestured.lab.export import Facts, export_forest, export_net
@@ -31,8 +31,11 @@ from gestured.lab.forest_graph import forest_outputs
 from gestured.lab.foretold import Foretold
 from gestured.lab.manifest import write_manifest
 from gestured.lab.nets import Judged, Opinion
+from gestured.lab.points import by_strictness, operating_points
 from gestured.lab.recordings.origin import origins
 from gestured.lab.samples import WINDOW, Samples, join
+from gestured.lab.verifier import Heard, fit_verifier, meant, with_past_of
+from gestured.model.context import NAMES
 from gestured.model.features import MEASURES, feature_names, measures
 from gestured.record.arrays import read
 from gestured.simulator import GESTURES, NONE, wide
@@ -219,30 +222,53 @@ def calibration_set(trained: Trained, data: TrainingData, plan: TrainingPlan) ->
         labels = np.concatenate([labels, targets(data.real)])
         sets = np.concatenate([sets, np.full(len(data.real), 2)])
     usable = labels >= 0
-    return Calibrated({name: x[torch.from_numpy(usable)] for name, x in found.items()}, labels[usable], sets[usable])
+    logits_of = {name: x[torch.from_numpy(usable)] for name, x in found.items()}
+    return Calibrated(logits_of, labels[usable], sets[usable])
 
 
 def foretold(trained: Trained, data: TrainingData, plan: TrainingPlan, cache: Path, jobs: int) -> Foretold:
     """What networks that have not seen them say of the calibration people, and of further ones, before the end."""
     further = simulated(cache, "wide", 4, plan.wide_early, jobs)
-    parts = [(trained.nets, data.calibrate), (trained.nets, further)]
+    alone = [data.calibrate, further]
+    if data.lived is not None:
+        alone = [replace(one, context=with_past_of(one, data.lived, n)) for n, one in enumerate(alone)]
+    parts = [(trained.nets, one) for one in alone]
     if data.real is not None:
         parts += [(nets, data.real.take(held)) for nets, held in zip(trained.folds, folds(data.real), strict=True)]
     return Foretold.sessions(parts)
 
 
-def judged(trained: Trained, name: str, calibrated: Calibrated) -> tuple[Judged, dict[str, Any], dict[str, Any]]:
-    """A network with its second opinion, their calibration, and how it answers then (`answer_figures`)."""
+def judged(
+    trained: Trained, name: str, calibrated: Calibrated, data: TrainingData | None = None
+) -> tuple[Judged, dict[str, Any], dict[str, Any]]:
+    """A network with its second opinion, their calibration, and how it answers then (`answer_figures`).
+
+    With `data` that holds everyday life they have a verifier, too, and the threshold is of answers that it has seen.
+    """
     first, second = calibrated.logits[name], calibrated.logits["trajectory"]
     decision = fit_decision(first, second, calibrated.labels, len(GESTURES))
-    answers = decided(decision, first, second)
-    least = threshold(answers, calibrated.labels, calibrated.sets)
+    answers, labels, sets, verifier = decided(decision, first, second), calibrated.labels, calibrated.sets, None
+    if data is not None and data.lived is not None:
+        alone = data.calibrate.take(targets(data.calibrate) >= 0)
+        taken = Heard.of(trained.nets, name, alone).beside(with_past_of(alone, data.lived, 1))
+        learned = [(Heard.of(trained.nets, name, data.lived), meant(data.lived)), (taken, meant(alone))]
+        verifier = fit_verifier(decision, learned, 1)
+        answers, labels, sets = taken.answers(decision, verifier), labels[: len(alone)], sets[: len(alone)]
+    least = threshold(answers, labels, sets)
     net, trajectory = trained.nets[name], trained.nets["trajectory"]
     assert isinstance(net, Opinion)
     assert isinstance(trajectory, Opinion)
-    module = Judged(net, trajectory, decision).eval()
-    answered = answer_figures(confidence(answers), calibrated.labels < len(GESTURES), least)
-    return module, calibration_of(decision, least), answered
+    module = Judged(net, trajectory, decision, verifier).eval()
+    return module, calibration_of(decision, least), answer_figures(confidence(answers), labels < len(GESTURES), least)
+
+
+def spoken(module: Judged, nets: nn.ModuleDict, name: str, data: TrainingData, plan: TrainingPlan) -> dict[str, Any]:
+    """The metadata `operating_points` of a network with a verifier, on hours of people of whom it knows nothing."""
+    assert data.spoken is not None
+    assert module.verifier is not None
+    answers = Heard.of(nets, name, data.spoken).answers(module.decision, module.verifier)
+    performed = sum(meant_on(3, index) for index in range(plan.days_points))
+    return operating_points(answers, data.spoken, performed, plan.days_points * DAY_S / 3600.0)
 
 
 def grow_forest(
@@ -336,10 +362,13 @@ def train(
     out.mkdir(parents=True, exist_ok=True)
     contacts = foretold(trained, data, plan, cache, jobs)
     for name in RECURRENT:
-        module, calibration, answered = judged(trained, name, calibrated)
+        module, calibration, answered = judged(trained, name, calibrated, data)
         common |= {"kind": name, "calibration": calibration, "quantiles": seen | answered}
-        rule = contacts.rule(name, module.decision, calibration["threshold"])
-        export_net(module, out / f"{name}.onnx", Facts(**common, classes=CLASSES, provisional=rule))
+        points = spoken(module, trained.nets, name, data, plan)
+        print(f"{name}\n{by_strictness(points)}", flush=True)
+        rule = contacts.rule(name, module, calibration["threshold"])
+        more: dict[str, Any] = {"classes": CLASSES, "context": NAMES, "operating_points": points, "provisional": rule}
+        export_net(module, out / f"{name}.onnx", Facts(**common, **more))
     forest, calibration, answered = grow_forest(data, plan, jobs)
     common |= {"kind": "touch_pattern_rf", "calibration": calibration, "quantiles": seen | answered}
     path = out / "touch_pattern_rf.onnx"

@@ -5,20 +5,22 @@ networks know nothing, and its context alone from sessions in which gestures and
 performance is given the past of some segment of such a session, so that nothing can be learned of takes by their past.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from gestured.lab.decide import Answers
+from gestured.lab.decide import Answers, decided
 from gestured.lab.fit import batch_of
 from gestured.lab.nets import Decision, Opinion, Verifier
-from gestured.lab.samples import Samples
+from gestured.lab.samples import EVERYDAY, LIKE_A_TAP, PART, Samples
 from gestured.model.context import PAST
+from gestured.simulator import NONE
 
-EPOCHS = 40
+EPOCHS = 30
 BATCH = 256
 RATE, DECAY = 2e-3, 3e-2
 EVERYDAY_COST = 1.0  # what all that nobody meant in everyday life counts, beside 1 for all gestures together
@@ -53,12 +55,32 @@ class Heard:
         first, second, embedding = (torch.cat(parts)[back] for parts in zip(*found, strict=True))
         return cls(first, second, embedding, torch.from_numpy(samples.context))
 
-    def answers(self, decision: Decision, verifier: Verifier) -> Answers:
-        """What both say together, after the verifier."""
+    def beside(self, context: NDArray[np.float32]) -> "Heard":
+        """The same segments in other surroundings, (G, C)."""
+        return replace(self, context=torch.from_numpy(context))
+
+    @classmethod
+    def join(cls, parts: "Sequence[Heard]") -> "Heard":
+        """What was made of several sets, one after the other."""
+        return cls(*(torch.cat([getattr(part, name) for part in parts]) for name in cls.__slots__))
+
+    def answers(self, decision: Decision, verifier: Verifier | None) -> Answers:
+        """What both say together, after the verifier if there is one."""
+        if verifier is None:
+            return decided(decision, self.first, self.second)
         with torch.no_grad():
             scores, cues = decision.cues(self.first, self.second)
             unknown = torch.sigmoid(verifier(cues, self.embedding, self.context))
         return scores.exp().numpy(), unknown.numpy()
+
+
+def meant(samples: Samples) -> NDArray[np.int64]:
+    """(G,) 0 for a gesture, 1 for everyday life, 2 for another non-gesture, -1 for what teaches nothing."""
+    kinds = np.full(len(samples), 2)
+    kinds[samples.kinds == EVERYDAY] = 1
+    kinds[np.isin(samples.kinds, (LIKE_A_TAP, PART))] = -1
+    kinds[samples.labels != NONE] = 0
+    return kinds
 
 
 def with_past_of(samples: Samples, lived: Samples, seed: int) -> NDArray[np.float32]:

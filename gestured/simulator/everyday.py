@@ -127,19 +127,22 @@ NOTHING, LEFT = "nothing", "just left"
 
 def day(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = None) -> Day:
     """So many seconds of everyday life at a place; the same for the same seed. Raises KeyError for an unknown place."""
+    plan = planned(seed, place, seconds, sensor)
+    everything = sorted([*plan.life, *((at, made) for at, made, _ in plan.meant)], key=lambda one: one[0])
+    take = plan.of.sensor.record(everything, seconds, plan.of.rng)
+    alone = [_truth(start, one) for start, one in plan.life if _like_a_tap(start, one, everything, plan.of.sensor)]
+    contacts = sum(len(one.contacts) for _, one in plan.life)
+    meant = tuple((_truth(at, one), lay) for at, one, lay in plan.meant)
+    return Day(place, plan.of.person.seed, take, contacts, meant, tuple(alone))
+
+
+def planned(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = None) -> "Plan":
+    """What happens in `day`, before any sensor sees it: a fraction of its work. Raises KeyError as `day` does."""
     where, rng = PLACES[place], generator(seed, 0xDA1, *map(ord, place))
     person = Participant(int(rng.integers(1 << 40)) + 2_000_000)
-    sensor = sensor or SimulatedSensor.nominal(day=person.seed)
-    lived = _Life(where, person, sensor, rng, seconds)
+    lived = _Life(where, person, sensor or SimulatedSensor.nominal(day=person.seed), rng, seconds)
     life = [one for one in lived.unmeant() if one[0] < seconds]
-    meant = list(lived.meant(life))
-    everything = sorted([*life, *((at, made) for at, made, _ in meant)], key=lambda one: one[0])
-    take = sensor.record(everything, seconds, rng)
-    alone = [_truth(start, one) for start, one in life if _like_a_tap(start, one, everything, sensor)]
-    contacts = sum(len(one.contacts) for _, one in life)
-    return Day(
-        place, person.seed, take, contacts, tuple((_truth(at, one), lay) for at, one, lay in meant), tuple(alone)
-    )
+    return Plan(lived, life, list(lived.meant(life)))
 
 
 Happening = tuple[float, Performance]  # when it begins (s), and what it is
@@ -263,6 +266,15 @@ def _reseated(t: Array, rng: np.random.Generator) -> Array:
     for moment, step in zip(moments, rng.normal(0.0, 1.0, moments.size), strict=True):
         way += step * np.clip((t - moment) / 0.33, 0.0, 1.0)
     return np.asarray(np.tanh(way))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What happens on a day: what nobody means, and what somebody does, each gesture with what lies on the sensor."""
+
+    of: _Life
+    life: list[Happening]
+    meant: list[tuple[float, Performance, str]]
 
 
 def _covers(rest: Press, press: Press) -> bool:

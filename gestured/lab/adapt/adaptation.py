@@ -163,7 +163,7 @@ def _early(new: Settled, takes: Simulated) -> Mapping[str, Any]:
     """The rule for provisional events, from what networks say of samples that they have not learned from."""
     parts = [(new.judged, takes.check), (new.judged, takes.early), *new.apart]
     asked = [(nn.ModuleDict({"net": one.net, "trajectory": one.trajectory}), samples) for one, samples in parts]
-    return Foretold.sessions(asked).rule("net", new.judged.decision, new.least)
+    return Foretold.sessions(asked).rule("net", new.judged, new.least)
 
 
 def _nominal(judged: Judged, least: float, takes: Simulated) -> Shares:
