@@ -91,7 +91,7 @@ def with_past_of(samples: Samples, lived: Samples, seed: int) -> NDArray[np.floa
     return context
 
 
-def fit_verifier(decision: Decision, parts: list[tuple[Heard, NDArray[np.float32]]], seed: int) -> Verifier:
+def fit_verifier(decision: Decision, parts: Sequence[tuple[Heard, NDArray[np.int64]]], seed: int) -> Verifier:
     """Learn from parts of (what was heard, (G,) classes: 0 a gesture, 1 everyday life, 2 another non-gesture, -1 none).
 
     Each of the three counts as a whole, however many there are of it.
