@@ -179,6 +179,8 @@ def everyone() -> dict[str, Samples]:
     people = {person: k for k, (person, *_) in enumerate(OTHER_TRIALS)}
     trials = {trial.participant: trial.index for trial in TRIALS}
     made = {f"wide{seed}": collect(s for i in range(25) for s in STREAMS["wide"](seed, i)) for seed in (1, 2, 3)}
+    for number, (stream, seed) in enumerate((("days", 1), ("days", 2), ("nominal_days", 3))):
+        made[f"{stream}{seed}"] = collect(s for s in STREAMS[stream](seed, 40 + number))
     made["cohort"] = collect(s for i in trials.values() for s in STREAMS["cohort"](0, i))
     made["others"] = collect(s for i in people.values() for s in STREAMS["others"](0, i))
     return made
@@ -187,7 +189,7 @@ def everyone() -> dict[str, Samples]:
 @pytest.fixture
 def few(everyone: dict[str, Samples], monkeypatch: pytest.MonkeyPatch) -> None:
     def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
-        return everyone[f"wide{seed}" if stream == "wide" else stream]
+        return everyone[stream if stream in ("cohort", "others") else f"{stream}{seed}"]
 
     monkeypatch.setattr(train, "simulated", simulated)
 
@@ -195,7 +197,10 @@ def few(everyone: dict[str, Samples], monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("few")
 def test_nobody_is_on_two_sides_of_the_split(tmp_path: Path, everyone: dict[str, Samples]) -> None:
     data = train.load_data(train.TrainingPlan(), tmp_path, None, 1)
-    parts = {"teach": data.teach, "calibrate": data.calibrate, **data.tests}
+    assert data.lived is not None
+    assert data.spoken is not None
+    days = {"lived": data.lived, "spoken": data.spoken}
+    parts = {"teach": data.teach, "calibrate": data.calibrate, **days, **data.tests}
     people = {name: set(samples.people.tolist()) for name, samples in parts.items()}
     for a in people:
         assert people[a]
