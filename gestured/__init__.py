@@ -8,7 +8,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from gestured.client.subscriber import Subscriber
     from gestured.core.errors import GesturedError
-    from gestured.core.events import Cancelled, Gesture, Onset, Provisional, Release, Status, Unknown
+    from gestured.core.events import Cancelled, Gate, Gesture, Onset, Provisional, Release, Status, Unknown
     from gestured.core.frames import Frame, Touch
     from gestured.core.hub import Hub
     from gestured.core.scene import Scene
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Cancelled",
     "Frame",
+    "Gate",
     "Gesture",
     "GesturedError",
     "Hub",
@@ -38,7 +39,7 @@ __all__ = [
 _HOMES = {
     "client.subscriber": ("Subscriber",),
     "core.errors": ("GesturedError",),
-    "core.events": ("Cancelled", "Gesture", "Onset", "Provisional", "Release", "Status", "Unknown"),
+    "core.events": ("Cancelled", "Gate", "Gesture", "Onset", "Provisional", "Release", "Status", "Unknown"),
     "core.frames": ("Frame", "Touch"),
     "core.hub": ("Hub",),
     "core.scene": ("Scene",),

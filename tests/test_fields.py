@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.client.fields import wrong_field
-from gestured.core.events import Cancelled, Gesture, Onset, Place, Provisional, Release, Status, Unknown, Where
+from gestured.core.events import Cancelled, Gate, Gesture, Onset, Place, Provisional, Release, Status, Unknown, Where
 from gestured.core.messages import gestures_json, hello_json, lost_json, quoted, to_json
 
 WHERE = Where(Place(0.2, 0.5), Place(0.8, 0.5), 0.6, 1e60, 30.0, 1, 0)  # a sensor's counts may be any
@@ -19,13 +19,14 @@ EVENTS = [
     Unknown("a", 1, 0.3, 1.0, 1.5, 2.0, 3, 0, **SAID),
     Cancelled("a", 1, "held"),
     Release("a", 1, 2.0),
+    Gate("a", True, ("door",), 2.5, 2.0),
     Status("ok", {"a": "ok"}, "m", 2.0),
 ]
 LINES = [
     json.loads(line)
     for line in (
         *(to_json(event, 1.8e9) for event in EVENTS),
-        hello_json("0.1", "i", "m", ["one_tap"], {"a": 3}),
+        hello_json("0.1", "i", "m", ["one_tap"], {"a": 3}, {"a": {"armed": None, "closed": ["door"], "until": None}}),
         gestures_json(["one_tap"]),
         lost_json(3),
     )
@@ -70,8 +71,8 @@ def test_any_line_has_an_answer(line, changes):
 
 
 def test_lines_of_a_newer_and_an_older_daemon_are_sound():
-    assert wrong_field({"type": "gate", "sensor": "a", "armed": None}) is None
-    assert wrong_field({"type": "gate", "sensor": 7}) is not None
+    assert wrong_field({"type": "news", "sensor": "a", "armed": None}) is None
+    assert wrong_field({"type": "news", "sensor": 7}) is not None
     (gesture,) = [line for line in LINES if line["type"] == "gesture"]
     assert wrong_field({key: value for key, value in gesture.items() if key not in ("own", "provisional")}) is None
     assert wrong_field({key: value for key, value in gesture.items() if key != "sequence"}) is not None

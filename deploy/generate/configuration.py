@@ -8,6 +8,8 @@ from typing import Any
 from gestured.daemon.settings import (
     TABLES,
     AddressSettings,
+    ArmingSettings,
+    GatesSettings,
     GestureSettings,
     Part,
     SensorSettings,
@@ -33,6 +35,8 @@ SHOWN: dict[str, Any] = {
     "sensors.strictness": "strict",
     "zones.at": [0.0, 0.5, 1.0, 1.0],
     "zones.gestures": ["swipe_left", "swipe_right"],
+    "arming.by": "double_tap",
+    "gates.start": ["door"],
     "gestures.threshold": 0.8,
     "gestures.refractory_s": 0.5,
 }
@@ -79,10 +83,13 @@ def tables() -> dict[str, list[Key]]:
     return {
         "": keys(Settings, leave_out=(*TABLES, "gestures")),
         "[gestures]": [Key(f"use = {use}", Settings.model_fields["gestures"].description or "")],
-        "[sensors.armrest]": keys(SensorSettings, "sensors.", leave_out=("zones",)),
+        "[sensors.armrest]": keys(SensorSettings, "sensors.", leave_out=("zones", "arming")),
+        "[sensors.armrest.arming]": keys(ArmingSettings, "arming."),
         "[sensors.armrest.zones.volume]": keys(ZoneSettings, "zones."),
         "[gestures.one_tap]": keys(GestureSettings, "gestures."),
         "[addresses]": keys(AddressSettings),
+        "[arming]": keys(ArmingSettings, "arming."),
+        "[gates]": keys(GatesSettings, "gates."),
     }
 
 

@@ -23,6 +23,10 @@ def _object(of: Callable[[Any], bool]) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, dict) and all(map(of, value.values()))
 
 
+def _is_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(map(_is(str), value))
+
+
 def _is_place(value: Any) -> bool:
     return isinstance(value, dict) and _is_number(value.get("x")) and _is_number(value.get("y"))
 
@@ -46,23 +50,35 @@ _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
     float: (_is_number, "a number"),
     bool: (_is(bool), "true or false"),
     str | None: (_is(str, type(None)), "a text or null"),
+    bool | None: (_is(bool, type(None)), "true, false or null"),
+    float | None: (lambda value: value is None or _is_number(value), "a number or null"),
     Where | None: (_is_where, "an object with start, end, way, pressure, snr, contacts, bridged and zone"),
-    list[str]: (lambda value: isinstance(value, list) and all(map(_is(str), value)), "a list of texts"),
+    list[str]: (_is_texts, "a list of texts"),
+    tuple[str, ...]: (_is_texts, "a list of texts"),
     Mapping[str, float]: (_object(_is_number), "an object of numbers"),
     Mapping[str, str]: (_object(_is(str)), "an object of texts"),
+    Mapping[str, Mapping[str, Any]]: (_object(_is(dict)), "an object of objects"),
     Mapping[str, int]: (_object(_is(int)), "an object of whole numbers"),
 }
 _EVENTS = {event.__name__.lower(): event for event in get_args(Event)}
 # Type of a line -> its fields, as they are annotated.
 _FIELDS: dict[str, dict[str, Any]] = {name: get_type_hints(event) for name, event in _EVENTS.items()} | {
-    "hello": {"version": str, "instance": str, "model": str, "gestures": list[str], "sensors": Mapping[str, int]},
+    "hello": {
+        "version": str,
+        "instance": str,
+        "model": str,
+        "gestures": list[str],
+        "sensors": Mapping[str, int],
+        "gates": Mapping[str, Mapping[str, Any]],
+    },
     "gestures": {"gestures": list[str]},
     "lost": {"count": int},
 }
 # Fields of an event that lines of an older daemon do not have.
 _ADDED = {
-    name: {field.name for field in fields(event) if field.default is not MISSING} for name, event in _EVENTS.items()
-}
+    name: {field.name for field in fields(event) if (field.default, field.default_factory) != (MISSING, MISSING)}
+    for name, event in _EVENTS.items()
+} | {"hello": {"gates"}}
 
 
 def wrong_field(line: Mapping[str, Any]) -> str | None:

@@ -6,7 +6,8 @@ answer's `provisional` says what became of it: "confirmed", "revoked", or None w
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +77,11 @@ class Gesture:
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A segment that is none of the gestures, or of which the model is not sure enough."""
+    """A segment that is none of the gestures, or of which the model is not sure enough, or that may be none now.
+
+    `reason` is confidence (below the threshold), hole (frames were lost), rate (the sensor is too slow or too fast),
+    disarmed (the gesture that arms the sensor did not come before) or inhibited (a gate is closed, or was).
+    """
 
     sensor: str
     id: int
@@ -89,9 +94,10 @@ class Unknown:
     model: str
     degraded: bool
     scores: Mapping[str, float]
-    reason: str = "confidence"  # confidence (below the threshold), hole (frames were lost), rate (too slow or too fast)
+    reason: str = "confidence"  # confidence, hole, rate, disarmed, inhibited
     provisional: str | None = None
     where: Where | None = None
+    gates: tuple[str, ...] = ()  # those that silenced it
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +120,22 @@ class Release:
 
 
 @dataclass(frozen=True, slots=True)
+class Gate:
+    """What a sensor listens to has changed: it is armed now or no longer, or a gate was closed or opened."""
+
+    sensor: str
+    armed: bool | None  # None where no gesture arms it
+    closed: tuple[str, ...]  # names of gates; while there is one, every contact is unknown
+    until: float | None  # s, when the first of this changes by itself; None where nothing does
+    since: float  # s
+
+    @property
+    def says(self) -> bool:
+        """Whether it says anything of a sensor that a sensor without gates and arming does not."""
+        return self.armed is not None or bool(self.closed)
+
+
+@dataclass(frozen=True, slots=True)
 class Status:
     """How the daemon is, once a second as a sign of life."""
 
@@ -121,6 +143,7 @@ class Status:
     sensors: Mapping[str, str]  # state of each sensor
     model: str
     time: float  # s since the Unix epoch
+    gates: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # `messages.listening` of some sensors
 
 
-Event = Onset | Provisional | Gesture | Unknown | Cancelled | Release | Status
+Event = Onset | Provisional | Gesture | Unknown | Cancelled | Release | Gate | Status

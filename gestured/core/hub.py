@@ -9,12 +9,15 @@ raised, since a daemon in a vehicle that dies of one sensor's odd frame helps no
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from gestured.core.beside.reading import Reading
 from gestured.core.beside.view import View
 from gestured.core.classifier import Classifier
+from gestured.core.events import Gate
 from gestured.core.facts import Changed, Dropped, Fact, Fault
+from gestured.core.gates import Gates
+from gestured.core.listening import Listening
 from gestured.core.owner import Source
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
@@ -44,6 +47,8 @@ class Hub:
         self._waits: dict[str, Sensor] = {}  # sensors in which a contact may be over before the next frame
         self._due = math.inf  # s, when the first contact of all sensors may be over
         self._later = later
+        self._armed: dict[str, float] = {}  # sensors that come armed, until so many s on this clock
+        self.gates = Gates(scene.gates)  # which a change of the scene leaves as they are
         self.looks: dict[str, Sensor] = {}  # sensors that wait for `look`, the one that has waited longest first
         self._set(scene, classifier)
 
@@ -64,7 +69,7 @@ class Hub:
 
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
         """Take packets that were found waiting at `now`, each with its source."""
-        facts: list[Fact] = []
+        facts = self._lapse(now)
         waiting: Waiting = {}
         for packet, source in packets:
             try:
@@ -111,11 +116,11 @@ class Hub:
 
     def tick(self, now: float) -> list[Fact]:
         """What the time alone decides, once everything that arrived until `now` was received: `wait`, and silences."""
-        facts = self.wait(now)
+        facts = self._lapse(now) + self.wait(now)
         sensors = self._sensors.values()
         self._owners = frozenset(sensor.owner.source for sensor in sensors if now - sensor.owner.heard <= FORGET_S)
         for sensor in sensors:
-            sensor.review()
+            sensor.review(now, facts)
             if not sensor.silent and sensor.stale(now):
                 facts.append(Changed(sensor.name, "silent", sensor.owner.source))
                 sensor.end(now, facts)
@@ -147,6 +152,26 @@ class Hub:
             sensor.change(scene, classifier, now, facts)
         return facts
 
+    def inhibit(self, sensor: str | None, gate: str, now: float, seconds: float = math.inf) -> list[Fact]:
+        """Close a gate for a sensor or (None) for all, and all that come, for so long or until it is opened.
+
+        While a gate is closed each contact is unknown, and so is one that began before it was closed or opened.
+        """
+        self.gates.inhibit(sensor, gate, now + seconds)
+        return self._shut(now)
+
+    def allow(self, sensor: str | None, gate: str, now: float) -> list[Fact]:
+        """Open a gate for a sensor or (None) for all."""
+        self.gates.allow(sensor, gate)
+        return self._shut(now)
+
+    def put(self, sensor: str, closed: Iterable[str], now: float, armed_until: float | None = None) -> list[Fact]:
+        """Exactly these gates are closed for a sensor from now on; one that was not heard yet may come armed."""
+        self.gates.put(sensor, closed)
+        if armed_until is not None:
+            self._armed[sensor] = armed_until
+        return self._shut(now)
+
     def foresee(self, sensors: Collection[str] | None) -> None:
         """Give provisional events of these sensors, by name, or of all (None). Answers stay what they are.
 
@@ -175,14 +200,37 @@ class Hub:
 
     def readings(self, now: float) -> dict[str, Reading]:
         """What is known of each sensor, heard or in the scene, at `now`. Any thread may ask."""
-        silent = {name: Reading("no_data", self._scene.grid_of(name)) for name in self._scene.sensors}
+        silent = {name: self._unheard(name, now) for name in self._scene.sensors}
         return silent | {name: sensor.reading(now) for name, sensor in tuple(self._sensors.items())}
+
+    def listening(self, now: float) -> list[Gate]:
+        """What gates and arming say at `now`, of the sensors of which they say anything."""
+        gates = [reading.gate for reading in self.readings(now).values()]
+        return [gate for gate in gates if gate is not None and gate.says]
 
     def view(self, name: str, now: float, *, raw: bool) -> tuple[View, Reading] | None:
         """A sensor as it is felt now, and what is known of it; None where it was not heard."""
         sensor = self._sensors.get(name)
         found = None if sensor is None else sensor.view(raw=raw)
         return None if sensor is None or found is None else (found, sensor.reading(now))
+
+    def _unheard(self, name: str, now: float) -> Reading:
+        listening = Listening(self._scene.arming_of(name))
+        listening.gate(self.gates.of(name), now)
+        return Reading("no_data", self._scene.grid_of(name), gate=listening.told(name, now))
+
+    def _lapse(self, now: float) -> list[Fact]:
+        """Open the gates that open by themselves until now."""
+        if now < self.gates.due:
+            return []
+        self.gates.lapse(now)
+        return self._shut(now)
+
+    def _shut(self, now: float) -> list[Fact]:
+        facts: list[Fact] = []
+        for sensor in self._sensors.values():
+            sensor.shut(self.gates.of(sensor.name), now, facts)
+        return facts
 
     def _set(self, scene: Scene, classifier: Classifier) -> None:
         missing = [gesture for gesture in scene.gestures if gesture not in classifier.gestures]
@@ -226,6 +274,7 @@ class Hub:
             sensor.foresee(asked=self.foreseen(name), later=self._later)
             self._told[name] = self._missed
             facts.append(Changed(name, "new", source))
+            sensor.greet(self.gates.of(name), self._armed.pop(name, None), now, facts)
         if not sensor.owner.admits(source, now, self._scene.stale_s):
             facts.append(Dropped("second_source", source))
             return None

@@ -4,18 +4,18 @@ A request that is none is a ProtocolError with the reason `subscription`.
 """
 
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any, get_args
 
 from gestured.core.address import is_sensor
 from gestured.core.errors import ProtocolError
-from gestured.core.events import Event, Gesture, Provisional, Status, Unknown, Where
+from gestured.core.events import Event, Gate, Gesture, Provisional, Status, Unknown, Where
 
 MAX_LINE = 4096  # bytes of a client's request
 LONGEST = 60  # characters of what a peer sent, in an answer to it
 EVENT_TYPES = tuple(cls.__name__.lower() for cls in get_args(Event))
-_STREAM_TIMES = frozenset(("onset", "offset", "decided"))
+_STREAM_TIMES = frozenset(("onset", "offset", "decided", "until", "since"))
 
 
 def json_object(text: str | bytes) -> dict[str, Any] | None:
@@ -40,16 +40,35 @@ def to_json(event: Event, epoch: float, *, test: bool = False) -> bytes:
     line: dict[str, Any] = {"type": event_type(event)}
     for field in fields(event):
         value = getattr(event, field.name)
-        if (field.name, value) in (("own", False), ("where", None)):
-            continue  # lines of the model's own gestures have no key `own`, those of which no place is known no `where`
-        line[field.name] = value + epoch if field.name in _STREAM_TIMES else value
+        if (field.name, value) in (("own", False), ("where", None), ("gates", ())):
+            continue  # only lines of which these say something have them
+        line[field.name] = value + epoch if field.name in _STREAM_TIMES and value is not None else value
     if test:
         line["test"] = True
     return _line(line)
 
 
-def hello_json(version: str, instance: str, model: str, gestures: Sequence[str], sensors: Mapping[str, int]) -> bytes:
-    """The first line to a client; `sensors` has the last sequence of each."""
+def listening(gates: Iterable[Gate], epoch: float) -> dict[str, dict[str, Any]]:
+    """What hello and status tell of sensors that a gate silences, or that a gesture arms; by their names."""
+    return {
+        gate.sensor: {
+            "armed": gate.armed,
+            "closed": gate.closed,
+            "until": None if gate.until is None else gate.until + epoch,
+        }
+        for gate in gates
+    }
+
+
+def hello_json(  # noqa: PLR0913 - each is a key of the line
+    version: str,
+    instance: str,
+    model: str,
+    gestures: Sequence[str],
+    sensors: Mapping[str, int],
+    gates: Mapping[str, Mapping[str, Any]],
+) -> bytes:
+    """The first line to a client; `sensors` has the last sequence of each, `gates` what `listening` gives."""
     return _line(
         {
             "type": "hello",
@@ -59,6 +78,7 @@ def hello_json(version: str, instance: str, model: str, gestures: Sequence[str],
             "model": model,
             "gestures": list(gestures),
             "sensors": dict(sensors),
+            "gates": gates,
         }
     )
 

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
-from gestured.core.address import SIDES
+from gestured.core.address import SIDES, is_sensor
+from gestured.core.listening import Arming
 from gestured.core.mounting import Mounting
 from gestured.core.points import STRICTNESS, USUAL, Strictness
 from gestured.core.timing import Timing
@@ -36,6 +37,7 @@ class Setup:
     clock: Clock | None = None
     strictness: Strictness | None = None
     zones: Mapping[str, Zone] = field(default_factory=dict)
+    arming: Arming | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +56,8 @@ class Scene:
     thresholds: Mapping[str, float] = field(default_factory=dict)  # by gesture: confidences in place of the model's own
     strictness: Strictness = USUAL  # the operating point of the model that answers, where `thresholds` says nothing
     refractory: Mapping[str, float] = field(default_factory=dict)  # by gesture: s in which it is not published again
+    arming: Arming | None = None  # the gesture before which no other counts
+    gates: tuple[str, ...] = ()  # closed for every sensor where a hub begins
     provisional_taps: bool = True  # whether a tap is said provisionally while a second one may follow
     touches: bool = False  # whether finger positions are kept
     frames: bool = False  # whether the hub tells of each frame that it used
@@ -71,6 +75,8 @@ class Scene:
         for value in (*self.thresholds.values(), *self.refractory.values()):
             if not math.isfinite(value):
                 raise ValueError(f"gestures: expected thresholds and seconds that are finite, found {value!r}")
+        if wrong := [name for name in self.gates if not is_sensor(name)]:
+            raise ValueError(f"gates.start: expected names of A-Z a-z 0-9 _ -, found {wrong[0]!r}")
         for name in ("", *self.sensors):
             self._check_sensor(name)
 
@@ -105,6 +111,8 @@ class Scene:
             allow=tuple(ipaddress.ip_network(str(network)) for network in told.get("allow", ())),
             thresholds={name: float(own["threshold"]) for name, own in parts if own["threshold"] is not None},
             refractory={name: float(own["refractory_s"]) for name, own in parts},
+            arming=Arming.of(told.get("arming")),
+            gates=tuple(told.get("gate", {}).get("start", ())),
             **{key: kind(told[key]) for key, kind in plain if key in told},
         )
 
@@ -123,6 +131,17 @@ class Scene:
     def strictness_of(self, sensor: str) -> Strictness:
         """How sure a model must be of what a sensor felt."""
         return self.setup(sensor).strictness or self.strictness
+
+    def arming_of(self, sensor: str) -> Arming | None:
+        """What arms a sensor; None where it always listens."""
+        return self.setup(sensor).arming or self.arming
+
+    @property
+    def arming_gestures(self) -> dict[str, str]:
+        """The gestures that arm sensors, by the field that names them."""
+        own = {f"sensors.{name}.arming.by": setup.arming for name, setup in self.sensors.items()}
+        every = {"arming.by": self.arming, **own}
+        return {field: arming.by for field, arming in every.items() if arming is not None}
 
     @property
     def waits_for_double_tap(self) -> bool:
@@ -152,5 +171,6 @@ def _setup(own: Mapping[str, Any]) -> Setup:
     grid = own.get("grid")
     mounting = Mounting(own.get("rotate", 0), own.get("mirror", False), own.get("invert", False))
     return Setup(
-        grid and _grid(grid), mounting, own.get("clock"), own.get("strictness"), zones_of(own.get("zones", {}))
-    )
+        grid and _grid(grid), mounting, own.get("clock"), own.get("strictness"), zones_of(own.get("zones", {})),
+        Arming.of(own.get("arming")),
+    )  # fmt: skip

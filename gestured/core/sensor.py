@@ -5,7 +5,7 @@ frames arrive. Whoever has no arrivals (`gestured.open`, the lab) uses `push`, `
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from gestured.core.beside.foresight import Foresight, Preview
 from gestured.core.beside.habits import Habits
@@ -18,6 +18,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unkn
 from gestured.core.facts import Arrived, Changed, Decided, Fact, Fault, Taken
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown
+from gestured.core.listening import INHIBITED, Listening
 from gestured.core.owner import Owner, Source
 from gestured.core.scene import Scene
 from gestured.core.stamping import Stamper
@@ -56,7 +57,8 @@ class Sensor:
         self.sequence, self.segments = numbers
         self.front_end = _front_end(name, scene)
         self._scene, self._decision = scene, Decision(scene, name)
-        self._zones = scene.setup(name).zones
+        self._zones, self._listening = scene.setup(name).zones, Listening(scene.arming_of(name))
+        self._closed: Mapping[str, float] = {}  # gates, as `shut` was told last
         self._stamper = Stamper(scene.clock_of(name))
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # last; no scores where it failed
         self._foresight = Foresight(name, taps=scene.provisional_taps)
@@ -76,6 +78,8 @@ class Sensor:
         """Take one frame, give what it decides; see `FrontEnd.push`."""
         front_end, foresight = self.front_end, self._foresight
         told = self._late(frame.t) if foresight.asked else []
+        if self._listening.armed:
+            told += self.lapse(frame.t)
         found = front_end.push(frame)
         if found:
             told += self._tell(found)
@@ -113,6 +117,16 @@ class Sensor:
         """The sensor restarted: cancel what is open, learn the idle sensor anew."""
         self._habits.clear()
         return self._tell(self.front_end.reset())
+
+    def lapse(self, t: float) -> list[Told]:
+        """Whether the sensor is no longer armed at `t` s."""
+        onset = self.front_end.segmenter.onset if self.front_end.segmenter.phase.pending else None
+        return [self._listening.told(self.name, t)] if self._listening.lapse(t, onset) else []
+
+    def gate(self, closed: Mapping[str, float], t: float) -> list[Told]:
+        """These gates are closed from `t` s on, and no others; by name: when each opens by itself."""
+        told = self.wait(t)
+        return [*told, self._listening.told(self.name, t)] if self._listening.gate(closed, t) else told
 
     def _tell(self, found: Sequence[Found]) -> list[Told]:
         """The events of what the front end has found, with the sensor's name and ids."""
@@ -154,7 +168,7 @@ class Sensor:
         scores, best, confidence = decision.best(self.classifier.gestures, answer, at.zone)
         seen = whole(cut.hole_s, self.front_end.interval_s)
         known = seen and confidence >= decision.threshold(best, answer)
-        decided = Decided(name, segment, answer, known)
+        decided, listening = Decided(name, segment, answer, known), self._listening
         own = answer.own if seen and decision.is_own(answer.own, at.zone, known=known) else None
         if own is not None:
             best, confidence = own.name, own.confidence
@@ -162,16 +176,21 @@ class Sensor:
             segment.onset, segment.offset, cut.decided, segment.last - segment.first + 1, segment.lost,
             answer.model, answer.degraded, scores,
         )  # fmt: skip
-        if not known and own is None:
+        recognised = best if known or own is not None else None
+        why = listening.refusal(segment.onset, recognised)
+        if why is None and recognised is None:
             why = reason(self.front_end.rate_hz, whole=seen)
-            unknown = Unknown(name, self.segments, confidence, *what, reason=why, where=at)
-            return [self._foresight.judged(unknown), decided]
+        if why is not None:
+            gates = listening.silenced if why == INHIBITED else ()
+            unknown = Unknown(name, self.segments, confidence, *what, reason=why, where=at, gates=gates)
+            return [self._foresight.judged(unknown), *([] if gates else [decided])]
         if decision.too_early(best, segment):
             return [self._cancelled("refractory"), decided]
         decision.published(best, segment)
         self.sequence += 1
         gesture = Gesture(name, self.segments, best, confidence, self.sequence, *what, own=own is not None, where=at)
-        return [self._foresight.judged(gesture), decided]
+        armed = [listening.told(name, cut.decided)] if listening.heard(cut.decided) else []
+        return [self._foresight.judged(gesture), decided, *armed]
 
     def _cancelled(self, why: str) -> Cancelled:
         return self._foresight.judged(Cancelled(self.name, self.segments, why))
@@ -192,6 +211,8 @@ class Sensor:
         """The provisional event of a contact that is not over, if the classifier is sure enough."""
         classifier, foresight, decision = self.classifier, self._foresight, self._decision
         if preview is None or (certainty := classifier.certainty) is None:
+            return []
+        if not self._listening.hears(preview.segment.onset):
             return []
         seen = whole(preview.hole_s, self.front_end.interval_s)
         if not seen or not foresight.wants(preview, certainty, self._scene.gestures):
@@ -291,9 +312,25 @@ class Sensor:
             self._square = new.rows == new.columns
         if another_clock:
             self._stamper = Stamper(scene.clock_of(self.name))
+        if self._listening.change(scene.arming_of(self.name), another_clock=another_clock):
+            facts.append(self._listening.told(self.name, self._stamper.at(now)))
         self.classifier, self._decision, self._asked = classifier, Decision(scene, self.name), None
         self._zones = scene.setup(self.name).zones
         self._foresight.taps = scene.provisional_taps
+
+    def shut(self, closed: Mapping[str, float], now: float, facts: list[Fact]) -> None:
+        """The gates that are closed from `now` on, by name: when each opens by itself, on the hub's clock."""
+        if closed != self._closed:
+            self._closed = closed
+            self._run(lambda t: self.gate({name: t + (until - now) for name, until in closed.items()}, t), now, facts)
+
+    def greet(self, closed: Mapping[str, float], armed_until: float | None, now: float, facts: list[Fact]) -> None:
+        """The sensor is new, and perhaps armed already: what it listens to is told, unless it is everything."""
+        if armed_until is not None:
+            self._listening.arm(armed_until)
+        self.shut(closed, now, facts)
+        if not closed and self._listening.arming is not None:
+            facts.append(self._listening.told(self.name, self._stamper.at(now)))
 
     def foresee(self, *, asked: bool, later: bool = False) -> None:
         """Say of contacts from now on, or no longer, what they will most probably be.
@@ -312,9 +349,11 @@ class Sensor:
         """Do what `look` does at `now` (s), and add its events to `facts`."""
         self._run(lambda _: self.look(), now, facts)
 
-    def review(self) -> None:
+    def review(self, now: float, facts: list[Fact]) -> None:
         """Look at what need not be looked at with each frame; called with each tick."""
         self._vitals.review(self.front_end)
+        if self._listening.armed:
+            self._run(self.lapse, now, facts)
 
     def stale(self, now: float) -> bool:
         """Whether nothing of the sensor was admitted for `stale_s` of the scene."""
@@ -345,6 +384,7 @@ class Sensor:
             lost=self._lost,
             lost_at=self._lost_at,
             exchanged=self._habits.exchanged,
+            gate=self._listening.told(self.name, self._stamper.at(now)),
             touched=front_end.touched,
             contact=self._open,
             sequence=self.sequence,

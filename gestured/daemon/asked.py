@@ -12,7 +12,14 @@ from gestured.daemon.metrics import Metrics
 from gestured.daemon.settings import Settings
 from gestured.daemon.sinks import Output, outputs
 from gestured.model import own_file
-from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, report_missing_points, require_gestures
+from gestured.model.ladder import (
+    Ladder,
+    gestures_in_use,
+    ladder_for,
+    report_missing_points,
+    require_arming,
+    require_gestures,
+)
 
 SLIP = 0.8  # of difflib's ratio: a name so near to a gesture of the model is taken for a slip of it
 
@@ -50,7 +57,17 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
     zones = [zone for sensor in settings.sensors.values() for zone in sensor.zones.values()]
     named = (*settings.per_gesture, *(name for zone in zones for name in zone.gestures or ()))
     require_gestures(ladder, (name for name in named if not _may_be_own(name, settings, ladder)))
+    _require_arming(settings, ladder)
     return ladder
+
+
+def _require_arming(settings: Settings, ladder: Ladder) -> None:
+    """Raises SettingsError where a gesture arms that can never come; a broken file of own gestures cannot tell."""
+    scene = scene_of(settings, ladder)
+    if not set(scene.arming_gestures.values()) <= set(scene.gestures):
+        own = own_file.load(own_file.where(settings.own_gestures, os.environ))
+        if own.fault is None:
+            require_arming(scene, (*scene.gestures, *own.gestures))
 
 
 def _may_be_own(name: str, settings: Settings, ladder: Ladder) -> bool:

@@ -20,8 +20,8 @@ example:
 
 Each flag is a variable (GESTURED_MODEL=...) and a key of the TOML file (model = "...") too; flags win over
 variables, these over the file. The file also takes [sensors.NAME] (grid, rotate, mirror, invert, clock, zones,
-strictness), [gestures.NAME] (threshold, refractory_s) and [addresses] (pressure, trajectory). SIGHUP reads
-it again.
+strictness, arming), [gestures.NAME] (threshold, refractory_s), [addresses] (pressure, trajectory), [arming] (by,
+seconds) and [gates] (start). SIGHUP reads it again.
 
 exit status:
   0 ended as asked, 2 usage or invalid configuration, 3 a model that cannot be used and no fallback,

@@ -11,7 +11,7 @@ from gestured.core.timing import Timing
 from gestured.daemon.asked import open_ladder
 from gestured.daemon.client import BACKLOG_BYTES
 from gestured.daemon.clients import CLIENTS
-from gestured.daemon.settings import TABLES, Settings
+from gestured.daemon.settings import TABLES, TITLES, Part, Settings
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
 from gestured.model import own_file
@@ -127,10 +127,10 @@ def _keys(settings: Settings, sources: Mapping[str, str]) -> Iterator[str]:
     """What was set, each key as the file has it, and by what."""
     for key, source in sources.items():
         table = getattr(settings, key)
-        if key == "addresses":
-            yield from (f"addresses.{field}: {source}" for field in sorted(table.model_fields_set))
+        title = TITLES.get(key, key)
+        if isinstance(table, Part):
+            yield from (f"{title}.{field}: {source}" for field in sorted(table.model_fields_set))
         elif key in TABLES:
-            title = "gestures" if key == "per_gesture" else key
             for name, part in table.items():
                 yield from (f"{title}.{name}.{field}: {source}" for field in sorted(part.model_fields_set))
         else:

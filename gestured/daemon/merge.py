@@ -15,7 +15,10 @@ from pydantic import ValidationError
 from gestured.core.errors import SettingsError
 from gestured.daemon.settings import (
     FLAGS,
+    TITLES,
     AddressSettings,
+    ArmingSettings,
+    GatesSettings,
     GestureSettings,
     Part,
     SensorSettings,
@@ -50,13 +53,15 @@ def _from_file(path: str) -> dict[str, Any]:
         raise SettingsError(f"config: {path}: {error.strerror}, expected a regular file of at most {limit}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise SettingsError(f"config: {path} is not valid TOML: {error}") from error
-    if "per_gesture" in found:  # our own name for the tables of [gestures], no key of the file's
-        raise SettingsError(f"per_gesture ({path}): unknown key, expected [gestures.NAME]")
+    for name in TITLES.keys() & found.keys():  # our own name for tables, no key of the file's
+        raise SettingsError(f"{name} ({path}): unknown key, expected [{TITLES[name]}]")
     if isinstance(found.get("gestures"), dict):
         tables = found.pop("gestures")
         if isinstance(tables.get("use"), list):
             found["gestures"] = tables.pop("use")
         found["per_gesture"] = tables
+    if isinstance(found.get("gates"), dict):
+        found["gate"] = found.pop("gates")
     return found
 
 
@@ -106,19 +111,25 @@ def _unknown(key: str, known: tuple[str, ...]) -> str:
 
 def _keys_at(place: tuple[Any, ...]) -> tuple[str, ...]:
     if len(place) < 2:
-        return tuple("gestures" if name == "per_gesture" else name for name in Settings.model_fields)
+        return tuple(TITLES.get(name, name) for name in Settings.model_fields)
     parts: dict[str, type[Part]] = {
         "sensors": SensorSettings,
         "per_gesture": GestureSettings,
         "addresses": AddressSettings,
+        "arming": ArmingSettings,
+        "gate": GatesSettings,
     }
-    part = ZoneSettings if "zones" in place[2:] else parts[place[0]]
+    inner: dict[str, type[Part]] = {"zones": ZoneSettings, "arming": ArmingSettings}
+    part = inner.get(place[2] if len(place) > 3 else "", parts[place[0]])
     return tuple(part.model_fields)
 
 
 def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     place = tuple(part for part in problem["loc"] if part not in ("[key]",))
     source = sources.get(str(place[0]), "default")
+    key = ".".join(TITLES.get(part, str(part)) for part in place)
+    if problem["type"] == "missing":
+        return f"{key} ({source}): is missing"
     if problem["type"] == "extra_forbidden":
         expected = _unknown(str(place[-1]), _keys_at(place))
     else:
@@ -126,7 +137,8 @@ def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:
         message = problem["msg"].removeprefix("Value error, " if ours else "Input should be ")
         message = message if ours else message[0].lower() + message[1:]
         expected = message if "expected" in message else "expected " + message
-    key = ".".join("gestures" if part == "per_gesture" else str(part) for part in place)
+    if problem["type"] == "model_type":
+        expected = f"expected a table [{key}]"
     return f"{key} = {problem['input']!r} ({source}): {expected}"
 
 

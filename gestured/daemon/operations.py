@@ -159,6 +159,8 @@ class Operations:
         """Stream packets and events over this connection from now on."""
         _not_yet(connection)
         self.taps.join(connection)
+        for gate in self.hub.listening(now := time.monotonic()):
+            self.taps.publish(gate, time.time() - now)  # what holds where the tape begins
         return self._scene()
 
     async def flight(self, connection: Connection) -> ReplyStream:

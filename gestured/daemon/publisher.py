@@ -43,7 +43,7 @@ class Publisher:
             self._recent.append(_answer(event, epoch, test))
         if not isinstance(event, Status):
             name = getattr(event, "gesture", None)
-            log.debug(messages.event_type(event), sensor=event.sensor, id=event.id, gesture=name)
+            log.debug(messages.event_type(event), sensor=event.sensor, id=getattr(event, "id", None), gesture=name)
 
     def recent(self) -> tuple[dict[str, Any], ...]:
         """The last RECENT answers as `gesturectl status` shows them, oldest first."""

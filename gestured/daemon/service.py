@@ -124,8 +124,9 @@ class Service:
 
     def _hello(self) -> bytes:
         """The first line to a client."""
+        gates = messages.listening(self._hub.listening(now := time.monotonic()), time.time() - now)
         sequences = self._hub.sequences()
-        return messages.hello_json(__version__, self._instance, self._ladder.active, self._gestures(), sequences)
+        return messages.hello_json(__version__, self._instance, self._ladder.active, self._gestures(), sequences, gates)
 
     def _gestures(self) -> tuple[str, ...]:
         """The gestures that a client may hear of: the model's in use, and the user's own."""
@@ -190,7 +191,9 @@ class Service:
         self._own.tick()
         snapshot = self.snapshot()
         self._metrics.kernel(snapshot.kernel_drops)
-        self._publisher.publish(Status(snapshot.state, snapshot.states, snapshot.models.active, snapshot.time))
+        self._publisher.publish(
+            Status(snapshot.state, snapshot.states, snapshot.models.active, snapshot.time, snapshot.listening)
+        )
         states = ", ".join(f"{name} {state}" for name, state in list(snapshot.states.items())[:SHOWN])
         words = f"{snapshot.state}: {snapshot.models.active} answers; sensors: {states or 'none yet'}"
         if words != self._said:

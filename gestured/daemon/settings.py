@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gestured.core.address import Address
+from gestured.core.listening import LONGEST_S, Arming
 from gestured.core.points import USUAL, Strictness
 from gestured.core.scene import MOST_SENSORS, STALE_S, TAP_GAP_S
 from gestured.core.timing import Timing
@@ -14,6 +15,7 @@ from gestured.core.zones import zones_of
 from gestured.daemon.values import (
     AddressField,
     DestinationField,
+    GateNameField,
     GridField,
     Listed,
     NetworkField,
@@ -39,6 +41,26 @@ class ZoneSettings(Part):
     )
 
 
+class ArmingSettings(Part):
+    """`[arming]`, `[sensors.NAME.arming]`: the gesture before which no other counts."""
+
+    by: str = Field(description="the gesture that arms: one in use, or an own one that was enrolled")
+    seconds: float = Field(
+        default=Arming("").seconds,
+        gt=0,
+        le=LONGEST_S,
+        description="seconds that a sensor stays armed after its last gesture",
+    )
+
+
+class GatesSettings(Part):
+    """`[gates]`: what keeps sensors silent."""
+
+    start: tuple[GateNameField, ...] = Field(
+        default=(), description="names of gates that are closed at every start, until they are allowed"
+    )
+
+
 class SensorSettings(Part):
     """`[sensors.NAME]`: how one sensor is built and mounted."""
 
@@ -56,6 +78,9 @@ class SensorSettings(Part):
     )
     zones: dict[SensorNameField, ZoneSettings] = Field(
         default={}, description="tables `[sensors.NAME.zones.ZONE]`, in the file only"
+    )
+    arming: ArmingSettings | None = Field(
+        default=None, description="table `[sensors.NAME.arming]`; by default the general `[arming]`"
     )
 
     @model_validator(mode="after")
@@ -184,8 +209,11 @@ class Settings(Part):
         default={}, description="tables `[gestures.NAME]`, in the file only"
     )
     addresses: AddressSettings = Field(default=AddressSettings(), description="table `[addresses]`, in the file only")
+    arming: ArmingSettings | None = Field(default=None, description="table `[arming]`, in the file only")
+    gate: GatesSettings = Field(default=GatesSettings(), description="table `[gates]`, in the file only")
 
 
-TABLES = ("sensors", "per_gesture", "addresses")  # in the file only
+TABLES = ("sensors", "per_gesture", "addresses", "arming", "gate")  # in the file only
+TITLES = {"per_gesture": "gestures", "gate": "gates"}  # what tables are called in the file, where their key is another
 FLAGS = tuple(name for name in Settings.model_fields if name not in TABLES)
 REPEATED = ("fallback", "publish", "allow")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gestured.core.beside.reading import SILENT, Reading
+from gestured.core.messages import listening
 from gestured.daemon.settings import Settings
 from gestured.daemon.shift import Shift
 from gestured.model.ladder import Ladder
@@ -72,6 +73,12 @@ class Snapshot:
     def every_gesture(self) -> tuple[str, ...]:
         """The model's gestures in use, and the user's own."""
         return (*self.gestures, *self.own["gestures"])
+
+    @property
+    def listening(self) -> dict[str, dict[str, Any]]:
+        """What hello and status tell of gates and arming."""
+        gates = [reading.gate for reading in self.sensors.values()]
+        return listening((gate for gate in gates if gate is not None and gate.says), self.time - self.now)
 
     @property
     def states(self) -> dict[str, str]:

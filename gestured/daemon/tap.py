@@ -7,6 +7,7 @@ taps and no flight recorder is set. A live tap is sent its lines soon after, so 
 
 import asyncio
 import base64
+import json
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -22,6 +23,7 @@ KEPT_S = 30.0  # how long the flight recorder keeps a packet
 OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps
 SOON_S = 0.025  # how long a packet's line waits, so that packets of many sensors that came with it are answered first
 TURN_LINES = 32  # lines that are made and sent before the loop looks after its frames again
+GATE = b'{"type":"gate"'  # how a line begins that tells what a sensor listens to
 Remembered = tuple[int, Source, bytes] | bytes  # a packet with its time in ns (monotonic), or an event's line
 
 
@@ -36,6 +38,7 @@ class Taps:
         self._timer: asyncio.Handle | None = None
         self._ring: deque[tuple[int, int, Remembered]] = deque()  # ns, bytes held, and what is held
         self._size = 0
+        self._gates: dict[str, bytes] = {}  # by sensor: the line that said what it listened to where the ring begins
 
     @property
     def active(self) -> bool:
@@ -73,7 +76,7 @@ class Taps:
     def flight(self) -> deque[Remembered]:
         """What the ring holds now, oldest first: the packets themselves, not copies of them."""
         self._forget(time.monotonic_ns())
-        return deque(what for _, _, what in self._ring)
+        return deque((*self._gates.values(), *(what for _, _, what in self._ring)))
 
     @property
     def held_bytes(self) -> int:
@@ -114,7 +117,10 @@ class Taps:
     def _forget(self, now_ns: int) -> None:
         oldest = now_ns - round(KEPT_S * 1e9)
         while self._ring and (self._size > self.ring_bytes or self._ring[0][0] < oldest):
-            self._size -= self._ring.popleft()[1]
+            _, size, what = self._ring.popleft()
+            self._size -= size
+            if isinstance(what, bytes) and what.startswith(GATE):
+                self._gates[json.loads(what)["sensor"]] = what
 
 
 def packet_line(t_ns: int, source: Source, packet: bytes) -> bytes:

@@ -32,10 +32,13 @@ def _grid(value: object) -> Grid:
     return Grid.parse(value if isinstance(value, str) else "")
 
 
-def _sensor(value: object) -> str:
-    if not isinstance(value, str) or not is_sensor(value):
-        raise ValueError("a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -")
-    return value
+def _name(of: str) -> BeforeValidator:
+    def checked(value: object) -> str:
+        if not isinstance(value, str) or not is_sensor(value):
+            raise ValueError(f"a {of}'s name, 1 to 64 of A-Z a-z 0-9 _ -")
+        return value
+
+    return BeforeValidator(checked)
 
 
 def _socket(value: object) -> Path:
@@ -63,5 +66,6 @@ AddressField = Annotated[Address, BeforeValidator(_address)]
 GridField = Annotated[Grid, BeforeValidator(_grid)]
 NetworkField = Annotated[ipaddress.IPv4Network | ipaddress.IPv6Network, BeforeValidator(_network)]
 DestinationField = Annotated[Address, BeforeValidator(_destination)]
-SensorNameField = Annotated[str, BeforeValidator(_sensor)]
+SensorNameField = Annotated[str, _name("sensor")]
+GateNameField = Annotated[str, _name("gate")]
 SocketField = Annotated[Path, BeforeValidator(_socket)]

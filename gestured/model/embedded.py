@@ -18,6 +18,7 @@ from gestured.core.errors import SettingsError
 from gestured.core.events import Event
 from gestured.core.facts import events_of
 from gestured.core.frames import Frame, Touch
+from gestured.core.listening import Arming
 from gestured.core.mounting import Mounting
 from gestured.core.points import USUAL, Strictness
 from gestured.core.scene import Scene, Setup
@@ -25,7 +26,14 @@ from gestured.core.sensor import Sensor
 from gestured.core.timing import Timing
 from gestured.core.zones import zones_of
 from gestured.model import own_file
-from gestured.model.ladder import Ladder, gestures_in_use, ladder_for, report_missing_points, require_gestures
+from gestured.model.ladder import (
+    Ladder,
+    gestures_in_use,
+    ladder_for,
+    report_missing_points,
+    require_arming,
+    require_gestures,
+)
 from gestured.model.own import Own
 from gestured.model.own_file import OwnFileError
 
@@ -42,6 +50,7 @@ class Embedded:
         self._sensor = sensor
         self._shape = sensor.front_end.sent
         self._last = -math.inf  # s, the time of the last frame
+        self._closed: set[str] = set()  # gates
 
     def push(self, t: float, values: ArrayLike, *, touches: Sequence[Touch] = (), lost: int = 0) -> list[Event]:
         """Take the frame of `t` s, (R, C) counts as the sensor sends them; give what it decides.
@@ -84,9 +93,25 @@ class Embedded:
         """
         return events_of(self._sensor.flush(self._now(t)))
 
+    def inhibit(self, t: float, gate: str) -> list[Event]:
+        """Close a gate at `t` s: until it is opened every contact is unknown, and one that began before as well.
+
+        Raises ValueError for a time before the last frame's.
+        """
+        return self._gate(t, {*self._closed, gate})
+
+    def allow(self, t: float, gate: str) -> list[Event]:
+        """Open a gate at `t` s; while others are closed the sensor stays silent. Raises ValueError as `inhibit`."""
+        return self._gate(t, self._closed - {gate})
+
     def reset(self) -> list[Event]:
         """The sensor restarted: cancel what is open, learn the idle sensor anew."""
         return events_of(self._sensor.reset())
+
+    def _gate(self, t: float, closed: set[str]) -> list[Event]:
+        told = self._sensor.gate(dict.fromkeys(closed, math.inf), self._now(t))
+        self._closed = closed
+        return events_of(told)
 
     def _now(self, t: float) -> float:
         if not self._last <= t < math.inf:
@@ -109,6 +134,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     tap_gap_s: float = Timing().tap_gap_s,
     provisional: bool = False,
     zones: Mapping[str, Any] | None = None,
+    arming: Mapping[str, Any] | None = None,
 ) -> Embedded:
     """The recogniser of one sensor with a model: the name of one that ships, or the path of an .onnx file.
 
@@ -120,6 +146,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     is how long a tap waits for a second one, 0.2 to 0.6 s. With `provisional` a contact's most probable gesture is
     said before it is over, where the model was made for that. `zones` are parts of the sensor by name, each as its four
     edges `(left, bottom, right, top)` in fractions, or as a mapping with `at` and the `gestures` that may begin there.
+    `arming`, such as `{"by": "double_tap", "seconds": 5}`, names the gesture before which no other counts.
 
     Recognisers of one model share it. Below a shipped model stand its fallbacks, as in the daemon; where one of them
     answers, the logger `gestured` gets a warning. Raises ModelError for a model that cannot be used, SettingsError or
@@ -142,6 +169,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
             sensors={sensor: Setup(mounting=Mounting(rotate, mirror, invert), zones=zones_of(zones or {}))},
             tap_gap_s=tap_gap_s,
             strictness=strictness,
+            arming=Arming.of(arming),
             thresholds=_thresholds(ladder, {} if thresholds is None else thresholds),
         )
     except (TypeError, ValueError) as error:
@@ -149,6 +177,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     report_missing_points(ladder, (strictness,))
     named = (name for zone in scene.setup(sensor).zones.values() for name in zone.gestures or ())
     require_gestures(ladder, (name for name in named if name not in ladder.own.gestures))
+    require_arming(scene, (*used, *ladder.own.gestures))
     found = Sensor(sensor, scene, ladder)
     found.foresee(asked=provisional)
     return Embedded(found, (*used, *ladder.own.gestures))

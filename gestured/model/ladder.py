@@ -15,6 +15,7 @@ from gestured.core.errors import ModelError, SettingsError
 from gestured.core.frames import Segment
 from gestured.core.own import Examples
 from gestured.core.points import USUAL
+from gestured.core.scene import Scene
 from gestured.model.model import Model
 from gestured.model.own import Own
 from gestured.model.rung import Rung
@@ -215,6 +216,13 @@ def require_gestures(ladder: Ladder, names: Iterable[str]) -> None:
         if name not in ladder.gestures:
             known = ", ".join(ladder.gestures)
             raise SettingsError(f"gestures: {name!r} is no gesture of {ladder.name}, expected any of {known}")
+
+
+def require_arming(scene: Scene, known: Sequence[str]) -> None:
+    """Raises SettingsError where a gesture that arms a sensor is not known: then no other would ever count."""
+    for field, gesture in scene.arming_gestures.items():
+        if gesture not in known:
+            raise SettingsError(f"{field} = {gesture!r}: is no gesture in use, expected any of {', '.join(known)}")
 
 
 def gestures_in_use(ladder: Ladder, chosen: Sequence[str] | None) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -112,7 +113,7 @@ class Replay:
         Raises RecordingError for a classifier that does not know the gestures that were in use.
         """
         try:
-            self._hub = Hub(dataclasses.replace(scene, frames=True), classifier)
+            self._hub = Hub(dataclasses.replace(scene, frames=True, gates=()), classifier)
         except ValueError as error:
             raise RecordingError(str(error)) from None
         self._hub.foresee(None if provisional else ())
@@ -130,11 +131,21 @@ class Replay:
     def facts(self) -> Iterator[Event | Decided | Arrived | Taken | Dropped | Changed]:
         """The same with all else that the hub tells of; frames are told of one by one."""
         now = 0.0
+        gates = deque(event for event in self._tape.events if event["type"] == "gate")
         for t_ns, packets in groupby(self._tape.packets, lambda packet: packet.t_ns):
             now = (t_ns - self._start) / 1e9
+            while gates and gates[0]["since"] - self.epoch < now:
+                yield from self._seen(self._gate(gates.popleft()))
             yield from self._seen(self._hub.receive([(packet.data, packet.source) for packet in packets], now))
             yield from self._seen(self._hub.tick(now))
         yield from self._seen(self._hub.flush(now + self._hub.scene.stale_s))
+
+    def _gate(self, told: Mapping[str, Any]) -> list[Fact]:
+        """What the tape tells of a sensor's gates; where that was so before its first packet, of its arming, too."""
+        since, until = told["since"] - self.epoch, told.get("until")
+        if since >= 0 or told.get("armed") is not True or not isinstance(until, int | float):
+            return self._hub.put(told["sensor"], told["closed"], max(since, 0.0))
+        return self._hub.put(told["sensor"], told["closed"], 0.0, until - self.epoch)
 
     def _seen(self, facts: list[Fact]) -> Iterator[Event | Decided | Arrived | Taken | Dropped | Changed]:
         for fact in facts:

@@ -30,6 +30,8 @@ EVENT_SCHEMA: dict[str, Any] = {
         "decided": {"type": "number"},
         "model": {"type": "string"},
         "reason": {"type": "string"},
+        "closed": {"type": "array", "items": {"type": "string"}},
+        "since": {"type": "number"},
     },
     "required": ["type"],
 }

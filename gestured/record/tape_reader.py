@@ -26,6 +26,7 @@ NEEDED = {
     "unknown": ("sensor", "id", "confidence", "onset", "offset"),
     "cancelled": ("sensor", "id", "reason"),
     "release": ("sensor", "id"),
+    "gate": ("sensor", "closed", "since"),
 }
 
 
@@ -117,6 +118,8 @@ def _event(line: bytes, number: int) -> Mapping[str, Any]:
 def _right(form: str, value: object) -> bool:
     if form == "string":
         return isinstance(value, str)
+    if form == "array":
+        return isinstance(value, list) and all(isinstance(item, str) for item in value)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return abs(value) <= LARGEST_NUMBER and (form == "number" or isinstance(value, int))  # so NaN is none

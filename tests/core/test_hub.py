@@ -4,11 +4,11 @@ import ipaddress
 import math
 import socket
 import statistics
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -180,7 +180,7 @@ def is_answer(fact: object) -> bool:
     return isinstance(fact, Gesture | Unknown | Cancelled)
 
 
-def write(path: Path, arrived: list[Arrived], **settings: object) -> Path:
+def write(path: Path, arrived: list[Arrived], events: Sequence[Mapping[str, Any]] = (), **settings: object) -> Path:
     """A tape as the daemon would have written it."""
     told = {
         "gestures": GESTURES,
@@ -194,6 +194,8 @@ def write(path: Path, arrived: list[Arrived], **settings: object) -> Path:
     with tape_writer.Writer(path, told, 1 << 30) as writer:
         for t, packet, source in sorted(arrived):
             writer.packet(round((t + 1e9) * 1e9), f"{source[0]}:{source[1]}", packet)
+        for event in events:
+            writer.event(0, event)
     return path
 
 

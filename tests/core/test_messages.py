@@ -25,6 +25,10 @@ BY_TYPE: dict[object, st.SearchStrategy] = {
     float: number,
     bool: st.booleans(),
     str | None: st.none() | word,
+    bool | None: st.none() | st.booleans(),
+    float | None: st.none() | number,
+    tuple[str, ...]: st.lists(word).map(tuple),
+    Mapping[str, Mapping[str, typing.Any]]: st.dictionaries(word, st.dictionaries(word, number)),
     Where | None: st.none()
     | st.builds(Where, PLACES, PLACES, number, number, number, st.integers(1, 2), st.integers(0, 9), st.none() | word),
     Mapping[str, float]: st.dictionaries(word, number),
@@ -43,8 +47,11 @@ def test_every_event_survives_its_json_line(event: Event, epoch: float) -> None:
     assert line.endswith(b"\n") and line.count(b"\n") == 1
     got = json.loads(line)
     assert getattr(events, got.pop("type").capitalize()) is type(event)
-    for key in ("onset", "offset", "decided"):
-        if key in got:
+    for key in ("closed", "gates"):
+        if isinstance(got.get(key), list):
+            got[key] = tuple(got[key])
+    for key in ("onset", "offset", "decided", "since", "until"):
+        if got.get(key) is not None:
             assert got[key] == getattr(event, key) + epoch
             got[key] = getattr(event, key)
     if (where := got.get("where")) is not None:
@@ -71,11 +78,11 @@ def test_a_gesture_looks_as_the_contract_says() -> None:
     )
     status = Status("ok", {"armrest": "ok"}, "cnn_lstm", 1234.5)
     assert messages.to_json(status, 1000.0) == (
-        b'{"type":"status","state":"ok","sensors":{"armrest":"ok"},"model":"cnn_lstm","time":1234.5}\n'
+        b'{"type":"status","state":"ok","sensors":{"armrest":"ok"},"model":"cnn_lstm","time":1234.5,"gates":{}}\n'
     )
-    assert messages.hello_json("0.1", "x", "m", ("a", "b"), {"armrest": 17}) == (
+    assert messages.hello_json("0.1", "x", "m", ("a", "b"), {"armrest": 17}, {}) == (
         b'{"type":"hello","protocol":1,"version":"0.1","instance":"x","model":"m","gestures":["a","b"],'
-        b'"sensors":{"armrest":17}}\n'
+        b'"sensors":{"armrest":17},"gates":{}}\n'
     )
     assert messages.lost_json(3) == b'{"type":"lost","count":3}\n'
     assert json.loads(messages.error_json('odd "ä"\n')) == {"type": "error", "reason": 'odd "ä"\n'}

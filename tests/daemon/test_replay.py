@@ -115,7 +115,8 @@ def test_a_tape_knows_everything_that_decides(model: Path, tmp_path: Path) -> No
         'strictness = "strict"\nallow = ["127.0.0.0/8", "fd00::/8"]\naddresses.pressure = "/skin/{sensor}"\n'
         'gestures.use = ["swipe_left", "one_tap"]\ngestures.one_tap = { threshold = 0.75, refractory_s = 1.5 }\n'
         'sensors.arm = { grid = "5x6", rotate = 90, mirror = true, invert = true, clock = "arrival" }\n'
-        'sensors.elbow = { strictness = "eager" }\n'
+        'sensors.elbow = { strictness = "eager", arming.by = "one_tap" }\n'
+        'arming = { by = "swipe_left", seconds = 3 }\ngates.start = ["door"]\n'
     )
     ladder = ladder_for(model)
     usual, odd = (load_settings({"model": str(model), **given}, {})[0] for given in ({}, {"config": str(file)}))

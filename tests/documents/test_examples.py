@@ -35,6 +35,7 @@ PHRASES = {
     "HEADER",
     "np.load",
     "zones=zones",
+    "arming={",
     "gestured.Hub",
     'sensors=["armrest"]) as events',
     "was_shown",
@@ -200,6 +201,15 @@ def test_one_sensor_with_several_zones(place: Place):
     assert {zone for zone, _ in said} == {"volume", "lamp", "window"}, done.stderr
     assert {gesture for zone, gesture in said if zone == "volume"} == {"swipe_left", "swipe_right"}
     assert ("lamp", "one_tap") in said
+
+
+def test_one_sensor_that_must_be_armed(place: Place):
+    command = [sys.executable, "-c", example("arming={").text]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=place.folder, env=environment, capture_output=True, text=True, timeout=60)
+    before, after = (done.stdout.partition("unknown: inhibited door") if done.stdout else ("", done.stderr, ""))[::2]
+    assert "unknown: disarmed\ndouble_tap\nswipe_left\n" in before, done.stderr
+    assert set(after.split("\n")) <= {"", "unknown: inhibited door"}
 
 
 def test_many_sensors_in_a_process_of_ones_own(place: Place):

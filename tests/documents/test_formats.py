@@ -9,7 +9,7 @@ from typing import Any, get_args
 import pytest
 
 from gestured.core import messages
-from gestured.core.events import Cancelled, Event, Gesture, Place, Provisional, Unknown, Where
+from gestured.core.events import Cancelled, Event, Gate, Gesture, Place, Provisional, Status, Unknown, Where
 from gestured.core.messages import parse_subscription
 from gestured.daemon.explain import explain
 from gestured.model.shipped import shipped
@@ -38,7 +38,7 @@ def valid() -> Any:
 def test_the_schema_has_each_key_of_each_event(event: type):
     part = SCHEMA["$defs"][event.__name__.lower()]
     keys = {"type", *(field.name for field in fields(event))}
-    assert set(part["required"]) == keys - {"own"}  # said where it is true alone
+    assert set(part["required"]) == keys - ({"own", "gates"} - ({"gates"} if event is Status else set()))
     assert set(part["properties"]) - {"test"} == keys
 
 
@@ -60,11 +60,19 @@ def test_lines_of_every_kind_are_valid(valid: Any):
         Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores, where=where),
         Gesture("a", 1, "swipe_left", 1.0, 1, 0.1, 0.2, 0.4, 3, 0, "m", True, scores, where=where),
         Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores, "hole", "revoked", where),
+        Unknown("a", 1, 0.7, 0.1, 0.2, 0.4, 3, 0, "m", False, scores, "inhibited", None, where, ("door",)),
+        Gate("a", None, ("door",), None, 2.0),
         Cancelled("a", 1, "held"),
         Provisional("a", 1, "swipe_left", 0.9, 0.1, 0.2),
     ):
         valid(json.loads(messages.to_json(event, 1.7e9)))
-    valid(json.loads(messages.hello_json("1", "x", "m", ["one_tap"], {"a": 0})))
+    valid(
+        json.loads(
+            messages.hello_json(
+                "1", "x", "m", ["one_tap"], {"a": 0}, {"a": {"armed": True, "closed": (), "until": 2.0}}
+            )
+        )
+    )
     valid(json.loads(messages.lost_json(3)))
     valid(json.loads(messages.error_json("no")))
 

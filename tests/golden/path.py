@@ -98,7 +98,7 @@ def as_line(event: Event) -> Line:
     if isinstance(event, Gesture):
         assert line.pop("own") is False
     if isinstance(event, Unknown):
-        assert line.pop("reason") in ("confidence", "hole", "rate")
+        assert line.pop("reason") in ("confidence", "hole", "rate") and not line.pop("gates")
     return line
 
 
