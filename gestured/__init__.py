@@ -8,7 +8,17 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from gestured.client.subscriber import Subscriber
     from gestured.core.errors import GesturedError
-    from gestured.core.events import Cancelled, Gate, Gesture, Onset, Provisional, Release, Status, Unknown
+    from gestured.core.events import (
+        Cancelled,
+        Gate,
+        Gesture,
+        Onset,
+        Provisional,
+        Release,
+        Status,
+        TouchEvent,
+        Unknown,
+    )
     from gestured.core.frames import Frame, Touch
     from gestured.core.hub import Hub
     from gestured.core.scene import Scene
@@ -32,6 +42,7 @@ __all__ = [
     "Status",
     "Subscriber",
     "Touch",
+    "TouchEvent",
     "Unknown",
     "open",
 ]
@@ -39,7 +50,17 @@ __all__ = [
 _HOMES = {
     "client.subscriber": ("Subscriber",),
     "core.errors": ("GesturedError",),
-    "core.events": ("Cancelled", "Gate", "Gesture", "Onset", "Provisional", "Release", "Status", "Unknown"),
+    "core.events": (
+        "Cancelled",
+        "Gate",
+        "Gesture",
+        "Onset",
+        "Provisional",
+        "Release",
+        "Status",
+        "TouchEvent",
+        "Unknown",
+    ),
     "core.frames": ("Frame", "Touch"),
     "core.hub": ("Hub",),
     "core.scene": ("Scene",),

@@ -7,7 +7,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.client.fields import wrong_field
-from gestured.core.events import Cancelled, Gate, Gesture, Onset, Place, Provisional, Release, Status, Unknown, Where
+from gestured.core.events import (
+    Cancelled,
+    Gate,
+    Gesture,
+    Onset,
+    Place,
+    Provisional,
+    Release,
+    Status,
+    Touch,
+    Unknown,
+    Where,
+)
 from gestured.core.messages import gestures_json, hello_json, lost_json, quoted, to_json
 
 WHERE = Where(Place(0.2, 0.5), Place(0.8, 0.5), 0.6, 1e60, 30.0, 1, 0)  # a sensor's counts may be any
@@ -20,6 +32,7 @@ EVENTS = [
     Cancelled("a", 1, "held"),
     Release("a", 1, 2.0),
     Gate("a", True, ("door",), 2.5, 2.0),
+    Touch("a", 1, 0, "up", 1.5, 0.5, 0.5, 0.0, 0.0, 1e9, 4, None, "learned"),
     Status("ok", {"a": "ok"}, "m", 2.0),
 ]
 LINES = [

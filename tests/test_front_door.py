@@ -43,7 +43,7 @@ def test_what_listens_needs_neither_numpy_nor_a_model():
 
 @pytest.mark.parametrize("name", gestured.__all__)
 def test_each_name_is_there_when_it_is_used(name: str):
-    assert getattr(gestured, name).__name__ == {"Recognizer": "Sensor"}.get(name, name)
+    assert getattr(gestured, name).__name__ == {"Recognizer": "Sensor", "TouchEvent": "Touch"}.get(name, name)
     assert name in dir(gestured)
 
 

@@ -76,7 +76,7 @@ def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
     """One event as one line for a person; `before` keeps the last provisional event of each sensor for its answer."""
     kind, sensor = event.get("type"), event.get("sensor", "-")
     early = before.pop(sensor, None)
-    moment = next((event[key] for key in ("decided", "onset", "offset", "time") if key in event), time.time())
+    moment = next((event[key] for key in ("decided", "onset", "offset", "t", "time") if key in event), time.time())
     clock = datetime.fromtimestamp(moment).strftime("%H:%M:%S.%f")[:-3]
     head = f"{clock}  {sensor:<12} "
     if kind in ("gesture", "unknown"):
@@ -94,6 +94,9 @@ def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
     if kind == "provisional":
         before[sensor] = event
         return f"{head}{event['gesture'] + '?':<24} {event['confidence']:4.2f}  provisional"
+    if kind == "touch":
+        what = f"touch {event['touch']} {event['phase']}" + (f" ({event['reason']})" if event.get("reason") else "")
+        return f"{head}{what:<24} {event['x']:.2f},{event['y']:.2f}  {event['pressure']:g} counts"
     if kind == "status":
         sensors = ", ".join(f"{name} {state}" for name, state in sorted(event["sensors"].items()))
         return f"{head}status: {event['state']} ({sensors or 'no sensor'})"

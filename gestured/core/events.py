@@ -136,6 +136,28 @@ class Gate:
 
 
 @dataclass(frozen=True, slots=True)
+class Touch:
+    """A finger of a contact that goes on. It is no answer: that follows, or has come already."""
+
+    sensor: str
+    id: int  # of the contact
+    touch: int  # counts the contact's fingers from 0
+    phase: str  # down, move, up; each `down` is followed by exactly one `up`
+    t: float  # s, when the finger was seen there
+    x: float  # 0..1, from left to right
+    y: float  # 0..1, upward
+    dx: float  # since the last event of this finger
+    dy: float
+    pressure: float  # counts of the strongest taxel above the idle sensor
+    area: int  # taxels above half of that
+    zone: str | None = None  # where it came down
+    reason: str | None = None  # of an `up` where the finger is still there: learned
+
+
+TouchEvent = Touch  # its public name, since `gestured.Touch` is a finger's position that a sensor reports
+
+
+@dataclass(frozen=True, slots=True)
 class Status:
     """How the daemon is, once a second as a sign of life."""
 
@@ -146,4 +168,4 @@ class Status:
     gates: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # `messages.listening` of some sensors
 
 
-Event = Onset | Provisional | Gesture | Unknown | Cancelled | Release | Gate | Status
+Event = Onset | Provisional | Gesture | Unknown | Cancelled | Release | Touch | Gate | Status

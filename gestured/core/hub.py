@@ -46,6 +46,7 @@ class Hub:
         self._asked: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
         self._waits: dict[str, Sensor] = {}  # sensors in which a contact may be over before the next frame
         self._due = math.inf  # s, when the first contact of all sensors may be over
+        self._followed: frozenset[str] | None = frozenset()  # sensors with touch events; None is all
         self._later = later
         self._armed: dict[str, float] = {}  # sensors that come armed, until so many s on this clock
         self.gates = Gates(scene.gates)  # which a change of the scene leaves as they are
@@ -150,6 +151,7 @@ class Hub:
         self._set(scene, classifier)
         for sensor in self._sensors.values():
             sensor.change(scene, classifier, now, facts)
+            sensor.follow(facts, asked=self._follows(sensor.name))
         return facts
 
     def inhibit(self, sensor: str | None, gate: str, now: float, seconds: float = math.inf) -> list[Fact]:
@@ -184,6 +186,17 @@ class Hub:
     def foreseen(self, name: str) -> bool:
         """Whether somebody asks for a sensor's provisional events."""
         return self._asked is None or name in self._asked
+
+    def follow(self, sensors: Collection[str] | None) -> list[Fact]:
+        """Give touch events of these sensors, by name, or of all (None), if the scene has `touch`."""
+        self._followed = None if sensors is None else frozenset(sensors)
+        facts: list[Fact] = []
+        for sensor in self._sensors.values():
+            sensor.follow(facts, asked=self._follows(sensor.name))
+        return facts
+
+    def _follows(self, name: str) -> bool:
+        return self._scene.touch and (self._followed is None or name in self._followed)
 
     def number(self, name: str) -> tuple[int, int]:
         """The next sequence and id of a sensor, for an event that is made up; they count as used."""
@@ -272,6 +285,7 @@ class Hub:
             numbers = self._numbers.pop(name, (0, 0))
             sensor = self._sensors[name] = Sensor(name, self._scene, self._classifier, source, numbers)
             sensor.foresee(asked=self.foreseen(name), later=self._later)
+            sensor.follow(facts, asked=self._follows(name))
             self._told[name] = self._missed
             facts.append(Changed(name, "new", source))
             sensor.greet(self.gates.of(name), self._armed.pop(name, None), now, facts)

@@ -46,13 +46,17 @@ class Listening:
         self._silent_until = -math.inf  # contacts that began before are silent; infinite while a gate is closed
         self._armed_until = -math.inf  # contacts that began until then count
 
+    def silences(self, onset: float) -> bool:
+        """Whether a gate was closed during a contact that began then."""
+        return onset < self._silent_until
+
     def hears(self, onset: float) -> bool:
         """Whether a contact that began then may be any gesture, and not only the one that arms."""
-        return onset >= self._silent_until and (self.arming is None or onset <= self._armed_until)
+        return not self.silences(onset) and (self.arming is None or onset <= self._armed_until)
 
     def refusal(self, onset: float, gesture: str | None) -> str | None:
         """Why a contact that began then must be unknown, though it was recognised as this gesture (None: as none)."""
-        if onset < self._silent_until:
+        if self.silences(onset):
             return INHIBITED
         free = gesture is None or self.arming is None or gesture == self.arming.by
         return None if free or onset <= self._armed_until else DISARMED

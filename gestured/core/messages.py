@@ -10,12 +10,17 @@ from typing import Any, get_args
 
 from gestured.core.address import is_sensor
 from gestured.core.errors import ProtocolError
-from gestured.core.events import Event, Gate, Gesture, Provisional, Status, Unknown, Where
+from gestured.core.events import Event, Gate, Gesture, Provisional, Status, Touch, Unknown, Where
 
 MAX_LINE = 4096  # bytes of a client's request
 LONGEST = 60  # characters of what a peer sent, in an answer to it
 EVENT_TYPES = tuple(cls.__name__.lower() for cls in get_args(Event))
-_STREAM_TIMES = frozenset(("onset", "offset", "decided", "until", "since"))
+_STREAM_TIMES = frozenset(("onset", "offset", "decided", "until", "since", "t"))
+# Fields that a line has only where they say something else than this.
+_UNSAID: dict[tuple[str, str], object] = {
+    ("gesture", "own"): False, ("gesture", "where"): None, ("unknown", "where"): None, ("unknown", "gates"): (),
+    ("touch", "reason"): None,
+}  # fmt: skip
 
 
 def json_object(text: str | bytes) -> dict[str, Any] | None:
@@ -40,8 +45,8 @@ def to_json(event: Event, epoch: float, *, test: bool = False) -> bytes:
     line: dict[str, Any] = {"type": event_type(event)}
     for field in fields(event):
         value = getattr(event, field.name)
-        if (field.name, value) in (("own", False), ("where", None), ("gates", ())):
-            continue  # only lines of which these say something have them
+        if value == _UNSAID.get((line["type"], field.name), ...):
+            continue
         line[field.name] = value + epoch if field.name in _STREAM_TIMES and value is not None else value
     if test:
         line["test"] = True
@@ -128,9 +133,9 @@ class Subscription:
     zones: frozenset[str] | None = None
 
     @property
-    def foresees(self) -> bool:
-        """Whether it asks for provisional events."""
-        return "provisional" in self.types
+    def costly(self) -> bool:
+        """Whether it asks for events that are made only where somebody does."""
+        return not self.types.isdisjoint(("provisional", "touch"))
 
     def matches(self, event: Event) -> bool:
         """`sensors` filters what is one sensor's, `gestures` what has a gesture's name, `zones` what has a place.
@@ -141,8 +146,9 @@ class Subscription:
             return False
         if self.sensors is not None and not isinstance(event, Status) and event.sensor not in self.sensors:
             return False
-        if self.zones is not None and isinstance(event, Gesture | Unknown):
-            if event.where is None or event.where.zone not in self.zones:
+        if self.zones is not None and isinstance(event, Gesture | Unknown | Touch):
+            place = event if isinstance(event, Touch) else event.where
+            if place is None or place.zone not in self.zones:
                 return False
         return self.gestures is None or not isinstance(event, Gesture | Provisional) or event.gesture in self.gestures
 
@@ -177,6 +183,8 @@ def _names(key: str, value: object, known: Mapping[str, Collection[str]]) -> fro
         if key == "sensors":
             if not is_sensor(item):
                 raise _refused(f"subscribe.sensors: {quoted(item)} cannot be a sensor's name")
+        elif (key, item) == ("types", "touch") and item not in known[key]:
+            raise _refused('subscribe.types: "touch" is off, expected `touch = true` in the configuration')
         elif item not in known[key]:
             expected = f"any of {', '.join(known[key])}" if known[key] else f"none, since no {key} are configured"
             raise _refused(f"subscribe.{key}: unknown {quoted(item)}, expected {expected}")

@@ -59,6 +59,7 @@ class Scene:
     arming: Arming | None = None  # the gesture before which no other counts
     gates: tuple[str, ...] = ()  # closed for every sensor where a hub begins
     provisional_taps: bool = True  # whether a tap is said provisionally while a second one may follow
+    touch: bool = False  # whether fingers may be followed while they touch: who presses what, when, is personal
     touches: bool = False  # whether finger positions are kept
     frames: bool = False  # whether the hub tells of each frame that it used
 
@@ -101,7 +102,7 @@ class Scene:
         parts = told.get("per_gesture", {}).items()
         plain: tuple[tuple[str, type], ...] = (
             ("clock", str), ("strictness", str), ("stale_s", float), ("tap_gap_s", float), ("provisional_taps", bool),
-            ("max_sensors", int),
+            ("touch", bool), ("max_sensors", int),
         )  # fmt: skip
         return cls(
             gestures=gestures,

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from gestured.core.beside.foresight import Foresight, Preview
 from gestured.core.beside.habits import Habits
 from gestured.core.beside.reading import Reading, Vitals
+from gestured.core.beside.touch import Fingers
 from gestured.core.beside.view import View, view_of
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.decision import Decision, reason, whole
@@ -62,6 +63,7 @@ class Sensor:
         self._stamper = Stamper(scene.clock_of(name))
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # last; no scores where it failed
         self._foresight = Foresight(name, taps=scene.provisional_taps)
+        self._fingers = Fingers(name, scene.setup(name).zones)
         self._later = False  # whether looks for provisional events wait until `look`
         self._habits, self._vitals = Habits(*self.front_end.sent), Vitals()
         self._square = self.front_end.rows == self.front_end.columns  # then idle frames say nothing of its habits
@@ -89,6 +91,8 @@ class Sensor:
                 told += self._foresee(foresight.preview(front_end, last.segment, frame.t, drafted=True))
             foresight.see(front_end, frame.t)
             told += self._at_once()
+        if self._fingers.asked and self.front_end.touched and not self._listening.silences(front_end.segmenter.onset):
+            told += self._fingers.see(front_end)
         if not self._square or ((look := front_end.look) is not None and look.burst):
             self._habits.see(front_end)
         return told
@@ -125,7 +129,7 @@ class Sensor:
 
     def gate(self, closed: Mapping[str, float], t: float) -> list[Told]:
         """These gates are closed from `t` s on, and no others; by name: when each opens by itself."""
-        told = self.wait(t)
+        told = [*(self._fingers.end() if closed else ()), *self.wait(t)]
         return [*told, self._listening.told(self.name, t)] if self._listening.gate(closed, t) else told
 
     def _tell(self, found: Sequence[Found]) -> list[Told]:
@@ -139,8 +143,10 @@ class Sensor:
             if isinstance(one, Opened):
                 self.segments += 1
                 self._foresight.begin(self.segments)
+                self._fingers.begin(self.segments)
                 told.append(Onset(self.name, self.segments, one.onset))
             elif isinstance(one, Ended):
+                told[:0] = self._fingers.end()  # whoever follows a finger hears first that it has left
                 told.append(Release(self.name, self.segments, one.offset))
             else:
                 told += self._decide(one) if isinstance(one, Cut) else [self._cancelled(one.reason)]
@@ -317,6 +323,7 @@ class Sensor:
         self.classifier, self._decision, self._asked = classifier, Decision(scene, self.name), None
         self._zones = scene.setup(self.name).zones
         self._foresight.taps = scene.provisional_taps
+        self._fingers.zones = self._zones
 
     def shut(self, closed: Mapping[str, float], now: float, facts: list[Fact]) -> None:
         """The gates that are closed from `now` on, by name: when each opens by itself, on the hub's clock."""
@@ -339,6 +346,12 @@ class Sensor:
         next one comes gives no provisional event.
         """
         self._foresight.asked, self._later = asked, later
+
+    def follow(self, facts: list[Fact], *, asked: bool) -> None:
+        """Tell of each finger from now on, or no longer; then those that are down are up, in `facts`."""
+        if not asked:
+            facts += self._fingers.end()
+        self._fingers.asked = asked
 
     @property
     def looks(self) -> bool:
@@ -408,6 +421,7 @@ class Sensor:
         """After a bug: start clean, and end what consumers believe to be open."""
         facts.append(Fault(self.name, error))
         try:
+            facts += self._fingers.end()
             self.reset()
         except Exception as second:
             facts.append(Fault(self.name, second))

@@ -42,8 +42,8 @@ def where(segment: Segment, zones: Mapping[str, Zone]) -> Where:
         start,
         end,
         round(way / (min(rows, columns) - 1), 4),
-        _digits(top),
-        _digits(snr),
+        digits(top),
+        digits(snr),
         contacts,
         0 if segment.bad is None else _under(segment.bad, places),
         zone_at(zones, start),
@@ -79,6 +79,6 @@ def _under(bad: NDArray[np.bool_], places: Array) -> int:
     return int(np.count_nonzero((np.hypot(*(taxels - nearest).transpose(2, 0, 1)) <= UNDER).any(axis=1)))
 
 
-def _digits(value: float) -> float:
+def digits(value: float) -> float:
     """A number to six digits: more of them would only make each line longer."""
     return float(f"{value:.6g}")

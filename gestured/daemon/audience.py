@@ -35,9 +35,9 @@ class Audience:
             wanted += [client for client in owed if self._is_here(client) and not client.subscription.matches(event)]
         return wanted
 
-    def foresees(self) -> tuple[frozenset[str], bool]:
-        """The sensors whose provisional events somebody asks for by name, and whether somebody asks for all."""
-        named = [asked.sensors for asked in self._classes if asked.foresees]
+    def asked(self, kind: str) -> tuple[frozenset[str], bool]:
+        """The sensors whose events of a type somebody asks for by name, and whether somebody asks for all."""
+        named = [asked.sensors for asked in self._classes if kind in asked.types]
         return frozenset().union(*(names for names in named if names is not None)), None in named
 
     def _is_here(self, client: Client) -> bool:

@@ -10,10 +10,12 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from typing import Protocol
 
 from gestured.core import messages
 from gestured.core.errors import ProtocolError
+from gestured.core.events import Touch
 from gestured.core.messages import MAX_LINE, Subscription, parse_subscription
 from gestured.daemon.metrics import Metrics
 
@@ -57,6 +59,9 @@ class Client:
         self._begun = b""  # rest of a line of which the client already has a part
         self._waiting: deque[bytes] = deque()  # whole lines that come after `_begun`
         self._size = 0  # bytes of the lines in `_waiting`
+        self._moves: dict[
+            tuple[str, int, int], tuple[Touch, float]
+        ] = {}  # by finger: how it moved since, and the epoch
         self._lost = 0  # lines that were dropped, of which the client was not told so far
         self.turns = TURNS  # turns that it has left in this second
         self._request = bytearray()  # a line that is not complete
@@ -79,6 +84,18 @@ class Client:
             self.blocked_since = time.monotonic()
             self._server.loop.add_writer(self.sock, self.flush)
 
+    def touch(self, event: Touch, epoch: float, line: bytes) -> None:
+        """Send a touch event, which `line` tells. Moves of a finger that wait are one: they displace nothing."""
+        key = event.sensor, event.id, event.touch
+        if key in self._moves:
+            before, _ = self._moves.pop(key)
+            event = replace(event, dx=round(before.dx + event.dx, 4), dy=round(before.dy + event.dy, 4))
+            line = messages.to_json(event, epoch)
+        if event.phase == "move" and self.blocked_since is not None:
+            self._moves[key] = event, epoch
+        else:
+            self.send(line)
+
     def flush(self) -> None:
         """Send what waits, as far as it goes."""
         while self.sock.fileno() >= 0:
@@ -89,6 +106,8 @@ class Client:
             elif self._waiting:
                 line = self._waiting.popleft()
                 self._size -= len(line)
+            elif self._moves:
+                line = messages.to_json(*self._moves.pop(next(iter(self._moves))))
             else:
                 self.blocked_since = None
                 self._server.loop.remove_writer(self.sock)

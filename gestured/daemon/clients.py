@@ -11,13 +11,14 @@ from collections import deque
 from collections.abc import Callable, Collection, Mapping
 
 from gestured.core import messages
-from gestured.core.events import Event
+from gestured.core.events import Event, Touch
 from gestured.core.messages import Subscription
 from gestured.daemon.audience import Audience
 from gestured.daemon.client import Client
 from gestured.daemon.log import Throttle
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.sockets import AGAIN_S, reason_of
+from gestured.daemon.touches import Touches
 
 CLIENTS = 1024  # connections at a time; each costs a descriptor, and at most BACKLOG_BYTES of memory
 STALLED_S = 30.0  # a client that takes nothing for this long is cut off
@@ -30,7 +31,7 @@ class EventServer:
     """Accepts clients on a listening Unix socket, greets them with `hello()` and sends them events.
 
     `known()` are the `gestures` and `zones` that a client may ask for; `changed()` is called when they ask for other
-    provisional events.
+    provisional or touch events.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class EventServer:
         self._listener, self._hello, self._throttle = listener, hello, Throttle()
         self._clients: set[Client] = set()
         self._audience = Audience()
+        self._touches = Touches(self._audience)
         self._queue: deque[Client] = deque()  # clients with a line that waits for its answer, each once
         self.loop.add_reader(listener, self._accept)
 
@@ -63,14 +65,17 @@ class EventServer:
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
         """Send an event to everyone who wants it; it is encoded once, and only if somebody does."""
+        if isinstance(event, Touch):
+            self._touches.publish(event, epoch)
+            return
         line = None
         for client in self._audience.of(event):
             line = line or messages.to_json(event, epoch, test=test)
             client.send(line)
 
-    def foresees(self) -> tuple[frozenset[str], bool]:
-        """The sensors whose provisional events somebody asks for by name, and whether somebody asks for all."""
-        return self._audience.foresees()
+    def asked(self, kind: str) -> tuple[frozenset[str], bool]:
+        """The sensors whose events of a type somebody asks for by name, and whether somebody asks for all."""
+        return self._audience.asked(kind)
 
     def tell(self, line: bytes) -> None:
         """Send a line that is no event to every client, whatever it asks for."""
@@ -83,13 +88,15 @@ class EventServer:
             return  # it went while it was being answered
         self._leave(client)
         self._audience.join(client, subscription)
-        if subscription.foresees:
+        self._touches.change(client, subscription)
+        if subscription.costly:
             self._changed()
 
     def remove(self, client: Client) -> None:
         """Forget a client that is gone."""
         if client in self._clients:
             self._clients.discard(client)
+            self._touches.forget(client)
             self._leave(client)
             self.loop.remove_reader(client.sock)
             self.loop.remove_writer(client.sock)
@@ -143,7 +150,7 @@ class EventServer:
             self.remove(client)
 
     def _leave(self, client: Client) -> None:
-        if self._audience.leave(client) and client.subscription.foresees:
+        if self._audience.leave(client) and client.subscription.costly:
             self._changed()
 
     def _accept(self) -> None:

@@ -97,7 +97,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
         "listens to": listens,
         "publishes on": publishes,
         "thresholds": list(_strictness(settings, ladder)),
-        "computes per frame": [*computes, *_early(ladder)],
+        "computes per frame": [*computes, *_early(settings, ladder)],
         "leaves out": [*leaves, *not_own, *_not_early(settings, ladder)],
         "set by": list(_keys(settings, sources)) or ["nothing, all defaults"],
     }
@@ -160,15 +160,19 @@ def _strictness(settings: Settings, ladder: Ladder) -> Iterator[str]:
         yield f"before these, thresholds of [gestures]: {', '.join(told)}"
 
 
-def _early(ladder: Ladder) -> list[str]:
-    """What is computed for provisional events."""
-    if ladder.certainty is None:
-        return []
-    return ["while touched, where somebody asks for provisional events: one inference a frame, at most 15 a second"]
+def _early(settings: Settings, ladder: Ladder) -> Iterator[str]:
+    """What is computed while a contact goes on."""
+    if ladder.certainty is not None:
+        yield "while touched, where somebody asks for provisional events: one inference a frame, at most 15 a second"
+    if settings.touch:
+        yield "while touched, where somebody asks for touch events: where its fingers are, at most 60 times a second"
 
 
-def _not_early(settings: Settings, ladder: Ladder) -> list[str]:
-    """Which provisional events there are not."""
+def _not_early(settings: Settings, ladder: Ladder) -> Iterator[str]:
+    """Which provisional and touch events there are not."""
     if ladder.certainty is None:
-        return [f"provisional events: the model {ladder.active} was not made for them"]
-    return [] if settings.provisional_taps else ["one tap as a provisional event: provisional_taps is false"]
+        yield f"provisional events: the model {ladder.active} was not made for them"
+    elif not settings.provisional_taps:
+        yield "one tap as a provisional event: provisional_taps is false"
+    if not settings.touch:
+        yield "touch events: touch is false"

@@ -5,7 +5,7 @@ from collections import deque
 from typing import Any
 
 from gestured.core import messages
-from gestured.core.events import Cancelled, Event, Gesture, Status, Unknown
+from gestured.core.events import Cancelled, Event, Gesture, Status, Touch, Unknown
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.sinks import Sink
@@ -31,6 +31,8 @@ class Publisher:
             except Exception:  # a bug in one sink must not keep the event from the others
                 self._metrics.internal_errors.add()
                 self._throttle.error("a bug in a sink", type(sink).__name__)
+        if isinstance(event, Touch):
+            return  # up to 60 a second, which say nothing of what was answered
         if not test:
             self._metrics.event(event)
             if isinstance(event, Gesture | Unknown):

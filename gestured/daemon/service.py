@@ -3,6 +3,7 @@
 import asyncio
 import secrets
 import time
+from collections.abc import Sequence
 from typing import Any
 
 from gestured import __version__
@@ -132,10 +133,13 @@ class Service:
         """The gestures that a client may hear of: the model's in use, and the user's own."""
         return (*self._hub.scene.gestures, *self._own.gestures)
 
-    def _known(self) -> dict[str, tuple[str, ...]]:
+    def _known(self) -> dict[str, Sequence[str]]:
         """What a client may name in a subscription."""
         zones = dict.fromkeys(name for setup in self._hub.scene.sensors.values() for name in setup.zones)
-        return {"gestures": self._gestures(), "zones": tuple(zones)}
+        types = (
+            messages.EVENT_TYPES if self._hub.scene.touch else [one for one in messages.EVENT_TYPES if one != "touch"]
+        )
+        return {"types": types, "gestures": self._gestures(), "zones": tuple(zones)}
 
     def _own_changed(self) -> None:
         """One of the user's own gestures came or went: whatever was asked about a contact is asked again."""
@@ -143,11 +147,17 @@ class Service:
         self._clients.tell(messages.gestures_json(self._gestures()))
 
     def _foresee(self) -> None:
-        """Have the hub give provisional events where somebody asks for them now."""
-        named, every = self._clients.foresees()
+        """Have the hub give provisional and touch events where somebody asks for them now."""
+        asyncio.get_running_loop().call_soon(self._follow)  # not among the events of which a client was just told
+        named, every = self._clients.asked("provisional")
         named |= self._views.sensors
         every = every or any(output.foresees for output in self._outputs)
         self._hub.foresee(None if every else named)
+
+    def _follow(self) -> None:
+        named, every = self._clients.asked("touch")
+        every = every or any(output.follows for output in self._outputs)
+        self._desk.take(self._hub.follow(None if every else named))
 
     async def start(self) -> None:
         """Take operators' connections, which needs a loop that turns."""

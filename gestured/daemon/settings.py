@@ -180,6 +180,11 @@ class Settings(Part):
     publish_provisional: bool = Field(
         default=False, description="whether provisional events and their revocations are also sent to `publish`"
     )
+    touch: bool = Field(
+        default=False,
+        description="whether clients may follow fingers while they touch, by events of the type touch; they tell who "
+        "presses what, and when",
+    )
     max_sensors: int = Field(
         default=64,
         ge=1,

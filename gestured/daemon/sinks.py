@@ -27,6 +27,7 @@ class Output(Sink, Protocol):
     """A sink that the configuration names; a reload replaces it."""
 
     foresees: bool  # whether it wants provisional events
+    follows: bool  # whether it wants touch events
 
     def close(self) -> None:
         """Let go of what the output holds; no event comes after this."""
@@ -55,7 +56,7 @@ class OscSink:
         self._metrics, self._throttle = metrics, Throttle()
         self._socket: socket.socket | None = None
         self._connected = False
-        self.foresees = provisional
+        self.foresees, self.follows = provisional, False
         self._said: dict[str, Provisional] = {}  # by sensor: the provisional event that was sent, until its answer
         try:
             family, self._where = resolve(destination, socket.SOCK_DGRAM)  # once: a look-up may block for seconds

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 
 from gestured.core import messages
-from gestured.core.events import Event, Status
+from gestured.core.events import Event, Status, Touch
 from gestured.core.owner import Source
 from gestured.daemon.caller import Connection
 from gestured.daemon.request import json_line
@@ -63,8 +63,11 @@ class Taps:
             self._remember(t_ns, len(packet), (t_ns, source, packet))
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
-        """Take an event, as a sink. The status and a test are left out, since no packet led to them."""
-        if self.active and not test and not isinstance(event, Status):
+        """Take an event, as a sink. The status and a test are left out, since no packet led to them.
+
+        Touch events are left out as well, since the packets say the same.
+        """
+        if self.active and not test and not isinstance(event, Status | Touch):
             line = messages.to_json(event, epoch)
             self._remember(time.monotonic_ns(), len(line), line)
 

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
-from gestured.core.events import Event, Provisional, Status
+from gestured.core.events import Event, Provisional, Status, Touch
 from gestured.core.facts import Arrived, Fact
 from gestured.core.hub import Hub
 from gestured.core.messages import to_json
@@ -76,8 +76,11 @@ class Views:
             self._expect({name for look in self._looks.values() for name in look.sensors & arrived})
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
-        """Take an event, as a sink, for all who look on. The status is left out, since the state says more."""
-        if self._looks and not isinstance(event, Status):
+        """Take an event, as a sink, for all who look on. The status is left out, since the state says more.
+
+        Touch events are left out, since who looks on has not asked for them.
+        """
+        if self._looks and not isinstance(event, Status | Touch):
             self._said.append((event, epoch, test))
             self._expect(())
 

@@ -135,6 +135,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     provisional: bool = False,
     zones: Mapping[str, Any] | None = None,
     arming: Mapping[str, Any] | None = None,
+    touch: bool = False,
 ) -> Embedded:
     """The recogniser of one sensor with a model: the name of one that ships, or the path of an .onnx file.
 
@@ -147,6 +148,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     said before it is over, where the model was made for that. `zones` are parts of the sensor by name, each as its four
     edges `(left, bottom, right, top)` in fractions, or as a mapping with `at` and the `gestures` that may begin there.
     `arming`, such as `{"by": "double_tap", "seconds": 5}`, names the gesture before which no other counts.
+    With `touch` each finger is told of while it touches.
 
     Recognisers of one model share it. Below a shipped model stand its fallbacks, as in the daemon; where one of them
     answers, the logger `gestured` gets a warning. Raises ModelError for a model that cannot be used, SettingsError or
@@ -168,6 +170,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
             grid=(rows, columns),
             sensors={sensor: Setup(mounting=Mounting(rotate, mirror, invert), zones=zones_of(zones or {}))},
             tap_gap_s=tap_gap_s,
+            touch=touch,
             strictness=strictness,
             arming=Arming.of(arming),
             thresholds=_thresholds(ladder, {} if thresholds is None else thresholds),
@@ -180,6 +183,7 @@ def open(  # noqa: PLR0913 - each is one setting of a sensor, by its name
     require_arming(scene, (*used, *ladder.own.gestures))
     found = Sensor(sensor, scene, ladder)
     found.foresee(asked=provisional)
+    found.follow([], asked=touch)
     return Embedded(found, (*used, *ladder.own.gestures))
 
 

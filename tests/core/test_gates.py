@@ -57,7 +57,7 @@ def gates(facts: list[Any]) -> list[tuple[str, bool | None, tuple[str, ...]]]:
 
 def reasons(events: list[Event]) -> list[str]:
     """The answers: a gesture's name, or why there is none."""
-    return [event.gesture if isinstance(event, Gesture) else event.reason for event in answers(events)]
+    return [event.gesture if isinstance(event, Gesture) else str(event.reason) for event in answers(events)]
 
 
 SCENE = Scene(GESTURES, (9, 9))

@@ -50,7 +50,7 @@ def test_every_event_survives_its_json_line(event: Event, epoch: float) -> None:
     for key in ("closed", "gates"):
         if isinstance(got.get(key), list):
             got[key] = tuple(got[key])
-    for key in ("onset", "offset", "decided", "since", "until"):
+    for key in ("onset", "offset", "decided", "since", "until", "t"):
         if got.get(key) is not None:
             assert got[key] == getattr(event, key) + epoch
             got[key] = getattr(event, key)

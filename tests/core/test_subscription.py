@@ -31,7 +31,7 @@ def test_subscriptions_filter() -> None:
         request(types=["gesture", "onset", "status"], sensors=["armrest"], gestures=["swipe_up"]) + b"\r\n", KNOWN
     )
     assert chosen.matches(GESTURE) and chosen.matches(Onset("armrest", 1, 0.0))
-    assert not chosen.foresees and parse_subscription(request(types=["provisional"]), KNOWN).foresees
+    assert not chosen.costly and parse_subscription(request(types=["provisional"]), KNOWN).costly
     assert chosen.matches(Status("ok", {}, "m", 1.0))
     assert not chosen.matches(Onset("door", 1, 0.0))
     assert not chosen.matches(Release("armrest", 1, 0.0))

@@ -112,10 +112,11 @@ def test_a_tape_knows_everything_that_decides(model: Path, tmp_path: Path) -> No
     file = tmp_path / "gestured.toml"
     file.write_text(
         'grid = "7x8"\nclock = "sensor"\nstale_s = 2.5\ntap_gap_s = 0.3\nprovisional_taps = false\nmax_sensors = 7\n'
-        'strictness = "strict"\nallow = ["127.0.0.0/8", "fd00::/8"]\naddresses.pressure = "/skin/{sensor}"\n'
+        'touch = true\nstrictness = "strict"\nallow = ["127.0.0.0/8", "fd00::/8"]\n'
+        'addresses.pressure = "/skin/{sensor}"\n'
         'gestures.use = ["swipe_left", "one_tap"]\ngestures.one_tap = { threshold = 0.75, refractory_s = 1.5 }\n'
         'sensors.arm = { grid = "5x6", rotate = 90, mirror = true, invert = true, clock = "arrival" }\n'
-        'sensors.elbow = { strictness = "eager", arming.by = "one_tap" }\n'
+        'sensors.elbow = { strictness = "eager", arming.by = "one_tap", zones.volume.at = [0.0, 0.5, 1.0, 1.0] }\n'
         'arming = { by = "swipe_left", seconds = 3 }\ngates.start = ["door"]\n'
     )
     ladder = ladder_for(model)

@@ -1,6 +1,7 @@
 """The examples marked `run: here`: run against a real daemon, but for the addresses."""
 
 import os
+import select
 import shutil
 import signal
 import socket
@@ -39,6 +40,7 @@ PHRASES = {
     "gestured.Hub",
     'sensors=["armrest"]) as events',
     "was_shown",
+    "starts where one touches",
 }
 
 
@@ -58,9 +60,8 @@ class Place:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.port = free_address().port
-        self.daemon = Daemon.start(
-            folder, "cnn_lstm", "--publish", f"osc://127.0.0.1:{self.port}", "--metrics", "127.0.0.1:0"
-        )
+        flags = ("--clock", "sensor", "--touch", "true", "--metrics", "127.0.0.1:0")
+        self.daemon = Daemon.start(folder, "cnn_lstm", *flags, "--publish", f"osc://127.0.0.1:{self.port}")
         for program, package in (("gestured", "daemon"), ("gesturectl", "control")):
             path = folder / program
             path.write_text(WRAPPER.format(root=ROOT, python=sys.executable, package=package))
@@ -180,6 +181,24 @@ def test_a_subscriber_that_does_something_before_the_answer(place: Place):
         lines = [process.stdout.readline() for _ in range(20)]
     first = lines.index("show swipe_left\n")
     assert lines[first : first + 4] == ["show swipe_left\n", "do swipe_left\n"] * 2
+
+
+def test_a_slider_that_follows_the_finger(place: Place):
+    text = place.here(example("starts where one touches").text)
+    with place.running(sys.executable, "-c", text) as process:
+        sensor = Sensor(place.daemon, "console").begin()
+        assert process.stdout is not None
+        while not select.select([process.stdout], [], [], 0.1)[0]:
+            assert process.poll() is None
+            sensor.perform("right")
+        sensor.perform("right", "left")  # the first one may have been under way already
+        lines: list[list[str]] = []
+        while [line[0] for line in lines].count("up") < 2:
+            lines.append(process.stdout.readline().split())
+    swipe = lines[[line[0] for line in lines].index("up") + 1 :]
+    assert [line[0] for line in swipe] == ["down", *["move"] * (len(swipe) - 2), "up"]
+    (absolute, relative), (to, by) = (map(float, line[1:]) for line in (swipe[0], swipe[-1]))
+    assert abs(to - absolute) > 50 and by == pytest.approx(min(max(relative + to - absolute, 0), 100), abs=2)
 
 
 def test_one_sensor_in_a_process_of_ones_own(place: Place):

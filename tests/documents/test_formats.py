@@ -9,7 +9,7 @@ from typing import Any, get_args
 import pytest
 
 from gestured.core import messages
-from gestured.core.events import Cancelled, Event, Gate, Gesture, Place, Provisional, Status, Unknown, Where
+from gestured.core.events import Cancelled, Event, Gate, Gesture, Place, Provisional, Touch, Unknown, Where
 from gestured.core.messages import parse_subscription
 from gestured.daemon.explain import explain
 from gestured.model.shipped import shipped
@@ -19,7 +19,7 @@ from tests.documents.blocks import ROOT, Block, blocks
 
 SCHEMA = json.loads((ROOT / "docs" / "events.schema.json").read_text())
 GESTURES = ("swipe_left",)
-TYPES = ("provisional", "onset", "gesture", "unknown", "cancelled", "release", "status")
+TYPES = ("provisional", "onset", "gesture", "unknown", "cancelled", "release", "touch", "status")
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,8 @@ def valid() -> Any:
 def test_the_schema_has_each_key_of_each_event(event: type):
     part = SCHEMA["$defs"][event.__name__.lower()]
     keys = {"type", *(field.name for field in fields(event))}
-    assert set(part["required"]) == keys - ({"own", "gates"} - ({"gates"} if event is Status else set()))
+    unsaid = {Gesture: {"own"}, Unknown: {"gates"}, Touch: {"reason"}}.get(event, set())  # said where it says anything
+    assert set(part["required"]) == keys - unsaid
     assert set(part["properties"]) - {"test"} == keys
 
 
@@ -64,6 +65,8 @@ def test_lines_of_every_kind_are_valid(valid: Any):
         Gate("a", None, ("door",), None, 2.0),
         Cancelled("a", 1, "held"),
         Provisional("a", 1, "swipe_left", 0.9, 0.1, 0.2),
+        Touch("a", 1, 0, "move", 0.2, 0.5, 1.0, -0.01, 0.0, 212.0, 4, "volume"),
+        Touch("a", 1, 0, "up", 0.2, 0.5, 1.0, -0.01, 0.0, 212.0, 4, None, "learned"),
     ):
         valid(json.loads(messages.to_json(event, 1.7e9)))
     valid(
@@ -81,7 +84,7 @@ def test_lines_of_every_kind_are_valid(valid: Any):
 def test_a_daemons_lines_are_valid(valid: Any, serve):
     if not shipped()["cnn_lstm"].exists():
         pytest.skip(f"{shipped()['cnn_lstm']} is not there")
-    daemon = serve("--clock", "sensor", model="cnn_lstm")
+    daemon = serve("--clock", "sensor", "--touch", "true", model="cnn_lstm")
     client = daemon.client().subscribe(*TYPES).ask(b"rubbish\n")
     Sensor(daemon, "armrest").begin().perform("left", "tap", "up")
     lines = [client.hello]

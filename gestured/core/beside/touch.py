@@ -1,0 +1,140 @@
+"""The fingers of the contact that goes on: where each is, from frame to frame, for whoever asks to follow them.
+
+A touch event is no answer, and nothing that decides an answer reads what is written here. While a contact may become a
+gesture, all that presses is followed. Once it was given up (`held`), what stands still for a second is learned: it ends
+with `learned`, and only what moves is followed from then on, beside an arm that rests, or the same finger further on.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.beside.lying import Lying
+from gestured.core.events import Touch
+from gestured.core.front_end import FrontEnd
+from gestured.core.spots import Spot, spots
+from gestured.core.where import digits, place
+from gestured.core.zones import Zone, zone_at
+
+Array = NDArray[np.float64]
+
+EACH_S = 0.0166  # from one move of a finger to the next: 60 a second, a little less than 1/60 because times are rounded
+GONE_S = 0.1  # a finger that was not seen for so long has left, as in `Timing.release_s`; at 15 Hz two frames
+
+
+class Finger:
+    """One finger as it was seen last."""
+
+    __slots__ = ("number", "spot", "t", "told", "zone")
+
+    def __init__(self, spot: Spot, t: float) -> None:
+        self.number = -1  # among the contact's fingers; -1 before it was told of
+        self.spot, self.t = spot, t  # where and when it was seen last; s
+        self.told = (0.0, 0.0)  # x and y as they were told last
+        self.zone: str | None = None  # where it came down
+
+
+class Fingers:
+    """The fingers of one sensor's contact, and what is told of them."""
+
+    def __init__(self, sensor: str, zones: Mapping[str, Zone]) -> None:
+        self._sensor, self.zones = sensor, zones
+        self.asked = False  # whether somebody follows them
+        self.begin(0)
+
+    def begin(self, number: int) -> None:
+        """Another contact begins; `number` is its id."""
+        self._id, self._count = number, 0
+        self._fingers: list[Finger] = []
+        self._looked = -math.inf  # s, the last frame that was looked at
+        self._lying: Lying | None = None  # since the contact was given up
+        self._baseline: Array | None = None  # (N,) counts, as it was before anything of the contact was learned
+
+    def end(self, reason: str | None = None) -> list[Touch]:
+        """The contact is over, or what there is was learned: each finger that was told of is up."""
+        fingers, self._fingers = self._fingers, []
+        return [self._tell(one, "up", reason) for one in fingers if one.number >= 0]
+
+    def see(self, front_end: FrontEnd) -> list[Touch]:
+        """The last frame of a front end, in which a contact goes on."""
+        look, segmenter = front_end.look, front_end.segmenter
+        if look is None or look.shifted:
+            return []
+        self._shape = front_end.rows, front_end.columns
+        given_up, baseline = not segmenter.phase.pending, front_end.baseline
+        if self._baseline is None:
+            self._baseline = baseline
+        quiet = segmenter.phase.let_go or (given_up and look.activity < segmenter.levels(look.t)[1])
+        if given_up and (self._lying is None or baseline is not self._baseline):
+            below, learned = baseline - self._baseline, baseline is not self._baseline
+            self._lying, self._baseline = Lying(look.t, below.reshape(self._shape)), baseline
+            if learned:  # by the front end: all that is there
+                return self.end(None if quiet else "learned")
+        if look.t - self._looked < EACH_S:
+            return []
+        self._looked = look.t
+        taxels = front_end.conditioner.taxels
+        frame = taxels.bridge(look.above[None])[0] if taxels.count else look.above.reshape(self._shape)
+        felt: Array | None = frame
+        if self._lying is not None:
+            least = segmenter.off if self._fingers else segmenter.on
+            felt = self._lying.moving(frame, look.t, least * front_end.noise)
+        told = self._follow([] if quiet or felt is None else spots(felt, front_end.noise), look.t)
+        if self._lying is not None:
+            lie = self._lying.learn([one.spot for one in self._fingers], frame, front_end.noise)
+            for one in [one for one in self._fingers if one.spot in lie]:
+                self._fingers.remove(one)
+                told += [self._tell(one, "up", "learned")] if one.number >= 0 else []
+        return told
+
+    def _follow(self, found: list[Spot], t: float) -> list[Touch]:
+        """Which finger is which, and what became of each."""
+        if len(found) == 1 == len(self._fingers):  # nearly all frames
+            one = self._fingers[0]
+            one.spot, one.t = found[0], t
+            return [self._tell(one, "move" if one.number >= 0 else "down")]
+        told, left = [], list(self._fingers)
+        for one, spot in _paired(left, found):
+            left.remove(one)
+            found.remove(spot)
+            one.spot, one.t = spot, t
+            told.append(self._tell(one, "move" if one.number >= 0 else "down"))
+        for one in left:
+            if one.number < 0 or t - one.t >= GONE_S:
+                self._fingers.remove(one)
+                told += [self._tell(one, "up")] if one.number >= 0 else []
+        for spot in found:
+            new = Finger(spot, t)
+            self._fingers.append(new)
+            if len(self._fingers) == 1:  # a second one may be a flaw of one frame
+                told.append(self._tell(new, "down"))
+        return told
+
+    def _tell(self, one: Finger, phase: str, reason: str | None = None) -> Touch:
+        """What is told of a finger now."""
+        spot, at = one.spot, place(*self._shape, *one.spot[:2])
+        if phase == "down":
+            one.number, one.told, one.zone = self._count, (at.x, at.y), zone_at(self.zones, at)
+            self._count += 1
+        dx, dy = round(at.x - one.told[0], 4), round(at.y - one.told[1], 4)
+        one.told = at.x, at.y
+        return Touch(
+            self._sensor, self._id, one.number, phase, one.t, at.x, at.y, dx, dy, digits(spot.peak), spot.area,
+            one.zone, reason,
+        )  # fmt: skip
+
+
+def _paired(fingers: list[Finger], found: list[Spot]) -> list[tuple[Finger, Spot]]:
+    """The fingers with the spots that they most probably are now; at most two of each."""
+    if len(fingers) == 2 and len(found) == 2:
+        straight = _apart(fingers[0].spot, found[0]) + _apart(fingers[1].spot, found[1])
+        crossed = _apart(fingers[0].spot, found[1]) + _apart(fingers[1].spot, found[0])
+        return list(zip(fingers, found if straight <= crossed else found[::-1], strict=True))
+    pairs = [(one, spot) for one in fingers for spot in found]
+    return [min(pairs, key=lambda pair: _apart(pair[0].spot, pair[1]))] if pairs else []
+
+
+def _apart(one: Spot, other: Spot) -> float:
+    return math.hypot(one.row - other.row, one.column - other.column)
