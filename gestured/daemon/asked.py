@@ -4,13 +4,14 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from gestured.core.errors import ModelError
+from gestured.core.errors import ModelError, SettingsError
 from gestured.core.own import is_name
 from gestured.core.scene import Scene
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.settings import Settings
 from gestured.daemon.sinks import Output, outputs
+from gestured.daemon.tuio import TUIO
 from gestured.model import own_file
 from gestured.model.ladder import (
     Ladder,
@@ -45,6 +46,9 @@ def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:
 
     With `insist` a fallback is not good enough: at a reload the model that runs already is better.
     """
+    for one in settings.publish:
+        if one.scheme == TUIO and not settings.touch:
+            raise SettingsError(f"publish = {one}: it tells where fingers are, expected `touch = true` as well")
     early: list[str] = []  # not logged yet: where opening fails in the end, the error says all of it
     ladder = ladder_for(settings.model, settings.fallback or None, report=early.append)
     if insist and ladder.degraded:

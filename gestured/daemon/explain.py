@@ -65,7 +65,10 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     what = "gestures and provisional events" if settings.publish_provisional else "gestures"
     publishes = [
         f"unix {path}, mode 0660, {CLIENTS} clients, {BACKLOG_BYTES >> 10} KiB waiting each",
-        *(f"osc://{destination}: {what}, and the status once a second" for destination in settings.publish),
+        *(
+            f"{one}: {'fingers while they touch' if one.scheme == 'tuio' else f'{what}, and the status once a second'}"
+            for one in settings.publish
+        ),
     ]
     publishes.append(f"control: unix {settings.control or control_beside(path)}, mode 0660, for owner and group")
     computes = [

@@ -132,7 +132,8 @@ class Settings(Part):
         description="UDP address where OSC frames arrive",
     )
     publish: Annotated[tuple[DestinationField, ...], Listed] = Field(
-        default=(), description="osc://HOST:PORT to which events are sent"
+        default=(),
+        description="osc://HOST:PORT to which events are sent, or tuio://HOST:PORT, fingers while they touch",
     )
     socket: SocketField | None = Field(
         default=None,

@@ -1,15 +1,14 @@
 """Where events go. A sink takes every event and never blocks; what it cannot deliver it counts."""
 
-import socket
 from typing import Protocol
 
 from gestured.core.address import Address
 from gestured.core.beside.reading import SILENT
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Status, Unknown
-from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.settings import Settings
-from gestured.daemon.sockets import resolve
+from gestured.daemon.tuio import TUIO, TuioSink
+from gestured.daemon.udp_out import UdpOut
 
 
 class Sink(Protocol):
@@ -36,33 +35,24 @@ class Output(Sink, Protocol):
 
 def outputs(settings: Settings, metrics: Metrics) -> list[Output]:
     """All outputs that a configuration names. It looks up names of hosts, which may take long."""
-    return [OscSink(address, metrics, provisional=settings.publish_provisional) for address in settings.publish]
+    return [
+        TuioSink(one.address, metrics)
+        if one.scheme == TUIO
+        else OscSink(one.address, metrics, provisional=settings.publish_provisional)
+        for one in settings.publish
+    ]
 
 
-class OscSink:
+class OscSink(UdpOut):
     """OSC over UDP to one destination: gestures and the status; their times are seconds since the Unix epoch.
 
     With `provisional` it also sends provisional events, and which of them are revoked.
-
-    The socket is connected, so that a port where nobody listens is told to us (by the next call). A
-    destination that cannot be reached costs a failed system call an event, nothing more.
     """
 
     def __init__(self, destination: Address, metrics: Metrics, *, provisional: bool = False) -> None:
-        from gestured.client import osc_out  # python-osc: a daemon that publishes nothing does not load it
-
-        self._out = osc_out
-        self.destination = destination
-        self._metrics, self._throttle = metrics, Throttle()
-        self._socket: socket.socket | None = None
-        self._connected = False
-        self.foresees, self.follows = provisional, False
+        super().__init__(destination, metrics)
+        self.foresees = provisional
         self._said: dict[str, Provisional] = {}  # by sensor: the provisional event that was sent, until its answer
-        try:
-            family, self._where = resolve(destination, socket.SOCK_DGRAM)  # once: a look-up may block for seconds
-            self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
-        except OSError as error:
-            log.error("publish: no such destination", destination=str(destination), error=error.strerror)
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
         """Send a gesture and where it was, the status, or where asked for a provisional event; others do not travel.
@@ -74,7 +64,7 @@ class OscSink:
         if isinstance(event, Provisional) and self.foresees:
             self._said[event.sensor] = event
             said = (event.gesture, event.confidence, event.id)
-            self._send(self._out.message(f"/gestured/{event.sensor}/provisional", "sfi", said).dgram)
+            self.send(self._out.message(f"/gestured/{event.sensor}/provisional", "sfi", said).dgram)
         elif isinstance(event, Gesture):
             args = (event.gesture, event.confidence, event.sequence, event.onset + epoch, event.offset + epoch)
             messages = [self._out.message(f"/gestured/{event.sensor}/gesture", "sfidd", args)]
@@ -83,15 +73,10 @@ class OscSink:
                 messages.append(self._out.message(f"/gestured/{event.sensor}/where", "iffffffi", place))
             mark = self._out.message("/gestured/test", "s", (event.sensor,))
             for packet in [self._out.bundle(mark, *messages)] if test else messages:
-                self._send(packet.dgram)
+                self.send(packet.dgram)
         elif isinstance(event, Status):
             heard = sum(state not in SILENT for state in event.sensors.values())
-            self._send(self._out.message("/gestured/status", "si", (event.state, heard)).dgram)
-
-    def close(self) -> None:
-        """Close the socket; nothing is sent after it."""
-        if self._socket is not None:
-            self._socket.close()
+            self.send(self._out.message("/gestured/status", "si", (event.state, heard)).dgram)
 
     def _judge(self, answer: Gesture | Unknown | Cancelled) -> None:
         """Take back what was sent of a contact that turns out to be something else."""
@@ -100,30 +85,4 @@ class OscSink:
             del self._said[answer.sensor]
             if answer.provisional == "revoked":
                 args = (said.gesture, said.id)
-                self._send(self._out.message(f"/gestured/{said.sensor}/revoked", "si", args).dgram)
-
-    def _send(self, packet: bytes) -> None:
-        if self._socket is None:
-            self._failed("unresolved")
-            return
-        for _ in range(2):
-            try:
-                if not self._connected:
-                    self._socket.connect(self._where)
-                    self._connected = True
-                self._socket.send(packet)
-                self._metrics.sent.add("sent")
-                return
-            except ConnectionRefusedError:
-                self._failed("refused")  # the refusal of an earlier packet: this one was not sent yet
-            except BlockingIOError:
-                self._failed("full")
-                return
-            except OSError:
-                self._connected = False  # our own address may have changed with the network
-                self._failed("unreachable")
-                return
-
-    def _failed(self, result: str) -> None:
-        self._metrics.sent.add(result)
-        self._throttle.warn("event not delivered", result, destination=str(self.destination))
+                self.send(self._out.message(f"/gestured/{said.sensor}/revoked", "si", args).dgram)

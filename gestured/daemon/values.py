@@ -7,8 +7,9 @@ from typing import Annotated
 
 from pydantic import BeforeValidator
 
-from gestured.core.address import Address, Grid, is_sensor
+from gestured.core.address import Address, Destination, Grid, is_sensor
 
+SCHEMES = ("osc", "tuio")  # in which events are sent
 SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
 
 
@@ -16,16 +17,16 @@ def _address(value: object) -> Address:
     return Address.parse(value if isinstance(value, str) else "")
 
 
-def _destination(value: object) -> Address:
+def _destination(value: object) -> Destination:
+    scheme, _, rest = value.partition("://") if isinstance(value, str) else ("", "", "")
     try:
-        if not isinstance(value, str) or not value.startswith("osc://"):
-            raise ValueError
-        address = Address.parse(value.removeprefix("osc://").rstrip("/"))
-        if address.port == 0:
+        address = Address.parse(rest.rstrip("/"))
+        if scheme not in SCHEMES or address.port == 0:
             raise ValueError
     except ValueError:
-        raise ValueError("osc://HOST:PORT with a port from 1 to 65535, such as osc://127.0.0.1:9001") from None
-    return address
+        expected = "osc://HOST:PORT or tuio://HOST:PORT with a port from 1 to 65535, such as osc://127.0.0.1:9001"
+        raise ValueError(expected) from None
+    return Destination(scheme, address)
 
 
 def _grid(value: object) -> Grid:
@@ -65,7 +66,7 @@ Listed = BeforeValidator(_listed)
 AddressField = Annotated[Address, BeforeValidator(_address)]
 GridField = Annotated[Grid, BeforeValidator(_grid)]
 NetworkField = Annotated[ipaddress.IPv4Network | ipaddress.IPv6Network, BeforeValidator(_network)]
-DestinationField = Annotated[Address, BeforeValidator(_destination)]
+DestinationField = Annotated[Destination, BeforeValidator(_destination)]
 SensorNameField = Annotated[str, _name("sensor")]
 GateNameField = Annotated[str, _name("gate")]
 SocketField = Annotated[Path, BeforeValidator(_socket)]

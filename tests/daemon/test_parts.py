@@ -56,7 +56,7 @@ def test_flags_win_over_the_environment_that_over_the_file_that_over_defaults(tm
 def test_lists_are_written_with_commas_or_repeated(tmp_path: Path) -> None:
     env = {"GESTURED_PUBLISH": "osc://127.0.0.1:1, osc://[::1]:2", "GESTURED_ALLOW": "10.0.0.0/8,::1"}
     settings, _ = load_settings({"gestures": "one_tap,swipe_left"}, env)
-    assert [str(a) for a in settings.publish] == ["127.0.0.1:1", "[::1]:2"]
+    assert [str(a) for a in settings.publish] == ["osc://127.0.0.1:1", "osc://[::1]:2"]
     assert settings.allow == (ipaddress.ip_network("10.0.0.0/8"), ipaddress.ip_network("::1/128"))
     assert settings.gestures == ("one_tap", "swipe_left")
 

@@ -1,0 +1,88 @@
+"""TUIO 1.1 over UDP: fingers as cursors (`/tuio/2Dcur`), for programs that draw them. Each sensor is a source."""
+
+import socket
+from dataclasses import dataclass, field
+
+from gestured.core.address import Address
+from gestured.core.events import Event, Status, Touch
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.udp_out import UdpOut
+
+TUIO = "tuio"  # the scheme of such a destination
+CURSOR = "/tuio/2Dcur"
+IDS = 2**31  # session ids and frame numbers begin anew there: TUIO's are int32
+
+
+@dataclass(slots=True)
+class Cursor:
+    """A finger that is down, as TUIO knows it."""
+
+    session: int
+    t: float  # s
+    speed: float = 0.0  # sides of the sensor a second
+
+
+@dataclass(slots=True)
+class Source:
+    """One sensor: its fingers by contact and number, and the frames that were sent of it."""
+
+    cursors: dict[tuple[int, int], Cursor] = field(default_factory=dict)
+    frames: int = 0
+
+
+class TuioSink(UdpOut):
+    """TUIO to one destination: `alive` and `set` with each event of a finger, `alive` alone once a second."""
+
+    follows = True
+
+    def __init__(self, destination: Address, metrics: Metrics) -> None:
+        super().__init__(destination, metrics)
+        self._sources: dict[str, Source] = {}  # by sensor
+        self._host = socket.gethostname()
+        self._sessions = 0
+
+    def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
+        """Send where a finger is, or that it has left; and with the status which fingers are there."""
+        if isinstance(event, Status):
+            here = {name: one for name, one in self._sources.items() if name in event.sensors or one.cursors}
+            self._sources = {name: Source() for name in event.sensors} | here
+            for sensor in self._sources:
+                self._bundle(sensor)
+        elif isinstance(event, Touch):
+            cursors = self._sources.setdefault(event.sensor, Source()).cursors
+            key = event.id, event.touch
+            if event.phase == "up":
+                cursors.pop(key, None)
+                self._bundle(event.sensor)
+                return
+            if key not in cursors:  # down, or already there when this destination was named
+                cursors[key] = Cursor(self._sessions, event.t)
+                self._sessions = (self._sessions + 1) % IDS
+            self._bundle(event.sensor, cursors[key], event)
+
+    def close(self) -> None:
+        """Say that no finger is there any more, then close the socket."""
+        for sensor, source in self._sources.items():
+            source.cursors.clear()
+            self._bundle(sensor)
+        super().close()
+
+    def _bundle(self, sensor: str, cursor: Cursor | None = None, moved: Touch | None = None) -> None:
+        """One frame of a sensor: who is there, and perhaps how one of them moved. TUIO's y grows downward."""
+        source = self._sources[sensor]
+        alive = [one.session for one in source.cursors.values()]
+        source.frames = (source.frames + 1) % IDS
+        messages = [
+            self._out.message(CURSOR, "ss", ("source", f"gestured/{sensor}@{self._host}")),
+            self._out.message(CURSOR, "s" + "i" * len(alive), ("alive", *alive)),
+        ]
+        if cursor is not None and moved is not None:
+            took = moved.t - cursor.t
+            right, down = (moved.dx / took, -moved.dy / took) if took > 0 else (0.0, 0.0)
+            speed = (right**2 + down**2) ** 0.5
+            faster = (speed - cursor.speed) / took if took > 0 else 0.0
+            cursor.t, cursor.speed = moved.t, speed
+            place = (cursor.session, moved.x, 1.0 - moved.y, right, down, faster)
+            messages.append(self._out.message(CURSOR, "sifffff", ("set", *place)))
+        messages.append(self._out.message(CURSOR, "si", ("fseq", source.frames)))
+        self.send(self._out.bundle(*messages).dgram)

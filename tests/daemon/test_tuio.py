@@ -1,0 +1,88 @@
+"""Fingers as TUIO cursors, read by a client that somebody else wrote (python-tuio)."""
+
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pythonosc.osc_bundle import OscBundle
+
+from gestured.core.address import Address
+from gestured.core.events import Status, Touch
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.tuio import TuioSink
+from tests.daemon.harness import Daemon, Sensor
+
+pythontuio = pytest.importorskip("pythontuio")
+
+
+class Screen(pythontuio.TuioListener):  # type: ignore[name-defined, misc]
+    """What a program that draws cursors is told of them: (what, session, x, y)."""
+
+    def __init__(self, udp: socket.socket) -> None:
+        self.seen: list[tuple[str, int, float, float]] = []
+        self._udp, self._client = udp, pythontuio.dispatcher.TuioDispatcher()
+        self._client.add_listener(self)
+
+    def read(self, until: Callable[[], bool]) -> None:
+        while not until():
+            self._client.call_handlers_for_packet(self._udp.recv(9999), ("127.0.0.1", 0))
+
+    def _note(self, what: str, cursor: Any) -> None:
+        self.seen.append((what, cursor.session_id, *cursor.position))
+
+    def add_tuio_cursor(self, cur: Any) -> None:
+        self._note("add", cur)
+
+    def update_tuio_cursor(self, cur: Any) -> None:
+        self._note("update", cur)
+
+    def remove_tuio_cursor(self, cur: Any) -> None:
+        self._note("remove", cur)
+
+
+def test_a_cursor_follows_the_finger_and_is_removed_with_it(start: Callable[..., Daemon], udp: socket.socket) -> None:
+    to = f"tuio://127.0.0.1:{udp.getsockname()[1]}"
+    daemon = start("--clock", "sensor", "--touch", "true", "--publish", to)
+    screen = Screen(udp)
+    Sensor(daemon, "arm").begin().perform("up", "right")
+    screen.read(lambda: [what for what, *_ in screen.seen].count("remove") == 2)
+    up, right = ([one for one in screen.seen if one[1] == session] for session in (0, 1))
+    for way in (up, right):
+        assert [what for what, *_ in way] == ["add", *["update"] * (len(way) - 2), "remove"] and len(way) >= 7
+    assert [y for *_, y in up] == sorted((y for *_, y in up), reverse=True)  # downward is more
+    assert up[0][3] > 0.8 and up[-1][3] < 0.2 and all(abs(x - 0.5) < 0.1 for _, _, x, _ in up)
+    assert right[-1][2] - right[0][2] > 0.6
+
+
+@pytest.fixture
+def sent(udp: socket.socket) -> Callable[[], list[list[Any]]]:
+    """The arguments of each message of the next bundle."""
+    return lambda: [[*message.params] for message in OscBundle(udp.recv(9999))]
+
+
+def test_each_frame_says_whose_it_is_who_is_alive_and_its_number(udp: socket.socket, sent: Any) -> None:
+    sink = TuioSink(Address(*udp.getsockname()), Metrics())
+    event = Touch("arm", 7, 0, "down", 10.0, 0.25, 0.75, 0.0, 0.0, 100.0, 4)
+    sink.publish(event, 0.0)
+    source, *rest = sent()
+    assert source == ["source", f"gestured/arm@{socket.gethostname()}"]
+    assert rest == [["alive", 0], ["set", 0, 0.25, 0.25, 0.0, 0.0, 0.0], ["fseq", 1]]
+    sink.publish(Touch("arm", 7, 1, "move", 10.0, 0.5, 0.5, 0.1, 0.0, 100.0, 4), 0.0)  # of which no `down` was seen
+    assert sent()[1:] == [["alive", 0, 1], ["set", 1, 0.5, 0.5, 0.0, 0.0, 0.0], ["fseq", 2]]
+    sink.publish(Touch("arm", 7, 0, "move", 10.5, 0.5, 0.875, 0.25, 0.125, 100.0, 4), 0.0)
+    speed = pytest.approx((0.5**2 + 0.25**2) ** 0.5 / 0.5, rel=1e-6)
+    assert sent()[2] == ["set", 0, 0.5, 0.125, 0.5, -0.25, speed]
+    sink.publish(Status("ok", {"arm": "ok", "leg": "ok"}, "m", 1.0), 0.0)
+    assert [sent()[1:] for _ in "12"] == [[["alive", 0, 1], ["fseq", 4]], [["alive"], ["fseq", 1]]]
+    sink.publish(Touch("arm", 7, 0, "up", 11.0, 0.5, 0.875, 0.0, 0.0, 100.0, 4), 0.0)
+    assert sent()[1:] == [["alive", 1], ["fseq", 5]]
+    sink.close()  # as at a reload: what it has drawn is no more
+    assert sent()[1:] == [["alive"], ["fseq", 6]]
+
+
+def test_it_needs_touch_events(tmp_path: Path, model: Path) -> None:
+    daemon = Daemon(tmp_path, "--model", model, "--listen", "127.0.0.1:0", "--publish", "tuio://127.0.0.1:3333")
+    assert daemon.wait() == 2
+    assert "publish = tuio://127.0.0.1:3333: it tells where fingers are, expected `touch = true`" in daemon.stderr()
