@@ -18,6 +18,7 @@ SUBCOMMANDS = (
     ("operate", "add_reload", ("reload",)),
     ("operate", "add_recalibrate", ("recalibrate",)),
     ("operate", "add_emit", ("emit",)),
+    ("gates", "add", ("inhibit", "allow")),
     ("own", "add", ("enrol", "gestures", "forget")),
     ("record", "add", ("record",)),
     ("flag", "add", ("flag",)),

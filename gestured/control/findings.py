@@ -165,6 +165,9 @@ def _sensor(name: str, sensor: dict[str, Any]) -> Iterator[Finding]:
         ),
     }
     yield words[sensor["state"]](sensor)
+    if sensor.get("closed"):
+        remedy = "; ".join(f"gesturectl allow {name} --gate {gate}" for gate in sensor["closed"])
+        yield Finding("warn", f"is silent, since gates are closed: {', '.join(sensor['closed'])}", remedy)
     if rate_is_outside(sensor["rate_hz"]):
         remedy = "let it send at another rate; gestures of slower or faster sensors are unreliable"
         yield Finding("warn", f"{sensor['rate_hz']:.1f} Hz, made for {RATES}", remedy)

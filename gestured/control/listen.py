@@ -13,7 +13,10 @@ from gestured.client.subscriber import Subscriber
 from gestured.client.values import some_of
 from gestured.control.address import add_sockets, event_path
 from gestured.control.show import said_when
+from gestured.control.status import listens
 from gestured.core.messages import EVENT_TYPES
+
+TIMES = ("decided", "onset", "offset", "t", "time", "since")  # keys that say when an event was; the first counts
 
 
 def add(commands: Commands) -> None:
@@ -76,7 +79,7 @@ def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
     """One event as one line for a person; `before` keeps the last provisional event of each sensor for its answer."""
     kind, sensor = event.get("type"), event.get("sensor", "-")
     early = before.pop(sensor, None)
-    moment = next((event[key] for key in ("decided", "onset", "offset", "t", "time") if key in event), time.time())
+    moment = next((event[key] for key in TIMES if key in event), time.time())
     clock = datetime.fromtimestamp(moment).strftime("%H:%M:%S.%f")[:-3]
     head = f"{clock}  {sensor:<12} "
     if kind in ("gesture", "unknown"):
@@ -88,7 +91,8 @@ def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
             when = said_when(early["decided"], event["offset"])
             tail += f"  {event['provisional']}: {early['gesture']}, {when}"
         tail += "  (test)" if event.get("test") else ""
-        why = f"unknown ({event['reason']})" if "reason" in event else "unknown"
+        gates = f": {', '.join(event['gates'])}" if event.get("gates") else ""
+        why = f"unknown ({event['reason']}{gates})" if "reason" in event else "unknown"
         name = f"{event.get('gesture', why):<24} {event['confidence']:4.2f}"
         return f"{head}{name}  {number:<6} {waited:4.0f} ms{tail}"
     if kind == "provisional":
@@ -97,6 +101,9 @@ def readable(event: dict[str, Any], before: dict[str, dict[str, Any]]) -> str:
     if kind == "touch":
         what = f"touch {event['touch']} {event['phase']}" + (f" ({event['reason']})" if event.get("reason") else "")
         return f"{head}{what:<24} {event['x']:.2f},{event['y']:.2f}  {event['pressure']:g} counts"
+    if kind == "gate":
+        until = datetime.fromtimestamp(event["until"]).strftime(", until %H:%M:%S") if event["until"] else ""
+        return f"{head}{listens(event)}{until}"
     if kind == "status":
         sensors = ", ".join(f"{name} {state}" for name, state in sorted(event["sensors"].items()))
         return f"{head}status: {event['state']} ({sensors or 'no sensor'})"

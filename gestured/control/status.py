@@ -113,7 +113,9 @@ def screen(status: dict[str, Any]) -> Iterator[str]:
     answers = status["answers"]
     total = sum(answers["gestures"].values())
     cancelled = ", ".join(f"{count} {reason}" for reason, count in answers["cancelled"].items()) or "none"
-    yield f"answers: {total} gestures, {answers['unknown']} unknown; cancelled: {cancelled}"
+    suppressed = sum(answers.get("suppressed", {}).values())  # a daemon of before has none
+    silenced = f", {suppressed} while silent or not armed" if suppressed else ""
+    yield f"answers: {total} gestures, {answers['unknown']} unknown{silenced}; cancelled: {cancelled}"
     yield from _recent(status["recent"])
     yield ""
     dropped = ", ".join(f"{count} {reason}" for reason, count in status["input"]["dropped"].items()) or "none"
@@ -135,12 +137,20 @@ def _sensors(sensors: dict[str, dict[str, Any]]) -> Iterator[str]:
         numbers = f"{s['rate_hz']:6.1f} {1000 * s['jitter_s']:4.0f} ms {s.get('lost', 0):6d} {s['bad_taxels']:4d}"
         touched = "  touched" if s.get("touched") else ""
         touched += f"  {s['reason']}" if s.get("reason") else ""
+        touched += f"  {listens(s)}" if s.get("closed") or s.get("armed") is not None else ""
         touched += f"  made for {RATES}" if outside(s["rate_hz"]) else ""
         touched += "  rows and columns are exchanged" if s.get("exchanged") else ""
         tail = f"{s['drift']:6.1f} {s.get('gestures', 0):8d}  {s['grid']}{touched}"
         yield f"{name[:16]:<16} {s['state']:<12} {numbers} {tail}"
     if len(sensors) > SENSOR_LINES:
         yield f"and {len(sensors) - SENSOR_LINES} more"
+
+
+def listens(told: dict[str, Any]) -> str:
+    """Whether a sensor listens, from the keys that a `gate` event and the status have."""
+    if told.get("closed"):
+        return f"silent, gates closed: {', '.join(told['closed'])}"
+    return "armed" if told.get("armed") else "listens" if told.get("armed") is None else "not armed"
 
 
 def _recent(recent: list[dict[str, Any]]) -> Iterator[str]:

@@ -127,7 +127,7 @@ class Gate:
     armed: bool | None  # None where no gesture arms it
     closed: tuple[str, ...]  # names of gates; while there is one, every contact is unknown
     until: float | None  # s, when the first of this changes by itself; None where nothing does
-    since: float  # s
+    since: float  # s; these two are on the hub's clock, by which an operator acts
 
     @property
     def says(self) -> bool:

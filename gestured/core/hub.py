@@ -70,7 +70,7 @@ class Hub:
 
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
         """Take packets that were found waiting at `now`, each with its source."""
-        facts = self._lapse(now)
+        facts = [] if now < self.gates.due else self._lapse(now)
         waiting: Waiting = {}
         for packet, source in packets:
             try:
@@ -117,7 +117,8 @@ class Hub:
 
     def tick(self, now: float) -> list[Fact]:
         """What the time alone decides, once everything that arrived until `now` was received: `wait`, and silences."""
-        facts = self._lapse(now) + self.wait(now)
+        facts = [] if now < self.gates.due else self._lapse(now)
+        facts += self.wait(now)
         sensors = self._sensors.values()
         self._owners = frozenset(sensor.owner.source for sensor in sensors if now - sensor.owner.heard <= FORGET_S)
         for sensor in sensors:
@@ -230,12 +231,10 @@ class Hub:
     def _unheard(self, name: str, now: float) -> Reading:
         listening = Listening(self._scene.arming_of(name))
         listening.gate(self.gates.of(name), now)
-        return Reading("no_data", self._scene.grid_of(name), gate=listening.told(name, now))
+        return Reading("no_data", self._scene.grid_of(name), gate=listening.told(name, now, -math.inf))
 
     def _lapse(self, now: float) -> list[Fact]:
         """Open the gates that open by themselves until now."""
-        if now < self.gates.due:
-            return []
         self.gates.lapse(now)
         return self._shut(now)
 

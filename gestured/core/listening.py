@@ -1,6 +1,6 @@
 """Whether what is felt on a sensor counts: a gesture may have to arm it, and gates may silence it.
 
-All times are seconds on the stream's clock. A contact is judged by its onset, so that it is silent or not as a whole.
+Times are seconds on the stream's clock. A contact is judged by its onset, so that it is silent or not as a whole.
 """
 
 import math
@@ -41,25 +41,25 @@ class Listening:
     def __init__(self, arming: Arming | None) -> None:
         self.arming = arming
         self.armed = False
-        self.closed: Mapping[str, float] = {}  # by name of a gate: when it opens by itself
+        self.closed: Mapping[str, float] = {}  # by name of a gate: when it opens by itself, on the hub's clock
         self.silenced: tuple[str, ...] = ()  # the gates that are closed, or were closed last
-        self._silent_until = -math.inf  # contacts that began before are silent; infinite while a gate is closed
-        self._armed_until = -math.inf  # contacts that began until then count
+        self._silent_until = -math.inf  # contacts that began until then are silent; infinite while a gate is closed
+        self.armed_until = -math.inf  # contacts that began until then count
 
     def silences(self, onset: float) -> bool:
         """Whether a gate was closed during a contact that began then."""
-        return onset < self._silent_until
+        return onset <= self._silent_until
 
     def hears(self, onset: float) -> bool:
         """Whether a contact that began then may be any gesture, and not only the one that arms."""
-        return not self.silences(onset) and (self.arming is None or onset <= self._armed_until)
+        return not self.silences(onset) and (self.arming is None or onset <= self.armed_until)
 
     def refusal(self, onset: float, gesture: str | None) -> str | None:
         """Why a contact that began then must be unknown, though it was recognised as this gesture (None: as none)."""
         if self.silences(onset):
             return INHIBITED
         free = gesture is None or self.arming is None or gesture == self.arming.by
-        return None if free or onset <= self._armed_until else DISARMED
+        return None if free or onset <= self.armed_until else DISARMED
 
     def heard(self, t: float) -> bool:
         """A gesture was published at `t`, and begins the seconds anew. Returns whether there is something to tell."""
@@ -70,25 +70,25 @@ class Listening:
 
     def arm(self, until: float) -> None:
         """Every gesture counts of a contact that begins until then."""
-        self.armed, self._armed_until = True, until
+        self.armed, self.armed_until = True, until
 
     def lapse(self, t: float, onset: float | None) -> bool:
         """Whether the seconds have run out by `t`, which is to be told. A contact that began before still counts.
 
         `onset` is when the contact began whose answer is open, None where there is none.
         """
-        over = self.armed and t > self._armed_until and (onset is None or onset > self._armed_until)
+        over = self.armed and t > self.armed_until and (onset is None or onset > self.armed_until)
         self.armed = self.armed and not over
         return over
 
-    def gate(self, closed: Mapping[str, float], t: float) -> bool:
-        """These gates are closed from `t` on. Returns whether there is something to tell."""
+    def gate(self, closed: Mapping[str, float], past: float) -> bool:
+        """These gates are closed from now on; what began until `past` has begun before. Returns whether to tell it."""
         if closed == self.closed:
             return False
         if closed:
             self._silent_until, self.silenced = math.inf, tuple(sorted(closed))
         elif self.closed:
-            self._silent_until = t
+            self._silent_until = past
         self.closed = closed
         return True
 
@@ -99,13 +99,11 @@ class Listening:
         if arming == self.arming and not another_clock:
             return False
         told = (self.arming is None, self.armed) != (arming is None, False)
-        self.arming, self.armed, self._armed_until = arming, False, -math.inf
+        self.arming, self.armed, self.armed_until = arming, False, -math.inf
         return told
 
-    def told(self, sensor: str, t: float) -> Gate:
-        """All of it as an event of that sensor, at `t`."""
+    def told(self, sensor: str, since: float, armed_until: float) -> Gate:
+        """All of it as an event of that sensor; times are on the hub's clock, that until which it is armed, too."""
         armed = None if self.arming is None else self.armed
-        until = min(self.closed.values(), default=math.inf)
-        if self.armed:
-            until = min(until, self._armed_until)
-        return Gate(sensor, armed, tuple(sorted(self.closed)), until if until < math.inf else None, t)
+        until = min((*self.closed.values(), *([armed_until] if self.armed else [])), default=math.inf)
+        return Gate(sensor, armed, tuple(sorted(self.closed)), until if until < math.inf else None, since)

@@ -15,7 +15,7 @@ from gestured.core.beside.view import View, view_of
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.decision import Decision, reason, whole
 from gestured.core.errors import ModelError
-from gestured.core.events import Cancelled, Event, Gesture, Onset, Release, Unknown
+from gestured.core.events import Cancelled, Event, Gate, Gesture, Onset, Release, Unknown
 from gestured.core.facts import Arrived, Changed, Decided, Fact, Fault, Taken
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown
@@ -59,7 +59,6 @@ class Sensor:
         self.front_end = _front_end(name, scene)
         self._scene, self._decision = scene, Decision(scene, name)
         self._zones, self._listening = scene.setup(name).zones, Listening(scene.arming_of(name))
-        self._closed: Mapping[str, float] = {}  # gates, as `shut` was told last
         self._stamper = Stamper(scene.clock_of(name))
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # last; no scores where it failed
         self._foresight = Foresight(name, taps=scene.provisional_taps)
@@ -125,12 +124,20 @@ class Sensor:
     def lapse(self, t: float) -> list[Told]:
         """Whether the sensor is no longer armed at `t` s."""
         onset = self.front_end.segmenter.onset if self.front_end.segmenter.phase.pending else None
-        return [self._listening.told(self.name, t)] if self._listening.lapse(t, onset) else []
+        return [self._gate(t)] if self._listening.lapse(t, onset) else []
 
-    def gate(self, closed: Mapping[str, float], t: float) -> list[Told]:
-        """These gates are closed from `t` s on, and no others; by name: when each opens by itself."""
+    def gate(self, closed: Mapping[str, float], t: float, past: float | None = None) -> list[Told]:
+        """These gates are closed from `t` s on, and no others; by name: when each opens by itself, on the hub's clock.
+
+        What was felt until `past` (`t` unless told) began before that.
+        """
         told = [*(self._fingers.end() if closed else ()), *self.wait(t)]
-        return [*told, self._listening.told(self.name, t)] if self._listening.gate(closed, t) else told
+        return [*told, self._gate(t)] if self._listening.gate(closed, t if past is None else past) else told
+
+    def _gate(self, t: float) -> Gate:
+        """What the sensor listens to since `t` s, on the hub's clock."""
+        when = self._stamper.when
+        return self._listening.told(self.name, when(t), when(self._listening.armed_until))
 
     def _tell(self, found: Sequence[Found]) -> list[Told]:
         """The events of what the front end has found, with the sensor's name and ids."""
@@ -195,7 +202,7 @@ class Sensor:
         decision.published(best, segment)
         self.sequence += 1
         gesture = Gesture(name, self.segments, best, confidence, self.sequence, *what, own=own is not None, where=at)
-        armed = [listening.told(name, cut.decided)] if listening.heard(cut.decided) else []
+        armed = [self._gate(cut.decided)] if listening.heard(cut.decided) else []
         return [self._foresight.judged(gesture), decided, *armed]
 
     def _cancelled(self, why: str) -> Cancelled:
@@ -319,7 +326,7 @@ class Sensor:
         if another_clock:
             self._stamper = Stamper(scene.clock_of(self.name))
         if self._listening.change(scene.arming_of(self.name), another_clock=another_clock):
-            facts.append(self._listening.told(self.name, self._stamper.at(now)))
+            facts.append(self._gate(self._stamper.at(now)))
         self.classifier, self._decision, self._asked = classifier, Decision(scene, self.name), None
         self._zones = scene.setup(self.name).zones
         self._foresight.taps = scene.provisional_taps
@@ -327,9 +334,8 @@ class Sensor:
 
     def shut(self, closed: Mapping[str, float], now: float, facts: list[Fact]) -> None:
         """The gates that are closed from `now` on, by name: when each opens by itself, on the hub's clock."""
-        if closed != self._closed:
-            self._closed = closed
-            self._run(lambda t: self.gate({name: t + (until - now) for name, until in closed.items()}, t), now, facts)
+        if closed != self._listening.closed:
+            self._run(lambda t: self.gate(closed, t, self._stamper.past(now)), now, facts)
 
     def greet(self, closed: Mapping[str, float], armed_until: float | None, now: float, facts: list[Fact]) -> None:
         """The sensor is new, and perhaps armed already: what it listens to is told, unless it is everything."""
@@ -337,7 +343,7 @@ class Sensor:
             self._listening.arm(armed_until)
         self.shut(closed, now, facts)
         if not closed and self._listening.arming is not None:
-            facts.append(self._listening.told(self.name, self._stamper.at(now)))
+            facts.append(self._gate(self._stamper.at(now)))
 
     def foresee(self, *, asked: bool, later: bool = False) -> None:
         """Say of contacts from now on, or no longer, what they will most probably be.
@@ -397,7 +403,7 @@ class Sensor:
             lost=self._lost,
             lost_at=self._lost_at,
             exchanged=self._habits.exchanged,
-            gate=self._listening.told(self.name, self._stamper.at(now)),
+            gate=self._gate(self._stamper.at(now)),
             touched=front_end.touched,
             contact=self._open,
             sequence=self.sequence,

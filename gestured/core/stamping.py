@@ -54,6 +54,13 @@ class Stamper:
         """The stream's time when frames that `arrived` then (s) were felt: the last stamp plus what passed since."""
         return arrived if self._last is None else self._last + max(0.0, arrived - self._arrived)
 
+    def past(self, arrived: float) -> float:
+        """The stream's time up to which what was felt has come before `arrived` (s).
+
+        A sensor's own clock is known by its frames alone, and may have stood still since the last one.
+        """
+        return self._last if self._by_tag and self._last is not None else self.at(arrived)
+
     def when(self, t: float) -> float:
         """The arrival time in s at which the stream's time is `t` s; the inverse of `at`."""
         return t if self._last is None else self._arrived + (t - self._last)

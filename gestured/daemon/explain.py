@@ -60,6 +60,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
             for name, sensor in settings.sensors.items()
         ),
     ]
+    listens += _when(settings)
     if settings.metrics:
         listens.append(f"http {settings.metrics} for /metrics, /healthz, /readyz")
     what = "gestures and provisional events" if settings.publish_provisional else "gestures"
@@ -124,6 +125,16 @@ def _own(settings: Settings) -> tuple[list[str], list[str]]:
         [f"own gestures {', '.join(own.gestures) or '(none yet)'}, in {own.path}"],
         [] if may else [f"enrolling: this account has no right to write in {folder}"],
     )
+
+
+def _when(settings: Settings) -> Iterator[str]:
+    """What must come before a gesture counts, and what is silent from the start."""
+    every = {"all sensors": settings.arming} | {f"sensor {name}": own.arming for name, own in settings.sensors.items()}
+    for which, arming in every.items():
+        if arming is not None:
+            yield f"{which}: no gesture counts but {arming.by}, and all for {arming.seconds:g} s after it"
+    if settings.gate.start:
+        yield f"nothing, until these gates are allowed: {', '.join(settings.gate.start)}"
 
 
 def _keys(settings: Settings, sources: Mapping[str, str]) -> Iterator[str]:

@@ -18,6 +18,10 @@ def exposition(metrics: Metrics, snapshot: Snapshot) -> bytes:
     return generate_latest(registry)
 
 
+def _silent(reading: Reading) -> bool:
+    return reading.gate is not None and bool(reading.gate.closed)
+
+
 # Figures of each sensor. Sensors that share a label show one figure: the worst of theirs, or the sum of bad taxels.
 _OF_SENSORS: tuple[tuple[str, str, Callable[[Iterable[float]], float], Callable[[Reading], float]], ...] = (
     ("gestured_sensor_rate_hertz", "Frames a second", min, lambda r: r.rate_hz),
@@ -27,6 +31,7 @@ _OF_SENSORS: tuple[tuple[str, str, Callable[[Iterable[float]], float], Callable[
 )
 _OF_THE_DAEMON: tuple[tuple[str, str, Callable[[Snapshot], float]], ...] = (
     ("gestured_sensors", "Sensors that were heard", lambda s: sum(r.source is not None for r in s.sensors.values())),
+    ("gestured_sensors_silent", "Sensors of which a gate is closed", lambda s: sum(map(_silent, s.sensors.values()))),
     ("gestured_clients", "Clients of the event socket", lambda s: s.clients),
     ("gestured_backlog_bytes", "Bytes that wait for slow clients", lambda s: s.backlog_bytes),
     ("gestured_kernel_drops_total", "Packets that found no room", lambda s: s.kernel_drops),

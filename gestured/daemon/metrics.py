@@ -9,12 +9,14 @@ from bisect import bisect_left
 from collections.abc import Sequence
 
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
+from gestured.core.listening import DISARMED, INHIBITED
 
 # At most 200 series, whatever arrives; a test counts them.
 NAMED_SENSORS = 8  # further sensors are counted together as "other"
 NAMED_MODELS = 3
 NAMED_GESTURES = 12
 NAMED_ZONES = 12
+NAMED_GATES = 5
 OTHER = "other"
 # Upper bounds of histograms' buckets. A segment takes some milliseconds; an answer waits at least `release_s`.
 INFERENCE_S = (0.0005, 0.001, 0.005, 0.025, 0.1)
@@ -79,6 +81,13 @@ class Metrics:
             most=NAMED_ZONES,
         )
         self.unknown = Counter("gestured_unknown", "Segments that are none of the gestures")
+        self.suppressed = Counter(
+            "gestured_suppressed",
+            "Segments that did not count, by the gates that were closed",
+            "reason",
+            "gate",
+            most=NAMED_GATES,
+        )
         self.cancelled = Counter("gestured_cancelled", "Segments that were not answered", "reason")
         self.provisional = Counter("gestured_provisional", "Provisional events by what became of them", "result")
         self.lead = Histogram(
@@ -129,9 +138,16 @@ class Metrics:
             if event.where is not None and event.where.zone is not None:
                 self.zones.add(event.sensor, event.where.zone)
         elif isinstance(event, Unknown):
-            self.unknown.add()
+            self._unknown(event)
         elif isinstance(event, Cancelled):
             self.cancelled.add(event.reason)
+
+    def _unknown(self, event: Unknown) -> None:
+        if event.reason not in (DISARMED, INHIBITED):
+            self.unknown.add()
+            return
+        for gate in event.gates or ("",):
+            self.suppressed.add(event.reason, gate)
 
     def sensor_label(self, sensor: str) -> str:
         """The sensor's name for the first few, "other" after that."""

@@ -12,6 +12,7 @@ from gestured.core.hub import Hub
 from gestured.core.zones import zone_at
 from gestured.daemon.caller import Connection
 from gestured.daemon.desk import Desk
+from gestured.daemon.gatekeeper import SENSOR, Gatekeeper
 from gestured.daemon.own import OwnGestures
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.request import Parameter, Refusal, Reply, ReplyStream, Verb
@@ -25,9 +26,6 @@ TEST_S = 0.4  # how long a made-up gesture took
 TEST_FRAMES = 6  # touched frames of a made-up gesture, at 15 Hz
 MIDDLE = Place(0.5, 0.5)  # of a sensor: there a made-up gesture begins and ends
 
-SENSOR = Parameter(
-    (str, type(None)), "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", check=lambda name: name is None or is_sensor(name)
-)
 NAMED = Parameter(str, "a sensor's name, 1 to 64 of A-Z a-z 0-9 _ -", required=True, check=is_sensor)
 SENSORS = Parameter(
     list,
@@ -69,7 +67,7 @@ class Operations:
             "forget": Verb(self.forget, {"name": LABEL}, slow=True),
             "tap": Verb(self.tap),
             "flight": Verb(self.flight),
-        }
+        } | Gatekeeper(self.hub, self.desk).verbs()
 
     async def status(self, connection: Connection) -> Reply:
         """How the daemon is, as `gesturectl status` shows it."""
@@ -140,7 +138,9 @@ class Operations:
         """Learn a gesture from what is performed on a sensor; a line follows for each example, and one at the end."""
         await self.own.writable()
         snapshot = self.snapshot()
-        _heard(snapshot, sensor)
+        silent = _heard(snapshot, sensor)[sensor].gate
+        if silent is not None and silent.closed:
+            raise Refusal(f"{sensor} is silent, since gates are closed: {', '.join(silent.closed)}; allow them first")
         _not_yet(connection)
         self.own.begin(connection, name, sensor, examples, snapshot.gestures)
         return {"name": name, "sensor": sensor, "examples": examples}
@@ -151,7 +151,10 @@ class Operations:
         return {"model": snapshot.models.active, "gestures": list(snapshot.gestures), "own": dict(snapshot.own)}
 
     async def forget(self, connection: Connection, name: str) -> Reply:
-        """Forget a gesture of the user's own, and delete its examples from the file."""
+        """Forget a gesture of the user's own, and delete its examples from the file; not one that arms a sensor."""
+        for setting, gesture in self.hub.scene.arming_gestures.items():
+            if gesture == name:
+                raise Refusal(f"{name!r} is {setting} in the configuration; take it out there and reload first")
         await self.own.forget(name)
         return {"forgotten": name}
 

@@ -99,6 +99,7 @@ class Service:
             gestures=self._hub.scene.gestures,
             own=self._own.report(),
             sensors=self._hub.readings(now - self._receiver.behind_s),
+            gates=tuple(sorted(self._hub.gates.of(None))),
             recent=self._publisher.recent(),
             clients=self._clients.count,
             backlog_bytes=self._clients.backlog,

@@ -58,6 +58,7 @@ class Snapshot:
     gestures: tuple[str, ...]  # of the model's, in use
     own: Mapping[str, Any]  # the user's own; see `OwnGestures.report`
     sensors: Mapping[str, Reading]
+    gates: tuple[str, ...]  # that are closed for each sensor that comes
     recent: tuple[Mapping[str, Any], ...]  # the last answers
     clients: int  # of the event socket
     backlog_bytes: int  # that wait for slow clients

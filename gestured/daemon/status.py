@@ -15,10 +15,12 @@ from gestured.core.own import Examples, to_dict
 from gestured.daemon.metrics import Counter, Metrics
 from gestured.daemon.snapshot import Snapshot
 
+OPEN = {"armed": None, "closed": (), "until": None}  # of a sensor that always listens
+
 
 def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
     """The answer to `status`; durations in seconds, `time` in seconds since the Unix epoch."""
-    models = snapshot.models
+    models, gates = snapshot.models, snapshot.listening
     return {
         "version": __version__,
         "instance": snapshot.instance,
@@ -40,11 +42,15 @@ def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
             "gestures": list(snapshot.gestures),
         },
         "own": dict(snapshot.own),
-        "sensors": {name: _sensor(reading, snapshot.now) for name, reading in snapshot.sensors.items()},
+        "sensors": {
+            name: _sensor(reading, snapshot.now) | gates.get(name, OPEN) for name, reading in snapshot.sensors.items()
+        },
+        "gates": list(snapshot.gates),
         "recent": list(snapshot.recent),
         "answers": {
             "gestures": _by_label(metrics.gestures.values),
             "unknown": metrics.unknown.total(),
+            "suppressed": _by_label(metrics.suppressed.values),
             "cancelled": _by_label(metrics.cancelled.values),
             "tests": metrics.tests.total(),
         },

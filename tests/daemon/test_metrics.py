@@ -15,6 +15,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Place, Provisional, 
 from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
+from gestured.core.gates import MOST_GATES
 from gestured.core.window import Window
 from gestured.daemon.exposition import exposition
 from gestured.daemon.metrics import NAMED_SENSORS, Metrics
@@ -42,6 +43,9 @@ def everything() -> Iterator[Event]:
     yield Gesture("s", 1, "left", 0.9, 1, 0, 1, 2, 3, 0, "lstm", False, {}, "confirmed")
     yield Cancelled("s", 1, "held", "revoked")
     yield Unknown("s", 1, 0.1, 0, 1, 2, 3, 0, "lstm", False, {})
+    yield Unknown("s", 1, 0.1, 0, 1, 2, 3, 0, "lstm", False, {}, "disarmed")
+    for n in range(MOST_GATES):
+        yield Unknown("s", 1, 0.1, 0, 1, 2, 3, 0, "lstm", False, {}, "inhibited", gates=(f"gate{n}", f"other{n}"))
     for reason in ("held", "silence", "restart", "glitch", "stuck", "refractory", "model", "internal_error"):
         yield Cancelled("s", 1, reason)
 

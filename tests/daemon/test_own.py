@@ -344,6 +344,29 @@ def test_thresholds_refractory_times_tests_and_filters_take_own_names(begin: Beg
         ask(daemon, "reload")
 
 
+def test_one_that_arms_is_heard_first_and_is_not_forgotten_while_it_does(begin: Begin, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text("")
+    daemon = begin("--config", config)
+    sensor = ready(daemon)
+    config.write_text('[arming]\nby = "slash"\n')
+    with pytest.raises(Refused, match="arming.by = 'slash': is no gesture in use, expected any of"):
+        ask(daemon, "reload")
+    enrol(daemon, sensor)
+    ask(daemon, "reload")
+    client = daemon.client().subscribe("gesture", "unknown")
+    said = [
+        answer(client, sensor, act)
+        for act in (lambda: sensor.perform("up"), sensor.slash, lambda: sensor.perform("up"))
+    ]
+    assert [line.get("gesture", line.get("reason")) for line in said] == ["disarmed", "slash", "swipe_up"]
+    with pytest.raises(Refused, match="'slash' is arming.by in the configuration; take it out there and reload first"):
+        ask(daemon, "forget", name="slash")
+    config.write_text("")
+    ask(daemon, "reload")
+    ask(daemon, "forget", name="slash")
+
+
 def test_an_enrolment_is_given_up_at_a_reload(begin: Begin) -> None:
     daemon = begin()
     ready(daemon)

@@ -35,7 +35,7 @@ class Reading:
     jitter_s: float = 0.0
     bad_taxels: int = 0
     noise: float = 0.0  # counts
-    gate: Gate | None = None  # what it listens to; its times are on the stream's clock
+    gate: Gate | None = None  # what it listens to
     source: tuple[str, int] | None = None
     heard: float = 0.0  # s, on the hub's clock
     lost: int = 0  # frames that went missing
