@@ -24,10 +24,12 @@ from gestured.model.shipped import shipped
 from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
 
 OSC = "osc://127.0.0.1:{port}"  # where somebody listens
+TUIO = "tuio://127.0.0.1:{port}"
 SCENES: dict[str, tuple[str, ...]] = {
     "minimal": (),
     "metrics": ("--metrics", "127.0.0.1:0"),  # which nobody reads
     "OSC out": ("--publish", OSC),
+    "TUIO out": ("--touch", "true", "--publish", TUIO),  # fingers are followed
     "flight recorder": ("--flight-recorder", "4"),
     "forest alone": (),
     "trajectories": (),  # the sensor sends finger positions beside its frames; nothing in the daemon asks for them

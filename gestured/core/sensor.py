@@ -15,7 +15,7 @@ from gestured.core.beside.view import View, view_of
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.decision import Decision, reason, whole
 from gestured.core.errors import ModelError
-from gestured.core.events import Cancelled, Event, Gate, Gesture, Onset, Release, Unknown
+from gestured.core.events import Cancelled, Event, Gate, Gesture, Onset, Release, Unknown, Where
 from gestured.core.facts import Arrived, Changed, Decided, Fact, Fault, Taken
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown
@@ -61,6 +61,7 @@ class Sensor:
         self._zones, self._listening = scene.setup(name).zones, Listening(scene.arming_of(name))
         self._stamper = Stamper(scene.clock_of(name))
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # last; no scores where it failed
+        self._placed: tuple[Segment, Where] | None = None  # where the last one that was shown was
         self._foresight = Foresight(name, taps=scene.provisional_taps)
         self._fingers = Fingers(name, scene.setup(name).zones)
         self._later = False  # whether looks for provisional events wait until `look`
@@ -145,6 +146,7 @@ class Sensor:
         for one in found:
             if isinstance(one, Shown):
                 self._ask(one.segment)
+                self._at(one.segment)
                 continue
             self._habits.hear(one)
             if isinstance(one, Opened):
@@ -170,6 +172,13 @@ class Sensor:
             self._asked = asked
         return asked[2]
 
+    def _at(self, segment: Segment) -> Where:
+        """Where a segment was, which is looked at once."""
+        placed = self._placed
+        if placed is None or placed[0] is not segment:
+            placed = self._placed = segment, where(segment, self._zones)
+        return placed[1]
+
     def _decide(self, cut: Cut) -> list[Told]:
         """The answer to a segment, and `Decided` where a classifier gave scores."""
         name, segment, decision = self.name, cut.segment, self._decision
@@ -177,7 +186,8 @@ class Sensor:
         self._asked = None
         if answer is None:
             return [self._cancelled("model")]
-        at = where(segment, self._zones)
+        at = self._at(segment)
+        self._placed = None
         scores, best, confidence = decision.best(self.classifier.gestures, answer, at.zone)
         seen = whole(cut.hole_s, self.front_end.interval_s)
         known = seen and confidence >= decision.threshold(best, answer)
@@ -328,6 +338,7 @@ class Sensor:
         if self._listening.change(scene.arming_of(self.name), another_clock=another_clock):
             facts.append(self._gate(self._stamper.at(now)))
         self.classifier, self._decision, self._asked = classifier, Decision(scene, self.name), None
+        self._placed = None
         self._zones = scene.setup(self.name).zones
         self._foresight.taps = scene.provisional_taps
         self._fingers.zones = self._zones

@@ -158,18 +158,23 @@ def test_what_is_asked_for_is_asked_of_the_daemon_and_unknown_keys_are_passed_on
     at = broker()
     listener = listen(at.port, "gestured/#")
     process = begin(
-        bridge, at, fake, "--types", "gesture,unknown", "--sensors", "armrest", "--gestures", "one_tap,double_tap"
+        bridge, at, fake, "--types", "gesture,unknown,touch", "--sensors", "armrest", "--gestures", "one_tap,double_tap"
     )
     fake.accept()
     assert fake.request() == {
         "subscribe": {
-            "types": ["gesture", "unknown", "status"], "sensors": ["armrest"], "gestures": ["one_tap", "double_tap"],
+            "types": ["gesture", "unknown", "touch", "status"],
+            "sensors": ["armrest"], "gestures": ["one_tap", "double_tap"],
         }
     }  # fmt: skip
     process.ready()
     fake.say(gesture(1, own=True, news={"of": 2027}), gesture(2) | {"type": "unknown", "reason": "hole"})
     assert json.loads(listener.until("gestured/car/armrest/gesture").payload)["news"] == {"of": 2027}
     assert json.loads(listener.until("gestured/car/armrest/unknown").payload)["reason"] == "hole"
+    fake.say({"type": "touch", "sensor": "armrest", "id": 3, "touch": 0, "phase": "down", "t": 1.8e9, "x": 0.5,
+              "y": 0.5, "dx": 0.0, "dy": 0.0, "pressure": 80.0, "area": 3, "zone": None})  # fmt: skip
+    assert listener.until("gestured/car/armrest/touch").retain is False
+    assert not [topic for topic in retained(listen, at, "gestured/#") if "armrest" in topic]
 
 
 def test_availability_when_the_daemon_goes_when_the_bridge_ends_and_when_it_is_killed(bridge, broker, listen, fake):
