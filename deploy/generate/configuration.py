@@ -23,6 +23,7 @@ SHOWN: dict[str, Any] = {
     "publish": ["osc://127.0.0.1:9001"],
     "socket": "/run/gestured/events.sock",
     "control": "/run/gestured/events.ctl",
+    "gates": "/run/gestured/gates.sock",
     "metrics": "127.0.0.1:9108",
     "grid": "9x9",
     "gestures": ["one_tap", "double_tap", "swipe_left", "swipe_right"],
@@ -77,19 +78,24 @@ def keys(part: type[Part], prefix: str = "", leave_out: tuple[str, ...] = ()) ->
     return found
 
 
+def words(name: str) -> str:
+    """What a key of the settings says of itself."""
+    return Settings.model_fields[name].description or ""
+
+
 def tables() -> dict[str, list[Key]]:
     """Heading of a table ("" for the keys above all tables) -> its keys."""
     use = literal(SHOWN["gestures"])
     return {
-        "": keys(Settings, leave_out=(*TABLES, "gestures")),
-        "[gestures]": [Key(f"use = {use}", Settings.model_fields["gestures"].description or "")],
+        "": keys(Settings, leave_out=(*TABLES, "gestures", "gates")),
+        "[gestures]": [Key(f"use = {use}", words("gestures"))],
         "[sensors.armrest]": keys(SensorSettings, "sensors.", leave_out=("zones", "arming")),
         "[sensors.armrest.arming]": keys(ArmingSettings, "arming."),
         "[sensors.armrest.zones.volume]": keys(ZoneSettings, "zones."),
         "[gestures.one_tap]": keys(GestureSettings, "gestures."),
         "[addresses]": keys(AddressSettings),
         "[arming]": keys(ArmingSettings, "arming."),
-        "[gates]": keys(GatesSettings, "gates."),
+        "[gates]": [*keys(GatesSettings, "gates."), Key(f"socket = {literal(SHOWN['gates'])}", words("gates"))],
     }
 
 

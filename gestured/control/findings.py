@@ -45,7 +45,7 @@ def examine_status(status: dict[str, Any], proposed: Sequence[str] = ()) -> Iter
     if proposed:
         what = "what arrives does not fit the settings, and is dropped"
         yield Finding("bad", what, "\n".join(["set in the configuration file, then gesturectl reload:", *proposed]))
-    for look in (_input, _sensors, _shift, _output):
+    for look in (_input, _sensors, _gates, _shift, _output):
         yield from look(status)
 
 
@@ -178,6 +178,14 @@ def _sensor(name: str, sensor: dict[str, Any]) -> Iterator[Finding]:
     if sensor.get("lost") and sensor["state"] != "intermittent":
         remedy = "look at the network, or at kernel drops"
         yield _dated(f"{sensor['lost']} frames lost on the way", sensor.get("lost_s_ago"), remedy)
+
+
+def _gates(status: dict[str, Any]) -> Iterator[Finding]:
+    for gate, seconds in status.get("overdue", {}).items():
+        what = f"gate {gate} is closed, and the bridge that closed it has given no sign of life for {span(seconds)}"
+        yield Finding(
+            "bad", what, f"does the bridge run, and its bus? To open it: gesturectl allow --all --gate {gate}"
+        )
 
 
 def _shift(status: dict[str, Any]) -> Iterator[Finding]:

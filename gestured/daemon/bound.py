@@ -28,6 +28,7 @@ SOCKET_NAMES = {
     "osc": (INTERNET, socket.SOCK_DGRAM, "ListenDatagram=HOST:PORT"),
     "events": ((socket.AF_UNIX,), socket.SOCK_STREAM, "ListenStream=/PATH"),
     "control": ((socket.AF_UNIX,), socket.SOCK_STREAM, "ListenStream=/PATH"),
+    "gates": ((socket.AF_UNIX,), socket.SOCK_STREAM, "ListenStream=/PATH"),
     "metrics": (INTERNET, socket.SOCK_STREAM, "ListenStream=HOST:PORT"),
 }
 
@@ -40,6 +41,7 @@ class Bound:
     since: float  # s, monotonic: packets that waited in a socket from systemd count as if they came then
     events: Listener
     control: Listener
+    gates: Listener | None
     http: socket.socket | None
 
     def addresses(self) -> dict[str, str | None]:
@@ -48,6 +50,7 @@ class Bound:
             "listen": name_of(self.udp),
             "socket": str(self.events.path),
             "control": str(self.control.path),
+            "gates": str(self.gates.path) if self.gates else None,
             "metrics": name_of(self.http) if self.http else None,
         }
 
@@ -56,8 +59,9 @@ class Bound:
         self.udp.close()
         self.events.close()
         self.control.close()
-        if self.http is not None:
-            self.http.close()
+        for other in (self.gates, self.http):
+            if other is not None:
+                other.close()
 
 
 def bind_all(settings: Settings) -> Bound:
@@ -87,14 +91,22 @@ def bind_all(settings: Settings) -> Bound:
             beside = settings.control or control_beside(path)
             if beside == path:
                 raise AddressError(f"control: {path} is the event socket, choose another path with --control")
-            control = UnixListener(beside, "control")
+            opened.append(control := UnixListener(beside, "control"))
+        gates = _gates(settings, given.get("gates"))
     except GesturedError:
         for sock in opened:
             sock.close()
         raise
     for name, sock in given.items():
         log.info("socket from systemd", name=name, address=_where(sock))
-    return Bound(udp, since, events, control, http)
+    return Bound(udp, since, events, control, gates, http)
+
+
+def _gates(settings: Settings, given: socket.socket | None) -> Listener | None:
+    """The bridges' socket, where there is to be one."""
+    if given is not None:
+        return Listener(given)
+    return None if settings.gates is None else UnixListener(settings.gates, "gates")
 
 
 def _passed() -> list[tuple[str, socket.socket]]:

@@ -21,7 +21,7 @@ example:
 Each flag is a variable (GESTURED_MODEL=...) and a key of the TOML file (model = "...") too; flags win over
 variables, these over the file. The file also takes [sensors.NAME] (grid, rotate, mirror, invert, clock, zones,
 strictness, arming), [gestures.NAME] (threshold, refractory_s), [addresses] (pressure, trajectory), [arming] (by,
-seconds) and [gates] (start). SIGHUP reads it again.
+seconds) and [gates] (start, socket). SIGHUP reads it again.
 
 exit status:
   0 ended as asked, 2 usage or invalid configuration, 3 a model that cannot be used and no fallback,
@@ -29,7 +29,7 @@ exit status:
 
 METAVARS = {
     "model": "MODEL", "fallback": "MODEL", "listen": "HOST:PORT", "publish": "osc://HOST:PORT",
-    "socket": "PATH", "control": "PATH", "metrics": "HOST:PORT", "grid": "RxC", "gestures": "A,B",
+    "socket": "PATH", "control": "PATH", "gates": "PATH", "metrics": "HOST:PORT", "grid": "RxC", "gestures": "A,B",
     "strictness": "|".join(STRICTNESS), "clock": "arrival|sensor",
     "allow": "CIDR", "flight_recorder": "MIB", "own_gestures": "FILE", "log_level": "LEVEL",
 }  # fmt: skip

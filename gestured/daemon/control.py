@@ -1,5 +1,7 @@
 """The control socket: one JSON object a line in, one JSON object a line out, for the daemon's owner and group.
 
+The bridges' socket for gates is another one of these, with verbs of its own, for whoever may open its file.
+
 A request is `{"verb": NAME, ...}`, checked as a whole before anything happens; what a verb takes stands in one
 table (`operations.verbs`). An answer is `{"ok": true, ...}` or `{"ok": false, "reason": "..."}`. Requests of one
 connection are answered one after the other, and those of all in turns between which the loop looks after its frames.
@@ -33,8 +35,9 @@ STAYS: dict[str, Any] = {"cleanup_socket": False} if sys.version_info >= (3, 13)
 class ControlServer:
     """Answers on a listening Unix socket. `start` before anything else."""
 
-    def __init__(self, sock: socket.socket, verbs: Mapping[str, Verb]) -> None:
-        self._sock, self._verbs = sock, verbs
+    def __init__(self, sock: socket.socket, verbs: Mapping[str, Verb], *, guarded: bool = True) -> None:
+        """`guarded`: the account at the other end is looked at, too, and not only the rights of the socket's file."""
+        self._sock, self._verbs, self._guarded = sock, verbs, guarded
         self._throttle, self._journal = Throttle(), Throttle(burst=LOGGED)
         self._open: set[asyncio.StreamWriter] = set()
         self._served = 0  # connections that hold one of the places
@@ -58,7 +61,7 @@ class ControlServer:
         try:
             who = peer_of(writer.get_extra_info("socket"))
             places = OPERATORS + (OPERATORS_KEPT if who.ours else 0)
-            if not who.may:
+            if self._guarded and not who.may:
                 self._throttle.warn("control refused", "peer", uid=who.uid, pid=who.pid)
                 writer.write(_refusal("only root, the daemon's user and its group may control it"))
             elif self._served >= places:
@@ -80,7 +83,7 @@ class ControlServer:
             writer.close()
 
     async def _answer_all(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, who: Peer) -> None:
-        connection = Connection(writer)
+        connection = Connection(writer, who)
         while True:
             try:
                 async with asyncio.timeout(None if connection.streams else IDLE_S):

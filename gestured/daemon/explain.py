@@ -17,6 +17,8 @@ from gestured.daemon.tap import KEPT_S
 from gestured.model import own_file
 from gestured.model.ladder import Ladder, gestures_in_use
 
+INSIDE = {"gestures": ("per_gesture", "use"), "gates": ("gate", "socket")}  # keys that a file has in a table, as this
+
 
 def _felt(wait_s: float, rate_hz: float) -> str:
     """Seconds from the last touched frame to the answer, in words: the wait begins with the first quiet frame."""
@@ -72,6 +74,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
         ),
     ]
     publishes.append(f"control: unix {settings.control or control_beside(path)}, mode 0660, for owner and group")
+    publishes += [f"gates: unix {gates}, mode 0660, for bridges" for gates in [settings.gates] if gates is not None]
     computes = [
         "decode, check, stamp; subtract the baseline, compare with the noise; no smoothing, no inference",
         f"after a contact: {'touch-pattern features' if forest else 'its frames as a window'}, one inference",
@@ -148,8 +151,8 @@ def _keys(settings: Settings, sources: Mapping[str, str]) -> Iterator[str]:
             for name, part in table.items():
                 yield from (f"{title}.{name}.{field}: {source}" for field in sorted(part.model_fields_set))
         else:
-            beside = key == "gestures" and sources.get("per_gesture") == source
-            yield f"{'gestures.use' if beside else key}: {source}"
+            table, inner = INSIDE.get(key, (key, ""))
+            yield f"{f'{key}.{inner}' if inner and sources.get(table) == source else key}: {source}"
 
 
 def _strictness(settings: Settings, ladder: Ladder) -> Iterator[str]:

@@ -61,7 +61,9 @@ def _from_file(path: str) -> dict[str, Any]:
             found["gestures"] = tables.pop("use")
         found["per_gesture"] = tables
     if isinstance(found.get("gates"), dict):
-        found["gate"] = found.pop("gates")
+        found["gate"] = tables = found.pop("gates")
+        if "socket" in tables:
+            found["gates"] = tables.pop("socket")
     return found
 
 

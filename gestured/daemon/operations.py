@@ -51,7 +51,11 @@ class Operations:
     snapshot: Callable[[], Snapshot]
     state: Callable[[], Reply]
     reload_all: Callable[[], Awaitable[str | None]]  # None, or why nothing has changed
+    gates: Gatekeeper = field(init=False)
     _tested: set[str] = field(default_factory=set)  # names that tests have used of sensors that were never heard
+
+    def __post_init__(self) -> None:
+        self.gates = Gatekeeper(self.hub, self.desk)
 
     def verbs(self) -> dict[str, Verb]:
         """Name -> verb. This table is all that the control socket can do."""
@@ -67,7 +71,7 @@ class Operations:
             "forget": Verb(self.forget, {"name": LABEL}, slow=True),
             "tap": Verb(self.tap),
             "flight": Verb(self.flight),
-        } | Gatekeeper(self.hub, self.desk).verbs()
+        } | self.gates.verbs()
 
     async def status(self, connection: Connection) -> Reply:
         """How the daemon is, as `gesturectl status` shows it."""

@@ -17,6 +17,7 @@ from gestured.daemon.bound import Bound
 from gestured.daemon.clients import EventServer
 from gestured.daemon.control import ControlServer
 from gestured.daemon.desk import Desk
+from gestured.daemon.gatekeeper import Bridges
 from gestured.daemon.health import TICK_S, Canary, Pulse, watchdog_period
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
@@ -36,7 +37,8 @@ from gestured.daemon.views import Views
 STATUS_S = 1.0  # from one status to the next
 DRAIN_S = 0.5  # for clients to read what waits for them, when the daemon ends
 SHOWN = 4  # sensors in systemd's status line
-AT_A_RESTART = ("listen", "socket", "control", "metrics", "flight_recorder")  # settings that a reload cannot change
+# Settings that a reload cannot change.
+AT_A_RESTART = ("listen", "socket", "control", "gates", "metrics", "flight_recorder")
 
 
 class Service:
@@ -76,7 +78,10 @@ class Service:
             self._hub, self._desk, self._publisher, self._taps, self._own,
             self._views, self.snapshot, self._state, self._reload.run,
         )  # fmt: skip
-        self._control = ControlServer(bound.control.sock, operations.verbs())
+        self._gates = operations.gates
+        self._servers = [ControlServer(bound.control.sock, operations.verbs())]
+        if bound.gates is not None:
+            self._servers.append(ControlServer(bound.gates.sock, Bridges(self._gates).verbs(), guarded=False))
         self._http: Any = None
         if bound.http is not None:
             from gestured.daemon.http import serve_pages
@@ -100,6 +105,7 @@ class Service:
             own=self._own.report(),
             sensors=self._hub.readings(now - self._receiver.behind_s),
             gates=tuple(sorted(self._hub.gates.of(None))),
+            overdue=self._gates.overdue(now),
             recent=self._publisher.recent(),
             clients=self._clients.count,
             backlog_bytes=self._clients.backlog,
@@ -161,8 +167,9 @@ class Service:
         self._desk.take(self._hub.follow(None if every else named))
 
     async def start(self) -> None:
-        """Take operators' connections, which needs a loop that turns."""
-        await self._control.start()
+        """Take the connections of operators and bridges, which needs a loop that turns."""
+        for server in self._servers:
+            await server.start()
 
     async def serve(self, stop: asyncio.Event, reload: asyncio.Event) -> None:
         """Look after the timers until `stop` is set; then finish what is in flight."""
@@ -218,7 +225,8 @@ class Service:
         self._receiver.drain()
         self._receiver.close()
         self._taps.flush()
-        self._control.close()
+        for server in self._servers:
+            server.close()
         self._desk.take(self._hub.flush(time.monotonic()))
         await self._clients.close(DRAIN_S)
         for output in self._outputs:

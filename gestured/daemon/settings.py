@@ -145,6 +145,11 @@ class Settings(Part):
         description="Unix socket for the requests of gesturectl; by default the event socket's path, "
         "with .ctl in place of .sock",
     )
+    gates: SocketField | None = Field(
+        default=None,
+        description="Unix socket on which bridges close and open gates, and can do nothing else; off unless set. "
+        "A file names it as `socket` under [gates]",
+    )
     metrics: AddressField | None = Field(
         default=None, description="HTTP address of /metrics, /healthz and /readyz; off unless set"
     )

@@ -59,6 +59,7 @@ class Snapshot:
     own: Mapping[str, Any]  # the user's own; see `OwnGestures.report`
     sensors: Mapping[str, Reading]
     gates: tuple[str, ...]  # that are closed for each sensor that comes
+    overdue: Mapping[str, float]  # by gate: for how many s the bridge that closed it has owed a sign of life
     recent: tuple[Mapping[str, Any], ...]  # the last answers
     clients: int  # of the event socket
     backlog_bytes: int  # that wait for slow clients

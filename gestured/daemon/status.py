@@ -46,6 +46,7 @@ def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
             name: _sensor(reading, snapshot.now) | gates.get(name, OPEN) for name, reading in snapshot.sensors.items()
         },
         "gates": list(snapshot.gates),
+        "overdue": {gate: round(seconds, 1) for gate, seconds in snapshot.overdue.items()},
         "recent": list(snapshot.recent),
         "answers": {
             "gestures": _by_label(metrics.gestures.values),

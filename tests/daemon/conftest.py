@@ -1,6 +1,8 @@
 """Daemons that tests share where they do not change them, and others that may end as they like."""
 
+import os
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -31,3 +33,25 @@ def start(model: Path, tmp_path: Path) -> Iterator[Callable[..., Daemon]]:
     yield start
     for daemon in daemons:
         daemon.stop()
+
+
+@pytest.fixture
+def nobody():
+    """The test is user and group 65534 while it is inside."""
+    if os.getuid() != 0:
+        pytest.skip("only root can be somebody else for a moment")
+
+    @contextmanager
+    def become():
+        groups = os.getgroups()
+        os.setgroups([])
+        os.setegid(65534)
+        os.seteuid(65534)
+        try:
+            yield
+        finally:
+            os.seteuid(0)
+            os.setegid(0)
+            os.setgroups(groups)
+
+    return become

@@ -8,7 +8,6 @@ import stat
 import subprocess
 import sys
 import tempfile
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -47,28 +46,6 @@ def test_it_cannot_stand_where_the_event_socket_stands(model: Path, tmp_path: Pa
     daemon = Daemon(tmp_path, *flags)
     assert daemon.wait() == 4 and "--control" in daemon.stderr()
     assert not (tmp_path / "a.ctl").exists()
-
-
-@pytest.fixture
-def nobody():
-    """The test is user and group 65534 while it is inside."""
-    if os.getuid() != 0:
-        pytest.skip("only root can be somebody else for a moment")
-
-    @contextmanager
-    def become():
-        groups = os.getgroups()
-        os.setgroups([])
-        os.setegid(65534)
-        os.seteuid(65534)
-        try:
-            yield
-        finally:
-            os.seteuid(0)
-            os.setegid(0)
-            os.setgroups(groups)
-
-    return become
 
 
 def test_a_stranger_is_refused_even_where_the_file_lets_him_in(start, nobody) -> None:

@@ -1,0 +1,98 @@
+"""The bridges' own socket of a real daemon: each closes and opens gates in its own name, and can do nothing else."""
+
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gestured.client.control import Control
+from gestured.client.lines import Refused
+from gestured.daemon.operations import Operations
+from tests.daemon.harness import Daemon, Sensor
+
+
+@pytest.fixture
+def daemon(start: Callable[..., Daemon], tmp_path: Path) -> Daemon:
+    config = tmp_path / "gestured.toml"
+    config.write_text(f'[sensors.armrest]\n[gates]\nstart = ["seat"]\nsocket = "{tmp_path}/gates.sock"\n')
+    return start("--config", config, "--clock", "sensor", "--stale-s", 30)
+
+
+@pytest.fixture
+def bridge(daemon: Daemon) -> Iterator[Control]:
+    with Control(Path(daemon.ready["gates"])) as control:
+        yield control
+
+
+def status(daemon: Daemon) -> dict[str, Any]:
+    with Control(Path(daemon.ready["control"])) as control:
+        return control.ask("status")
+
+
+def test_a_bridge_closes_its_own_gate_and_it_stays_closed_when_the_bridge_is_gone(daemon: Daemon) -> None:
+    client = daemon.client().subscribe("gesture", "gate")
+    assert client.hello["gates"] == {"armrest": {"armed": None, "closed": ["seat"], "until": None}}
+    sensor = Sensor(daemon, "armrest").begin()
+    assert client.line()["closed"] == ["seat"]
+    with Control(Path(daemon.ready["gates"])) as bridge:
+        bridge.ask("inhibit", bridge="car", gate="car-door", seconds=0.01)
+        assert client.line()["closed"] == ["car-door", "seat"]
+        bridge.ask("inhibit", bridge="car", gate="car-door", seconds=0.01)  # nothing has changed, and nothing is told
+        bridge.ask("inhibit", bridge="seat", gate="seat", seconds=60)
+        assert bridge.ask("allow", bridge="seat", gate="seat")["sensors"] == {"armrest": ["car-door"]}
+        assert client.line()["closed"] == ["car-door"]
+    sensor.perform("left", "up")
+    while not (late := status(daemon)["overdue"]):
+        pass
+    assert list(late) == ["car-door"] and status(daemon)["sensors"]["armrest"]["closed"] == ["car-door"]
+    with Control(Path(daemon.ready["control"])) as operator:
+        operator.ask("allow", gate="car-door")
+    assert status(daemon)["overdue"] == {}
+    sensor.perform("down")
+    told = [client.line(), client.line()]
+    assert told[0]["closed"] == [] and told[1]["gesture"] == "swipe_down", "nothing was said in between"
+    assert "gate closed by a bridge" in daemon.stderr()
+
+
+def test_it_knows_inhibit_and_allow_alone(daemon: Daemon, bridge: Control) -> None:
+    operators = set(Operations(*[None] * 9).verbs())  # type: ignore[arg-type]
+    assert {"reload", "tap", "enrol", "recalibrate", "status"} <= operators
+    for verb in operators - {"inhibit", "allow"}:
+        with pytest.raises(Refused, match=f'unknown "{verb}", expected one of inhibit, allow$'):
+            bridge.ask(verb)
+
+
+@pytest.mark.parametrize(
+    ("request_", "words"),
+    [
+        ({"gate": "seat"}, "gate 'seat' is not car's own, expected car, or car- and more"),
+        ({"gate": "cargo"}, "gate 'cargo' is not car's own"),
+        ({"gate": "car/door"}, 'expected a gate\'s name, 1 to 64 of A-Z a-z 0-9 _ -, found "car/door"'),
+        ({"gate": "car", "sensor": "elbow"}, "no sensor 'elbow', expected one of armrest"),
+        ({"gate": "car", "seconds": 0}, "expected seconds, more than 0"),
+        ({"gate": "car", "seconds": None}, "expected seconds, more than 0"),
+    ],
+)
+def test_what_is_not_its_own_is_refused(bridge: Control, request_: dict[str, Any], words: str) -> None:
+    with pytest.raises(Refused) as refused:
+        bridge.ask("inhibit", **{"bridge": "car", "seconds": 60} | request_)
+    assert words in str(refused.value)
+
+
+def test_a_name_belongs_to_the_account_that_used_it_first(start: Callable[..., Daemon], nobody: Any) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)
+        daemon = start("--gates", f"{folder}/gates.sock")
+        path = Path(daemon.ready["gates"])
+        path.chmod(0o666)
+        with Control(path) as bridge:
+            bridge.ask("inhibit", bridge="car", gate="car", seconds=60)
+        with nobody():
+            bridge = Control(path)
+        with bridge:
+            bridge.ask("inhibit", bridge="house", gate="house", seconds=60)  # whom the file lets in may
+            with pytest.raises(Refused, match="'car' is the name of uid 0, which has used it first, not of 65534"):
+                bridge.ask("allow", bridge="car", gate="car")
+        assert status(daemon)["gates"] == ["car", "house"]
