@@ -11,7 +11,7 @@ from gestured.bridge.options import BridgeError, peer_address
 PLAIN_PORT, TLS_PORT = 1883, 8883  # registered with IANA
 BROKER_S = 5.0  # s that the broker may take to answer a call
 KEEPALIVE_S = 5  # a broker that vanished without a word is noticed, and ours declared dead, after one and a half
-MOST_BYTES = 65_536  # of a packet from the broker, which is told so; we subscribe to nothing, so that all are small
+MOST_BYTES = 65_536  # of a packet from the broker, which is told so; we subscribe to commands at most, which are small
 _LOGIN = "set MQTT_USER and MQTT_PASSWORD, or --credentials FILE, as the broker knows them"
 # Reason codes of MQTT 5 (docs.oasis-open.org/mqtt/mqtt/v5.0, 2.4) after which waiting is no help.
 REFUSALS = {
@@ -36,6 +36,8 @@ class Broker:
             raise BridgeError(f"--broker {error}") from None
         self._host, self._prefix = host, args.discovery
         self._user, self._password = credentials(args.credentials)
+        if args.gates is not None and self._user is None and args.cert is None:
+            raise BridgeError(f"--gates: a broker that knows nobody may close no gate: {_LOGIN}, or name a --cert")
         self._tls = tls_context(args)
 
     def client(self, will: str) -> Any:
@@ -73,6 +75,19 @@ class Broker:
         if code == SILENT or "timed out" in said:
             return "it does not answer as an MQTT broker does (is it one with TLS: --tls?)"
         return "it closed the connection" if code == CLOSED else said
+
+    def hear(self, client: Any, topic: str) -> None:
+        """Subscribe to commands: none that is retained, and each with the word whether it shall be."""
+        from paho.mqtt.subscribeoptions import SubscribeOptions
+
+        client.subscribe(topic, options=SubscribeOptions(qos=1, retainAsPublished=True, retainHandling=2))
+
+    def deaf(self, code: object) -> BridgeError:
+        """What is to be said where the broker does not let us hear commands."""
+        return BridgeError(
+            f"the broker {self.address} does not let us hear commands ({code}): allow this user to read "
+            f"{topic_of(self._host, '+', 'gate', 'set')} in its access list, or leave out --gates"
+        )
 
     def refusal(self, code: object) -> BridgeError:
         """What is to be said where the broker does not take what we publish."""

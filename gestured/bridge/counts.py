@@ -13,6 +13,7 @@ from gestured.core.address import Address
 HELP = {
     "events": "Events of the daemon, by what became of them",
     "frames": "Frames on their way to the daemon, by what became of them",
+    "commands": "Commands of the other side, by what became of them",
     "bytes": "Bytes from a serial line that belong to no frame",
     "connected": "Whether the other side is there",
     "reconnects": "How often the other side was found again",

@@ -58,6 +58,7 @@ class Daemon:
         self.version = ""  # the last one that was there
         self.states: dict[str, str] = {}  # sensor -> how it is, the one heard of last at the end; kept while it is away
         self.gestures: list[str] | None = None  # None until it has said them
+        self.listening: dict[str, Line] = {}  # sensor -> what `messages.listening` says; none where there is nothing
         self._wanted_sensors, self._wanted_gestures = sensors, gestures
         self._lags: dict[str, tuple[float, float]] = {}  # sensor -> its smallest lag, and when that was found
 
@@ -67,15 +68,21 @@ class Daemon:
             case "hello":
                 self.hello, self.version = line, line["version"]
                 self._gestures(line["gestures"])
+                self.listening = dict(line.get("gates", {}))
                 self._heard({name: self.states.get(name, "no_data") for name in line["sensors"]})
                 self._counts.connected("daemon", True, "daemon is there")
             case "gestures":
                 self._gestures(line["gestures"])
             case "status":
+                self.listening = dict(line.get("gates", {}))
                 self._heard(line["sensors"])
             case "gone":
                 self.hello = {}
                 self._counts.connected("daemon", False, "daemon went")
+
+    def silent_by(self, gate: str) -> list[str]:
+        """The sensors for which that gate is closed."""
+        return [name for name, told in self.listening.items() if gate in told.get("closed", ())]
 
     def age(self, event: Line, now: float) -> float:
         """How many seconds ago an event was decided; `now` is in seconds since the epoch.

@@ -2,6 +2,8 @@
 
     gestured/{host}/{sensor}/{type}    an event in JSON as on the socket, with the daemon's `instance`; never retained
     gestured/{host}/{sensor}/state     how the sensor is, retained
+    gestured/{host}/{sensor}/gates     whether it listens, as JSON, retained
+    gestured/{host}/{sensor}/gate/set  with --gates: `OFF` closes a gate of the sensor, `ON` opens it; never retained
     gestured/{host}/availability       `online` or `offline`, retained; `offline` also by last will
 
 All with QoS 1, so that an event may come twice: `instance`, `sensor` and `sequence` tell.
@@ -30,7 +32,9 @@ def add(commands: Commands) -> None:
         description="Publish events under gestured/HOST/SENSOR/TYPE, with Home Assistant discovery.\n"
         "User and password are the variables MQTT_USER and MQTT_PASSWORD, or a file that holds USER:PASSWORD.",
         epilog="examples:\n  gestured-bridge mqtt --broker 192.168.7.2\n"
-        "  gestured-bridge mqtt --broker broker.example --tls --credentials /etc/gestured/mqtt-user",
+        "  gestured-bridge mqtt --broker broker.example --tls --credentials /etc/gestured/mqtt-user\n"
+        "  gestured-bridge mqtt --broker broker.example --tls --credentials /etc/gestured/mqtt-user \\\n"
+        "                       --gates /run/gestured/gates.sock",
     )
     text = f"the broker (port {PLAIN_PORT}, with TLS {TLS_PORT}, unless named)"
     parser.add_argument("--broker", required=True, metavar="HOST[:PORT]", help=text)
@@ -43,6 +47,9 @@ def add(commands: Commands) -> None:
     text = "discovery prefix of Home Assistant (default: homeassistant)"
     parser.add_argument("--discovery", default="homeassistant", metavar="PREFIX", help=text)
     parser.add_argument("--no-discovery", action="store_true", help="publish nothing for Home Assistant")
+    text = "the daemon's socket for bridges: have the broker close and open a gate (default: it can do nothing)"
+    parser.add_argument("--gates", type=Path, metavar="PATH", help=text)
+    parser.add_argument("--gate", default="mqtt", metavar="NAME", help="name of that gate (default: mqtt)")
     add_metrics(parser)
     parser.set_defaults(run=run)
 

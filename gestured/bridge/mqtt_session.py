@@ -13,10 +13,12 @@ from typing import Any
 from gestured.bridge.broker import Broker, properties, topic_of
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import GONE, OLD_S, Daemon, Line
-from gestured.bridge.options import STATUS, host_name
-from gestured.bridge.retained import Retained
+from gestured.bridge.gates import OFF, ON, Gate
+from gestured.bridge.options import STATUS, gate_name, host_name
+from gestured.bridge.retained import OPEN, Retained
 from gestured.core.errors import GesturedError
 
+COMMAND = ("gate", "set")  # below a sensor, in a topic
 EXPIRY_S = 1  # how long a broker keeps an event for a subscriber: as OLD_S says, which MQTT counts in whole seconds
 FIRST_S, LONGEST_S = 0.25, 2.0  # from one attempt to the next: doubled each time, a broker that is back is found soon
 LAST_S = 1.0  # for the broker's answer to our good-bye; without it, it publishes our last will
@@ -46,7 +48,10 @@ class Mqtt:
         self._availability = topic_of(self._host, "availability")
         self._counts = counts
         self._daemon = Daemon(args.sensors, args.gestures, counts)
-        self._retained = Retained(self._daemon, self._host, args.discovery, discovers=not args.no_discovery)
+        self._gate = None if args.gates is None else Gate(args.gates, gate_name(args.gate), counts)
+        gate = None if self._gate is None else self._gate.name
+        self._retained = Retained(self._daemon, self._host, args.discovery, gate, discovers=not args.no_discovery)
+        self._commands: dict[str, str] = {}  # sensor -> the last command, until it is obeyed
         self._inbox: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()  # a signal handler may put into it
         self._stopping = False
         self._client: Any = None  # of this connection, from the call on; None while there is none
@@ -103,6 +108,8 @@ class Mqtt:
             decided = time.monotonic() - self._daemon.age(line, time.time())
             topic = topic_of(self._host, line["sensor"], line["type"])
             self._waiting.append(Outgoing(decided, topic, self._daemon.payload(line)))
+        if self._gate is not None and self._connected and line["type"] == STATUS:
+            self._gate.repeat(self._daemon.silent_by(self._gate.name))
         self._changed |= line["type"] in ("hello", "gestures", STATUS, GONE)
         self._send()
 
@@ -121,6 +128,8 @@ class Mqtt:
 
         client.on_connect = told(self._there, 3)
         client.on_disconnect = told(self._gone, 3)
+        client.on_message = lambda _, __, message: self._hear(message)
+        client.on_subscribe = told(self._subscribed, 3)
         client.on_publish = lambda _, __, number, code, ___: self._inbox.put(partial(self._taken, client, number, code))
         threading.Thread(target=call, name="broker", daemon=True).start()
 
@@ -131,6 +140,8 @@ class Mqtt:
             return
         self._connected, self._wait_s = True, FIRST_S
         self._counts.connected("broker", True, f"broker {self._broker.address} is there")
+        if self._gate is not None:
+            self._broker.hear(client, topic_of(self._host, "+", *COMMAND))
         self._retained.forget()
         self._changed, self._changes, self._change = True, iter(()), 0
         self._waiting.extendleft(reversed(self._sent.values()))  # what it has not acknowledged, before all else
@@ -160,6 +171,35 @@ class Mqtt:
             self._change = 0
         elif self._sent.pop(number, None) is not None:
             self._counts.add("events", "sent")
+        self._send()
+
+    def _subscribed(self, client: Any, codes: Any) -> None:
+        """The broker has answered whether we may hear commands."""
+        if client is self._client and codes[0].is_failure:
+            raise self._broker.deaf(codes[0])
+
+    def _hear(self, message: Any) -> None:
+        """A command, in the library's thread. Of several for one sensor that have not been obeyed the last counts."""
+        sensor = message.topic.split("/")[2]
+        command = message.payload.decode(errors="replace")
+        if message.retain or command not in (ON, OFF) or sensor not in self._daemon.states:
+            self._counts.add("commands", "retained" if message.retain else "wrong")
+            return
+        waits, self._commands[sensor] = sensor in self._commands, command
+        if not waits:
+            self._inbox.put(partial(self._obey, sensor))
+
+    def _obey(self, sensor: str) -> None:
+        command = self._commands.pop(sensor)
+        if self._gate is None:
+            return
+        try:
+            closed = self._gate.obey(sensor, command)
+        except GesturedError:
+            return  # it was said; the switch shows what is so
+        self._counts.add("commands", "obeyed")
+        self._daemon.listening[sensor] = {**OPEN, **self._daemon.listening.get(sensor, {}), "closed": closed}
+        self._changed = True
         self._send()
 
     def _send(self) -> None:

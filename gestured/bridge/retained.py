@@ -2,8 +2,9 @@
 
 By Home Assistant's MQTT discovery sensors and gestures appear there by themselves. For each sensor it has one device
 with an `event` entity, and a device trigger for each gesture: event entities alone give no triggers in the editor of
-automations (home-assistant/core#158789). The keys are those of home-assistant.io/integrations/event.mqtt and
-home-assistant.io/integrations/device_trigger.mqtt.
+automations (home-assistant/core#158789). A binary sensor says whether the sensor listens; where this bridge has a gate,
+a switch closes and opens it. The keys are those of home-assistant.io/integrations/event.mqtt, device_trigger.mqtt,
+binary_sensor.mqtt and switch.mqtt.
 """
 
 import json
@@ -12,6 +13,7 @@ from typing import Any
 
 from gestured.bridge.broker import topic_of
 from gestured.bridge.daemon import Daemon
+from gestured.bridge.gates import OFF, ON
 from gestured.bridge.options import plain
 
 # What the event entity makes of a gesture's line: what it is, and some of what is known of it.
@@ -20,12 +22,19 @@ EVENT = (
     " 'instance': value_json.instance} | tojson }}"
 )
 
+OPEN: dict[str, Any] = {"armed": None, "closed": [], "until": None}  # of a sensor of which a daemon says nothing else
+LISTENS = "{{ 'ON' if not value_json.closed and value_json.armed != false else 'OFF' }}"
+
 
 class Retained:
     """What a broker should retain, and what it does as far as is known."""
 
-    def __init__(self, daemon: Daemon, host: str, prefix: str, *, discovers: bool) -> None:
-        """`prefix` is Home Assistant's discovery prefix; `discovers`: whether anything is published there."""
+    def __init__(self, daemon: Daemon, host: str, prefix: str, gate: str | None = None, *, discovers: bool) -> None:
+        """`prefix` is Home Assistant's discovery prefix; `discovers`: whether anything is published there.
+
+        `gate` is the name of the gate that can be closed and opened from there, if any.
+        """
+        self._gate = gate
         self._daemon, self._host, self._prefix, self._discovers = daemon, host, prefix, discovers
         self._kept: dict[str, str | None] = {}  # topic -> what the broker retains of ours; None where that is not known
 
@@ -53,14 +62,15 @@ class Retained:
         wanted = {topic_of(self._host, "availability"): "online" if daemon.hello else "offline"}
         for sensor, state in daemon.states.items():
             wanted[topic_of(self._host, sensor, "state")] = state
+            wanted[topic_of(self._host, sensor, "gates")] = json.dumps(daemon.listening.get(sensor, OPEN))
             if self._discovers and daemon.gestures:
-                found = discovery(self._prefix, self._host, daemon.version, sensor, daemon.gestures)
+                found = discovery(self._prefix, self._host, daemon.version, sensor, daemon.gestures, self._gate)
                 wanted |= {topic: json.dumps(payload) for topic, payload in found}
         return wanted
 
 
-def discovery(
-    prefix: str, host: str, version: str, sensor: str, gestures: Sequence[str]
+def discovery(  # noqa: PLR0913 - each is a part of a topic or a payload
+    prefix: str, host: str, version: str, sensor: str, gestures: Sequence[str], gate: str | None
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """(topic, payload) of all that a sensor has; `prefix` is Home Assistant's discovery prefix."""
     base = f"gestured/{host}"
@@ -85,6 +95,24 @@ def discovery(
         "availability_topic": f"{base}/availability",
     }
     yield f"{prefix}/event/{node}/{sensor}/config", event | common
+    gates = {"state_topic": f"{base}/{sensor}/gates", "availability_topic": f"{base}/availability"}
+    listens = {
+        "name": "Listens",
+        "unique_id": f"{node}_{sensor}_listens",
+        "value_template": LISTENS,
+        "json_attributes_topic": f"{base}/{sensor}/gates",
+    }
+    yield f"{prefix}/binary_sensor/{node}/{sensor}/config", listens | gates | common
+    if gate is not None:
+        switch = {
+            "name": f"Gate {gate}",
+            "unique_id": f"{node}_{sensor}_gate_{gate}",
+            "command_topic": f"{base}/{sensor}/gate/set",
+            "payload_on": ON,
+            "payload_off": OFF,
+            "value_template": f"{{{{ 'OFF' if '{gate}' in value_json.closed else 'ON' }}}}",
+        }
+        yield f"{prefix}/switch/{node}/{sensor}/config", switch | gates | common
     for gesture in gestures:
         trigger = {
             "automation_type": "trigger",

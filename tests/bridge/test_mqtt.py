@@ -143,7 +143,8 @@ def test_sensors_states_are_retained_and_follow_the_daemon(bridge, broker, liste
     listener.until("gestured/car/armrest/state", "no_data")
     fake.say(STATUS)
     listener.until("gestured/car/armrest/state", "ok")
-    fake.say(STATUS | {"sensors": {"armrest": "stale", "door": "starting"}})
+    silent = {"armrest": {"armed": None, "closed": ["seat"], "until": None}}
+    fake.say(STATUS | {"sensors": {"armrest": "stale", "door": "starting"}, "gates": silent})
     listener.until("gestured/car/armrest/state", "stale")
     listener.until("gestured/car/door/state", "starting")
     found = retained(listen, at, "gestured/#")
@@ -151,6 +152,8 @@ def test_sensors_states_are_retained_and_follow_the_daemon(bridge, broker, liste
         "gestured/car/availability": "online",
         "gestured/car/armrest/state": "stale",
         "gestured/car/door/state": "starting",
+        "gestured/car/armrest/gates": '{"armed": null, "closed": ["seat"], "until": null}',
+        "gestured/car/door/gates": '{"armed": null, "closed": [], "until": null}',
     }
 
 
@@ -210,23 +213,31 @@ def test_a_killed_bridges_last_will_does_not_outlive_its_successor(bridge, broke
     assert retained(listen, at, "gestured/#")["gestured/car/availability"] == "online"
 
 
-# What Home Assistant takes (homeassistant/components/mqtt: event.py, device_trigger.py, schemas.py, and the pages
-# integrations/event.mqtt, integrations/device_trigger.mqtt and integrations/mqtt of home-assistant.io, November 2026).
+# What Home Assistant takes (homeassistant/components/mqtt: event.py, device_trigger.py, binary_sensor.py, switch.py,
+# schemas.py, and the pages integrations/event.mqtt, device_trigger.mqtt, binary_sensor.mqtt, switch.mqtt and mqtt of
+# home-assistant.io, November 2026).
 BASE = {"qos", "encoding", "device", "origin"}
 DEVICE = {
     "identifiers", "connections", "manufacturer", "model", "model_id", "name", "hw_version", "serial_number",
     "sw_version", "via_device", "suggested_area", "configuration_url",
 }  # fmt: skip
 ORIGIN = {"name", "sw_version", "support_url"}
+ENTITY = BASE | {
+    "state_topic", "value_template", "name", "unique_id", "device_class", "icon",
+    "availability", "availability_mode", "availability_template", "availability_topic",
+    "payload_available", "payload_not_available", "enabled_by_default", "entity_category",
+    "entity_picture", "json_attributes_topic", "json_attributes_template", "object_id", "default_entity_id",
+}  # fmt: skip
 KEYS = {  # component -> required, allowed
-    "event": (
-        {"state_topic", "event_types"},
-        BASE
-        | {
-            "state_topic", "event_types", "value_template", "name", "unique_id", "device_class", "icon",
-            "availability", "availability_mode", "availability_template", "availability_topic",
-            "payload_available", "payload_not_available", "enabled_by_default", "entity_category",
-            "entity_picture", "json_attributes_topic", "json_attributes_template", "object_id", "default_entity_id",
+    "event": ({"state_topic", "event_types"}, ENTITY | {"event_types"}),
+    "binary_sensor": (
+        {"state_topic"}, ENTITY | {"payload_on", "payload_off", "expire_after", "force_update", "off_delay"}
+    ),
+    "switch": (
+        {"command_topic"},
+        ENTITY | {
+            "command_topic", "command_template", "payload_on", "payload_off", "state_on", "state_off", "optimistic",
+            "retain",
         },
     ),
     "device_automation": (
@@ -242,7 +253,7 @@ def test_discovery_holds_what_home_assistant_takes(bridge, broker, listen, fake)
     begin(bridge, at, fake)
     fake.accept(HELLO | {"gestures": ["one_tap", "swipe_left"]})
     triggers = {}
-    for _ in range(3):
+    for _ in range(4):
         message = listener.next()
         _, component, node, identifier, config = message.topic.split("/")
         payload = json.loads(message.payload)
@@ -255,6 +266,8 @@ def test_discovery_holds_what_home_assistant_takes(bridge, broker, listen, fake)
             assert payload["event_types"] == ["one_tap", "swipe_left"]
             assert payload["state_topic"] == "gestured/car/armrest/gesture"
             assert payload["availability_topic"] == "gestured/car/availability"
+        elif component == "binary_sensor":
+            assert payload["state_topic"] == "gestured/car/armrest/gates"
         else:
             triggers[payload["subtype"]] = payload
     assert {name: (each["topic"], each["payload"]) for name, each in triggers.items()} == {
@@ -267,13 +280,23 @@ def test_templates_make_of_an_event_what_home_assistant_expects():
     jinja2 = pytest.importorskip("jinja2", reason="the extra [lab] brings the template engine")
     from gestured.bridge.retained import discovery
 
-    found = dict(discovery("homeassistant", "car", "1", "armrest", ["one_tap"]))
+    found = dict(discovery("homeassistant", "car", "1", "armrest", ["one_tap"], "house"))
     value = gesture(7) | {"instance": "i"}
     event = found["homeassistant/event/gestured_car/armrest/config"]
     made = json.loads(jinja2.Environment().from_string(event["value_template"]).render(value_json=value))
     assert made == {"event_type": "one_tap", "confidence": 0.9, "sequence": 7, "instance": "i"}
     trigger = found["homeassistant/device_automation/gestured_car/armrest-one_tap/config"]
     assert jinja2.Environment().from_string(trigger["value_template"]).render(value_json=value) == trigger["payload"]
+    switch = found["homeassistant/switch/gestured_car/armrest/config"]
+    assert KEYS["switch"][0] <= switch.keys() <= KEYS["switch"][1]
+    listens = found["homeassistant/binary_sensor/gestured_car/armrest/config"]
+    for armed, closed, expected in (
+        (None, [], ("ON", "ON")), (True, [], ("ON", "ON")), (False, [], ("ON", "OFF")),
+        (None, ["door"], ("ON", "OFF")), (None, ["house", "door"], ("OFF", "OFF")),
+    ):  # fmt: skip
+        told = {"armed": armed, "closed": closed, "until": None}
+        templates = (switch["value_template"], listens["value_template"])
+        assert tuple(jinja2.Environment().from_string(each).render(value_json=told) for each in templates) == expected
 
 
 def test_own_gestures_appear_and_vanish(bridge, broker, listen, fake):

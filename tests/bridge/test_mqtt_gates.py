@@ -1,0 +1,170 @@
+"""A gate that a real broker closes and opens, of a real daemon, through the bridge."""
+
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gestured.bridge.counts import Counts
+from gestured.bridge.gates import OFF, ON, Gate
+from gestured.client.control import Control
+from tests.bridge.conftest import Broker, Process, page, wait
+from tests.daemon.harness import Client, Daemon, Sensor
+
+paho = pytest.importorskip("paho.mqtt.client", reason="the bridge to MQTT needs the extra [mqtt]")
+SET = "gestured/car/armrest/gate/set"
+ACCESS = """\
+user car
+topic write gestured/car/#
+topic write homeassistant/+/gestured_car/#
+topic read gestured/car/+/gate/set
+user house
+topic readwrite #
+"""
+
+
+@pytest.fixture
+def gated(model: Path, tmp_path: Path) -> Iterator[Daemon]:
+    """A daemon with a socket for bridges."""
+    daemon = Daemon.start(tmp_path, model, "--clock", "sensor", "--stale-s", 30, "--gates", tmp_path / "gates.sock")
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+
+
+@pytest.fixture
+def at(broker: Callable[..., Broker], tmp_path: Path) -> Broker:
+    """A broker that knows the bridge and a house."""
+    (tmp_path / "passwords").write_text("car:secret\nhouse:open\n")
+    subprocess.run(["mosquitto_passwd", "-U", str(tmp_path / "passwords")], check=True, timeout=60)
+    (tmp_path / "access").write_text(ACCESS)
+    for name in ("passwords", "access"):
+        (tmp_path / name).chmod(0o644)
+    files = [f"password_file {tmp_path}/passwords", f"acl_file {tmp_path}/access"]
+    return broker("allow_anonymous false", *files, "user root")
+
+
+@pytest.fixture
+def house(at: Broker) -> Iterator[Any]:
+    """Whoever has the switch."""
+    client = paho.Client(paho.CallbackAPIVersion.VERSION2, protocol=paho.MQTTv5)
+    client.username_pw_set("house", "open")
+    client.connect("127.0.0.1", at.port)
+    client.loop_start()
+    yield client
+    client.disconnect()
+    client.loop_stop()
+
+
+def say(house: Any, payload: str, topic: str = SET, *, retain: bool = False) -> None:
+    """Publish a command, and wait until the broker has it."""
+    house.publish(topic, payload, qos=1, retain=retain).wait_for_publish(timeout=20)
+
+
+def start(bridge: Callable[..., Process], at: Broker, daemon: Daemon, *more: object) -> tuple[Process, dict[str, Any]]:
+    """A bridge that hears commands."""
+    sockets = ("--socket", daemon.socket, "--gates", daemon.ready["gates"])
+    process = bridge(
+        "mqtt", "--broker", at.address, "--host", "car", *sockets, *more,
+        env={"MQTT_USER": "car", "MQTT_PASSWORD": "secret"},
+    )  # fmt: skip
+    ready = process.ready()
+    wait(lambda: "Sending SUBACK to gestured-car" in at.said(), at.said)
+    return process, ready
+
+
+def known(daemon: Daemon) -> tuple[Sensor, Client]:
+    """A sensor that the daemon knows, and who hears of it."""
+    client = daemon.client().subscribe("gesture", "unknown", "gate")
+    sensor = Sensor(daemon, "armrest").begin().perform("left")
+    assert client.line()["gesture"] == "swipe_left"
+    return sensor, client
+
+
+def test_what_the_bus_closes_stays_closed_when_the_bridge_is_killed(bridge, at, gated, house) -> None:
+    sensor, client = known(gated)
+    process, _ = start(bridge, at, gated)
+    say(house, OFF)
+    assert client.line()["closed"] == ["mqtt"]
+    process.process.kill()
+    process.process.wait()
+    sensor.perform("left", "up")
+    assert [client.line()["gates"] for _ in range(2)] == [["mqtt"], ["mqtt"]]
+    with Control(Path(gated.ready["control"])) as operator:
+        assert operator.ask("status")["sensors"]["armrest"]["closed"] == ["mqtt"]
+        operator.ask("allow", gate="mqtt")
+    sensor.perform("down")
+    assert [client.line().get(key) for key in ("closed", "gesture")] == [[], "swipe_down"]  # nothing in between
+
+
+def test_what_the_bus_closes_it_opens_and_shows(bridge, at, gated, house) -> None:
+    heard: list[bytes] = []
+    house.message_callback_add("gestured/car/armrest/gates", lambda _, __, message: heard.append(message.payload))
+    house.subscribe("gestured/car/armrest/gates", qos=1)
+    _, client = known(gated)
+    start(bridge, at, gated, "--gate", "house")
+    for command, closed in ((OFF, b'"closed": ["house"]'), (ON, b'"closed": []')):
+        say(house, command)
+        assert client.line()["closed"] == (["house"] if command == OFF else [])
+        wait(lambda: heard and closed in heard[-1], lambda: heard)  # noqa: B023 - asked at once
+
+
+def test_retained_and_senseless_commands_do_nothing(bridge, at, gated, house) -> None:
+    _, client = known(gated)
+    say(house, OFF, retain=True)  # before the bridge comes
+    _, ready = start(bridge, at, gated, "--metrics", "127.0.0.1:0")
+    say(house, OFF, retain=True)
+    say(house, "off")
+    say(house, OFF, "gestured/car/elbow/gate/set")
+    say(house, "RECALIBRATE", "gestured/car/armrest/gate/set")
+    with Control(Path(gated.ready["control"])) as operator:
+        operator.ask("inhibit", gate="door")
+    say(house, ON)  # opens its own gate alone, which is open
+    counted = 'gestured_bridge_commands_total{bridge="mqtt",result="%s"} %s.0'
+    wait(
+        lambda: all(counted % each in page(ready["metrics"]) for each in (("retained", 1), ("wrong", 3), ("obeyed", 1)))
+    )
+    with Control(Path(gated.ready["control"])) as operator:
+        assert operator.ask("status")["sensors"]["armrest"]["closed"] == ["door"]
+    assert client.line()["closed"] == ["door"]
+
+
+def test_a_bridge_repeats_what_the_daemon_says_is_closed_in_its_name(gated: Daemon, monkeypatch) -> None:
+    known(gated)
+    gate = Gate(Path(gated.ready["gates"]), "mqtt", Counts("mqtt"))
+    monkeypatch.setattr("gestured.bridge.gates.ALIVE_S", 0.001)
+    gate.obey("armrest", OFF)
+    with Control(Path(gated.ready["control"])) as operator:
+        wait(lambda: operator.ask("status")["overdue"])
+        monkeypatch.setattr("gestured.bridge.gates.ALIVE_S", 60.0)
+        gate.repeat(["armrest"])
+        assert operator.ask("status")["overdue"] == {}
+        operator.ask("allow", gate="mqtt")
+        gate.repeat(["armrest"])  # too soon
+        assert operator.ask("status")["sensors"]["armrest"]["closed"] == []
+
+
+def test_without_a_daemon_a_command_fails_and_the_next_one_is_obeyed(bridge, at, gated, house, tmp_path: Path) -> None:
+    process, _ = start(bridge, at, gated)
+    _, client = known(gated)
+    path = Path(gated.ready["gates"])
+    path.rename(path.with_suffix(".away"))
+    wait(lambda: (say(house, OFF), "armrest OFF: " in process.said())[1])
+    path.with_suffix(".away").rename(path)
+    say(house, OFF)
+    assert client.line()["closed"] == ["mqtt"]
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        ([], "--gates: a broker that knows nobody may close no gate: set MQTT_USER and MQTT_PASSWORD"),
+        (["--gate", "a/b"], "--gate 'a/b': expected 1 to 64 of A-Z a-z 0-9 _ -"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(refused, monkeypatch, tmp_path: Path, flags: list[str], words: str) -> None:
+    if flags:
+        monkeypatch.setenv("MQTT_USER", "car")
+    said = refused("mqtt", "--broker", "localhost", "--socket", tmp_path / "x.sock", "--gates", tmp_path / "g", *flags)
+    assert words in said and said.count("\n") == 1
