@@ -16,14 +16,17 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from gestured.client.web.door import HEADER, at_home
+from gestured.client.web.server import BODY_BYTES, SHARED, STRANGERS
 from gestured.control.view import NICE
-from gestured.control.view.door import HEADER, at_home
-from gestured.control.view.server import BODY_BYTES, FILES, PAGE, STRANGERS
+from gestured.control.view.server import PAGE
 from gestured.core.address import Address
 from gestured.record.tape_reader import read
 from tests.control.browser import PROGRAM, Browser
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Frame, Sensor
+
+FILES = [*SHARED.iterdir(), *PAGE.iterdir()]
 
 
 class Page:
@@ -118,8 +121,8 @@ def test_the_address_works_once_and_becomes_a_secret_of_the_tab(view: Page) -> N
 def test_what_a_browser_is_told_to_allow(view: Page) -> None:
     view.come_in()
     for path in FILES:
-        status, headers, body = view.ask(path)
-        assert status == 200 and body == (PAGE / FILES[path][0]).read_bytes()
+        status, headers, body = view.ask(f"/{path.name}".removesuffix("index.html"))
+        assert status == 200 and body == path.read_bytes()
         policy = headers["Content-Security-Policy"]
         assert policy.startswith("default-src 'none'") and "unsafe" not in policy and "frame-ancestors 'none'" in policy
         assert headers["Referrer-Policy"] == "no-referrer" and headers["X-Content-Type-Options"] == "nosniff"
@@ -229,8 +232,8 @@ def test_a_port_that_is_taken_and_a_daemon_that_is_not_there(run, real: Daemon, 
 
 
 def test_the_page_is_small_and_nothing_in_it_comes_from_elsewhere() -> None:
-    assert sum(path.stat().st_size for path in PAGE.iterdir()) < 60_000
-    for path in PAGE.iterdir():
+    assert sum(path.stat().st_size for path in FILES) < 60_000
+    for path in FILES:
         text = path.read_text()
         assert not re.search(r"https?://|//[a-z]+\.|innerHTML|outerHTML|insertAdjacent|document\.write|eval\(", text)
 
@@ -482,7 +485,7 @@ def test_everything_has_a_name_for_who_does_not_see_it(view: Page, real: Daemon,
 def test_a_page_on_another_port_of_this_machine_gets_nothing(view: Page, real: Daemon, browser: Browser) -> None:
     """A neighbour serves it, and the owner's browser is led there after it has looked."""
     follow(view, browser, "arm", real)
-    secret = browser.run("state.secret")
+    secret = browser.run("door.secret")
     heard: list[str] = []
 
     class Neighbour(BaseHTTPRequestHandler):

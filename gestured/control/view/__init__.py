@@ -1,7 +1,6 @@
 """`gesturectl view`: a running daemon as one page in a browser on this machine."""
 
 import argparse
-import ipaddress
 import os
 import signal
 import sys
@@ -40,31 +39,23 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM."""
-    from gestured.control.view.door import Door
-    from gestured.control.view.server import Server
+    from gestured.client.web.door import Door, is_loopback
+    from gestured.control.view.server import ViewServer
     from gestured.control.view.source import Source
 
     for signalled in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(signalled, signal.default_int_handler)
-    if not _loopback(args.listen.host):
+    if not is_loopback(args.listen.host):
         raise GesturedError(f"--listen {args.listen}: expected a loopback address, such as {DEFAULT}")
     connect(args).close()  # who has no daemon, is told so at once
     os.nice(NICE)
     source = Source(control_path(args), args.folder)
-    door = Door()
-    with Server(args.listen, source, door) as server:
-        address = f"http://{server.address}/#{door.token}"
-        tell(args.json, {"type": "view", "address": address}, address)
+    door = Door("gesturectl view")
+    with ViewServer(args.listen, source, door) as server:
+        tell(args.json, {"type": "view", "address": server.page}, server.page)
         say("Open this address in a browser on this machine; it works once. Ctrl-C ends the view.", to=sys.stderr)
         try:
             server.serve_forever()
         finally:
             source.close()
     return 0
-
-
-def _loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"

@@ -7,13 +7,21 @@ from typing import Any
 from gestured.client.control import Control
 from gestured.client.fields import wrong_field
 from gestured.client.lines import Refused
+from gestured.client.web.outbox import Outbox
 from gestured.control.flag import flag, flag_path
-from gestured.control.view.outbox import Outbox
 from gestured.core.errors import GesturedError
 
 AGAIN_S = 0.5  # before a daemon that has gone is asked again
 
 Looked = tuple[list[str], bool] | None  # sensors, and whether with their counts as they were sent; None: nobody looks
+
+
+class Looker(Outbox):
+    """What waits for a browser that looks at a sensor, and perhaps at its counts as they were sent."""
+
+    def __init__(self, sensor: str, raw: bool) -> None:
+        super().__init__()
+        self.sensor, self.raw = sensor, raw
 
 
 class Source:
@@ -22,7 +30,7 @@ class Source:
     def __init__(self, control: Path, folder: Path) -> None:
         """What is flagged is put into `folder`."""
         self._control, self._folder = control, folder
-        self._open: list[Outbox] = []
+        self._open: list[Looker] = []
         self._changed = threading.Condition()
         self._closed = threading.Event()
         self._state: dict[str, Any] = {}  # the daemon's, as the page is told it
@@ -31,7 +39,7 @@ class Source:
         self._latest: dict[str, dict[str, Any]] = {}  # the last view of each sensor that is looked at
         threading.Thread(target=self._look_again_and_again, daemon=True).start()
 
-    def join(self, outbox: Outbox) -> None:
+    def join(self, outbox: Looker) -> None:
         """A browser begins to look: fill its outbox from now on."""
         if self._state:
             outbox.put("sensors", self._state)
@@ -41,7 +49,7 @@ class Source:
             self._open.append(outbox)
             self._look_anew()
 
-    def leave(self, outbox: Outbox) -> None:
+    def leave(self, outbox: Looker) -> None:
         """And looks no more."""
         with self._changed:
             self._open.remove(outbox)
@@ -117,7 +125,7 @@ class Source:
         else:
             self._tell("event", line)
 
-    def _lookers(self, sensor: str) -> list[Outbox]:
+    def _lookers(self, sensor: str) -> list[Looker]:
         return [outbox for outbox in list(self._open) if outbox.sensor == sensor]
 
     def _wanted(self) -> Looked:

@@ -1,69 +1,28 @@
 "use strict";
-// The page of `gesturectl view`. What comes from the daemon is written by textContent alone: a name is never markup.
+// The page of `gesturectl view`.
 const KEPT_S = 30, PATH_S = 3, CHART_S = 10, ROWS = 100;
-const STOPS = ["#00204d", "#31446b", "#666970", "#958f78", "#cab969", "#ffea46"].map(c => [1, 3, 5].map(i => parseInt(c.slice(i, i + 2), 16)));
 const STEPS = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000, 50000, 100000, 1e6, 1e7, 1e9];
 const PHASES = { IDLE: "idle", CONTACT: "contact", RELEASING: "releasing", GAP: "waiting for a second tap", SPENT: "held too long" };
 const SHADES = { IDLE: "#8a94a0", CONTACT: "#e69f00", RELEASING: "#56b4e9", GAP: "#009e73", SPENT: "#cc79a7" }; // Okabe and Ito
-const at = id => document.getElementById(id);
-const state = { secret: sessionStorage.getItem("secret") ?? "", stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0, early: null };
+const state = { stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0, early: null };
 
-const token = location.hash.slice(1); // works once: for a secret that this tab keeps, and no other origin can read
-history.replaceState(null, "", "/");
 for (const step of STEPS.slice(0, -2)) at("scale").append(new Option(`0 to ${step}`, step));
 
-function words(name) { return String(name).replaceAll("_", " "); }
-function percent(share) { return `${Math.round(100 * share)} %`; }
 function clock(s) { return new Date(1000 * s).toLocaleTimeString("en-GB") + "." + String(Math.floor(s % 1 * 10)); }
 
 const kinds = { sensors, frame, event, gone: gone => daemon(gone.reason, true) };
-
-async function ask(path, more) {
-  return fetch(path, { ...more, headers: { "X-Gestured-Token": state.secret || token, ...more?.headers } });
-}
-
-async function enter() {
-  if (token) state.secret = "";
-  const answer = await ask("open", { method: "POST", body: "{}" });
-  const told = await answer.json();
-  if (!answer.ok) { daemon(told.error, true); return; }
-  state.secret = told.secret;
-  sessionStorage.setItem("secret", told.secret);
-  open("");
-}
 
 function open(sensor) {
   if (state.stream) state.stream.abort();
   state.frames = []; state.full = 0; state.sensor = sensor;
   state.stream = new AbortController();
-  listen(state.stream);
-}
-
-async function listen(stream) { // server-sent events; EventSource sends no header
-  const query = new URLSearchParams({ sensor: state.sensor, raw: at("raw").checked ? "1" : "0" });
-  while (!stream.signal.aborted) {
-    try {
-      const answer = await ask("stream?" + query, { signal: stream.signal });
-      if (!answer.ok) { daemon(await answer.text(), true); return; }
-      const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
-      for (let rest = "", part; !(part = await reader.read()).done;) {
-        const blocks = (rest + part.value).split("\n\n");
-        rest = blocks.pop();
-        for (const block of blocks) {
-          const told = /^event: (\w+)\ndata: (.*)$/.exec(block);
-          if (told && !stream.signal.aborted) kinds[told[1]]?.(JSON.parse(told[2]));
-        }
-      }
-    } catch { /* it has gone, or something else is looked at */ }
-    if (stream.signal.aborted) return;
-    daemon("the viewer does not answer: is gesturectl view still running?", true);
-    await new Promise(again => setTimeout(again, 1000));
-  }
+  const query = new URLSearchParams({ sensor, raw: at("raw").checked ? "1" : "0" });
+  listen("stream?" + query, state.stream.signal, kinds, reason => daemon(reason, true));
 }
 
 function daemon(text, gone) {
-  at("daemon").textContent = text;
-  at("daemon").classList.toggle("gone", gone);
+  at("state").textContent = text;
+  at("state").classList.toggle("gone", gone);
 }
 
 function sensors(told) {
@@ -176,23 +135,6 @@ function draw() {
   state.drawn++;
 }
 
-function fit(canvas, ratio) {
-  const width = Math.round(canvas.clientWidth * devicePixelRatio);
-  const height = Math.round((ratio ? canvas.clientWidth * ratio : canvas.clientHeight) * devicePixelRatio);
-  if (canvas.width !== width || canvas.height !== height) {
-    canvas.width = width; canvas.height = height;
-    if (ratio) canvas.style.height = `${canvas.clientWidth * ratio}px`;
-  }
-  const g = canvas.getContext("2d");
-  g.clearRect(0, 0, width, height);
-  return [g, width, height];
-}
-
-function colour(share) {
-  const place = Math.min(Math.max(share, 0), 1) * (STOPS.length - 1), i = Math.min(Math.floor(place), STOPS.length - 2);
-  return STOPS[i].map((low, c) => Math.round(low + (STOPS[i + 1][c] - low) * (place - i)));
-}
-
 function matrix(now, i, full) {
   const sent = at("raw").checked && now.raw;
   const [rows, columns] = sent ? now.raw_grid : now.grid;
@@ -203,18 +145,17 @@ function matrix(now, i, full) {
   // Counts as they were sent have a scale of their own: from the least of this frame.
   const least = sent ? Math.min(...values) : 0, bad = new Set(sent ? [] : now.bad);
   let best = 0;
+  taxels(g, values, columns, side, left, least, full);
   values.forEach((value, n) => {
     if (value > values[best]) best = n;
-    const x = left + side * (n % columns), y = side * Math.floor(n / columns), [r, green, b] = colour((value - least) / full);
-    g.fillStyle = `rgb(${r} ${green} ${b})`;
-    g.fillRect(x, y, side - 1, side - 1);
+    const x = left + side * (n % columns), y = side * Math.floor(n / columns);
     if (bad.has(n)) {
       g.strokeStyle = "#ff6e6e"; g.lineWidth = 2 * devicePixelRatio;
       g.strokeRect(x + 2, y + 2, side - 5, side - 5);
       g.beginPath(); g.moveTo(x + 2, y + 2); g.lineTo(x + side - 3, y + side - 3); g.moveTo(x + side - 3, y + 2); g.lineTo(x + 2, y + side - 3); g.stroke();
     }
     if (label) {
-      g.fillStyle = r + green + b > 380 ? "#000" : "#fff";
+      g.fillStyle = colour((value - least) / full).reduce((a, b) => a + b) > 380 ? "#000" : "#fff";
       g.font = `${Math.max(9 * devicePixelRatio, side / 4)}px ui-monospace, monospace`;
       g.textAlign = "center"; g.textBaseline = "middle";
       g.fillText(String(Math.round(value)), x + side / 2, y + side / 2);
@@ -301,7 +242,7 @@ function step(frames) {
 
 async function act(path, what) {
   at("done").textContent = "...";
-  const answer = await ask(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(what) }).then(r => r.json(), error => ({ error: String(error) }));
+  const answer = await post(path, what);
   at("done").textContent = answer.error ?? answer.done;
 }
 
@@ -328,4 +269,4 @@ addEventListener("keydown", e => {
   const wanted = keys[e.key.length === 1 ? e.key.toLowerCase() : e.key];
   if (wanted && !(e.key === " " && e.target.type === "checkbox")) { e.preventDefault(); wanted(); }
 });
-enter();
+enter().then(() => open(""), error => daemon(error.message, true));

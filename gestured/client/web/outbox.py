@@ -11,8 +11,7 @@ MOST = 200  # events that wait; a browser that was stalled shows no more
 class Outbox:
     """Filled by those who hear the daemon, emptied by the thread that serves the browser; nobody waits to fill it."""
 
-    def __init__(self, sensor: str, raw: bool) -> None:
-        self.sensor, self.raw = sensor, raw  # what the browser looks at
+    def __init__(self) -> None:
         self._changed = threading.Condition()
         self._frame: dict[str, Any] | None = None
         self._rest: deque[tuple[str, dict[str, Any]]] = deque(maxlen=MOST)

@@ -1,0 +1,110 @@
+"use strict";
+// What the pages of gestured share. What comes from a server is written by textContent alone: a name is never markup.
+const at = id => document.getElementById(id);
+const CIVIDIS = ["#00204d", "#31446b", "#666970", "#958f78", "#cab969", "#ffea46"];
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const door = { secret: sessionStorage.getItem("secret") ?? "", token: location.hash.slice(1) };
+let stops; // colours from nothing, which is the page's own ground, to the most
+history.replaceState(null, "", "/"); // the token works once: for a secret that this tab keeps, and no other origin can read
+
+function words(name) { return String(name).replaceAll("_", " "); }
+function percent(share) { return `${Math.round(100 * share)} %`; }
+
+async function ask(path, more) {
+  return fetch(path, { ...more, headers: { "X-Gestured-Token": door.secret || door.token, ...more?.headers } });
+}
+
+async function post(path, what) {
+  return ask(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(what) })
+    .then(r => r.json(), error => ({ error: String(error) }));
+}
+
+async function enter() { // throws the reason where the door is closed
+  if (door.token) door.secret = "";
+  const told = await post("open", {});
+  if (told.error) throw new Error(told.error);
+  sessionStorage.setItem("secret", door.secret = told.secret);
+}
+
+async function listen(path, signal, hear, lost) { // server-sent events; EventSource sends no header
+  while (!signal.aborted) {
+    try {
+      const answer = await ask(path, { signal });
+      if (!answer.ok) { lost(await answer.text()); return; }
+      const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
+      for (let rest = "", part; !(part = await reader.read()).done;) {
+        const blocks = (rest + part.value).split("\n\n");
+        rest = blocks.pop();
+        for (const block of blocks) {
+          const told = /^event: (\w+)\ndata: (.*)$/.exec(block);
+          if (told && !signal.aborted) hear[told[1]]?.(JSON.parse(told[2]));
+        }
+      }
+    } catch { /* it has gone, or something else is looked at */ }
+    if (signal.aborted) return;
+    lost("the program that serves this page does not answer: does it still run?");
+    await new Promise(again => setTimeout(again, 1000));
+  }
+}
+
+// The name of a contact, first and largest: grey while it is a guess, solid when it is said, struck where it is revoked.
+let guess = null;
+
+function name(told) { // an event of the sensor that is shown
+  const ms = (from, to) => `${Math.round(1000 * (to - from))} ms`;
+  const show = (text, how, ...notes) => {
+    at("name").replaceChildren(text);
+    at("name").className = how;
+    at("name-note").textContent = notes.filter(Boolean).join(", ");
+  };
+  if (told.type === "onset") { guess = null; show("…", "guess", "touched"); }
+  if (told.type === "provisional") {
+    guess = told;
+    show(words(told.gesture), "guess", "a guess", percent(told.confidence), `${ms(told.onset, told.decided)} after it began`);
+  }
+  if (told.type === "cancelled") show("no answer", "unknown", words(told.reason));
+  if (told.type !== "gesture" && told.type !== "unknown") return;
+  const guessed = told.provisional && guess?.id === told.id ? guess : null;
+  const said = told.type === "gesture";
+  show(said ? words(told.gesture) : "none of these", told.type, said ? percent(told.confidence) : words(told.reason ?? ""),
+    `${ms(told.offset, told.decided)} after the finger left`, guessed && `${told.provisional}, ${ms(guessed.decided, told.decided)} after the guess`);
+  if (told.provisional === "revoked" && guessed) {
+    const struck = document.createElement("s");
+    struck.textContent = words(guessed.gesture);
+    at("name").prepend(struck, " ");
+  }
+}
+
+function fit(canvas, ratio) { // its drawing ground, as fine as the screen; the height follows the width where a ratio is given
+  const width = Math.round(canvas.clientWidth * devicePixelRatio);
+  const height = Math.round((ratio ? canvas.clientWidth * ratio : canvas.clientHeight) * devicePixelRatio);
+  if (canvas.width !== width || canvas.height !== height) {
+    canvas.width = width; canvas.height = height;
+    if (ratio) canvas.style.height = `${canvas.clientWidth * ratio}px`;
+  }
+  const g = canvas.getContext("2d");
+  g.clearRect(0, 0, width, height);
+  return [g, width, height];
+}
+
+function colours() { // lighter is more on a dark page, darker on a light one
+  const ground = getComputedStyle(document.documentElement).getPropertyValue("--panel").trim();
+  const rest = dark.matches ? CIVIDIS.slice(1) : [...CIVIDIS].reverse();
+  stops = [ground, ...rest].map(c => [1, 3, 5].map(i => parseInt(c.slice(i, i + 2), 16)));
+  document.documentElement.style.setProperty("--scale", `linear-gradient(90deg, ${[ground, ...rest].join(", ")})`);
+}
+
+function colour(share) {
+  const place = Math.min(Math.max(share, 0), 1) * (stops.length - 1), i = Math.min(Math.floor(place), stops.length - 2);
+  return stops[i].map((low, c) => Math.round(low + (stops[i + 1][c] - low) * (place - i)));
+}
+
+function taxels(g, values, columns, side, left, least, full) {
+  values.forEach((value, n) => {
+    g.fillStyle = `rgb(${colour((value - least) / full).join(" ")})`;
+    g.fillRect(left + side * (n % columns), side * Math.floor(n / columns), side - 1, side - 1);
+  });
+}
+
+colours();
+dark.addEventListener("change", colours);
