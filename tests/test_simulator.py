@@ -3,7 +3,7 @@
 import hashlib
 import math
 from collections import Counter
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import islice
 
 import numpy as np
@@ -27,6 +27,7 @@ from gestured.simulator import (
     wide,
 )
 from gestured.simulator.kinematics import stroke_progress
+from gestured.simulator.live import LiveTextile
 from gestured.simulator.textile import relax
 
 # Integer frames and counters of 51 cohort trials and 40 wide takes. It changes when the simulated data do;
@@ -385,3 +386,17 @@ def test_line_bursts_hit_whole_rows_or_columns_of_single_frames() -> None:
         hit = frame > 0.5 * frame.max()
         assert hit.all(axis=0).any() or hit.all(axis=1).any()
         assert hit.sum() <= 2 * 9
+
+
+@pytest.mark.parametrize("rate_hz", [15.0, 40.0])
+def test_a_live_textile_answers_as_a_recorded_one_does(rate_hz: float) -> None:
+    """Frame by frame it is the same textile: without noise the counts are the same, to the last one."""
+    silent = {f.name: 0.0 for f in fields(SimulatedSensor) if f.name.endswith("noise")}
+    sensor = replace(SimulatedSensor.nominal(), rate_hz=rate_hz, drift=0.0, jitter_s=0.0, **silent)
+    performance = perform("double_tap", Participant(4), generator(4))
+    take = sensor.record([(0.5, performance)], 3.0, generator(5))
+    presses = [replace(press, t=press.t + 0.5) for press in performance.contacts]
+    live = LiveTextile(sensor, 6)
+    frames = [live.frame(float(t), presses) for t in take.sensor_times]
+    assert take.frames.max() > 600
+    np.testing.assert_array_equal(frames, take.frames)

@@ -13,6 +13,7 @@ SUBCOMMANDS = (
     ("status", "add", ("status",)),
     ("listen", "add", ("listen",)),
     ("view", "add", ("view",)),
+    ("pad", "add", ("pad",)),
     ("doctor", "add", ("doctor",)),
     ("sniff", "add", ("sniff",)),
     ("operate", "add_reload", ("reload",)),

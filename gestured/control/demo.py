@@ -15,6 +15,8 @@ from subprocess import DEVNULL, PIPE, Popen
 from gestured.client.control import Control
 from gestured.client.engine import Engine
 from gestured.client.lines import Refused, read_ahead
+from gestured.client.pad.pad import Pad
+from gestured.client.pad.server import PadServer
 from gestured.client.picture import trace
 from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json
@@ -23,6 +25,7 @@ from gestured.client.stream import Stream
 from gestured.control.play import add_arguments, frames, takes
 from gestured.control.screen import Felt, Screen, in_colour
 from gestured.control.show import as_dict, block, in_words
+from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.record.judge import Outcome, Performed, Tally
 from gestured.simulator import Take
@@ -32,6 +35,7 @@ SLACK_S = 0.3  # idle frames shown before what was performed, and waited for at 
 VIEW = (sys.executable, "-m", "gestured.control", "view", "--listen", "127.0.0.1:0")
 DRAWN_AFTER_S = 0.1
 POLL_S = 0.05
+GONE_S = 3.0  # without a page a pad counts as closed: a page that is loaded again comes back within that time
 HEARD = ("gesture", "unknown", "provisional")  # events that the daemon is asked for
 
 
@@ -65,7 +69,8 @@ def run(args: argparse.Namespace) -> int:
             with (
                 Control(Path(engine.ready["control"])) as control,
                 nullcontext("") if args.json else page(control.path) as address,
-                closing(Stream(engine.socket, {"types": HEARD})) as stream,
+                nullcontext() if args.json else pad(engine, args.grid, args.rate) as touched,
+                closing(Stream(engine.socket, {"types": HEARD, "sensors": [DEMO_SENSOR]})) as stream,
                 closing(Sensor(engine.listen, Form(DEMO_SENSOR))) as sensor,
                 show.screen or nullcontext(),
             ):
@@ -73,10 +78,14 @@ def run(args: argparse.Namespace) -> int:
                     f"The daemon listens on {engine.listen} with the model {engine.ready['model']}.",
                     f"A simulated sensor of {rows} x {columns} taxels sends OSC to it at {args.rate:g} Hz.",
                     *([f"Until the demo ends, a browser shows it at {address}"] if address else []),
+                    *([f"A pad for your own finger or mouse is at {touched.page}"] if touched else []),
                     "For two seconds nobody touches it. Ctrl-C ends.",
                     "",
                 )
                 show.follow(sensor, stream, control)
+                if touched is not None and touched.open:
+                    show.say("", "The pad is still open: the demo ends when its page is closed, or with Ctrl-C.")
+                    await_closed(touched)
         except KeyboardInterrupt:
             show.say("")
     show.conclude()
@@ -92,6 +101,19 @@ def page(control: Path) -> Iterator[str]:
             yield process.stdout.readline().strip() if process.stdout is not None else ""
         finally:
             process.terminate()
+
+
+def pad(engine: Engine, grid: tuple[int, int], rate_hz: float) -> PadServer:
+    """A pad that sends to the demo's daemon, on any free port; a context manager."""
+    server = PadServer(Address("127.0.0.1", 0), Pad(engine.listen, "pad", grid, min(rate_hz, 200.0)), "the demo")
+    return server.serve(engine.socket)
+
+
+def await_closed(server: PadServer) -> None:
+    """Wait until no page shows the pad any more, or nobody has touched it for long."""
+    shown = time.monotonic()
+    while time.monotonic() - shown < GONE_S and not server.ended.wait(POLL_S):
+        shown = time.monotonic() if server.open else shown
 
 
 class Show:
@@ -152,7 +174,8 @@ class Show:
                 f"  {programs / 'gestured'} --model {self.model}",
                 f"  {programs / 'gesturectl'} simulate --sensor armrest",
                 f"  {programs / 'gesturectl'} listen",
-                f"{programs / 'gesturectl'} view shows that sensor in a browser.",
+                f"{programs / 'gesturectl'} view shows that sensor in a browser, and",
+                f"{programs / 'gesturectl'} pad makes a sensor of a mouse, a touchscreen or a telephone.",
             )
 
     def _draw(self, control: Control) -> None:

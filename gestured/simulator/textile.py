@@ -24,29 +24,50 @@ def relax(field: Array, dt_s: float, amplitudes: Sequence[float], taus_s: Sequen
     """
     if not len(amplitudes) and hysteresis <= 0.0:
         return field
-    share = np.asarray(amplitudes, dtype=np.float64)[:, None, None]
-    step = -np.expm1(-dt_s / np.asarray(taus_s, dtype=np.float64))[:, None, None]
-    fade = math.exp(-dt_s / REMANENCE_S)
-    state = np.zeros((len(amplitudes), *field.shape[1:]))
-    play = np.zeros(field.shape[1:])
+    lag = Lag(field.shape[1:], dt_s, amplitudes, taus_s, hysteresis)
     out = np.empty_like(field)
-    direct = 1.0 - float(share.sum())
-    # A frame in which nothing was pressed and everything has decayed answers with exactly nothing.
-    pressed = field.max(axis=(1, 2)) > 0.0
-    resting = True
-    for k in range(field.shape[0]):
-        p = field[k]
-        if resting and not pressed[k]:
-            out[k] = 0.0
-            continue
-        state += step * (p - state)
-        answer = direct * p + (share * state).sum(axis=0)
-        if hysteresis > 0.0:
-            play = np.minimum(np.maximum(play * fade, p - hysteresis), p + hysteresis)
-            answer = 0.5 * (answer + play) + 0.5 * hysteresis * (p > 0.0) * np.minimum(p, 1.0)
-        out[k] = answer
-        resting = not pressed[k] and float(np.abs(state).max(initial=0.0)) < 1e-5 and float(np.abs(play).max()) < 1e-5
+    for k, p in enumerate(field):
+        out[k] = lag.answer(p)
     return out
+
+
+class Lag:
+    """The lagging answer of `relax` frame by frame, for a grid of the given shape."""
+
+    def __init__(
+        self,
+        shape: tuple[int, ...],
+        dt_s: float,
+        amplitudes: Sequence[float],
+        taus_s: Sequence[float],
+        hysteresis: float,
+    ) -> None:
+        self._share = np.asarray(amplitudes, dtype=np.float64)[:, None, None]
+        self._step = -np.expm1(-dt_s / np.asarray(taus_s, dtype=np.float64))[:, None, None]
+        self._fade = math.exp(-dt_s / REMANENCE_S)
+        self._hysteresis = hysteresis
+        self._direct = 1.0 - float(self._share.sum())
+        self._state = np.zeros((len(amplitudes), *shape))
+        self._play = np.zeros(shape)
+        self._resting = True
+
+    def answer(self, p: Array) -> Array:
+        """The answer (R, C) to the pressure (R, C) of the next frame.
+
+        A frame in which nothing is pressed and everything has decayed answers with exactly nothing.
+        """
+        pressed = float(p.max()) > 0.0
+        if self._resting and not pressed:
+            return np.zeros_like(p)
+        state, width = self._state, self._hysteresis
+        state += self._step * (p - state)
+        answer = self._direct * p + (self._share * state).sum(axis=0)
+        if width > 0.0:
+            self._play = np.minimum(np.maximum(self._play * self._fade, p - width), p + width)
+            answer = 0.5 * (answer + self._play) + 0.5 * width * (p > 0.0) * np.minimum(p, 1.0)
+        left = max(float(np.abs(state).max(initial=0.0)), float(np.abs(self._play).max()))
+        self._resting = not pressed and left < 1e-5
+        return np.asarray(answer)
 
 
 def leak(field: Array, row: float, column: float, ghost: float) -> Array:

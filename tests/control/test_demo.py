@@ -11,6 +11,7 @@ import pytest
 import gestured
 from gestured.client.engine import Engine
 from gestured.model.shipped import shipped
+from tests.control.test_view import Page
 
 pytestmark = [
     pytest.mark.e2e,
@@ -83,6 +84,20 @@ def test_ended_early_it_still_sums_up_and_leaves_nothing_behind(start, shallow, 
     out, err = process.communicate(timeout=30)
     assert process.returncode == 0
     assert b"Summary" in out and err == b""
+    assert daemons(shallow) == [] and os.listdir(shallow) == []
+
+
+def test_it_goes_on_while_its_pad_is_open(start, shallow):
+    process = start("demo", "--seconds", 5, env={"TMPDIR": str(shallow)})
+    (address,) = [line.split()[-1] for _, line in zip(range(5), process.stdout, strict=False) if b"A pad for" in line]
+    stream = Page(address.decode()).come_in().stream()
+    stream.until("frame")
+    while b"The pad is still open" not in process.stdout.readline():
+        pass
+    stream.until("frame")
+    stream.close()
+    status, out, err = ended(process)
+    assert (status, err) == (0, "") and "Summary" in out
     assert daemons(shallow) == [] and os.listdir(shallow) == []
 
 

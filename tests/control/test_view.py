@@ -87,6 +87,11 @@ class Stream:
                 return kind, json.loads(line[6:])
         raise AssertionError("the viewer hung up")
 
+    def close(self) -> None:
+        """Look no more."""
+        self._file.close()
+        self.sock.close()
+
 
 @pytest.fixture
 def real(serve, tmp_path: Path) -> Daemon:

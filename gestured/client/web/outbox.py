@@ -30,7 +30,7 @@ class Outbox:
             self._changed.notify()
 
     def close(self) -> None:
-        """Nothing more will come."""
+        """Nothing more will come after what waits."""
         with self._changed:
             self._closed = True
             self._changed.notify()
@@ -39,11 +39,9 @@ class Outbox:
         """All that waits, as server-sent events; a comment where nothing came for so long, None at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._frame or self._rest, patience_s)
-            if self._closed:
-                return None
             found = [*self._rest, *([("frame", self._frame)] if self._frame is not None else [])]
             self._rest.clear()
             self._frame = None
         if not found:
-            return b": nothing new\n\n"
+            return None if self._closed else b": nothing new\n\n"
         return b"".join(f"event: {kind}\ndata: {json.dumps(what)}\n\n".encode() for kind, what in found)

@@ -1,0 +1,86 @@
+"""A pad as a sensor: its contacts become frames at the sensor's rate, which are sent to a daemon as OSC."""
+
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gestured.client.pad.contacts import Contacts
+from gestured.client.sensor import Form, Sensor
+from gestured.core.address import Address
+from gestured.core.errors import GesturedError
+from gestured.core.frames import Frame
+from gestured.simulator import SimulatedSensor
+from gestured.simulator.live import LiveTextile
+
+LATE_S = 0.06  # a frame shows what touched the pad so long ago: by then the browser has told it
+AGAIN_S = 1.0  # after a packet could not be sent
+SEEN = 0.1  # how much of what the untouched sensor shows is learned from each frame
+
+Tell = Callable[[str, dict[str, Any]], None]  # an event to the page: its kind, and what
+
+
+class Pad:
+    """A simulated sensor that is touched in a browser. Raises GesturedError where nothing can be sent to `to`."""
+
+    def __init__(self, to: Address, name: str, grid: tuple[int, int], rate_hz: float) -> None:
+        nominal = SimulatedSensor.nominal()
+        rows, columns = grid
+        pitch = min(nominal.extent) / min(grid)
+        sensor = replace(nominal, rows=rows, columns=columns, pitch_mm=pitch, rate_hz=rate_hz)
+        self.to, self.name, self.grid, self.rate_hz = to, name, grid, rate_hz
+        self.contacts = Contacts(sensor)
+        self.lock = threading.Lock()  # for the contacts
+        self._textile = LiveTextile(sensor, time.time_ns())
+        try:
+            self._sender = Sensor(to, Form(name))
+        except OSError as error:
+            raise GesturedError(f"cannot send to {to}: {error.strerror or error}") from error
+
+    def begin(self, tell: Tell, events: Iterable[dict[str, Any]] = ()) -> None:
+        """Send frames from now on; the page is told them, and events, as they come."""
+        self._tell = tell
+        threading.Thread(target=self._send, daemon=True).start()
+        threading.Thread(target=self._hear, args=(events,), daemon=True).start()
+
+    def close(self) -> None:
+        """Send nothing more."""
+        self._sender.close()
+
+    def _send(self) -> None:
+        frames, stop = self._frames(), self._sender.stop
+        while not stop.is_set():
+            try:
+                self._sender.send(frames)
+            except OSError as error:
+                if not stop.is_set():
+                    self._tell("gone", {"reason": f"cannot send to {self.to}: {error.strerror or error}"})
+                stop.wait(AGAIN_S)
+
+    def _hear(self, events: Iterable[dict[str, Any]]) -> None:
+        try:
+            for event in events:
+                self._tell("event", event)
+        except GesturedError as error:
+            self._tell("gone", {"reason": str(error)})
+
+    def _frames(self) -> Iterator[tuple[int, Frame]]:
+        """Each frame at its time; those for which the machine had no time are left out, and their counts are lost."""
+        dt, start, stop = 1.0 / self.rate_hz, self._sender.start, self._sender.stop
+        counter, unheard, idle = 0, 0, None
+        while not stop.is_set():
+            counter = max(counter + 1, int((time.monotonic() - start) / dt))
+            stop.wait(max(start + counter * dt - time.monotonic(), 0.0))
+            t = start + counter * dt - LATE_S
+            with self.lock:
+                presses, touches = self.contacts.presses(t, time.monotonic())
+            values = self._textile.frame(t, presses).astype(np.float64)
+            if idle is None or not presses:
+                idle = values if idle is None else idle + SEEN * (values - idle)
+            felt = np.rint(values - idle).astype(int)
+            self._tell("frame", {"values": felt.ravel().tolist(), "heard": self._sender.unheard == unheard})
+            unheard = self._sender.unheard
+            yield counter, Frame(counter * dt, values, touches)

@@ -1,0 +1,70 @@
+"""`gesturectl pad`: a mouse, a touchscreen or a telephone as a sensor."""
+
+import argparse
+import signal
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+
+from gestured.client.engine import Engine
+from gestured.client.pad.invitation import invite
+from gestured.client.pad.pad import Pad
+from gestured.client.pad.server import DEFAULT, PadServer
+from gestured.client.program import Commands
+from gestured.client.say import say, tell
+from gestured.client.values import bind_address, host_port, number, rows_by_columns, sensor_name
+from gestured.control.address import add_sockets, event_path
+from gestured.core.errors import GesturedError, SettingsError
+
+
+def add(commands: Commands) -> None:
+    """Add the subcommand to gesturectl's command line."""
+    parser = commands.add_parser(
+        "pad",
+        help="make a sensor of a mouse, a touchscreen or a telephone",
+        description="Serve a page with a pad: what touches it becomes the frames of a simulated textile, and the page\n"
+        "says what gestured makes of them. They go to a daemon of its own, or with --to to another one as OSC.\n"
+        "Prints the page's address: it works once, and ends after ten minutes without a touch.",
+        epilog="examples:\n  gesturectl pad\n  gesturectl pad --to 127.0.0.1:9000 --sensor armrest\n"
+        "  gesturectl pad --listen 192.168.1.5:9110   # for a telephone in this network",
+    )
+    text = f"the one address at which the page is served (default: {DEFAULT}; port 0: any)"
+    parser.add_argument("--listen", type=bind_address, default=DEFAULT, metavar="HOST:PORT", help=text)
+    text = "a daemon that takes the frames (default: one of its own)"
+    parser.add_argument("--to", type=host_port, metavar="HOST:PORT", help=text)
+    parser.add_argument("--sensor", type=sensor_name, default="pad", metavar="NAME", help="its name (default: pad)")
+    parser.add_argument("--grid", type=rows_by_columns, default=(9, 9), metavar="RxC", help="taxels (default: 9x9)")
+    parser.add_argument("--rate", type=number(5, 200), default=15.0, metavar="HZ", help="frames a second (default: 15)")
+    parser.add_argument("--model", default="cnn_lstm", help="of its own daemon (default: cnn_lstm)")
+    add_sockets(parser)
+    parser.add_argument("--json", action="store_true", help="print the address as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until Ctrl-C, SIGTERM, or ten minutes without a touch."""
+    for signalled in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(signalled, signal.default_int_handler)
+    with ExitStack() as held:
+        if args.to is None:
+            engine = held.enter_context(Engine(args.model, *args.grid))
+            to, sockets = engine.listen, [engine.socket]
+        else:
+            to, sockets = args.to, _sockets(args)
+        server = held.enter_context(
+            PadServer(args.listen, Pad(to, args.sensor, args.grid, args.rate), "gesturectl pad")
+        )
+        server.serve(*sockets)
+        tell(args.json, {"type": "pad", "address": server.page}, server.page)
+        invite(server)
+        say("Ctrl-C ends it.", to=sys.stderr)
+        server.ended.wait()
+    raise GesturedError("nobody touched the pad for ten minutes: its address has ended")
+
+
+def _sockets(args: argparse.Namespace) -> list[Path]:
+    """Where the daemon's names are heard; nowhere where none is named and there is no usual place."""
+    try:
+        return [event_path(args)]
+    except SettingsError:
+        return []
