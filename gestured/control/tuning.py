@@ -14,22 +14,13 @@ import numpy as np
 from gestured.core.errors import GesturedError
 from gestured.core.points import USUAL, OperatingPoints
 from gestured.model.model import Model
-from gestured.record.judge import NONE, Performed, owners, verdict
+from gestured.record.judge import NONE, Performed, Said, owners, verdicts
 
 THRESHOLDS = tuple(round(0.05 * k, 2) for k in range(1, 20))
 CANDIDATES = (*THRESHOLDS, 0.96, 0.97, 0.98, 0.99)  # that may be proposed
 ENOUGH = 20  # performances of a gesture before anything is proposed for it alone
 GESTURES_AN_HOUR = 20  # assumed where nobody performed any, to hold what a model misses against what is false
 DOUBT = 0.05  # probability that hours show so few false ones although more come
-
-
-@dataclass(frozen=True)
-class Said:
-    """What the model would have published of one contact, were it sure enough."""
-
-    gesture: str
-    confidence: float
-    performed: Performed | None  # what was performed then
 
 
 @dataclass
@@ -86,10 +77,7 @@ def counted(played: Played, least: float | Mapping[str, float], gesture: str | N
     """
     answered: dict[int, bool] = {}  # performed -> whether rightly
     wrong = false = provoked = 0
-    for said in played.said:
-        if said.confidence < (least[said.gesture] if isinstance(least, Mapping) else least):
-            continue
-        found = verdict(said.gesture, said.performed, answered=id(said.performed) in answered)
+    for said, found in verdicts(played.said, least):
         if found != "false":
             answered[id(said.performed)] = found == "right"
         if gesture in (None, said.gesture):

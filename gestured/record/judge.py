@@ -7,7 +7,7 @@ Times are seconds on any clock that both sides share.
 """
 
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 from typing import Any, Protocol, TypeVar
@@ -78,6 +78,27 @@ class Performed:
     offset: float
     answered: bool = False
     unknown: bool = False  # the daemon saw it, and called it unknown
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a model would have published of one contact, were it sure enough."""
+
+    gesture: str
+    confidence: float
+    performed: Performed | None  # what was performed then
+
+
+def verdicts(said: Iterable[Said], least: float | Mapping[str, float]) -> Iterator[tuple[Said, str]]:
+    """What is published at a threshold, or at one for each gesture, of what is said in order; and how each went."""
+    answered: set[int] = set()
+    for one in said:
+        if one.confidence < (least[one.gesture] if isinstance(least, Mapping) else least):
+            continue
+        found = verdict(one.gesture, one.performed, answered=id(one.performed) in answered)
+        if found != "false":
+            answered.add(id(one.performed))
+        yield one, found
 
 
 @dataclass(frozen=True)
