@@ -2,7 +2,7 @@
 
 import argparse
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import chain, cycle
 
@@ -21,6 +21,7 @@ from gestured.simulator import (
     generator,
     session,
 )
+from gestured.simulator.everyday import day
 
 KINDS = GESTURES + NON_GESTURES + SEQUENCES
 PART_S = 600.0  # what is simulated at a time; between two parts the sensor is off
@@ -34,19 +35,37 @@ def takes(args: argparse.Namespace, seconds: float | None, first: str | None = N
 
     The same flags give the same frames. `first` is performed before all else, where they do not name kinds.
     """
+    return _parts(lambda part, length: _take(args, part, length, first), seconds)
+
+
+def everyday(args: argparse.Namespace, seconds: float | None) -> Iterator[tuple[float, Take]]:
+    """As `takes`, life at the place `args.everyday`; each part is of another person."""
+
+    def lived(part: int, length: float) -> Take:
+        seed = args.seed + part
+        return day(seed, args.everyday, length, _sensor(args, seed)).take
+
+    return _parts(lived, seconds)
+
+
+def _parts(make: Callable[[int, float], Take], seconds: float | None) -> Iterator[tuple[float, Take]]:
     start, part = 0.0, 0
     while seconds is None or start < seconds:
         length = PART_S if seconds is None else min(PART_S, seconds - start)
-        yield start, _take(args, part, length, first)
+        yield start, make(part, length)
         start, part = start + length + OFF_S, part + 1
+
+
+def _sensor(args: argparse.Namespace, of_day: int) -> SimulatedSensor:
+    rows, columns = args.grid
+    nominal = SimulatedSensor.nominal(day=of_day)
+    pitch = min(nominal.extent) / min(rows, columns)
+    return replace(nominal, rows=rows, columns=columns, pitch_mm=pitch, rate_hz=args.rate)
 
 
 def _take(args: argparse.Namespace, part: int, seconds: float, first: str | None) -> Take:
     rng = generator(args.seed, 0xC7, args.participant, part)
-    rows, columns = args.grid
-    nominal = SimulatedSensor.nominal(day=args.participant)
-    pitch = min(nominal.extent) / min(rows, columns)
-    sensor = replace(nominal, rows=rows, columns=columns, pitch_mm=pitch, rate_hz=args.rate)
+    sensor = _sensor(args, args.participant)
     at_first = [first] if first else []
     kinds = cycle(args.kinds) if args.kinds else chain(at_first, at_random(rng, args.non_gestures))
     person = Participant(args.participant)

@@ -9,11 +9,12 @@ from gestured.client.program import Commands
 from gestured.client.say import say, tell
 from gestured.client.sensor import BLOBS, Form, Sensor
 from gestured.client.values import host_port, sensor_name
-from gestured.control.play import add_arguments, frames, takes
+from gestured.control.play import add_arguments, everyday, frames, takes
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
 from gestured.simulator import Act
+from gestured.simulator.everyday import PLACES
 
 DESCRIPTION = """Send the pressure frames of a simulated person on a simulated textile sensor,
 as OSC over UDP, in real time. Says what is performed as it ends, to be compared
@@ -27,7 +28,8 @@ def add(commands: Commands) -> None:
         help="simulate a sensor that somebody touches",
         description=DESCRIPTION,
         epilog="examples:\n  gesturectl simulate --to 127.0.0.1:9000 --sensor armrest\n"
-        "  gesturectl simulate --kinds swipe_left,double_tap --seconds 30 --blob",
+        "  gesturectl simulate --kinds swipe_left,double_tap --seconds 30 --blob\n"
+        "  gesturectl simulate --everyday seat",
     )
     parser.add_argument("--to", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT",
                         help="where the daemon listens (default: 127.0.0.1:9000)")  # fmt: skip
@@ -35,6 +37,13 @@ def add(commands: Commands) -> None:
         "--sensor", type=sensor_name, default="simulated", metavar="NAME", help="its name (default: simulated)"
     )
     parser.add_argument("--seconds", type=float, metavar="S", help="end after so long (default: go on)")
+    parser.add_argument(
+        "--everyday",
+        nargs="?",
+        const="armrest",
+        choices=tuple(PLACES),
+        help="everyday contact at a place (default: armrest), in which few gestures are meant; --seed says whose",
+    )
     add_arguments(parser)
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--ints", action="store_true", help="send integers instead of floats")
@@ -48,6 +57,8 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Send until the time is over, or Ctrl-C. Raises GesturedError where nobody listens from the first packet on."""
+    if args.everyday and (args.kinds or args.speed):
+        raise GesturedError("--everyday: expected neither --kinds nor --speed, a day has its own")
     form = Form(args.sensor, "ints" if args.ints else args.blob or "floats", args.plain)
     try:
         sensor = Sensor(args.to, form)
@@ -57,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     what = f"{rows} x {columns} taxels at {args.rate:g} Hz"
     say(f"sending {what} to {args.to} as {args.sensor}; Ctrl-C ends", to=sys.stderr)
     try:
-        for start, take in takes(args, args.seconds):
+        for start, take in (everyday if args.everyday else takes)(args, args.seconds):
             sensor.send(_telling(frames(start, take), start, take.events, sensor, args.json))
     finally:
         sensor.close()
@@ -75,7 +86,7 @@ def _telling(
     as_json: bool,
 ) -> Iterator[tuple[int, Frame]]:
     """The frames, and what was performed printed as each ends."""
-    left = list(events)
+    left = sorted(events, key=lambda event: event.offset_s)  # what rests lasts longer than what happens beside it
     for counter, frame in frames:
         if sensor.unheard and sensor.unheard >= sensor.sent - 1:  # of the last packet nobody can know
             raise GesturedError(f"nobody listens on {sensor.to}: start gestured, or name its address with --to")

@@ -11,6 +11,10 @@ import pytest
 from pythonosc.osc_bundle import OscBundle
 from pythonosc.osc_message import OscMessage
 
+from gestured.client.sensor import Sensor
+from gestured.simulator import GESTURES
+from gestured.simulator.everyday import PLACES, POSTURES
+
 FRAMES = 60  # 4 seconds at 15 Hz
 
 
@@ -93,6 +97,28 @@ def test_says_in_words_what_is_performed_and_ctrl_c_ends_it(start, udp):
     assert b"Traceback" not in err
 
 
+class Unpaced(Sensor):
+    """Sends nothing, and waits for no frame's time."""
+
+    shapes: set[tuple[int, ...]] = set()
+
+    def send(self, frames):
+        Unpaced.shapes = {frame.values.shape for _, frame in frames}
+
+
+def test_a_day_at_a_place_is_told_as_each_thing_ends(run, monkeypatch):
+    monkeypatch.setattr("gestured.control.simulate.Sensor", Unpaced)
+    flags = ("simulate", "--everyday", "table", "--seconds", 700, "--grid", "7x5", "--json")
+    status, out, _ = run(*flags)
+    told = [json.loads(line) for line in out.splitlines()]
+    ends = [one["offset"] for one in told]
+    assert (status, Unpaced.shapes) == (0, {(7, 5)}) and ends == sorted(ends)
+    kinds = {one["kind"] for one in told}
+    assert kinds & set(POSTURES) and kinds & set(GESTURES) and kinds & set(PLACES["table"].rates)
+    assert len({one["participant"] for one in told}) == 2  # each ten minutes are another person's
+    assert run(*flags, "--seed", 1)[1] != out
+
+
 def test_the_same_seed_sends_the_same_frames(start, udp):
     def frames(seed: int) -> list[list[object]]:
         flags = ("--rate", 200, "--seconds", 1, "--seed", seed, "--plain")
@@ -135,9 +161,16 @@ def test_a_daemon_that_goes_is_said_at_the_end_and_may_come_back(start):
         ("--rate", "nan"),
         ("--grid", "1x9"),
         ("--blob", "int12"),
+        ("--everyday", "moon"),
     ],
 )
 def test_wrong_usage_names_the_flag_and_the_value(run, wrong):
     status, out, err = run("simulate", *wrong)
     assert (status, out) == (2, "")
     assert wrong[0] in err and wrong[1] in err
+
+
+def test_a_day_has_kinds_of_its_own(run):
+    status, out, err = run("simulate", "--everyday", "--kinds", "one_tap")
+    assert (status, out) == (1, "")
+    assert "--everyday: expected neither --kinds nor --speed" in err
