@@ -61,7 +61,7 @@ bench: .venv-dev/.dev .venv-dev/.lab  ## speed as ratios measured side by side, 
 lab: .venv-dev/.dev .venv-dev/.lab  ## what training needs (torch), and how to train
 	@.venv-dev/bin/gestured-lab --help
 
-hostile: .venv-dev/.dev .venv-dev/.lab  ## the slow fault tests, what damage does to gestures, a minute of each fuzzer
+hostile: .venv-dev/.dev .venv-dev/.lab  ## the slow fault tests, twelve hours of everyday contact, what damage does, a minute of each fuzzer
 	@.venv-dev/bin/python -m pytest -m hostile $(ARGS)
 	@.venv-dev/bin/python -m experiments.damage
 	@.venv-dev/bin/python -m experiments.deaf

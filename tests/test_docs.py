@@ -138,8 +138,9 @@ def test_the_first_steps_in_the_readme_lead_to_a_gesture(tmp_path: Path):
 
 
 def test_the_readme_quotes_the_tables():
-    readme, figures, performance = (
-        (ROOT / name).read_text() for name in ("README.md", "docs/figures.md", "docs/performance.md")
+    readme, figures, performance, everyday = (
+        (ROOT / name).read_text()
+        for name in ("README.md", "docs/figures.md", "docs/performance.md", "docs/everyday.md")
     )
     screen = readme.partition("## What it is")[0]
 
@@ -154,10 +155,9 @@ def test_the_readme_quotes_the_tables():
         assert cells(readme, f"{field} ")[1:] == [count, right, wrong, lost, rejected]
     _, count, _, right, wrong, *_ = cells(figures, "`cnn_lstm.onnx`, real, taps and swipes")
     assert f"{right} of {count} taps" in screen and f"{wrong} were wrong" in screen
-    people, contacts, false, interval, _, _, right, *_ = map(str.strip, cells(figures, "all ")[1:])
-    assert f"{false} in an hour" in screen and f"interval {interval})" in screen
-    assert f"{people} simulated people" in screen
-    assert f"of {contacts} contacts an hour" in screen and f"while {right} of the gestures" in screen
+    hours, contacts, false, interval, *_, missed, _ = map(str.strip, cells(everyday, "all ")[1:])
+    assert f"{false} false gestures an hour on a simulated day at {100 * float(missed):.1f} % missed" in screen
+    assert f"interval {interval}" in screen and f"{hours} people" in screen and f"{contacts} contacts" in screen
     for begins in ("answer decided to event received (p50)", "start to ready"):
         assert cells(performance, begins)[1] in readme, begins
     assert f"{float(cells(performance, 'resident memory, one sensor')[1].split()[0]):.0f} MiB" in readme

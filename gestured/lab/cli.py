@@ -11,6 +11,8 @@ from typing import Any
 from gestured import __version__
 from gestured.client.say import say
 from gestured.core.errors import GesturedError
+from gestured.core.points import STRICTNESS, USUAL
+from gestured.lab.everyday import FIRST as FIRST_DAY
 from gestured.lab.recordings.flags import add_recordings
 
 CACHE = Path(".cache/lab")
@@ -21,6 +23,7 @@ PROGRAMS = {
     "train": "gestured.lab.commands",
     "evaluate": "gestured.lab.commands",
     "adapt": "gestured.lab.adapt.command",
+    "everyday": "gestured.lab.everyday.command",
     "online": "gestured.lab.online",
     "own": "gestured.lab.own.command",
     "stability": "gestured.lab.stability.command",
@@ -92,6 +95,21 @@ def parser() -> argparse.ArgumentParser:
                           "written anew, such as docs/figures.md")  # fmt: skip
     evaluate.add_argument("--recordings", **mine, help="the recordings with which the models were trained")
     add_data(evaluate)
+    everyday = add("everyday", "count false gestures in hours of everyday contact, simulated or of your own, and what "
+                   "becomes of the gestures that were meant in them",
+                   "gestured-lab everyday cnn_lstm --hours 10 --svg curve.svg")  # fmt: skip
+    everyday.add_argument("model", nargs="?", default="cnn_lstm", metavar="MODEL",
+                          help="a shipped model, or a file (default: cnn_lstm)")  # fmt: skip
+    everyday.add_argument("--hours", type=int, default=60, help="of simulated people, an hour each (default: 60)")
+    everyday.add_argument("--recordings", **mine, help="instead, hours of your own: tapes of gesturectl record, and "
+                          ".npz; where these do not tell what was performed all that is said is false")  # fmt: skip
+    everyday.add_argument("--strictness", choices=STRICTNESS, default=USUAL, help=f"operating point (default: {USUAL})")
+    everyday.add_argument("--svg", type=Path, metavar="FILE", help="draw missed against false, with every threshold")
+    everyday.add_argument("--document", type=Path, metavar="PAGE", help="a page whose tables `everyday` are written "
+                          "anew, such as docs/everyday.md")  # fmt: skip
+    everyday.add_argument("--seed", type=int, default=FIRST_DAY, help="of the first hour; nothing was trained on the "
+                          f"default's (default: {FIRST_DAY})")  # fmt: skip
+    everyday.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
     online = add("online", "start a daemon, send it continuous simulated sessions over UDP, and score its events",
                  "gestured-lab online --model cnn_lstm --minutes 10")  # fmt: skip
     online.add_argument("--model", default="cnn_lstm", help="model of the daemon that is started (default: cnn_lstm)")

@@ -23,7 +23,7 @@ class Table:
         lines = [_line(row, widths) for row in cells]
         rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
         notes = textwrap.fill(" ".join(self.notes), 118)
-        return "\n".join([f"### {self.title}", "", lines[0], rule, *lines[1:], "", notes, ""])
+        return "\n".join([f"### {self.title}", "", lines[0], rule, *lines[1:], "", *([notes, ""] if notes else [])])
 
 
 def _line(cells: Sequence[str], widths: Sequence[int]) -> str:

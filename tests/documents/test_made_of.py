@@ -15,8 +15,8 @@ GENERATED = {
     "docs/figures.md": (
         "gestured-lab evaluate",
         "python -m experiments.foreign.judge",
-        "python -m experiments.everyday",
     ),
+    "docs/everyday.md": ("gestured-lab everyday",),
     "docs/performance.md": ("make bench",),
     "docs/limits-and-choices.md": ("python -m experiments.taps",),
     "docs/numerics.md": ("gestured-lab stability",),

@@ -1,0 +1,88 @@
+"""`gestured-lab everyday`: plays hours in processes, judges what was said, and prints, draws and writes it."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from functools import cache, partial
+from importlib.util import find_spec
+from pathlib import Path
+
+from gestured.core.errors import GesturedError
+from gestured.core.points import Strictness
+from gestured.lab.dataset import in_processes
+from gestured.lab.everyday import report
+from gestured.lab.everyday.heard import Heard, hear
+from gestured.lab.everyday.hours import points_of
+from gestured.lab.everyday.stretches import lived, recorded
+from gestured.lab.made_of import kept, made_of, renew
+from gestured.lab.table import Table
+from gestured.model.model import Model
+from gestured.model.opening import open_model
+from gestured.model.shipped import LADDER, shipped
+from gestured.record.files import PUBLIC, atomic_write
+
+
+@cache
+def rungs(source: str) -> tuple[Model, ...]:
+    """A model, and after it the shipped ones that know the same gestures; held open in each process."""
+    first = open_model(Path(source) if "/" in source or source.endswith(".onnx") else source)
+    others = [open_model(name) for name in LADDER if name != first.name]
+    return (first, *(model for model in others if model.gestures == first.gestures))
+
+
+def at(source: str, strictness: Strictness) -> tuple[Model, ...]:
+    """The `rungs` of a model that has this operating point; GesturedError for one that has not."""
+    models = rungs(source)
+    if strictness not in (have := points_of(models[0])):
+        raise GesturedError(
+            f"--strictness {strictness}: {models[0].name} has no operating points, expected {', '.join(have)}"
+        )
+    return models
+
+
+def run(args: argparse.Namespace) -> int:
+    """Play, judge, print."""
+    if args.hours < 1:
+        raise GesturedError(f"--hours: expected 1 or more, found {args.hours}")
+    if args.document and args.recordings:
+        raise GesturedError("--document: expected no --recordings, the page's tables are of simulated hours")
+    if args.document and not kept(args.document, "everyday"):
+        raise GesturedError(f"--document: expected a page with the marks of `everyday`, found none in {args.document}")
+    if args.svg and find_spec("matplotlib") is None:
+        raise GesturedError("--svg: matplotlib is missing: pip install 'gestured[lab]', or make lab")
+    models = at(args.model, args.strictness)
+    if args.recordings:
+        work = partial(_recorded, args.recordings, args.model, args.strictness)
+        parts = in_processes(work, range(len(args.recordings)), args.jobs, "recordings")
+    else:
+        work = partial(_lived, args.model, args.strictness)
+        parts = in_processes(work, range(args.seed, args.seed + args.hours), args.jobs, "hours")
+    heard = [one for part in parts for one in part]
+    if not any(one.seconds for one in heard):
+        raise GesturedError(f"{args.recordings[0]}: expected more than one frame")
+    found = report.figures(heard, models, args.strictness)
+    if args.svg:
+        from gestured.lab.everyday.picture import draw
+
+        with atomic_write(args.svg, PUBLIC) as file:
+            file.write(draw(found).encode())
+    shown = report.tables(found, "recorded" if args.recordings else "simulated")
+    if args.document:
+        sources = [shipped().get(model.name, Path(args.model)) for model in models]
+        made = made_of(args.words, [*sources, *([args.svg] if args.svg else [])])
+        renew(args.document, "everyday", [made, "", *map(str, shown)])
+    tell(found, shown, args.json)
+    return 0
+
+
+def tell(found: report.Figures, shown: Sequence[Table], as_json: bool) -> None:
+    """Print the figures."""
+    print(json.dumps(found) if as_json else "\n".join(map(str, shown)))
+
+
+def _lived(model: str, strictness: Strictness, seed: int) -> list[Heard]:
+    return [hear(lived(seed), at(model, strictness), strictness)]
+
+
+def _recorded(paths: Sequence[Path], model: str, strictness: Strictness, n: int) -> list[Heard]:
+    return [hear(life, at(model, strictness), strictness) for life in recorded(paths[n])]

@@ -1,0 +1,74 @@
+"""Hours to be judged: simulated days, recordings (.npz) and tapes, each as a stream of frames with its truth."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from gestured.core.errors import RecordingError
+from gestured.core.frames import Frame
+from gestured.core.scene import Setup
+from gestured.core.timing import Timing
+from gestured.lab.everyday import FIRST
+from gestured.record.arrays import read
+from gestured.record.check import SESSION
+from gestured.record.judge import NONE, Performed
+from gestured.record.replay import frames_used, opened
+from gestured.simulator.everyday import PLACES, day
+
+HOUR_S = 3600.0
+
+
+@dataclass
+class Stretch:
+    """One person at one place for a while; times in s on one clock."""
+
+    place: str
+    person: str
+    frames: Iterable[Frame]
+    setup: Setup  # the sensor's; only grid and mounting count
+    meant: list[Performed]  # gestures
+    taps: list[Performed]  # which nobody meant, but which are taps in truth
+    contacts: int | None = None  # that nobody meant; None where only the front end can tell
+    tap_gap_s: float = Timing().tap_gap_s
+
+
+def lived(seed: int, seconds: float = HOUR_S) -> Stretch:
+    """A simulated day of the person with this seed, at one of the places in turn."""
+    life = day(seed, list(PLACES)[(seed - FIRST) % len(PLACES)], seconds)
+    taps = [Performed(NONE, act.kind, act.onset_s, act.offset_s) for act in life.like]
+    meant = [Performed(act.label, lay, act.onset_s, act.offset_s) for act, lay in life.meant]
+    frames = map(Frame, life.take.times.tolist(), life.take.frames)
+    setup = Setup(grid=life.take.frames[0].shape)
+    return Stretch(life.place, str(life.person), frames, setup, meant, taps, life.contacts)
+
+
+def recorded(path: Path) -> Iterator[Stretch]:
+    """The streams of a file. What was performed in them counts as meant, as far as an .npz tells; a tape tells nothing.
+
+    Raises RecordingError.
+    """
+    yield from _arrays(path) if path.suffix == ".npz" else _tape(path)
+
+
+def _arrays(path: Path) -> Iterator[Stretch]:
+    found = read(path)
+    events = (found.event_recording, found.event_labels, found.event_onsets, found.event_offsets)
+    told = [] if any(field is None for field in events) else list(zip(*events, strict=True))  # type: ignore[arg-type]
+    for i, whole in enumerate(found.labels):
+        start, end = map(float, found.times_of(i)[[0, -1]])
+        acts = [Performed(str(label), "", float(on), float(off)) for n, label, on, off in told if n == i]
+        if whole not in (NONE, SESSION):
+            acts.append(Performed(str(whole), "", start, end))
+        meant = [act for act in acts if act.label != NONE]
+        setup = Setup(grid=found.frames.shape[1:])
+        yield Stretch(path.stem, str(found.subjects[i]), found.stream(i), setup, meant, [])
+
+
+def _tape(path: Path) -> Iterator[Stretch]:
+    tape, maker = opened(path)
+    used = frames_used(tape, maker.scene)
+    if not used:
+        raise RecordingError(f"{path}: holds no frames that a daemon could use")
+    for name, frames in used.items():
+        setup = Setup(maker.scene.grid_of(name), maker.scene.setup(name).mounting)
+        yield Stretch(f"{path.stem}: {name}", path.stem, frames, setup, [], [], tap_gap_s=maker.scene.tap_gap_s)

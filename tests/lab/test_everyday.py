@@ -1,0 +1,220 @@
+"""The judge of everyday life: one rule for simulated days, the other generator's hours, recordings and tapes."""
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from experiments.everyday.foreign_hours import lived as foreign_lived
+from experiments.foreign import session
+from gestured.core.events import Gesture, Onset
+from gestured.core.facts import events_of
+from gestured.core.frames import Frame
+from gestured.core.scene import Scene, Setup
+from gestured.core.sensor import Sensor
+from gestured.lab.cli import main
+from gestured.lab.everyday import FIRST, command
+from gestured.lab.everyday.heard import HELD, NOT_READY, RESTARTING, Heard, hear
+from gestured.lab.everyday.hours import FEW, LEVELS, judged, points_of
+from gestured.lab.everyday.picture import draw
+from gestured.lab.everyday.report import figures, tables
+from gestured.lab.everyday.stretches import Stretch, lived
+from gestured.lab.made_of import LINE
+from gestured.model.shipped import LADDER, shipped
+from gestured.record.arrays import write
+from gestured.record.judge import NONE, Performed, Said
+from gestured.record.recordings import Recordings
+from gestured.record.replay import Replay, opened
+from tests.small_model import GESTURES, STRICTER, build, operating_points
+
+ROOT = Path(__file__).resolve().parents[2]
+SHORT_S = 400.0
+
+
+@cache
+def afternoon() -> Heard:
+    """Some minutes of a day, heard by all shipped models."""
+    return hear(lived(FIRST, SHORT_S), command.rungs("cnn_lstm"), "normal")
+
+
+def said(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
+    assert main(["everyday", "--json", "--jobs", "1", *map(str, arguments)]) == 0
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def test_what_a_recording_does_not_tell_is_false_and_what_it_tells_is_judged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one = session(9100, "nominal", 60.0, 0.0)
+    events = one["events"]
+    silent = Recordings(
+        frames=one["frames"], times=one["times"], offsets=np.array([0, len(one["times"])]),
+        labels=np.array(["session"]), subjects=np.array([0]),
+    )  # fmt: skip
+    marks = {
+        "event_recording": np.zeros(len(events), np.int64),
+        "event_labels": np.array([event["label"] for event in events]),
+        "event_kinds": np.array([event["kind"] for event in events]),
+        "event_onsets": np.array([event["onset"] for event in events]),
+        "event_offsets": np.array([event["release"] for event in events]),
+    }
+    write(tmp_path / "silent.npz", silent)
+    write(tmp_path / "told.npz", Recordings(**dict(silent.present()), **marks))
+    unknown = said(capsys, "--recordings", tmp_path / "silent.npz")
+    known = said(capsys, "--recordings", tmp_path / "told.npz")
+    assert known["right"] > 0.8 and known["false_per_hour"] < 0.2 * unknown["false_per_hour"]
+    assert unknown["false_per_hour"] * unknown["hours"] >= 0.8 * len(events)
+    assert (unknown["meant"], unknown["right"]) == (0, None) and known["meant"] == len(events)
+
+
+def test_of_a_tape_all_that_the_daemon_would_publish_is_false(capsys: pytest.CaptureFixture[str]) -> None:
+    path = ROOT / "docs" / "demo.mcap"
+    tape, maker = opened(path)
+    (model, *_) = command.rungs("cnn_lstm")
+    events = list(Replay(tape, maker.scene, model).events())
+    names = [event.gesture for event in events if isinstance(event, Gesture)]
+    found = said(capsys, "--recordings", path)
+    assert {name: of["false"] for name, of in found["gestures"].items() if of["false"]} == {
+        name: names.count(name) for name in names
+    }
+    onsets = sum(isinstance(event, Onset) for event in events)
+    assert found["contacts"] == onsets
+
+
+@pytest.mark.parametrize("lived", [lambda: lived(FIRST, SHORT_S), lambda: foreign_lived("nominal", FIRST)])
+def test_the_hours_of_either_generator_carry_their_truth(lived: Any) -> None:
+    life = lived()
+    frames = list(life.frames)
+    last = frames[-1].t
+    assert frames[0].values.shape == life.setup.grid == (9, 9) and life.contacts >= 0.02 * last
+    assert life.meant and all(0 < act.onset < act.offset < last for act in [*life.meant, *life.taps])
+    assert all(act.label != NONE for act in life.meant) and all(act.label == NONE for act in life.taps)
+
+
+def test_what_counts_at_the_thresholds_is_what_a_daemon_publishes() -> None:
+    (model, *_) = command.rungs("cnn_lstm")
+    life = lived(FIRST, SHORT_S)
+    sensor = Sensor("lab", Scene(model.gestures, (9, 9)), model)
+    told = [one for frame in life.frames for one in sensor.push(frame)] + sensor.flush(SHORT_S + 5)
+    published = [event.gesture for event in events_of(told) if isinstance(event, Gesture)]
+    counts = judged([afternoon()], model.name, points_of(model)["normal"]).said
+    assert len(published) == counts["right"] + counts["wrong"] + counts["false"] + counts["apart"] > 0
+    assert counts["right"] + counts["wrong"] + counts["missed"] == len(life.meant)
+
+
+def test_a_higher_threshold_says_less_and_misses_more() -> None:
+    found = figures([afternoon()], command.rungs("cnn_lstm"), "normal")
+    assert list(found["curves"]) == list(found["points"]) == list(LADDER)
+    for rows in found["curves"].values():
+        assert [row["threshold"] for row in rows] == LEVELS
+        assert (np.diff([row["false_per_hour"] for row in rows]) <= 0).all()
+        assert (np.diff([row["missed"] for row in rows]) >= 0).all()
+    assert found["points"]["cnn_lstm"]["normal"] == {key: found[key] for key in ("false_per_hour", "wrong", "missed")}
+    assert sum(of["false"] for of in found["gestures"].values()) == round(found["false_per_hour"] * found["hours"])
+    assert sum(of["meant"] for of in found["lay"].values()) == found["meant"]
+
+
+def made(*answers: Said, meant: list[Performed], person: str = "a", seconds: float = 3600.0) -> Heard:
+    return Heard("table", person, 50, meant, {"m": list(answers)}, seconds)
+
+
+def test_each_thing_that_is_said_is_counted_once() -> None:
+    swipe, lost, late = (Performed("swipe_up", "nothing", t, t + 1) for t in (1.0, 2.0, 3.0))
+    tap = Performed(NONE, "idle_tap", 9.0, 9.1)
+    one = made(
+        Said("swipe_up", 0.9, swipe), Said("swipe_up", 0.9, swipe), Said("one_tap", 0.9, late),
+        Said("swipe_up", 0.4, lost), Said("one_tap", 0.9, tap), Said("circle_clockwise", 0.9, None),
+        meant=[swipe, lost, late],
+    )  # fmt: skip
+    found = judged([one], "m", 0.5)
+    assert found.said == {"right": 1, "wrong": 1, "missed": 1, "false": 2, "apart": 1}
+    assert found.false == {"swipe_up": 1, "circle_clockwise": 1}
+    assert judged([one], "m", {"swipe_up": 0.3, "one_tap": 0.95, "circle_clockwise": 0.95}).said["right"] == 2
+
+
+def test_the_interval_is_over_people_and_says_what_few_hours_cannot() -> None:
+    false = Said("one_tap", 0.9, None)
+    silent, even = (judged([made(*answers, meant=[], person=str(n)) for n in range(10)], "m", 0.5)
+                    for answers in ([], [false, false]))  # fmt: skip
+    assert silent.interval() == pytest.approx((0.0, 0.3)) and even.interval() == (2.0, 2.0)
+    uneven = judged([made(*[false] * (n % 2) * 4, meant=[], person=str(n)) for n in range(10)], "m", 0.5)
+    low, high = uneven.interval()
+    assert low < 2.0 < high
+    lone = judged([made(*[false] * 20, meant=[], person="a", seconds=3600.0 * FEW)], "m", 0.5)
+    low, high = lone.interval()
+    assert 2.0 < low < 4.0 < high < 6.5
+
+
+def test_where_a_sensor_is_deaf_is_told() -> None:
+    (model, *_) = command.rungs("cnn_lstm")
+    rng = np.random.default_rng(5)
+    frames = rng.normal(1000.0, 2.0, (40 * 15, 9, 9))
+    frames[75:285, 4:6, 4:6] += 400.0  # 14 s
+    frames[450:] -= 600.0  # another zero: a sensor that began anew
+    stream = [Frame(n / 15, values) for n, values in enumerate(frames)]
+    deaf = hear(Stretch("a", "b", stream, Setup(grid=(9, 9)), [], []), [model], "normal").deaf_s
+    assert 0.5 < deaf[NOT_READY] < 2.0 and 0.0 < deaf[HELD] < 14.0 and 0.0 < deaf[RESTARTING] < 5.0
+
+
+def test_operating_points_of_a_model_are_marked_and_those_it_has_not_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = build(tmp_path / "mine.onnx", operating_points=operating_points())
+    found = said(capsys, path, "--strictness", "strict", "--recordings", ROOT / "docs" / "demo.mcap")
+    assert list(found["points"]) == ["mine"] and list(found["gestures"]) == list(GESTURES)  # others know other gestures
+    points = found["points"]["mine"]
+    assert list(points) == list(STRICTER) and points["strict"]["false_per_hour"] == found["false_per_hour"]
+    assert points["strict"]["false_per_hour"] <= points["eager"]["false_per_hour"] > 0
+    build(tmp_path / "old.onnx")
+    assert main(["everyday", str(tmp_path / "old.onnx"), "--strictness", "strict"]) == 1
+    assert "--strictness strict: old has no operating points, expected normal" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--hours", "0"], "--hours: expected 1 or more, found 0"),
+        (["--jobs", "0"], "--jobs: expected 1 or more, found 0"),
+        (["--recordings", "a.npz", "--document", "p.md"], "--document: expected no --recordings"),
+        (["--document", "nowhere.md"], "--document: expected a page with the marks of `everyday`"),
+        (["--recordings", "nowhere.mcap"], "nowhere.mcap: cannot be read"),
+    ],
+)
+def test_what_cannot_be_is_said_in_one_sentence(
+    flags: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["everyday", *flags]) == 1
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("gestured-lab: ")]
+    assert words in line
+
+
+def test_the_page_and_the_picture_are_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(command, "in_processes", lambda *_: [[afternoon()]])
+    page, curve = tmp_path / "page.md", tmp_path / "curve.svg"
+    page.write_text("before\n<!-- everyday: begin -->\nold\n<!-- everyday: end -->\nafter\n")
+    assert main(["everyday", "--document", str(page), "--svg", str(curve)]) == 0
+    printed = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| ")]
+    lines = page.read_text().splitlines()
+    assert [line for line in lines if line.startswith("| ")] == printed and (lines[0], lines[-1]) == ("before", "after")
+    match = LINE.fullmatch(lines[2])
+    assert match and [part.split()[0] for part in match[2].split(", ")] == [
+        *(path.name for path in shipped().values()), "curve.svg",
+    ]  # fmt: skip
+    words = {text.text for text in ElementTree.fromstring(curve.read_text()).iter("{http://www.w3.org/2000/svg}text")}
+    assert {*LADDER, "normal", "0.5 an hour"} <= words
+    assert curve.read_text() == draw(figures([afternoon()], command.rungs("cnn_lstm"), "normal"))
+
+
+def test_hours_in_which_nothing_is_said_have_a_table_and_a_picture() -> None:
+    models = command.rungs("cnn_lstm")
+    quiet = Heard("table", "a", 0, [], {model.name: [] for model in models}, 1800.0)
+    found = figures([quiet], models, "normal")
+    assert (found["false_per_hour"], found["high"], found["right"]) == (0.0, 6.0, None)
+    assert "Nothing false was said" in "".join(map(str, tables(found, "recorded"))) and "svg" in draw(found)
