@@ -20,7 +20,6 @@ from gestured.lab.adapt.judging import Answers
 from gestured.lab.adapt.learning import opinions
 from gestured.lab.cli import CACHE
 from gestured.lab.dataset import simulated
-from gestured.lab.decide import decided
 from gestured.lab.fit import FitConfig
 from gestured.lab.nets import Judged
 from gestured.lab.samples import Samples
@@ -84,7 +83,7 @@ def network(cache: Path, kind: str | None) -> tuple[Judged, float]:
 
 def asked(model: Judged, samples: Samples) -> Answers:
     """What a network says of each sample."""
-    return Answers.of(samples, decided(model.decision, *opinions(model, samples)), np.zeros(0, np.int64))
+    return Answers.of(samples, opinions(model, samples).answers(model.decision, model.verifier), np.zeros(0, np.int64))
 
 
 def row(title: str, every: Answers, without: Answers, least: float) -> str:

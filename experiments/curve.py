@@ -21,7 +21,6 @@ from gestured.lab.adapt.learning import Course, opinions
 from gestured.lab.adapt.material import Own, own_recordings
 from gestured.lab.adapt.takes import simulate
 from gestured.lab.cli import CACHE
-from gestured.lab.decide import decided
 from gestured.lab.evaluate import without
 from gestured.lab.nets import Judged
 from gestured.lab.train import REAL_FILES, Trained, TrainingPlan, calibration_set, folds, judged, learn, load_data
@@ -47,7 +46,7 @@ class Said:
 
     def add(self, model: Judged, least: float, judges: Own) -> None:
         """Ask a model that publishes from a confidence of `least` on."""
-        said = decided(model.decision, *opinions(model, judges.samples))
+        said = opinions(model, judges.samples).answers(model.decision, model.verifier)
         self.take(Answers.of(judges.samples, said, judges.missed[:, 0]), least)
 
     def take(self, found: Answers, least: float) -> None:

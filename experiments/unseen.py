@@ -20,7 +20,7 @@ from experiments.trained import options, trained
 from gestured.lab.adapt.learning import opinions
 from gestured.lab.augment import symmetry_table
 from gestured.lab.cards import with_interval
-from gestured.lab.decide import Answers, confidence, decided
+from gestured.lab.decide import Answers, confidence
 from gestured.lab.evaluate import Evaluation, model_answers, outcome
 from gestured.lab.fit import CLASSES, targets
 from gestured.lab.made_of import made_of, renew
@@ -157,7 +157,7 @@ def _answers(trained: Trained, data: TrainingData, plan: TrainingPlan, classes: 
     module, calibration, _ = judged(trained, NAME, calibration_set(trained, data, plan))
     least = calibration["threshold"]
     return [
-        Said(test, decided(module.decision, *opinions(module, samples)), samples, least, classes)
+        Said(test, opinions(module, samples).answers(module.decision, module.verifier), samples, least, classes)
         for test, samples in data.tests.items()
     ]
 

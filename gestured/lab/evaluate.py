@@ -13,11 +13,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from gestured.lab.decide import Answers, confidence, decided
+from gestured.lab.decide import Answers, confidence
 from gestured.lab.fit import RECURRENT, padded, targets
 from gestured.lab.samples import Samples
 from gestured.lab.study.bootstrap import interval
 from gestured.lab.train import REAL_SETS, Calibrated, Trained, TrainingData, folds, is_of, judged
+from gestured.lab.verifier import Heard
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.simulator import GESTURES, NONE
@@ -117,7 +118,9 @@ def model_answers(model: Model, samples: Samples) -> Answers:
     for length in np.unique(samples.lengths()):  # a window that is padded would seem to be over
         same = np.flatnonzero(samples.lengths() == length)
         for index in np.array_split(same, -(-len(same) // 200)):
-            scores[index], unknown[index] = model.run(padded(samples, index, 100).numpy())
+            scores[index], unknown[index] = model.run(
+                padded(samples, index, 100).numpy(), beside=samples.context[index]
+            )
     return scores, unknown
 
 
@@ -162,10 +165,10 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
         scores = np.zeros((len(real), len(GESTURES)), np.float32)
         unknown = np.zeros(len(real), np.float32)
         levels = []
-        for held in folds(real):
-            module, calibration, _ = judged(trained, name, without(calibrated, real, held))
-            both = (trained.held_out[n][torch.from_numpy(held)] for n in (name, "trajectory"))
-            scores[held], unknown[held] = decided(module.decision, *both)
+        for nets, held in zip(trained.folds, folds(real), strict=True):
+            module, calibration, _ = judged(trained, name, without(calibrated, real, held), data)
+            heard = Heard.of(nets, name, real.take(held))
+            scores[held], unknown[held] = heard.answers(module.decision, module.verifier)
             levels.append(calibration["threshold"])
         least = float(np.mean(levels))
         judged_once = np.arange(len(real)) < data.real_judged

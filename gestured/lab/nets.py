@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from gestured.model.features import ACTIVE
 
+UNITS = 32  # of an LSTM
 HIDDEN = 160  # units of each hidden layer of the perceptron
 SCALE = 3.0  # windows are mostly zeros: without it the first layers hardly move
 
@@ -51,7 +52,7 @@ class Opinion(nn.Module):
 class Recurrent(Opinion):
     """An LSTM of 32 units over per-frame features, read at `read_at`, and a linear head."""
 
-    def __init__(self, inputs: int, classes: int, units: int = 32) -> None:
+    def __init__(self, inputs: int, classes: int, units: int = UNITS) -> None:
         super().__init__()
         self.lstm = nn.LSTM(inputs, units, batch_first=True)
         with torch.no_grad():  # remember by default (Jozefowicz et al. 2015): a gesture's beginning decides its name

@@ -173,6 +173,14 @@ class Trained:
     nets: nn.ModuleDict
     held_out: dict[str, Tensor] | None  # (G, K) logits of each net over the real samples, None without any
     folds: list[nn.ModuleDict] = field(default_factory=list)  # those that had not seen the subjects of `folds`
+    _heard: dict[tuple[str, str], Heard] = field(default_factory=dict)
+
+    def hear(self, name: str, samples: Samples) -> Heard:
+        """What a network, and the trajectory net beside it, make of samples; each set is asked about once."""
+        key = name, samples.digest()
+        if key not in self._heard:
+            self._heard[key] = Heard.of(self.nets, name, samples)
+        return self._heard[key]
 
 
 def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[str] = NETS) -> Trained:
@@ -250,8 +258,8 @@ def judged(
     answers, labels, sets, verifier = decided(decision, first, second), calibrated.labels, calibrated.sets, None
     if data is not None and data.lived is not None:
         alone = data.calibrate.take(targets(data.calibrate) >= 0)
-        taken = Heard.of(trained.nets, name, alone).beside(with_past_of(alone, data.lived, 1))
-        learned = [(Heard.of(trained.nets, name, data.lived), meant(data.lived)), (taken, meant(alone))]
+        taken = trained.hear(name, alone).beside(with_past_of(alone, data.lived, 1))
+        learned = [(trained.hear(name, data.lived), meant(data.lived)), (taken, meant(alone))]
         verifier = fit_verifier(decision, learned, 1)
         answers, labels, sets = taken.answers(decision, verifier), labels[: len(alone)], sets[: len(alone)]
     least = threshold(answers, labels, sets)

@@ -64,6 +64,10 @@ class Heard:
         """What was made of several sets, one after the other."""
         return cls(*(torch.cat([getattr(part, name) for part in parts]) for name in cls.__slots__))
 
+    def take(self, chosen: Tensor) -> "Heard":
+        """Of the chosen segments, a mask or indices."""
+        return Heard(*(getattr(self, name)[chosen] for name in self.__slots__))
+
     def answers(self, decision: Decision, verifier: Verifier | None) -> Answers:
         """What both say together, after the verifier if there is one."""
         if verifier is None:

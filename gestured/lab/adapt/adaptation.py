@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import nn
 
 from gestured.lab.adapt.judging import Answers, Shares
 from gestured.lab.adapt.learning import Course, between, classes_of, learned, opinions
@@ -21,16 +21,14 @@ from gestured.lab.adapt.material import Groups, Own, held_out
 from gestured.lab.adapt.refitting import refitted
 from gestured.lab.adapt.takes import Simulated
 from gestured.lab.adapt.weights import Base
-from gestured.lab.decide import decided
 from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Decision, Judged
 from gestured.lab.samples import Samples
+from gestured.lab.verifier import Heard
 from gestured.simulator import GESTURES
 
 WAYS = (0.25, 0.5, 0.75, 1.0)  # of the way from the old weights to the new ones
 LOSS = 0.01  # share of the simulated gestures that may be lost, and of simulated non-gestures that may be accepted more
-
-Opinions = tuple[Tensor, Tensor]  # (G, K) logits of the network and of its second opinion
 
 
 @dataclass(frozen=True)
@@ -95,8 +93,8 @@ def settled(start: Judged, least: float, own: Own, takes: Simulated, course: Cou
     run.listen(ends)
     samples = replace(own.samples, people=groups.unit_of_samples)
 
-    def answers(decision: Decision, said: Opinions) -> Answers:
-        return Answers.of(samples, decided(decision, *said), groups.unit_of_missed)
+    def answers(decision: Decision, said: Heard) -> Answers:
+        return Answers.of(samples, said.answers(decision, start.verifier), groups.unit_of_missed)
 
     of_rows = np.concatenate([groups.of_samples, groups.of_missed])
     before = answers(start.decision, opinions(start, own.samples)).shares(least)
@@ -122,7 +120,7 @@ class _Run:
     def __init__(self, start: Judged, own: Own, groups: NDArray[np.int64], takes: Simulated) -> None:
         self._start, self._own, self._groups, self._takes = start, own, groups, takes
         self._classes = classes_of(own.samples)
-        self.said: dict[float, Opinions] = {}
+        self.said: dict[float, Heard] = {}
         self._loss: dict[float, NDArray[np.float64]] = {}
 
     def listen(self, ends: list[Judged]) -> None:
@@ -134,9 +132,8 @@ class _Run:
                 opinions(between(self._start, end, way), self._own.samples.take(part))
                 for end, part in zip(ends, parts, strict=True)
             ]
-            first, second = (torch.cat([one[n] for one in found])[back] for n in (0, 1))
-            self.said[way] = first, second
-            self._loss[way] = _losses(self._start.decision, (first, second), self._classes)
+            self.said[way] = Heard.join(found).take(back)
+            self._loss[way] = _losses(self._start, self.said[way], self._classes)
 
     def decision(self, end: Judged, others: NDArray[np.bool_]) -> tuple[Decision, float]:
         """Fitted for networks that go to `end`, on those of `others` who were held out; and the way that suits them."""
@@ -144,16 +141,16 @@ class _Run:
         check = self._takes.check
         both = opinions(between(self._start, end, way), check)
         rows = torch.from_numpy(others)
-        first, second = (torch.cat([own[rows], made]) for own, made in zip(self.said[way], both, strict=True))
+        heard = Heard.join([self.said[way].take(rows), both])
         own, made = int(others.sum()), len(check)
         weight = np.concatenate([np.ones(own), np.full(made, own / made)])  # simulated ones count as much in all
         classes = np.concatenate([self._classes[others], classes_of(check)])
-        return refitted(self._start.decision, first, second, classes, weight), way
+        return refitted(self._start.decision, heard.first, heard.second, classes, weight), way
 
 
-def _losses(decision: Decision, said: Opinions, classes: NDArray[np.int64]) -> NDArray[np.float64]:
+def _losses(start: Judged, said: Heard, classes: NDArray[np.int64]) -> NDArray[np.float64]:
     """(G,) how little each answer was expected."""
-    scores, unknown = decided(decision, *said)
+    scores, unknown = said.answers(start.decision, start.verifier)
     known = classes < len(GESTURES)
     named = scores[np.arange(len(classes)), np.minimum(classes, len(GESTURES) - 1)] * (1 - unknown)
     return -np.log(np.maximum(np.where(known, named, unknown), 1e-6)).astype(np.float64)
@@ -167,7 +164,7 @@ def _early(new: Settled, takes: Simulated) -> Mapping[str, Any]:
 
 
 def _nominal(judged: Judged, least: float, takes: Simulated) -> Shares:
-    found = decided(judged.decision, *opinions(judged, takes.nominal))
+    found = opinions(judged, takes.nominal).answers(judged.decision, judged.verifier)
     return Answers.of(takes.nominal, found, takes.missed).shares(least)
 
 

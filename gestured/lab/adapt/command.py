@@ -100,6 +100,7 @@ def _facts(base: Base, own: Own, found: Adapted, simulated: Samples, recordings:
         training_data=hashlib.sha256(learned.encode()).hexdigest(),
         quantiles=quantiles(gestures) | answer_figures(new.answers.confidence[cut], new.answers.known[cut], new.least),
         classes=CLASSES,
+        context=base.model.metadata.context,
         provisional=found.provisional,
         learned_from=[*before, *origins(recordings)],
     )
@@ -127,6 +128,7 @@ def _tell(own: Own, found: Adapted) -> None:
     for title, before, after in (("own", new.before, new.after), ("simulated", found.before, found.after)):
         say(_row(f"{title} before", before), _row(f"{title} after", after))
     say(f"threshold {new.least:.3f}, where no more are wrong than before", WORTH[new.groups.unit])
+    say("it has no operating points, since its networks are new: every strictness is this threshold (gesturectl tune)")
 
 
 def _row(title: str, shares: Shares) -> str:

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from gestured.lab.augment import symmetry_table
-from gestured.lab.fit import CLASSES, FitConfig, Shown, logits, optimiser_of, step, targets
+from gestured.lab.fit import CLASSES, FitConfig, Shown, optimiser_of, step, targets
 from gestured.lab.nets import Judged, Opinion
 from gestured.lab.progress import progress
 from gestured.lab.samples import Samples, join
+from gestured.lab.verifier import Heard
 from gestured.simulator import GESTURES
 
 OTHER = len(CLASSES)  # a non-gesture of a kind that has no class
@@ -70,11 +71,9 @@ def between(start: Judged, end: Judged, share: float) -> Judged:
     return found.eval()
 
 
-def opinions(judged: Judged, samples: Samples) -> tuple[Tensor, Tensor]:
-    """(G, K) logits of the network and of its second opinion for all samples, in their order."""
-    nets = nn.ModuleDict({"net": judged.net, "trajectory": judged.trajectory})
-    found = logits(nets, samples)
-    return found["net"], found["trajectory"]
+def opinions(judged: Judged, samples: Samples) -> Heard:
+    """What the network and its second opinion make of all samples, in their order."""
+    return Heard.of(nn.ModuleDict({"net": judged.net, "trajectory": judged.trajectory}), "net", samples)
 
 
 def _batches(

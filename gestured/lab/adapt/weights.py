@@ -9,6 +9,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -20,8 +21,9 @@ from torch import Tensor, nn
 from gestured.core.errors import ModelError
 from gestured.lab.export import PARITY
 from gestured.lab.fit import CLASSES, RECURRENT, build
-from gestured.lab.nets import Decision, Judged, Opinion
+from gestured.lab.nets import HIDDEN, UNITS, Decision, Judged, Opinion, Verifier
 from gestured.lab.samples import WINDOW
+from gestured.model.context import NAMES, calm
 from gestured.model.file import read_bytes
 from gestured.model.model import Model
 from gestured.model.opening import open_model
@@ -56,29 +58,33 @@ def base_of(source: str) -> Base:
     if json.loads(model.properties.get("classes", "null")) not in (None, CLASSES):
         raise ModelError(f"{path}: is not adaptable: expected the classes that this version trains")
     try:
-        judged = read(
-            onnx.load_model_from_string(read_bytes(path)), metadata.kind, metadata.calibration.get("temperature")
-        )
+        judged = read(onnx.load_model_from_string(read_bytes(path)), metadata.kind, metadata.calibration)
         _compare(judged, model)
     except ValueError as error:
         raise ModelError(f"{path}: is not adaptable: {error}") from error
     return Base(model, judged)
 
 
-def untrained(kind: str) -> Judged:
-    """The networks of a kind, and their decision, before anything was learned."""
+def untrained(kind: str, *, verified: bool = False) -> Judged:
+    """The networks of a kind, and their decision, before anything was learned; perhaps with a verifier."""
     nets = build()
     net, trajectory = nets[kind], nets["trajectory"]
     assert isinstance(net, Opinion)
     assert isinstance(trajectory, Opinion)
-    return Judged(net, trajectory, Decision(len(GESTURES))).eval()
+    verifier = Verifier(Decision.CUES, UNITS + HIDDEN, len(NAMES)) if verified else None
+    return Judged(net, trajectory, Decision(len(GESTURES)), verifier).eval()
 
 
-def read(proto: onnx.ModelProto, kind: str, temperatures: object) -> Judged:
-    """The networks of an ONNX graph and their decision; ValueError where it does not hold every weight."""
+def read(proto: onnx.ModelProto, kind: str, calibration: Mapping[str, Any]) -> Judged:
+    """The networks of an ONNX graph, their decision and their verifier, if it has one.
+
+    ValueError where the graph and the calibration do not hold every weight.
+    """
     stored = {tensor.name: numpy_helper.to_array(tensor) for tensor in proto.graph.initializer}
-    judged = untrained(kind)
-    found = _recurrent(judged, proto, stored) | _shares(temperatures)
+    judged = untrained(kind, verified="verifier.mean" in stored)
+    found = _recurrent(judged, proto, stored) | _shares(calibration.get("temperature"))
+    if judged.verifier is not None:  # it replaces what the decision would reject by, which the graph does not hold then
+        found |= _rejection(calibration)
     state = {}
     for name, expected in judged.state_dict().items():
         value = found.get(name, stored.get(name))
@@ -123,13 +129,22 @@ def _shares(temperatures: object) -> dict[str, NDArray[np.generic]]:
     return {"decision.share": 1 / np.array(temperatures, np.float64)}
 
 
+def _rejection(calibration: Mapping[str, Any]) -> dict[str, NDArray[np.generic]]:
+    """The weights by which a decision without a verifier rejects."""
+    weight, bias = calibration.get("unknown_weight"), calibration.get("unknown_bias")
+    if not isinstance(weight, list) or not all(isinstance(value, int | float) for value in (*weight, bias)):
+        raise ValueError("calibration: unknown_weight and unknown_bias: expected numbers")
+    return {"decision.weight": np.array(weight, np.float64), "decision.bias": np.array(bias, np.float64)}
+
+
 def _compare(judged: Judged, model: Model) -> None:
     """ValueError where the networks answer otherwise than the file, to its own self-test and to noise."""
     noise = np.random.default_rng(1).random((3, 20, WINDOW.rows, WINDOW.columns), np.float32)
     for values in (model.metadata.self_test.values, noise):
         expected = model.run(values)
         with torch.no_grad():
-            found: tuple[Tensor, ...] = judged(torch.from_numpy(values))
+            around = torch.from_numpy(calm(len(values), NAMES))
+            found: tuple[Tensor, ...] = judged(torch.from_numpy(values), around)
         largest = max(float(np.abs(one.numpy() - other).max()) for one, other in zip(found, expected, strict=False))
         if not largest <= PARITY:
             raise ValueError(f"its weights, read back, answer by up to {largest:.2g} otherwise than the file")
