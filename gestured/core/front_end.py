@@ -254,7 +254,7 @@ class FrontEnd:
             self._below_since = look.t
         leaving = self.conditioner.idle.bare is not None  # then `unloaded` will know the sensor when it has left
         if look.t - self._below_since >= (self.timing.stale_s if leaving else self.timing.shift_s):
-            found = self._restart(keep=True)
+            found = self._restart(keep=True, shown=look.raw)
         self.conditioner.settle(look.t, look.raw)
         return found
 
@@ -266,11 +266,11 @@ class FrontEnd:
         self._forget_rubbish()
         return found
 
-    def _restart(self, *, keep: bool) -> list[Found]:
-        """Start clean. `keep`: the frames that may show the idle sensor as it is now count already."""
+    def _restart(self, *, keep: bool, shown: NDArray[np.float64] | None = None) -> list[Found]:
+        """Start clean. `keep`: the frames that may show the idle sensor as it is now count already; so does `shown`."""
         found = self._cancel("restart") if self.touched else []
         self.segmenter.reset()
-        self.conditioner.idle.forget(keep=keep)
+        self.conditioner.idle.forget(keep=keep, shown=shown)
         self._cutter.clear()
         self._below_since = None
         return found

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.quantiles import median
+from gestured.core.quantiles import median, quantile
 from gestured.core.settling import LEAST_STEP, RESOLUTION, SIGMA_PER_DEVIATION, Learned, Settling
 
 Array = NDArray[np.float64]
@@ -21,6 +21,7 @@ REVIEW_S = 0.5  # the pause between two looks at the noise; they would cost too 
 UNSEEN_S = 4.0  # the most that one look counts of the time under a contact or in silence
 OUTLIER = 4.0  # times a taxel's noise: the furthest that it counts as off its baseline, since one outlier must not rule
 QUIETER = 10.0  # where frames move so many times less than the noise that was learned, that was no idle sensor's
+SHARED = 0.1  # of the taxels: so many may lie lower than what all share
 LOADED = 10.0  # times a taxel's noise: where no taxel is further above the bare sensor, nothing rests on it any more
 GLANCE_S = 0.19  # the pause between two glances at how much frames move
 GLANCE, GLANCE_REPEATED, GLANCES = 3, 1, 9  # weights of a quieter frame and of a repeated one; the sum that tells
@@ -65,6 +66,10 @@ class Idle:
         learned = self._settling.push(t, raw, patience=restless or not self.known)
         if learned is not None:
             bare = Bare(self.counts, self.sigma) if rests and self.bare is None else self.bare
+            if (
+                bare is not None and not self.known
+            ):  # the bare sensor was seen for a moment: what all taxels share is drift
+                bare = Bare(bare.counts + max(quantile(learned.baseline - bare.counts, SHARED), 0.0), bare.sigma)
             self.bare = bare if bare is not None and _loaded(learned.baseline, bare) else None
             self.counts, self.step, self.lively = learned.baseline, learned.step, learned.lively
             self.known, self.provisional = True, not learned.stable
@@ -158,10 +163,13 @@ class Idle:
         self._settling.clear()
         self.doubt()
 
-    def forget(self, *, keep: bool) -> None:
-        """Learn the next stable second. `keep`: the frames that `settle` was offered count for it."""
+    def forget(self, *, keep: bool, shown: Array | None = None) -> None:
+        """Learn the next stable second. `keep`: the frames that `settle` was offered count for it.
+
+        `shown` (N,) counts: what the sensor shows meanwhile, if a hand may come before it is learned.
+        """
         self.known = self.provisional = False
-        self.bare = None
+        self.bare = None if shown is None else Bare(shown, self.sigma)
         self._followed = None
         if not keep:
             self._settling.clear()
