@@ -83,6 +83,7 @@ class FrontEnd:
         self.pace = Pace()
         self._past = Past()
         self._below_since: float | None = None  # s, since when the frames lie far below the baseline
+        self._lowest = np.zeros(0)  # (N,) counts, the lowest since then
 
     @property
     def ready(self) -> bool:
@@ -251,10 +252,11 @@ class FrontEnd:
         """Frames far below the baseline. Interference passes, and they are lost; a sensor that restarted stays so."""
         found: list[Found] = []
         if self._below_since is None:
-            self._below_since = look.t
+            self._below_since, self._lowest = look.t, look.raw
+        self._lowest = np.minimum(self._lowest, look.raw)
         leaving = self.conditioner.idle.bare is not None  # then `unloaded` will know the sensor when it has left
         if look.t - self._below_since >= (self.timing.stale_s if leaving else self.timing.shift_s):
-            found = self._restart(keep=True, shown=look.raw)
+            found = self._restart(keep=True, shown=self._lowest)
         self.conditioner.settle(look.t, look.raw)
         return found
 

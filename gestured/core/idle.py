@@ -169,7 +169,7 @@ class Idle:
         `shown` (N,) counts: what the sensor shows meanwhile, if a hand may come before it is learned.
         """
         self.known = self.provisional = False
-        self.bare = None if shown is None else Bare(shown, self.sigma)
+        self.bare = None if shown is None else Bare(shown, (self.bare or self).sigma)
         self._followed = None
         if not keep:
             self._settling.clear()

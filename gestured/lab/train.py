@@ -53,7 +53,7 @@ class TrainingPlan:
 
     wide: int = 60_000
     days: int = 500  # of everyday life, twelve minutes of a person each
-    days_calibrate: int = 500  # days to learn the verifier from
+    days_calibrate: int = 300  # days to learn the verifier from
     days_points: int = 300  # days on the nominal sensor to choose the operating points by
     wide_calibrate: int = 12_000  # takes to calibrate
     wide_check: int = 4_000  # takes to test

@@ -32,6 +32,7 @@ TAP_TRAVEL = 0.15  # of the pad's shorter side
 APART_S = 0.3  # a gesture that is meant keeps so far from the next thing that the same hand does
 COVERS = 1.6  # standard deviations around the middle of what rests: nobody aims a gesture at a place under an arm
 AIMS = 6  # places that a person looks for beside what rests, before the gesture is given up; assumed
+FREE_S = (3.0, 6.0)  # a sensor is switched on before somebody lies on it; what is learned with a hand is no idle sensor
 SOON = 0.12  # share of all that leaves after which a gesture is meant within a second; assumed
 
 
@@ -160,7 +161,7 @@ class _Life:
 
     def unmeant(self) -> Iterator[Happening]:
         """What nobody means: postures one after the other, and what happens beside them."""
-        names, now = list(self.where.postures), 0.0
+        names, now = list(self.where.postures), float(self.rng.uniform(*FREE_S))
         chances = np.array([self.where.postures[name] for name in names])
         while now < self.seconds:
             name = names[int(self.rng.choice(len(names), p=chances / chances.sum()))]
