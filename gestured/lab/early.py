@@ -143,9 +143,11 @@ def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None) -> dict
     }
 
 
-def published(answers: Answers, least: float) -> NDArray[np.int64]:
-    """(N,) the gesture that is published from a confidence of `least` on, -1 for none."""
-    return np.where(confidence(answers) >= least, answers[0].argmax(axis=1), -1)
+def published(answers: Answers, least: float | NDArray[np.float64]) -> NDArray[np.int64]:
+    """(N,) the gesture that is published from a confidence of `least` on, one for all or (G,) of each; -1 for none."""
+    best = answers[0].argmax(axis=1)
+    needed = np.broadcast_to(least, answers[0].shape[1])[best]
+    return np.where(confidence(answers) >= needed, best, -1)
 
 
 def at_release(samples: Samples) -> Samples:

@@ -59,8 +59,8 @@ class Foretold:
         contacts = np.concatenate(contact), np.concatenate(since), np.concatenate(second)
         return cls(together, _joined(whole), _joined(released), _joined(early), *contacts)
 
-    def rule(self, name: str, module: Judged, least: float) -> dict[str, Any]:
-        """The metadata `provisional` of a network with its decision, that publishes from `least` on."""
+    def rule(self, name: str, module: Judged, least: float | NDArray[np.float64]) -> dict[str, Any]:
+        """The metadata `provisional` of a network with its decision, that publishes from `least` on, one for all or of each."""
         scores, unknown = _said(self.prefixes, name, module)
         final = published(_said(self.whole, name, module), least)
         best, confidence = scores.argmax(axis=1), scores.max(axis=1).astype(np.float64) * (1 - unknown)

@@ -16,6 +16,9 @@ from gestured.lab.fit import targets
 from gestured.lab.samples import EVERYDAY, Samples
 from gestured.simulator import GESTURES, NONE
 
+# Of each gesture's right answers, the most that a point may lose: a budget alone would be kept by giving up the taps,
+# which are what everyday life most looks like.
+LOST = dict(zip(STRICTNESS, (0.05, 0.15, 0.4), strict=True))
 BUDGETS = dict(zip(STRICTNESS, (4.0, 0.7, 0.15), strict=True))  # false gestures an hour, on simulated everyday life
 COSTS = np.geomspace(0.001, 100.0, 400)  # gestures lost that one false gesture counts as much as
 LEVELS = np.round(np.concatenate([np.arange(0.05, 0.95, 0.01), np.arange(0.95, 0.9995, 0.001)]), 4)
@@ -35,7 +38,7 @@ def operating_points(answers: Answers, lived: Samples, performed: int, hours: fl
     rightly, wrongly, falsely = (_by_level(best, sure, chosen) for chosen in (right, known & ~right, false))
     found: dict[str, Any] = {}
     for name in STRICTNESS:
-        level = _levels(rightly, wrongly, falsely, BUDGETS[name] * hours)
+        level = _levels(rightly, wrongly, falsely, BUDGETS[name] * hours, LOST[name])
         of = np.arange(len(GESTURES)), level
         found[name] = {
             "thresholds": {gesture: float(LEVELS[k]) for gesture, k in zip(GESTURES, level, strict=True)},
@@ -57,11 +60,15 @@ def _by_level(best: NDArray[np.int64], sure: NDArray[np.floating], chosen: NDArr
 
 
 def _levels(
-    right: NDArray[np.int64], wrong: NDArray[np.int64], false: NDArray[np.int64], budget: float
+    right: NDArray[np.int64], wrong: NDArray[np.int64], false: NDArray[np.int64], budget: float, lost: float
 ) -> NDArray[np.int64]:
-    """(G,) the level of each gesture at the least cost of a false one that keeps them within the budget."""
+    """(G,) the level of each gesture at the least cost of a false one that keeps them within the budget.
+
+    Where a gesture would lose more than that share of its right answers, it stays where it loses so many.
+    """
+    bearable = right >= (1.0 - lost) * right[:, :1]
     for cost in COSTS:
-        worth = right - WRONG * wrong - cost * false
+        worth = np.where(bearable, right - WRONG * wrong - cost * false, -np.inf)
         level = np.asarray(worth.argmax(axis=1))
         if false[np.arange(len(level)), level].sum() <= budget:
             break

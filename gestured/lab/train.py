@@ -20,6 +20,7 @@ from sklearn.ensemble import RandomForestClassifier
 from torch import Tensor, nn
 
 import gestured
+from gestured.core.points import USUAL
 from gestured.lab.adapt.material import own_recordings
 from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import DAY_S, OTHER_TRIALS, TRIALS, meant_on, recorded, simulated
@@ -374,7 +375,7 @@ def train(
         common |= {"kind": name, "calibration": calibration, "quantiles": seen | answered}
         points = spoken(module, trained.nets, name, data, plan)
         print(f"{name}\n{by_strictness(points)}", flush=True)
-        rule = contacts.rule(name, module, calibration["threshold"])
+        rule = contacts.rule(name, module, np.array(list(points[USUAL]["thresholds"].values())))
         more: dict[str, Any] = {"classes": CLASSES, "context": NAMES, "operating_points": points, "provisional": rule}
         export_net(module, out / f"{name}.onnx", Facts(**common, **more))
     forest, calibration, answered = grow_forest(data, plan, jobs)
