@@ -60,7 +60,7 @@ class Foretold:
         return cls(together, _joined(whole), _joined(released), _joined(early), *contacts)
 
     def rule(self, name: str, module: Judged, least: float | NDArray[np.float64]) -> dict[str, Any]:
-        """The metadata `provisional` of a network that publishes from `least` on, one for all gestures or (G,) of each."""
+        """The metadata `provisional` of a network that publishes from `least` on, for all or (G,) of each gesture."""
         scores, unknown = _said(self.prefixes, name, module)
         final = published(_said(self.whole, name, module), least)
         best, confidence = scores.argmax(axis=1), scores.max(axis=1).astype(np.float64) * (1 - unknown)
