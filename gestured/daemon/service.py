@@ -70,9 +70,10 @@ class Service:
         )
         self._outputs = asked.outputs
         self._views = Views(self._hub, self._state, self._foresee)
-        self._foresee()
         self._publisher = Publisher(self._metrics, self._sinks())
         self._desk = Desk(self._metrics, self._publisher, Shift.of(ladder.model), self._own, self._views)
+        self._foresee()
+        self._follow()
         self._receiver = Receiver(bound.udp, bound.since, self._hub, self._desk, self._taps)
         operations = Operations(
             self._hub, self._desk, self._publisher, self._taps, self._own,
@@ -154,7 +155,7 @@ class Service:
         self._clients.tell(messages.gestures_json(self._gestures()))
 
     def _foresee(self) -> None:
-        """Have the hub give provisional and touch events where somebody asks for them now."""
+        """Have the hub give provisional events where somebody asks for them now, and soon touch events alike."""
         asyncio.get_running_loop().call_soon(self._follow)  # not among the events of which a client was just told
         named, every = self._clients.asked("provisional")
         named |= self._views.sensors
@@ -162,6 +163,7 @@ class Service:
         self._hub.foresee(None if every else named)
 
     def _follow(self) -> None:
+        """Have the hub give touch events where somebody asks for them now."""
         named, every = self._clients.asked("touch")
         every = every or any(output.follows for output in self._outputs)
         self._desk.take(self._hub.follow(None if every else named))

@@ -97,8 +97,8 @@ class _Server:
     def remove_reader(self, sock: object) -> None:
         """The reads are done by hand."""
 
-    def gestures(self) -> tuple[str, ...]:
-        return GESTURES
+    def known(self) -> dict[str, tuple[str, ...]]:
+        return {"gestures": GESTURES}
 
     def subscribe(self, client: object, subscription: object) -> None:
         self.subscribed.append(subscription)
