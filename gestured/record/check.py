@@ -36,6 +36,7 @@ FORMS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "event_kinds": (TEXT, ("E",)),
     "event_onsets": ("float64", ("E",)),
     "event_offsets": ("float64", ("E",)),
+    "sensors": (TEXT, ("G",)),
     "consents": (TEXT, ("G",)),
 }
 DTYPE_KINDS = {INTEGERS: "iu", COUNTS: "iuf", ANY: "iufU", TEXT: "U"}  # NumPy's; any other form is the very type

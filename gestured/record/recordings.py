@@ -34,6 +34,7 @@ class Recordings:
     event_kinds: NDArray[np.str_] | None = None  # (E,)
     event_onsets: NDArray[np.float64] | None = None  # (E,) s on the recording's times
     event_offsets: NDArray[np.float64] | None = None  # (E,) s
+    sensors: NDArray[np.str_] | None = None  # (G,) the kind of sensor, as "touchscreen"; "" is not said
     consents: NDArray[np.str_] | None = None  # (G,) day of the participant's consent, YYYY-MM-DD; "" is not known
 
     def __len__(self) -> int:

@@ -20,6 +20,7 @@ from gestured.core.errors import GesturedError
 PAGE = Path(__file__).with_name("page")
 MESSAGES = 120  # a second
 IDLE_S = 600.0  # without a touch; then the address has ended
+SAID = 1000  # characters
 DEFAULT = Address("127.0.0.1", 9110)
 HEARD = ("onset", "provisional", "gesture", "unknown", "cancelled")  # events that the page shows
 
@@ -39,6 +40,7 @@ class PadServer(Server):
         self.pad = pad
         self.ended = threading.Event()
         self.press: Callable[[str], None] | None = None  # takes a key of the page, where somebody waits for one
+        self._said = ""  # what somebody who waits for keys has said last
         self._idle_s, self._used = idle_s, time.monotonic()
         self._messages: deque[float] = deque(maxlen=MESSAGES)  # when the last ones came
         self._outbox: Outbox | None = None  # of the browser that has the pad
@@ -64,6 +66,11 @@ class PadServer(Server):
         else:
             outbox.put(kind, what)
 
+    def say(self, text: str) -> None:
+        """Show words on the page; whoever opens it later sees the last ones."""
+        self._said = (self._said + text)[-SAID:]
+        self.tell("told", {"text": text})
+
     def service_actions(self) -> None:
         """End the address after its time; called twice a second."""
         if time.monotonic() - self._used > self._idle_s and not self.ended.is_set():
@@ -81,6 +88,7 @@ class PadServer(Server):
             pad.contacts.lift()
             what = {"seat": self._seat, "sensor": pad.name, "grid": pad.grid, "rate_hz": pad.rate_hz, "to": str(pad.to)}
             outbox.put("seat", what | {"keys": self.press is not None})
+            outbox.put("told", {"text": self._said})
             self._outbox = outbox
         if before is not None:
             before.put("over", {"reason": "Another tab shows this pad now."})

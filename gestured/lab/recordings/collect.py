@@ -2,12 +2,16 @@
 
 import argparse
 from collections import Counter
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 
+from gestured.client.pad.pad import Pad
+from gestured.client.pad.server import PadServer
 from gestured.client.say import say_json
+from gestured.core.address import Address
 from gestured.core.errors import RecordingError
 from gestured.lab.recordings.live import LiveSensor
+from gestured.lab.recordings.on_pad import KIND, NON_GESTURES, RATE_HZ, PadTerminal
 from gestured.lab.recordings.protocol import order
 from gestured.lab.recordings.session import Session
 from gestured.lab.recordings.terminal import Terminal
@@ -18,14 +22,25 @@ from gestured.record.recordings import Recordings
 
 def run(args: argparse.Namespace) -> int:
     """Collect until all is done or somebody quits; the same command goes on."""
-    terminal = Terminal()
+    terminal = PadTerminal() if args.pad else Terminal()
     args.out.mkdir(parents=True, exist_ok=True)
     path: Path = args.out / f"{args.participant}.npz"
     kept = already(path, args.participant, args.grid)
     model = open_model(args.model)
-    trials = order(args.participant, args.seed, args.gestures, args.repeats)
-    with closing(LiveSensor(args.listen, args.grid, args.sensor, model)) as sensor, terminal:
+    others = args.non_gestures or (NON_GESTURES if args.pad else ())
+    trials = order(args.participant, args.seed, args.gestures, args.repeats, others)
+    listen = Address("127.0.0.1", 0) if args.pad else args.listen
+    with (
+        closing(LiveSensor(listen, args.grid, args.sensor, model)) as sensor,
+        ExitStack() as held,
+    ):
         session = Session(args.participant, path, kept, sensor, terminal, args.countdown)
+        if isinstance(terminal, PadTerminal):
+            pad = Pad(Address(*sensor.socket.getsockname()), args.sensor or "pad", args.grid, RATE_HZ)
+            terminal.join(held.enter_context(PadServer(args.pad, pad, "gestured-lab collect --pad")).serve())
+            session.inclination, session.kind = 0, KIND
+            trials = [trial for trial in trials if trial.inclination == session.inclination]
+        held.enter_context(terminal)
         session.run(trials)
     if args.json:
         labels = Counter(session.kept.labels.tolist()) if session.kept is not None else {}

@@ -6,12 +6,13 @@ from collections.abc import Callable
 from datetime import date
 from pathlib import Path
 
-from gestured.client.values import host_port, number, rows_by_columns, sensor_name
+from gestured.client.pad.server import DEFAULT
+from gestured.client.values import bind_address, host_port, number, rows_by_columns, sensor_name, some_of
 from gestured.core.address import Address
 from gestured.core.own import is_name
 from gestured.lab.recordings.protocol import pseudonym
 from gestured.record.check import SESSION, UNNAMED
-from gestured.simulator import GESTURES, NONE
+from gestured.simulator import GESTURES, NON_GESTURES, NONE
 
 FOLDER = Path("recordings")
 NO_NAMES = (SESSION, UNNAMED)  # labels of recordings that are no gesture's, besides those that no gesture may have
@@ -42,6 +43,10 @@ def add_recordings(command: Add) -> None:
     collect.add_argument("--seed", type=int, default=0, metavar="N", help="another order of the trials (0)")
     collect.add_argument("--gestures", type=_gestures, default=GESTURES, metavar="A,B",
                          help="only these, or names of your own (all ten)")  # fmt: skip
+    collect.add_argument("--non-gestures", type=some_of(NON_GESTURES), metavar="A,B",
+                         help="non-gestures, each once beside the gestures (none; with --pad a few)")  # fmt: skip
+    collect.add_argument("--pad", type=bind_address, nargs="?", const=DEFAULT, metavar="HOST:PORT",
+                         help=f"the sensor is a pad on a page that is served here ({DEFAULT})")  # fmt: skip
     collect.add_argument("--model", default="cnn_lstm", metavar="MODEL",
                          help="says at once where a gesture looks like another (cnn_lstm)")  # fmt: skip
     collect.add_argument("--repeats", type=_count, default=1, metavar="N", help="times that each trial is done (1)")

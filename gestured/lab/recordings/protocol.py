@@ -1,4 +1,4 @@
-"""Who performs what in which order: ten gestures x three inclinations x three speeds, each `repeats` times."""
+"""Who performs what in which order: gestures x inclinations x speeds, each `repeats` times, and non-gestures."""
 
 import argparse
 import re
@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gestured.record.recordings import Recordings
-from gestured.simulator import SPEEDS
+from gestured.simulator import NONE, SPEEDS
 
 INCLINATION_NAMES = ("flat", "tilted", "upright")  # of the sensor; recordings hold their numbers 0, 1, 2
 PSEUDONYM = re.compile(r"[A-Za-z0-9_-]{1,32}")
@@ -21,9 +21,16 @@ class Exercise(NamedTuple):
     gesture: str
     speed: str
     inclination: int
+    none: bool = False  # a non-gesture, `gesture` is its kind
+
+    @property
+    def label(self) -> str:
+        """What a recording of it is called."""
+        return NONE if self.none else self.gesture
 
     def __str__(self) -> str:
-        return f"{self.gesture}, {self.speed}, sensor {INCLINATION_NAMES[self.inclination]}"
+        what = f"{self.gesture} (no gesture)" if self.none else self.gesture
+        return f"{what}, {self.speed}, sensor {INCLINATION_NAMES[self.inclination]}"
 
 
 def pseudonym(text: str) -> str:
@@ -36,16 +43,20 @@ def pseudonym(text: str) -> str:
     return text
 
 
-def order(participant: str, seed: int, gestures: Sequence[str], repeats: int) -> list[Exercise]:
+def order(
+    participant: str, seed: int, gestures: Sequence[str], repeats: int, others: Sequence[str] = ()
+) -> list[Exercise]:
     """All trials in this participant's own order: the same for the same arguments.
 
     Inclinations come in blocks, in random order, since whoever moves the sensor must hold it still for a while before
-    it can be used again. Within a block gestures and speeds are shuffled, each once before any comes again.
+    it can be used again. Within a block gestures and speeds are shuffled, each once before any comes again, and so are
+    `others`, kinds of non-gestures, at one speed.
     """
     rng = np.random.default_rng([seed, *participant.encode()])
     trials: list[Exercise] = []
     for inclination in rng.permutation(len(INCLINATION_NAMES)).tolist():
         block = [Exercise(gesture, speed, inclination) for gesture in gestures for speed in SPEEDS]
+        block += [Exercise(kind, "normal", inclination, none=True) for kind in others]
         for _ in range(repeats):
             trials += [block[k] for k in rng.permutation(len(block))]
     return trials
@@ -66,5 +77,9 @@ def left(trials: Sequence[Exercise], kept: Recordings | None) -> list[Exercise]:
 def _performed(kept: Recordings) -> list[Exercise]:
     if kept.speeds is None or kept.inclinations is None:
         return []
-    fields = (kept.labels.tolist(), kept.speeds.tolist(), kept.inclinations.tolist())
-    return [Exercise(*found) for found in zip(*fields, strict=True)]
+    kinds = kept.labels if kept.kinds is None else kept.kinds
+    fields = (kept.labels.tolist(), kinds.tolist(), kept.speeds.tolist(), kept.inclinations.tolist())
+    return [
+        Exercise(kind if label == NONE else label, speed, inclination, label == NONE)
+        for label, kind, speed, inclination in zip(*fields, strict=True)
+    ]

@@ -48,7 +48,8 @@ class Session:
         self.participant, self.path, self.kept = participant, path, kept
         self._sensor, self._terminal, self._wait_s = sensor, terminal, wait_s
         self._consent = ""
-        self._inclination: int | None = None
+        self.inclination: int | None = None  # how the sensor lies; None is not known
+        self.kind = ""  # of sensor, as recordings have it
 
     def run(self, trials: Sequence[Exercise]) -> None:
         """Ask for one trial after the other until all are kept, or somebody quits."""
@@ -101,12 +102,12 @@ class Session:
         say = self._terminal.say
         while True:
             try:
-                if trial.inclination != self._inclination:
-                    self._inclination = None
+                if trial.inclination != self.inclination:
+                    self.inclination = None
                     say(f"\nThe sensor {INCLINATION_NAMES[trial.inclination]}, please. Enter when it is in place.")
                     while self._until(None) != "\n":
                         pass
-                    self._inclination = trial.inclination
+                    self.inclination = trial.inclination
                 say(f"\n{number}/{total}  {trial}")
                 answer, take = self._once(trial)
             except Paused:
@@ -136,7 +137,7 @@ class Session:
         take = sensor.take()
         self._show(trial, take)
         usable = take is not None and not take.trouble
-        doubt = usable and take is not None and take.sure >= SURE and take.looks != trial.gesture
+        doubt = usable and take is not None and take.sure >= SURE and take.looks != trial.gesture and not trial.none
         if doubt and take is not None:
             terminal.say(f"  that looked like {take.looks}, {take.sure:.2f}: keep? [y/N]")
         terminal.say(f"  {KEYS if usable and not doubt else KEYS.removeprefix(KEEP)}")
@@ -171,7 +172,7 @@ class Session:
             self._terminal.say(textwrap.fill("  NOT GOOD: " + "; ".join(wrong), WIDTH, subsequent_indent="  "))
 
     def _keep(self, take: Captured, trial: Exercise) -> None:
-        new = recording(take, trial, self.participant, self._consent)
+        new = recording(take, trial, self.participant, self._consent, self.kind)
         together = new if self.kept is None else join_recordings([self.kept, new])
         write(self.path, together)
         self.kept = together

@@ -90,15 +90,15 @@ def touched(frames: NDArray[Any], times: NDArray[np.float64]) -> tuple[int, int]
     return None
 
 
-def recording(take: Captured, trial: Exercise, participant: str, consent: str) -> Recordings:
-    """A take in the contract's form, times counted from its first frame."""
+def recording(take: Captured, trial: Exercise, participant: str, consent: str, sensor: str = "") -> Recordings:
+    """A take in the contract's form, times counted from its first frame; `sensor` is its kind."""
     times = take.times()
     touches, ids = touch_arrays(take.frames)
     return Recordings(
         frames=compact(np.array([frame.values for frame in take.frames])),
         times=times - times[0],
         offsets=np.array([0, len(times)], np.int64),
-        labels=np.array([trial.gesture]),
+        labels=np.array([trial.label]),
         subjects=np.array([participant]),
         speeds=np.array([trial.speed]),
         inclinations=np.array([trial.inclination]),
@@ -107,5 +107,6 @@ def recording(take: Captured, trial: Exercise, participant: str, consent: str) -
         releases=np.array([take.release]),
         touches=touches,
         touch_ids=ids,
+        sensors=np.array([sensor]) if sensor else None,
         consents=np.array([consent]),
     )

@@ -1,9 +1,12 @@
 """`gestured-lab collect` in a real pseudo-terminal, with the simulated sensor over UDP: a whole session and its end."""
 
+import math
 import os
+import re
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -17,6 +20,7 @@ from gestured.lab.cli import main
 from gestured.lab.recordings.collect import already
 from gestured.lab.recordings.protocol import order
 from gestured.record.arrays import read, write
+from tests.control.test_view import Page
 from tests.small_recording import example
 from tests.sockets import free_address
 from tests.terminal import Terminal
@@ -107,6 +111,46 @@ def test_a_session_that_is_ended_and_goes_on(tmp_path: Path, port: int, sensor: 
         assert kept.onsets[i] <= strongest <= kept.releases[i]
         assert kept.times_of(i)[0] == 0.0
     assert os.listdir(tmp_path) == ["07.npz"]
+
+
+def draws(page: Page, seat: int, scribble: bool) -> None:
+    """One finger of somebody at a pad: a tap, or a scribble."""
+    begun = time.monotonic()
+    while (t := time.monotonic() - begun) < (1.0 if scribble else 0.15):
+        x, y = (0.5 + 0.3 * math.sin(9 * t), 0.5 + 0.3 * math.sin(14 * t)) if scribble else (0.5, 0.5)
+        page.ask("/touch", "POST", {"seat": seat, "sent": t, "samples": [[1, t, x, y, 0.5, 0.0]]})
+        time.sleep(0.01)  # between two pictures of a screen
+    page.ask("/touch", "POST", {"seat": seat, "sent": t, "samples": [[1, t, x, y, 0.0, 0.0]]})
+
+
+@pytest.mark.slow
+def test_a_pad_is_a_sensor_and_its_page_shows_the_words_and_presses_the_keys(tmp_path: Path, port: int) -> None:
+    with collect(tmp_path, port, "--pad", "127.0.0.1:0", "--non-gestures", "scribble") as person:
+        person.sees("Do you agree?")
+        page = Page(re.findall(r"http://\S+", person.said)[0]).come_in()
+        stream = page.stream()
+        seat = stream.until("seat")[1]["seat"]
+        person.types("yes\n")
+        for n in range(1, 5):
+            verdict = ""
+            while verdict not in (GOOD, "keep? [y/N]"):
+                while f"{n}/4  " not in (trial := stream.until("told")[1]["text"]):
+                    pass
+                while "now!" not in stream.until("told")[1]["text"]:
+                    pass
+                draws(page, seat, "scribble" in trial)
+                verdict = person.sees(GOOD, "keep? [y/N]", "  " + KEYS)
+                press = {GOOD: "\n", "keep? [y/N]": "y"}.get(verdict, "r")
+                assert page.ask("/key", "POST", {"key": press})[0] == 200
+            person.sees(f"kept, {n} in")
+        person.sees("All 4 are done")
+        assert person.ends() == 0
+    kept = read(tmp_path / "07.npz")
+    assert kept.sensors.tolist() == ["touchscreen"] * 4 and set(kept.inclinations.tolist()) == {0}
+    assert sorted(zip(kept.labels.tolist(), kept.kinds.tolist(), strict=True)) == [
+        ("none", "scribble"), *[("one_tap", "one_tap")] * 3
+    ]  # fmt: skip
+    assert kept.touch_ids is not None and (kept.touch_ids >= 0).any() and set(kept.consents.tolist()) != {""}
 
 
 def test_without_consent_nothing_is_recorded(tmp_path: Path, port: int) -> None:

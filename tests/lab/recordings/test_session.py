@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from gestured.lab.recordings import session as module
-from gestured.lab.recordings.protocol import order
+from gestured.lab.recordings.protocol import left, order
 from gestured.lab.recordings.quality import Captured
 from gestured.lab.recordings.session import Session
 from gestured.lab.recordings.terminal import Terminal
@@ -99,7 +99,18 @@ def test_a_whole_protocol_ends_with_thanks(tmp_path: Path) -> None:
     kept = read(tmp_path / "07.npz")
     assert kept.speeds is not None and kept.inclinations is not None
     found = list(zip(kept.labels.tolist(), kept.speeds.tolist(), kept.inclinations.tolist(), strict=True))
-    assert found == [tuple(trial) for trial in TRIALS]
+    assert found == [trial[:3] for trial in TRIALS] and kept.sensors is None
+
+
+def test_a_non_gesture_is_none_with_its_kind_and_never_doubted(tmp_path: Path) -> None:
+    """What a model takes for a gesture is the non-gesture that is worth most."""
+    taken_for_one = replace(GOOD, looks="swipe_left", sure=0.99)
+    trials = [trial for trial in order("07", 0, [], 1, ["scribble"]) if trial.inclination == 0]
+    script = Script(("in place", "\n"), ("Enter keep", "\n"))
+    Session("07", tmp_path / "07.npz", None, FakeSensor(taken_for_one), script, 0).run(trials)  # type: ignore[arg-type]
+    kept = read(tmp_path / "07.npz")
+    assert (kept.labels.tolist(), kept.kinds.tolist()) == (["none"], ["scribble"])
+    assert left(trials, kept) == []
 
 
 def test_nothing_cannot_be_kept(tmp_path: Path) -> None:

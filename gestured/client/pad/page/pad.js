@@ -1,7 +1,7 @@
 "use strict";
 // The page of a pad: what touches it is told to the server, at most sixty times a second, one message after the other.
 const MESSAGE_MS = 16, STILL_MS = 100, TRAIL_MS = 700, SAMPLES = 60, SAID = 8, FULL = 1100; // counts of a firm touch
-const KEYS = { "\n": "Keep", r: "Repeat", d: "Discard", y: "Keep all the same", p: "Pause" };
+const KEYS = { "\n": "Keep, go on", r: "Repeat", d: "Discard", y: "Keep all the same", p: "Pause" };
 const pad = at("pad"), down = new Map(), trail = [];
 const state = { seat: null, waiting: [], flying: false, frame: null, stream: new AbortController(), drawn: 0 };
 
@@ -15,6 +15,8 @@ function over(told) { state.stream.abort(); state.seat = null; status(told.reaso
 function seat(told) {
   state.seat = told; state.waiting = []; down.clear();
   at("lead").hidden = !told.keys;
+  at("name").parentElement.hidden = told.keys;
+  at("told").textContent = "";
   sends();
 }
 
