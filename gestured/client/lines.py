@@ -12,7 +12,7 @@ from gestured.core.errors import GesturedError
 from gestured.core.messages import json_object
 
 T = TypeVar("T")
-JOIN = 'sudo adduser "$USER" gestured, and log in again'
+JOIN = 'sudo usermod -aG gestured,gestured-events "$USER", and log in again'
 
 
 class Unreachable(GesturedError):

@@ -200,7 +200,7 @@ def test_a_socket_that_is_not_for_us_names_the_remedy(capsys, monkeypatch: pytes
     for command in (["status"], ["listen"], ["doctor"]):
         assert main(command) == 1
         out, err = capsys.readouterr()
-        assert "Permission denied" in out + err and 'adduser "$USER" gestured' in out + err
+        assert "Permission denied" in out + err and 'usermod -aG gestured,gestured-events "$USER"' in out + err
 
 
 def test_doctor_looks_at_the_machine(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from tests.systemd.vehicle import Vehicle, steady
 
 HERE = "tests/systemd/fleet.py::"
 FRAMES = 20  # that a sensor sends to be heard, or not
+SOCKETS = ("gestured-osc.socket", "gestured-events.socket", "gestured-metrics.socket")
 NO_END = 1_000_000  # frames
 
 pytestmark = [
@@ -209,11 +210,40 @@ def test_the_bridge_has_the_network_that_its_drop_in_names_and_the_service_has_n
         wait("its complaint", lambda: f"broker {NETWORK}:1883 is not there" in connected(box, "gestured-bridge@house"))
     finally:
         box.run("systemctl", "disable", "--now", "gestured-bridge@house")
-        box.run(
-            "systemctl",
-            "stop",
-            "gestured.service",
-            "gestured-osc.socket",
-            "gestured-events.socket",
-            "gestured-metrics.socket",
-        )
+        box.run("systemctl", "stop", "gestured.service", *SOCKETS)
+
+
+ASK = """
+import contextlib, json, socket, sys
+with socket.socket(socket.AF_UNIX) as daemon:
+    daemon.connect(sys.argv[1])
+    with contextlib.suppress(BrokenPipeError):  # who is refused is told so at once
+        daemon.sendall(sys.argv[2].encode() + b"\\n")
+    print(daemon.makefile().readline())
+"""
+
+
+def test_a_bridge_may_close_its_gate_and_can_command_nothing(box: Container):
+    """As its unit's groups let it, of the activated service and of an instance, whose sockets the daemon makes."""
+    wanted = box.run("systemctl", "show", "-P", "SupplementaryGroups", "gestured-bridge@house").stdout.split()
+    groups = ",".join(box.run("getent", "group", name).stdout.split(":")[2] for name in wanted)
+
+    def ask(path: str, **request: object) -> str:
+        as_bridge = ("setpriv", "--reuid=4001", "--regid=4001", f"--groups={groups}")
+        done = box.run(*as_bridge, "python3", "-c", ASK, path, json.dumps(request), check=False)
+        return done.stdout + done.stderr
+
+    try:
+        box.follow(example("test_a_bridge_may_close_its_gate_and_can_command_nothing"))
+        closing = {"verb": "inhibit", "bridge": "mqtt", "gate": "mqtt", "seconds": 30}
+        assert '"ok":true' in ask("/run/gestured/gates.sock", **closing)
+        assert 'unknown \\"reload\\", expected one of inhibit, allow' in ask("/run/gestured/gates.sock", verb="reload")
+        box.run("systemctl", "start", "gestured@left")
+        for folder in ("/run/gestured", "/run/gestured-left"):
+            assert '"type":"hello"' in ask(f"{folder}/events.sock", subscribe={})
+            for verb in ("reload", "tap", "enrol", "recalibrate", "status", "allow"):
+                said = ask(f"{folder}/events.ctl", verb=verb)
+                assert "Permission denied" in said or "only root, the daemon's user and its group" in said, said
+    finally:
+        box.run("systemctl", "disable", "--now", "gestured-gates.socket", check=False)
+        box.run("systemctl", "stop", "gestured@left", "gestured.service", *SOCKETS, check=False)

@@ -24,6 +24,7 @@ from tests.systemd.vehicle import Vehicle, steady
 
 METRICS = "http://127.0.0.1:9108/metrics"
 CONFIGURATION = "/etc/gestured/gestured.toml"
+CONNECT = "import socket; socket.socket(socket.AF_UNIX).connect('/run/gestured/events.sock')"
 SOCKETS = ("gestured-osc.socket", "gestured-events.socket", "gestured-metrics.socket")
 RELOADS = (  # a configuration, and why it is refused
     ('model = "lstm"\nmodle = 1\n', "did you mean model?"),
@@ -125,14 +126,18 @@ def test_installed_documents_find_each_other(box: Container, installed: Path):
 
 
 def test_members_of_the_group_may_and_others_may_not(box: Container):
-    group = box.run("id", "--group", "gestured").stdout.strip()
+    member, events = (box.run("getent", "group", name).stdout.split(":")[2] for name in ("gestured", "gestured-events"))
     for command in ("status", "reload", "doctor"):
         stranger = as_user(box, "gesturectl", command, groups="")
         said = stranger.stdout + stranger.stderr
-        assert stranger.returncode == 1 and "Permission denied" in said and "adduser" in said
+        assert stranger.returncode == 1 and "Permission denied" in said and "usermod" in said
     for command in ("status", "reload"):
-        member = as_user(box, "gesturectl", command, groups=group)
-        assert member.returncode == 0, member.stdout + member.stderr
+        found = as_user(box, "gesturectl", command, groups=f"{member},{events}")
+        assert found.returncode == 0, found.stdout + found.stderr
+        reader = as_user(box, "gesturectl", command, groups=events)
+        assert reader.returncode == 1 and "only root, the daemon's user and its group may" in reader.stderr
+    for groups, may in (("", False), (member, False), (events, True)):
+        assert (as_user(box, "python3", "-c", CONNECT, groups=groups).returncode == 0) == may
 
 
 def test_a_foreign_model_is_opened_apart_inside_the_units_sandbox(box: Container, tmp_path: Path):

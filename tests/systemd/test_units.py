@@ -81,7 +81,10 @@ def test_the_services_differ_in_the_network_alone():
 def test_an_instance_differs_from_the_standalone_service_in_its_name_alone():
     one, many = keys("gestured-standalone.service"), keys("gestured@.service")
     different = {key for key in one | many if one.get(key) != many.get(key)}
-    assert different == {"Description", "Conflicts", "ExecStart", "ExecReload", "RuntimeDirectory", "StateDirectory"}
+    assert different == {
+        "Description", "Conflicts", "ExecStart", "ExecStartPre", "ExecReload", "Environment", "ReadWritePaths",
+        "StateDirectory",
+    }  # fmt: skip
     for key in different - {"Description", "Conflicts"}:
         assert [value.replace("-%i", "").replace("%i", "gestured") for value in many[key]] == [
             value if key != "ExecReload" else f"{value} --control /run/gestured/events.ctl" for value in one[key]
@@ -91,7 +94,9 @@ def test_an_instance_differs_from_the_standalone_service_in_its_name_alone():
 def test_each_socket_belongs_to_the_service_that_lists_it():
     sockets = sorted(path.name for path in UNITS.glob("*.socket"))
     service = keys("gestured.service")
-    assert sorted(service["Sockets"][0].split()) == sorted(service["Also"][0].split()) == sockets
+    listed = service["Sockets"][0].split()
+    assert sorted(listed) == sorted(service["Also"][0].split())
+    assert sorted([*listed, "gestured-gates.socket"]) == sockets  # off unless it is enabled
     for socket in sockets:
         assert keys(socket)["Service"] == ["gestured.service"]
         assert f"gestured-{keys(socket)['FileDescriptorName'][0]}.socket" == socket
