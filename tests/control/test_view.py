@@ -16,6 +16,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from gestured.client.control import Control
 from gestured.client.web.door import HEADER, at_home
 from gestured.client.web.server import BODY_BYTES, SHARED, STRANGERS
 from gestured.control.view import NICE
@@ -198,7 +199,7 @@ def test_what_changes_anything_needs_the_header(view: Page, real: Daemon) -> Non
     view.come_in()
     Sensor(real, "arm").begin()
     for wrong in ("", "x", view.token):
-        for path in ("/recalibrate", "/flag"):
+        for path in ("/recalibrate", "/flag", "/silence", "/hear"):
             status, _, body = view.ask(path, "POST", {"sensor": "arm"}, X_Gestured_Token=wrong)
             assert status == 403 and "error" in json.loads(body)
     mine = {"Origin": f"http://{view.address}"}
@@ -456,6 +457,32 @@ def test_pause_step_back_and_keys(view: Page, real: Daemon, browser: Browser) ->
     key("m", "KeyM")
     sensor.send([sensor.hand.frame()])
     browser.until("document.getElementById('raw').checked && state.frames.some(f => f.raw)")
+    assert browser.complaints() == []
+
+
+def test_a_switch_silences_a_sensor_after_a_question(view: Page, real: Daemon, browser: Browser) -> None:
+    sensor = follow(view, browser, "arm", real)
+
+    def says(word: str, hears: bool) -> None:
+        browser.until(f"document.getElementById('listens').textContent === {word!r}")
+        assert browser.run("document.getElementById('gate').getAttribute('aria-checked')") == str(hears).lower()
+
+    says("listens", True)
+    for answer, word in ((False, "listens"), (True, "silent, gates closed: view")):
+        browser.run(f"window.confirm = question => {{ window.asked = question; return {str(answer).lower()} }}")
+        browser.run("document.getElementById('gate').click()")
+        assert browser.run("window.asked") == (
+            'Silence arm? No program hears a gesture of it until its gate "view" is opened.'
+        )
+        says(word, not answer)
+    perform(sensor, browser, "left")
+    browser.until("document.getElementById('answer').textContent.startsWith('unknown: inhibited view,')")
+    with Control(Path(real.ready["control"])) as control:
+        control.ask("inhibit", sensor="arm", gate="door")
+    says("silent, gates closed: door, view", False)
+    browser.run("document.getElementById('gate').click()")
+    says("silent, gates closed: door", True)
+    browser.until("document.getElementById('done').textContent === 'arm: silent, gates closed: door'")
     assert browser.complaints() == []
 
 

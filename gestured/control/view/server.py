@@ -1,4 +1,4 @@
-"""What the page of `gesturectl view` asks for: the stream of a sensor, a flag, a sensor learned anew."""
+"""What the page of `gesturectl view` asks for: the stream of a sensor, a flag, a sensor learned anew or silenced."""
 
 import threading
 from collections.abc import Mapping
@@ -47,12 +47,14 @@ class _Handler(Handler):
                 self.server.browsers.release()
 
     def act(self, what: dict[str, Any]) -> Said:
-        """Flag or recalibrate."""
+        """Flag, recalibrate, silence or let be heard."""
         if not all(isinstance(value, str) for value in what.values()):
             return HTTPStatus.BAD_REQUEST, {"error": "expected a JSON object of texts"}
         source = self.server.source
         acts = {
             "/flag": lambda: source.flag(what.get("note", "")),
+            "/silence": lambda: source.silence(what.get("sensor", "")),
+            "/hear": lambda: source.hear(what.get("sensor", "")),
             "/recalibrate": lambda: source.recalibrate(what.get("sensor", "")),
         }
         if self.path not in acts:

@@ -11,6 +11,7 @@ from gestured.client.web.outbox import Outbox
 from gestured.control.flag import flag, flag_path
 from gestured.core.errors import GesturedError
 
+GATE = "view"  # the page's own
 AGAIN_S = 0.5  # before a daemon that has gone is asked again
 
 Looked = tuple[list[str], bool] | None  # sensors, and whether with their counts as they were sent; None: nobody looks
@@ -60,6 +61,19 @@ class Source:
         with Control(self._control) as control:
             control.ask("recalibrate", sensor=sensor)
         return f"{sensor}: learned anew, leave it untouched for a second"
+
+    def silence(self, sensor: str) -> str:
+        """Close the page's own gate of a sensor; what was done, in words. Raises GesturedError."""
+        return self._gate("inhibit", sensor)
+
+    def hear(self, sensor: str) -> str:
+        """Open it again; others may be closed."""
+        return self._gate("allow", sensor)
+
+    def _gate(self, verb: str, sensor: str) -> str:
+        with Control(self._control) as control:
+            closed = control.ask(verb, sensor=sensor, gate=GATE)["sensors"][sensor]
+        return f"{sensor}: silent, gates closed: {', '.join(closed)}" if closed else f"{sensor}: no gate is closed"
 
     def flag(self, note: str) -> str:
         """Keep what the flight recorder holds as a recording; what was done, in words. Raises GesturedError."""

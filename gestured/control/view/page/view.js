@@ -30,14 +30,26 @@ function sensors(told) {
   const names = Object.keys(told.sensors), select = at("sensor");
   at("sensors").tBodies[0].replaceChildren(...names.map(name => {
     const s = told.sensors[name];
-    const tr = row([name, s.state + (s.touched ? ", touched" : ""), s.rate_hz.toFixed(1), `${Math.round(1000 * s.jitter_s)} ms`, s.lost ?? 0, s.bad_taxels]);
+    const tr = row([name, s.state + (s.touched ? ", touched" : "") + (s.closed?.length ? ", silent" : ""), s.rate_hz.toFixed(1), `${Math.round(1000 * s.jitter_s)} ms`, s.lost ?? 0, s.bad_taxels]);
     if (name === state.sensor) tr.className = "now";
     return tr;
   }));
+  heard(told.sensors[state.sensor]);
   if (names.join("\n") !== [...select.options].map(o => o.value).join("\n")) {
     select.replaceChildren(...names.map(name => new Option(name, name, false, name === state.sensor)));
     if (!names.includes(state.sensor) && names.length) { select.value = names[0]; open(names[0]); }
   }
+}
+
+function listens(told) {
+  if (told.closed?.length) return `silent, gates closed: ${told.closed.join(", ")}`;
+  return told.armed === false ? "not armed" : told.armed ? "armed" : "listens";
+}
+
+function heard(told) { // what the sensor that is looked at listens to, as far as the daemon has said it
+  at("listens").textContent = told ? listens(told) : "";
+  at("gate").disabled = !told;
+  at("gate").setAttribute("aria-checked", String(!told?.closed?.includes("view")));
 }
 
 function row(cells) {
@@ -63,14 +75,16 @@ function event(told) {
   let what = told.type;
   if (told.type === "gesture") what = words(told.gesture);
   if (told.type === "provisional") what = `probably ${words(told.gesture)}`;
-  if (told.type === "unknown") what = told.reason ? `unknown: ${told.reason}` : "unknown";
+  if (told.type === "unknown") what = told.reason ? `unknown: ${[told.reason, ...told.gates ?? []].join(" ")}` : "unknown";
+  if (told.type === "gate") what = listens(told);
   if (told.type === "cancelled") what = `cancelled: ${told.reason}`;
   const verdict = told.provisional ? `; provisional ${told.provisional}` : ""; // confirmed, or revoked
-  const time = told.decided ?? told.offset ?? told.onset ?? Date.now() / 1000;
+  const time = told.decided ?? told.offset ?? told.onset ?? told.since ?? Date.now() / 1000;
   const body = at("events").tBodies[0];
   body.prepend(row([clock(time), told.sensor, what + verdict + (told.test ? " (test)" : ""), told.confidence === undefined ? "" : percent(told.confidence), latency]));
   while (body.rows.length > ROWS) body.deleteRow(-1);
   if (!mine) return;
+  if (told.type === "gate") heard(told);
   if (told.type === "onset") { provisional("-", ""); at("answer").textContent = "..."; }
   if (told.type === "provisional") {
     state.early = told;
@@ -262,10 +276,16 @@ at("when").oninput = () => {
 };
 at("flag").onclick = () => act("flag", { note: at("note").value });
 at("recalibrate").onclick = () => act("recalibrate", { sensor: state.sensor });
+at("gate").onclick = () => {
+  const silence = at("gate").getAttribute("aria-checked") === "true";
+  const question = silence ? `Silence ${state.sensor}? No program hears a gesture of it until its gate "view" is opened.`
+    : `Open the gate "view" of ${state.sensor}? Programs act on its gestures again, unless another gate is closed.`;
+  if (confirm(question)) act(silence ? "silence" : "hear", { sensor: state.sensor });
+};
 addEventListener("resize", plan);
 addEventListener("keydown", e => {
   if (e.ctrlKey || e.altKey || e.metaKey || /^(INPUT|SELECT|BUTTON)$/.test(e.target.tagName) && e.target.type !== "checkbox") return;
-  const keys = { " ": () => pause(!state.paused), ArrowLeft: () => step(-1), ArrowRight: () => step(1), c: () => at("counts").click(), m: () => at("raw").click(), f: () => at("flag").click(), r: () => at("recalibrate").click() };
+  const keys = { " ": () => pause(!state.paused), ArrowLeft: () => step(-1), ArrowRight: () => step(1), c: () => at("counts").click(), m: () => at("raw").click(), f: () => at("flag").click(), r: () => at("recalibrate").click(), h: () => at("gate").click() };
   const wanted = keys[e.key.length === 1 ? e.key.toLowerCase() : e.key];
   if (wanted && !(e.key === " " && e.target.type === "checkbox")) { e.preventDefault(); wanted(); }
 });
