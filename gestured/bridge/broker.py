@@ -82,13 +82,6 @@ class Broker:
 
         client.subscribe(topic, options=SubscribeOptions(qos=1, retainAsPublished=True, retainHandling=2))
 
-    def deaf(self, code: object) -> BridgeError:
-        """What is to be said where the broker does not let us hear commands."""
-        return BridgeError(
-            f"the broker {self.address} does not let us hear commands ({code}): allow this user to read "
-            f"{topic_of(self._host, '+', 'gate', 'set')} in its access list, or leave out --gates"
-        )
-
     def refusal(self, code: object) -> BridgeError:
         """What is to be said where the broker does not take what we publish."""
         return BridgeError(

@@ -22,6 +22,7 @@ from gestured.bridge.daemon import NOTICE_S, follow
 from gestured.bridge.mqtt_session import Mqtt
 from gestured.bridge.options import add_filters, add_metrics, need, on_stop, subscriber
 from gestured.client.program import Commands
+from gestured.client.values import sensor_name
 
 
 def add(commands: Commands) -> None:
@@ -49,7 +50,9 @@ def add(commands: Commands) -> None:
     parser.add_argument("--no-discovery", action="store_true", help="publish nothing for Home Assistant")
     text = "the daemon's socket for bridges: have the broker close and open a gate (default: it can do nothing)"
     parser.add_argument("--gates", type=Path, metavar="PATH", help=text)
-    parser.add_argument("--gate", default="mqtt", metavar="NAME", help="name of that gate (default: mqtt)")
+    parser.add_argument(
+        "--gate", type=sensor_name, default="mqtt", metavar="NAME", help="name of that gate (default: mqtt)"
+    )
     add_metrics(parser)
     parser.set_defaults(run=run)
 

@@ -14,7 +14,7 @@ from gestured.bridge.broker import Broker, properties, topic_of
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import GONE, OLD_S, Daemon, Line
 from gestured.bridge.gates import OFF, ON, Gate
-from gestured.bridge.options import STATUS, gate_name, host_name
+from gestured.bridge.options import STATUS, host_name
 from gestured.bridge.retained import OPEN, Retained
 from gestured.core.errors import GesturedError
 
@@ -48,7 +48,7 @@ class Mqtt:
         self._availability = topic_of(self._host, "availability")
         self._counts = counts
         self._daemon = Daemon(args.sensors, args.gestures, counts)
-        self._gate = None if args.gates is None else Gate(args.gates, gate_name(args.gate), counts)
+        self._gate = None if args.gates is None else Gate(args.gates, args.gate, counts)
         gate = None if self._gate is None else self._gate.name
         self._retained = Retained(self._daemon, self._host, args.discovery, gate, discovers=not args.no_discovery)
         self._commands: dict[str, str] = {}  # sensor -> the last command, until it is obeyed
@@ -129,7 +129,6 @@ class Mqtt:
         client.on_connect = told(self._there, 3)
         client.on_disconnect = told(self._gone, 3)
         client.on_message = lambda _, __, message: self._hear(message)
-        client.on_subscribe = told(self._subscribed, 3)
         client.on_publish = lambda _, __, number, code, ___: self._inbox.put(partial(self._taken, client, number, code))
         threading.Thread(target=call, name="broker", daemon=True).start()
 
@@ -172,11 +171,6 @@ class Mqtt:
         elif self._sent.pop(number, None) is not None:
             self._counts.add("events", "sent")
         self._send()
-
-    def _subscribed(self, client: Any, codes: Any) -> None:
-        """The broker has answered whether we may hear commands."""
-        if client is self._client and codes[0].is_failure:
-            raise self._broker.deaf(codes[0])
 
     def _hear(self, message: Any) -> None:
         """A command, in the library's thread. Of several for one sensor that have not been obeyed the last counts."""

@@ -13,7 +13,7 @@ from typing import Any
 from gestured.client.address import find_socket
 from gestured.client.subscriber import Subscriber
 from gestured.client.values import bind_address, host_port, some_of
-from gestured.core.address import Address, is_sensor
+from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.messages import EVENT_TYPES
 
@@ -72,13 +72,6 @@ def plain(name: str) -> str:
 def host_name(named: str | None) -> str:
     """The plain name that was given, else this machine's."""
     return plain(named or socket.gethostname())
-
-
-def gate_name(name: str) -> str:
-    """The name of a gate. Raises BridgeError for what can be none."""
-    if not is_sensor(name):
-        raise BridgeError(f"--gate {name!r}: expected 1 to 64 of A-Z a-z 0-9 _ -")
-    return name
 
 
 def on_stop(act: Callable[[], object]) -> None:

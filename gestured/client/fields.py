@@ -43,6 +43,7 @@ _WHERE: dict[Any, Callable[[Any], bool]] = {
     str | None: _is(str, type(None)),
 }
 _WHERE_FIELDS = get_type_hints(Where)
+GATES = Mapping[str, Mapping[str, Any]]
 # How a field is annotated -> whether a value is one, and what it is called.
 _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
     str: (_is(str), "a text"),
@@ -57,20 +58,14 @@ _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
     tuple[str, ...]: (_is_texts, "a list of texts"),
     Mapping[str, float]: (_object(_is_number), "an object of numbers"),
     Mapping[str, str]: (_object(_is(str)), "an object of texts"),
-    Mapping[str, Mapping[str, Any]]: (_object(_is(dict)), "an object of objects"),
+    GATES: (_object(_is(dict)), "an object of objects"),
     Mapping[str, int]: (_object(_is(int)), "an object of whole numbers"),
 }
 _EVENTS = {event.__name__.lower(): event for event in get_args(Event)}
 # Type of a line -> its fields, as they are annotated.
 _FIELDS: dict[str, dict[str, Any]] = {name: get_type_hints(event) for name, event in _EVENTS.items()} | {
-    "hello": {
-        "version": str,
-        "instance": str,
-        "model": str,
-        "gestures": list[str],
-        "sensors": Mapping[str, int],
-        "gates": Mapping[str, Mapping[str, Any]],
-    },
+    "hello": dict.fromkeys(("version", "instance", "model"), str)
+    | {"gestures": list[str], "sensors": Mapping[str, int], "gates": GATES},
     "gestures": {"gestures": list[str]},
     "lost": {"count": int},
 }

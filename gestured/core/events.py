@@ -129,11 +129,6 @@ class Gate:
     until: float | None  # s, when the first of this changes by itself; None where nothing does
     since: float  # s; these two are on the hub's clock, by which an operator acts
 
-    @property
-    def says(self) -> bool:
-        """Whether it says anything of a sensor that a sensor without gates and arming does not."""
-        return self.armed is not None or bool(self.closed)
-
 
 @dataclass(frozen=True, slots=True)
 class Touch:

@@ -220,7 +220,7 @@ class Hub:
     def listening(self, now: float) -> list[Gate]:
         """What gates and arming say at `now`, of the sensors of which they say anything."""
         gates = [reading.gate for reading in self.readings(now).values()]
-        return [gate for gate in gates if gate is not None and gate.says]
+        return [gate for gate in gates if gate is not None and (gate.closed or gate.armed is not None)]
 
     def view(self, name: str, now: float, *, raw: bool) -> tuple[View, Reading] | None:
         """A sensor as it is felt now, and what is known of it; None where it was not heard."""
@@ -287,7 +287,7 @@ class Hub:
             sensor.follow(facts, asked=self._follows(name))
             self._told[name] = self._missed
             facts.append(Changed(name, "new", source))
-            sensor.greet(self.gates.of(name), self._armed.pop(name, None), now, facts)
+            sensor.shut(self.gates.of(name), now, facts, armed_until=self._armed.pop(name, -math.inf))
         if not sensor.owner.admits(source, now, self._scene.stale_s):
             facts.append(Dropped("second_source", source))
             return None

@@ -4,7 +4,7 @@ A request that is none is a ProtocolError with the reason `subscription`.
 """
 
 import json
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any, get_args
 
@@ -53,16 +53,10 @@ def to_json(event: Event, epoch: float, *, test: bool = False) -> bytes:
     return _line(line)
 
 
-def listening(gates: Iterable[Gate], epoch: float) -> dict[str, dict[str, Any]]:
+def listening(gates: Sequence[Gate], epoch: float) -> dict[str, dict[str, Any]]:
     """What hello and status tell of sensors that a gate silences, or that a gesture arms; by their names."""
-    return {
-        gate.sensor: {
-            "armed": gate.armed,
-            "closed": gate.closed,
-            "until": None if gate.until is None else gate.until + epoch,
-        }
-        for gate in gates
-    }
+    until = {gate.sensor: None if gate.until is None else gate.until + epoch for gate in gates}
+    return {g.sensor: {"armed": g.armed, "closed": g.closed, "until": until[g.sensor]} for g in gates}
 
 
 def hello_json(  # noqa: PLR0913 - each is a key of the line

@@ -343,17 +343,18 @@ class Sensor:
         self._foresight.taps = scene.provisional_taps
         self._fingers.zones = self._zones
 
-    def shut(self, closed: Mapping[str, float], now: float, facts: list[Fact]) -> None:
-        """The gates that are closed from `now` on, by name: when each opens by itself, on the hub's clock."""
+    def shut(
+        self, closed: Mapping[str, float], now: float, facts: list[Fact], armed_until: float | None = None
+    ) -> None:
+        """The gates that are closed from `now` on, by name: when each opens by itself, on the hub's clock.
+
+        With `armed_until` the sensor is new, and what it listens to is told in any case, unless it is everything.
+        """
+        if armed_until is not None and armed_until > -math.inf:
+            self._listening.arm(armed_until)
         if closed != self._listening.closed:
             self._run(lambda t: self.gate(closed, t, self._stamper.past(now)), now, facts)
-
-    def greet(self, closed: Mapping[str, float], armed_until: float | None, now: float, facts: list[Fact]) -> None:
-        """The sensor is new, and perhaps armed already: what it listens to is told, unless it is everything."""
-        if armed_until is not None:
-            self._listening.arm(armed_until)
-        self.shut(closed, now, facts)
-        if not closed and self._listening.arming is not None:
+        elif armed_until is not None and self._listening.arming is not None:
             facts.append(self._gate(self._stamper.at(now)))
 
     def foresee(self, *, asked: bool, later: bool = False) -> None:

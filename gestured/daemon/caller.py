@@ -16,8 +16,8 @@ SO_PEERGROUPS = 59  # Linux 4.13; not in Python's socket module
 class Connection:
     """One operator's connection to the control socket."""
 
-    def __init__(self, writer: asyncio.StreamWriter, who: "Peer") -> None:
-        self._writer, self.who = writer, who
+    def __init__(self, writer: asyncio.StreamWriter) -> None:
+        self._writer = writer
         self.lost = 0  # lines that found no room in the backlog
         self.streams = False  # whether it is sent a stream of lines, and need not ask for anything
         self.flush: Callable[[], None] = lambda: None  # has what waits for this connection sent

@@ -83,7 +83,7 @@ class ControlServer:
             writer.close()
 
     async def _answer_all(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, who: Peer) -> None:
-        connection = Connection(writer, who)
+        connection = Connection(writer)
         while True:
             try:
                 async with asyncio.timeout(None if connection.streams else IDLE_S):

@@ -17,7 +17,6 @@ from gestured.daemon.bound import Bound
 from gestured.daemon.clients import EventServer
 from gestured.daemon.control import ControlServer
 from gestured.daemon.desk import Desk
-from gestured.daemon.gatekeeper import Bridges
 from gestured.daemon.health import TICK_S, Canary, Pulse, watchdog_period
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
@@ -82,7 +81,7 @@ class Service:
         self._gates = operations.gates
         self._servers = [ControlServer(bound.control.sock, operations.verbs())]
         if bound.gates is not None:
-            self._servers.append(ControlServer(bound.gates.sock, Bridges(self._gates).verbs(), guarded=False))
+            self._servers.append(ControlServer(bound.gates.sock, self._gates.of_bridges(), guarded=False))
         self._http: Any = None
         if bound.http is not None:
             from gestured.daemon.http import serve_pages
@@ -105,6 +104,7 @@ class Service:
             gestures=self._hub.scene.gestures,
             own=self._own.report(),
             sensors=self._hub.readings(now - self._receiver.behind_s),
+            listening=self._listening(now),
             gates=tuple(sorted(self._hub.gates.of(None))),
             overdue=self._gates.overdue(now),
             recent=self._publisher.recent(),
@@ -133,9 +133,11 @@ class Service:
 
     def _hello(self) -> bytes:
         """The first line to a client."""
-        gates = messages.listening(self._hub.listening(now := time.monotonic()), time.time() - now)
-        sequences = self._hub.sequences()
-        return messages.hello_json(__version__, self._instance, self._ladder.active, self._gestures(), sequences, gates)
+        names = self._ladder.active, self._gestures(), self._hub.sequences(), self._listening(time.monotonic())
+        return messages.hello_json(__version__, self._instance, *names)
+
+    def _listening(self, now: float) -> dict[str, dict[str, Any]]:
+        return messages.listening(self._hub.listening(now), time.time() - now)
 
     def _gestures(self) -> tuple[str, ...]:
         """The gestures that a client may hear of: the model's in use, and the user's own."""

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from gestured.core.beside.reading import SILENT, Reading
-from gestured.core.messages import listening
 from gestured.daemon.settings import Settings
 from gestured.daemon.shift import Shift
 from gestured.model.ladder import Ladder
@@ -58,6 +57,7 @@ class Snapshot:
     gestures: tuple[str, ...]  # of the model's, in use
     own: Mapping[str, Any]  # the user's own; see `OwnGestures.report`
     sensors: Mapping[str, Reading]
+    listening: Mapping[str, Mapping[str, Any]]  # `messages.listening`
     gates: tuple[str, ...]  # that are closed for each sensor that comes
     overdue: Mapping[str, float]  # by gate: for how many s the bridge that closed it has owed a sign of life
     recent: tuple[Mapping[str, Any], ...]  # the last answers
@@ -75,12 +75,6 @@ class Snapshot:
     def every_gesture(self) -> tuple[str, ...]:
         """The model's gestures in use, and the user's own."""
         return (*self.gestures, *self.own["gestures"])
-
-    @property
-    def listening(self) -> dict[str, dict[str, Any]]:
-        """What hello and status tell of gates and arming."""
-        gates = [reading.gate for reading in self.sensors.values()]
-        return listening((gate for gate in gates if gate is not None and gate.says), self.time - self.now)
 
     @property
     def states(self) -> dict[str, str]:

@@ -43,7 +43,8 @@ def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
         },
         "own": dict(snapshot.own),
         "sensors": {
-            name: _sensor(reading, snapshot.now) | gates.get(name, OPEN) for name, reading in snapshot.sensors.items()
+            name: {**_sensor(reading, snapshot.now), **gates.get(name, OPEN)}
+            for name, reading in snapshot.sensors.items()
         },
         "gates": list(snapshot.gates),
         "overdue": {gate: round(seconds, 1) for gate, seconds in snapshot.overdue.items()},

@@ -25,7 +25,7 @@ SOURCE = ("10.0.0.1", 1)
 SNAPSHOT = Snapshot(
     instance="i", time=1.7e9, now=10.0, started=1.7e9, uptime_s=10.0, stopping=False, loop_age_s=0.1, loop_lag_s=0.0,
     models=Models("m", "m", 0, False, 0, "m.onnx", "1", "", (9, 9), False, 0, {}, ()), gestures=("one_tap",),
-    own={"gestures": {}}, sensors={"arm": Reading("ok", (9, 9))}, gates=(), overdue={}, recent=(),
+    own={"gestures": {}}, sensors={"arm": Reading("ok", (9, 9))}, listening={}, gates=(), overdue={}, recent=(),
     clients=0, backlog_bytes=0, kernel_drops=0, taps=0, flight_limit_bytes=0, flight_held_bytes=0, addresses={},
     settings=Settings(), awaiting_restart=[],
 )  # fmt: skip
