@@ -190,7 +190,7 @@ class Sensor:
         self._placed = None
         scores, best, confidence = decision.best(self.classifier.gestures, answer, at.zone)
         seen = whole(cut.hole_s, self.front_end.interval_s)
-        known = seen and confidence >= decision.threshold(best, answer)
+        known = seen and decision.may(best, at.zone) and confidence >= decision.threshold(best, answer)
         decided, listening = Decided(name, segment, answer, known), self._listening
         own = answer.own if seen and decision.is_own(answer.own, at.zone, known=known) else None
         if own is not None:

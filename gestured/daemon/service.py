@@ -24,6 +24,7 @@ from gestured.daemon.operations import Operations
 from gestured.daemon.own import OwnGestures, Ready
 from gestured.daemon.publisher import Publisher
 from gestured.daemon.reload import Loader, Reload
+from gestured.daemon.settings import TITLES
 from gestured.daemon.shift import Shift
 from gestured.daemon.sinks import Sink
 from gestured.daemon.snapshot import Models, Snapshot
@@ -37,7 +38,7 @@ STATUS_S = 1.0  # from one status to the next
 DRAIN_S = 0.5  # for clients to read what waits for them, when the daemon ends
 SHOWN = 4  # sensors in systemd's status line
 # Settings that a reload cannot change.
-AT_A_RESTART = ("listen", "socket", "control", "gates", "metrics", "flight_recorder")
+AT_A_RESTART = ("listen", "socket", "control", "gates", "gate", "metrics", "flight_recorder")
 
 
 class Service:
@@ -121,7 +122,8 @@ class Service:
 
     def _awaiting_restart(self) -> list[str]:
         """Settings that a reload has read, but that a restart alone can put to use."""
-        return [key for key in AT_A_RESTART if getattr(self._settings, key) != getattr(self._started_with, key)]
+        new, old = self._settings, self._started_with
+        return [TITLES.get(key, key) for key in AT_A_RESTART if getattr(new, key) != getattr(old, key)]
 
     def _state(self) -> dict[str, Any]:
         """Everything that an operator may see of the daemon now."""

@@ -53,16 +53,21 @@ def test_what_can_be_no_zone_is_named(told: dict[str, Any], says: str) -> None:
         zones_of(told)
 
 
-def answer(zones: dict[str, Any], scores: Scores) -> Gesture | Unknown:
+def answer(zones: dict[str, Any], scores: Scores, **more: Any) -> Gesture | Unknown:
     """What becomes of a swipe from column 1 to 7 in row 4, so from the left half, half-way up."""
     classifier = Fake([scores])
     subject = Sensor(
-        "armrest", Scene(classifier.gestures, (9, 9), {"armrest": Setup(zones=zones_of(zones))}), classifier
+        "armrest", Scene(classifier.gestures, (9, 9), {"armrest": Setup(zones=zones_of(zones))}, **more), classifier
     )
     stream = frames("quiet for 1500ms", SWIPE, "quiet for 900ms")
     found = events_of(one for frame in stream for one in subject.push(frame))
     (one,) = (one for one in found if isinstance(one, Gesture | Unknown))
     return one
+
+
+def test_in_a_zone_of_silence_nothing_begins_whatever_the_threshold() -> None:
+    found = answer({"here": {"at": (0, 0, 0.5, 1), "gestures": []}}, says(0.0, 1.0, 0.0), thresholds={"left": 0.0})
+    assert isinstance(found, Unknown) and found.confidence == 0.0
 
 
 def test_a_contact_belongs_to_the_zone_in_which_it_begins() -> None:

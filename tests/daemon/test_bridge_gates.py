@@ -55,6 +55,14 @@ def test_a_bridge_closes_its_own_gate_and_it_stays_closed_when_the_bridge_is_gon
     assert "a bridge has changed what is closed" in daemon.stderr()
 
 
+def test_what_is_closed_at_a_start_counts_from_the_next_one_on(daemon: Daemon, tmp_path: Path) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text(config.read_text().replace('"seat"', '"door"'))
+    with Control(Path(daemon.ready["control"])) as operator:
+        assert operator.ask("reload")["awaiting_restart"] == ["gates"]
+        assert operator.ask("status")["gates"] == ["seat"]
+
+
 def test_it_knows_inhibit_and_allow_alone(daemon: Daemon, bridge: Control) -> None:
     operators = set(Operations(*[None] * 9).verbs())  # type: ignore[arg-type]
     assert {"reload", "tap", "enrol", "recalibrate", "status"} <= operators
