@@ -2,7 +2,6 @@
 
 import os
 import select
-import shutil
 import signal
 import socket
 import subprocess
@@ -20,20 +19,22 @@ from pythonosc.osc_message import OscMessage
 from gestured.client.control import Control
 from gestured.model.shipped import shipped
 from tests.daemon.harness import RATE_HZ, Daemon, Hand, Sensor
+from tests.deploy.compilers import CPP, POSIX, C, compiled
 from tests.documents.blocks import ROOT, Block, blocks
 from tests.sockets import free_address
 
 WRAPPER = '#!/bin/sh\nPYTHONPATH={root} exec {python} -m gestured.{package} "$@"\n'
+COMPILERS = pytest.mark.parametrize(("compiler", "standard"), [("gcc", C), ("g++", CPP)])
 # A phrase that only this example has, and so its name.
 ENDING, *LOOPS = SHELL = ("--types gesture,unknown --count 2", "--json --reconnect | while", "show the next track")
 PHRASES = {
     *SHELL,
     "across its restarts",
-    "sockaddr_un",
+    "gestured_open",
     "BlockingOSCUDPServer",
     "OscBundleBuilder",
     "measure()",
-    "HEADER",
+    "gestured_packet",
     "np.load",
     "zones=zones",
     "arming={",
@@ -116,15 +117,11 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
     assert place.daemon.stop() == 0, place.daemon.stderr()
 
 
-def compiled(place: Place, phrase: str) -> str:
-    """A C++ example as a program; no warning."""
-    if shutil.which("g++") is None:
-        pytest.skip("g++ is not installed")
-    source, program = place.folder / f"{phrase}.cpp", place.folder / phrase
-    source.write_text(place.here(example(phrase).text))
-    command = ["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-o", str(program), str(source)]
-    subprocess.run(command, check=True, timeout=60)
-    return str(program)
+def c_program(folder: Path, phrase: str, compiler: str, standard: str) -> str:
+    """An example in C as a program; no warning."""
+    source = folder / f"example.{'c' if standard == C else 'cpp'}"
+    source.write_text(example(phrase).text)
+    return str(compiled(compiler, standard, folder / "example", POSIX, source))
 
 
 def shell(place: Place, phrase: str) -> "subprocess.Popen[str]":
@@ -156,10 +153,11 @@ def test_python_subscriber(place: Place):
     assert line == "armrest swipe_left 1.00 0 missed\n"
 
 
-def test_cpp_subscriber(place: Place):
-    program = compiled(place, "sockaddr_un")
+@COMPILERS
+def test_c_subscriber(place: Place, tmp_path: Path, compiler: str, standard: str):
+    program = c_program(tmp_path, "gestured_open", compiler, standard)
     with place.gestures():
-        assert place.first_line(program, str(place.daemon.socket)) == "armrest swipe_left 1.0\n"
+        assert place.first_line(program, str(place.daemon.socket)) == "armrest swipe_left 1.00\n"
 
 
 def test_osc_subscriber(place: Place):
@@ -268,8 +266,10 @@ def test_python_sensor(place: Place):
     assert "armrest" in place.daemon.get("/readyz")[1]
 
 
-def test_cpp_sensor(place: Place):
-    packet = subprocess.run([compiled(place, "HEADER")], capture_output=True, check=True, timeout=30).stdout
+@COMPILERS
+def test_c_sensor(tmp_path: Path, compiler: str, standard: str):
+    program = c_program(tmp_path, "gestured_packet", compiler, standard)
+    packet = subprocess.run([program], capture_output=True, check=True, timeout=30).stdout
     message = OscMessage(packet)
-    assert (message.address, len(packet)) == ("/armrest/pressure", 192)
-    assert message.params == [bytes(162)]
+    assert (message.address, len(packet)) == ("/armrest/pressure", 196)
+    assert message.params == [0, b"\0\x14" + bytes(160)]
