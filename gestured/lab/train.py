@@ -53,15 +53,15 @@ class TrainingPlan:
     """How much is simulated; the numbers behind the shipped models are the defaults."""
 
     wide: int = 60_000
-    days: int = 500  # of everyday life, twelve minutes of a person each
-    days_calibrate: int = 300  # days to learn the verifier from
-    days_points: int = 300  # days on the nominal sensor to choose the operating points by
     wide_calibrate: int = 12_000  # takes to calibrate
     wide_check: int = 4_000  # takes to test
     wide_early: int = 60_000  # takes for provisional events: the fewer people, the safer a threshold has to be
     cohort: int = len(TRIALS)
     others: int = len(OTHER_TRIALS)
     forest: int = 20_000  # simulated samples for the forest
+    days: int = 500  # of everyday life, twelve minutes of a person each
+    days_calibrate: int = 300  # days to learn the verifier from
+    days_points: int = 300  # days on the nominal sensor to choose the operating points by
     fit: FitConfig = field(default_factory=FitConfig)
 
     @classmethod
@@ -351,7 +351,8 @@ def _at(values: NDArray[np.floating]) -> list[float]:
 def answer_figures(confidence: NDArray[np.floating], known: NDArray[np.bool_], least: float) -> dict[str, Any]:
     """How a model answers gestures of people whom it has not seen: confidence where it answers, and how often not."""
     given = confidence[known]
-    return {"confidence": _at(given[given >= least]), "unknown": round(float((given < least).mean()), 4)}
+    answered = given[given >= least] if (given >= least).any() else given
+    return {"confidence": _at(answered), "unknown": round(float((given < least).mean()), 4)}
 
 
 def train(
