@@ -26,7 +26,7 @@ def add(commands: Commands) -> None:
         "says what gestured makes of them. They go to a daemon of its own, or with --to to another one as OSC.\n"
         "Prints the page's address: it works once, and ends after ten minutes without a touch.",
         epilog="examples:\n  gesturectl pad\n  gesturectl pad --to 127.0.0.1:9000 --sensor armrest\n"
-        "  gesturectl pad --listen 192.168.1.5:9110   # for a telephone in this network",
+        "  gesturectl pad --listen 192.168.1.5:9110",
     )
     text = f"the one address at which the page is served (default: {DEFAULT}; port 0: any)"
     parser.add_argument("--listen", type=bind_address, default=DEFAULT, metavar="HOST:PORT", help=text)

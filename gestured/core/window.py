@@ -14,6 +14,7 @@ SAME_RATE = 0.12  # a rate this near to the model's is taken as it is: interpola
 SLACK = 0.25  # of the model's interval, by which a window is longer: jitter must not decide whether a frame is in
 USED = 0.3  # of the most pressed row or column of a long sensor: those above it are part of the movement
 RIM = 2.0  # taxel pitches around the movement that are taken in with it, both sides together
+DEEPEST = 1e6  # times the peak: deeper below the baseline nothing is told apart
 LEAST_PEAK = 1e-37  # counts; its reciprocal is still a number in float32
 
 
@@ -69,7 +70,7 @@ class Window:
         if self.smooth_frames > 1:
             frames = running_mean(frames, self.smooth_frames)
         peak = max(float(frames.max()), self.floor * segment.noise, LEAST_PEAK)
-        return (frames / peak).astype(np.float32)
+        return np.maximum(frames / peak, -DEEPEST).astype(np.float32)
 
     def span(self, segment: Segment) -> tuple[int, int]:
         """Which frames are taken in: from `lead_s` before the first touched one to `tail_s` after the last."""

@@ -23,6 +23,7 @@ from gestured.lab.samples import WINDOW
 from gestured.lab.stability.segments import segment_cases
 from gestured.lab.study.onnx_form import Graph, quantised
 from gestured.lab.table import Table, Value
+from gestured.model.context import NAMES, calm
 from gestured.model.features import touch_pattern
 from gestured.model.model import Model
 from gestured.model.shipped import shipped
@@ -81,7 +82,8 @@ def ways(name: str, data: bytes, model: Model) -> dict[str, Run]:
 
         def by_torch(frames: NDArray[Any]) -> Sequence[Any]:
             with torch.no_grad():
-                return [output.numpy() for output in module(torch.from_numpy(frames))]
+                around = torch.from_numpy(calm(len(frames), NAMES))
+                return [output.numpy() for output in module(torch.from_numpy(frames), around)]
 
         found["torch"] = by_torch
         smaller = quantised(Graph(data))
@@ -93,9 +95,7 @@ def ways(name: str, data: bytes, model: Model) -> dict[str, Run]:
 def by_reference(data: bytes) -> Run:
     """The graph in float64."""
     runner = ReferenceEvaluator(widened(data), new_ops=[GatherElements])
-    (name,) = runner.input_names
-
-    return lambda values: list(runner.run(["scores", "unknown"], {name: values.astype(np.float64)}))
+    return lambda values: list(runner.run(["scores", "unknown"], _inputs(runner.input_names, values, np.float64)))
 
 
 def unchecked(data: bytes) -> Run:
@@ -103,8 +103,14 @@ def unchecked(data: bytes) -> Run:
     import onnxruntime
 
     session = onnxruntime.InferenceSession(data, providers=["CPUExecutionProvider"])
-    (name,) = (value.name for value in session.get_inputs())
-    return lambda values: list(session.run(("scores", "unknown"), {name: values}))
+    names = [value.name for value in session.get_inputs()]
+    return lambda values: list(session.run(("scores", "unknown"), _inputs(names, values, np.float32)))
+
+
+def _inputs(names: Sequence[str], values: NDArray[Any], kind: type[np.floating[Any]]) -> dict[str, NDArray[Any]]:
+    """A graph's inputs by name: the windows or features, and of what may surround them nothing out of the way."""
+    given = {names[0]: values.astype(kind)}
+    return given | {name: calm(len(values), NAMES).astype(kind) for name in names[1:]}
 
 
 def widened(data: bytes) -> onnx.ModelProto:
