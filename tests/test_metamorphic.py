@@ -46,7 +46,7 @@ def model(name: str) -> Model:
 
 
 class Alike:
-    """A model with one threshold for all gestures: those of operating points differ from a gesture to its mirror image."""
+    """A model with one threshold for all gestures: operating points differ from a gesture to its mirror image."""
 
     certainty = None
 
