@@ -234,6 +234,7 @@ class Service:
         for server in self._servers:
             server.close()
         self._desk.take(self._hub.flush(time.monotonic()))
+        self._views.close()
         await self._clients.close(DRAIN_S)
         for output in self._outputs:
             output.close()

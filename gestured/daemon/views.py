@@ -91,6 +91,12 @@ class Views:
             self._state_due = True
             self._expect(())
 
+    def close(self) -> None:
+        """Show nothing more, since the sockets that the state tells of are closed from now on."""
+        self._looks.clear()
+        if self._timer is not None:
+            self._timer.cancel()
+
     def _expect(self, sensors: Collection[str]) -> None:
         self._due.update(sensors)
         if self._timer is None and (self._due or self._said or self._state_due):

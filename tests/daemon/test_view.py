@@ -12,8 +12,12 @@ import pytest
 from gestured.client.control import Control
 from gestured.client.lines import Refused
 from gestured.daemon import operations, views
+from gestured.daemon.asked import open_all
+from gestured.daemon.bound import bind_all
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.service import Service
 from tests.daemon.harness import Daemon, Hand, Sensor
-from tests.daemon.parts import SNAPSHOT, Parts
+from tests.daemon.parts import SNAPSHOT, Parts, settings_of
 
 
 def test_a_sensor_is_shown_as_it_is_felt(shared: Daemon) -> None:
@@ -121,6 +125,34 @@ def test_who_ends_following_has_heard_all_that_was_published(shared: Daemon) -> 
         control.finish()
         heard = [line["type"] for line in control.lines() if line.get("sensor") == sensor.name]
     assert heard[:2] == ["onset", "gesture"]
+
+
+def test_a_daemon_that_ends_asks_for_no_state_any_more(model, tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A view that is due tells of the daemon's sockets, and they may be closed before its time comes."""
+    settings = settings_of("--model", model, "--listen", "127.0.0.1:0", "--socket", tmp_path / "events.sock")[0]
+
+    async def main() -> list[asyncio.TimerHandle]:
+        loop, stop = asyncio.get_running_loop(), asyncio.Event()
+        waiting: list[asyncio.TimerHandle] = []
+
+        def call_later(delay: float, act: Any, *args: Any) -> asyncio.TimerHandle:
+            waiting.append(asyncio.TimerHandle(loop.time() + delay, act, args, loop))
+            return waiting[-1]  # its time does not come by itself
+
+        clock = SimpleNamespace(call_later=call_later, call_soon=loop.call_soon)
+        bound, metrics = bind_all(settings), Metrics()
+        service = Service(open_all(settings, metrics), metrics, bound, lambda: settings)
+        await service.start()
+        with Control(bound.control.path) as control:
+            monkeypatch.setattr(views, "asyncio", SimpleNamespace(get_running_loop=lambda: clock))
+            await asyncio.to_thread(control.ask, "follow", sensors=[])
+            stop.set()
+            await service.serve(stop, asyncio.Event())
+        bound.close()
+        return waiting
+
+    waiting = asyncio.run(main())
+    assert waiting and all(handle.cancelled() for handle in waiting)
 
 
 class Follower:
