@@ -1,7 +1,7 @@
 """The operating points of a model: thresholds by strictness, and the curve of missed gestures against false ones.
 
-They are chosen on hours of simulated everyday life of people of whom no network knows: for each gesture the threshold
-at which right answers are worth most against wrong and false ones.
+They are chosen on hours of simulated everyday life of people of whom no network knows. Gestures that are mirror images of one
+another share a threshold: the one at which right answers are worth most against wrong and false ones.
 """
 
 from collections.abc import Mapping
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.points import STRICTNESS
+from gestured.lab.augment import symmetry_table
 from gestured.lab.decide import Answers, confidence
-from gestured.lab.fit import targets
+from gestured.lab.fit import CLASSES, targets
 from gestured.lab.samples import EVERYDAY, Samples
 from gestured.simulator import GESTURES, NONE
 
@@ -34,9 +35,11 @@ def operating_points(answers: Answers, lived: Samples, performed: int, hours: fl
     right = known & (best == label)
     # (G, L) by gesture and level: how many were right, wrong and false there
     rightly, wrongly, falsely = (_by_level(best, sure, chosen) for chosen in (right, known & ~right, false))
+    groups = alike()
     found: dict[str, Any] = {}
     for name in STRICTNESS:
-        level = np.asarray((rightly - WRONG * wrongly - COSTS[name] * falsely).argmax(axis=1))
+        worth = rightly - WRONG * wrongly - COSTS[name] * falsely
+        level = np.array([int(worth[group].sum(axis=0).argmax()) for group in groups])
         of = np.arange(len(GESTURES)), level
         found[name] = {
             "thresholds": {gesture: float(LEVELS[k]) for gesture, k in zip(GESTURES, level, strict=True)},
@@ -55,6 +58,15 @@ def _by_level(best: NDArray[np.int64], sure: NDArray[np.floating], chosen: NDArr
     """(G, L) how many of the chosen segments are named each gesture with at least each of LEVELS."""
     counts = [(sure[chosen & (best == g)][:, None] >= LEVELS).sum(axis=0) for g in range(len(GESTURES))]
     return np.array(counts, np.int64)
+
+
+def alike() -> list[list[int]]:
+    """(G,) for each gesture those that turns and mirrors make of it, itself among them.
+
+    No direction is meant more often than another, so what told the thresholds of two directions apart would be chance.
+    """
+    table = symmetry_table(CLASSES)[:, : len(GESTURES)]
+    return [sorted({int(k) for k in column if k < len(GESTURES)}) for column in table.T]
 
 
 def by_strictness(points: Mapping[str, Any]) -> str:

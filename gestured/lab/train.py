@@ -271,7 +271,7 @@ def judged(
     return module, calibration_of(decision, least), answer_figures(confidence(answers), labels < len(GESTURES), least)
 
 
-def spoken(module: Judged, nets: nn.ModuleDict, name: str, data: TrainingData, plan: TrainingPlan) -> dict[str, Any]:
+def points_of(module: Judged, nets: nn.ModuleDict, name: str, data: TrainingData, plan: TrainingPlan) -> dict[str, Any]:
     """The metadata `operating_points` of a network with a verifier, on hours of people of whom it knows nothing."""
     assert data.spoken is not None
     assert module.verifier is not None
@@ -374,7 +374,7 @@ def train(
     for name in RECURRENT:
         module, calibration, answered = judged(trained, name, calibrated, data)
         common |= {"kind": name, "calibration": calibration, "quantiles": seen | answered}
-        points = spoken(module, trained.nets, name, data, plan)
+        points = points_of(module, trained.nets, name, data, plan)
         print(f"{name}\n{by_strictness(points)}", flush=True)
         rule = contacts.rule(name, module, np.array(list(points[USUAL]["thresholds"].values())))
         more: dict[str, Any] = {"classes": CLASSES, "context": NAMES, "operating_points": points, "provisional": rule}
