@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gestured.core.classifier import Scores
+from gestured.core.classifier import Classifier, Scores
 from gestured.core.frames import Segment
 from gestured.core.mounting import Mounting
 from gestured.lab.dataset import cuts
@@ -45,8 +45,17 @@ def model(name: str) -> Model:
     return open_model(name)
 
 
-class Alike:
-    """A model with one threshold for all gestures: operating points differ from a gesture to its mirror image."""
+@cache
+def net(name: str) -> Classifier:
+    return model(name) if name == LADDER[0] else OneThreshold(model(name))
+
+
+class OneThreshold:
+    """A model that answers by its one threshold and not by its operating points.
+
+    Near the points' higher thresholds the fallback answers 3 of 60 mirrored streams otherwise (a gesture is unknown).
+    So what its network says is held to LEAST here; the default model keeps it at its operating points, too.
+    """
 
     certainty = None
 
@@ -62,7 +71,7 @@ class Alike:
 
 @cache
 def said(name: str) -> list[tuple[str, ...]]:
-    return [labels(events(stream, Alike(model(name)))) for stream in streams()]
+    return [labels(events(stream, net(name))) for stream in streams()]
 
 
 @settings(max_examples=60, deadline=None)
@@ -87,8 +96,8 @@ def test_a_sensor_that_is_mounted_otherwise_and_says_so_gives_the_same_events(
     stream = streams()[number]
     sent = np.rot90(stream.frames, rotate // 90, axes=(1, 2))  # counter-clockwise: the mounting turns it back
     turned_back = Series(stream.times, sent[:, :, ::-1] if mirror else sent)
-    net = model(LADDER[0])
-    assert events(turned_back, net, Mounting(rotate, mirror)) == events(stream, net)
+    default = model(LADDER[0])
+    assert events(turned_back, default, Mounting(rotate, mirror)) == events(stream, default)
 
 
 @pytest.mark.parametrize("name", LADDER[:2])
@@ -98,9 +107,8 @@ def test_a_sensor_that_is_mounted_otherwise_and_says_so_gives_the_same_events(
     ids=lambda change: change.name,
 )
 def test_the_nets_say_the_same_or_what_it_became(name: str, change: Property) -> None:
-    net = Alike(model(name))
     right = [
-        labels(events(change.apply(stream), net)) == renamed(before, change.names)
+        labels(events(change.apply(stream), net(name))) == renamed(before, change.names)
         for stream, before in zip(streams(), said(name), strict=True)
     ]
     assert sum(right) >= LEAST * len(right)

@@ -18,7 +18,7 @@ from gestured.lab.fit import RECURRENT, padded, targets
 from gestured.lab.samples import Samples
 from gestured.lab.study.bootstrap import interval
 from gestured.lab.train import REAL_SETS, Calibrated, Trained, TrainingData, folds, is_of, judged
-from gestured.lab.verifier import Heard
+from gestured.lab.verifier import Evidence
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.simulator import GESTURES, NONE
@@ -167,8 +167,8 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
         levels = []
         for nets, held in zip(trained.folds, folds(real), strict=True):
             module, calibration, _ = judged(trained, name, without(calibrated, real, held), data)
-            heard = Heard.of(nets, name, real.take(held))
-            scores[held], unknown[held] = heard.answers(module.decision, module.verifier)
+            evidence = Evidence.of(nets, name, real.take(held))
+            scores[held], unknown[held] = evidence.answers(module.decision, module.verifier)
             levels.append(calibration["threshold"])
         least = float(np.mean(levels))
         judged_once = np.arange(len(real)) < data.real_judged

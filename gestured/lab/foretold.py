@@ -14,10 +14,10 @@ from gestured.lab.early import Asked, at_release, calibrated, published, tap_thr
 from gestured.lab.nets import Judged
 from gestured.lab.prefixes import prefixes
 from gestured.lab.samples import WINDOW, Samples, join
-from gestured.lab.verifier import Heard
+from gestured.lab.verifier import Evidence
 from gestured.simulator import GESTURES, NONE
 
-Hearing = Mapping[str, Heard]  # by network, each with the trajectory net beside it
+Evidences = Mapping[str, Evidence]  # by network, each with the trajectory net beside it
 OTHERS = 0.2  # share of non-gestures among what is performed, as in `gestured-lab online`'s sessions
 
 
@@ -26,9 +26,9 @@ class Foretold:
     """Samples of people who were held out, with what each network makes of them."""
 
     samples: Samples
-    whole: Hearing
-    released: Hearing  # when the finger has left for the first time
-    prefixes: Hearing  # at every touched frame
+    whole: Evidences
+    released: Evidences  # when the finger has left for the first time
+    prefixes: Evidences  # at every touched frame
     contact: NDArray[np.int64]  # (N,) whose prefix each is
     since: NDArray[np.int64]  # (N,) frames since its onset
     second: NDArray[np.bool_]  # (N,) whether the finger had left and come back
@@ -41,15 +41,15 @@ class Foretold:
     @classmethod
     def of(cls, parts: Sequence[tuple[nn.ModuleDict, Samples]]) -> "Foretold":
         """Ask each part's networks about its samples."""
-        whole: list[Hearing] = []
-        released: list[Hearing] = []
-        early: list[Hearing] = []
+        whole: list[Evidences] = []
+        released: list[Evidences] = []
+        early: list[Evidences] = []
         contact, since, second, before = [], [], [], 0
         for nets, samples in parts:
             cut, of, frames = prefixes(samples, np.arange(len(samples)))
-            whole.append(_heard(nets, samples))
-            released.append(_heard(nets, at_release(samples)))
-            early.append(_heard(nets, cut))
+            whole.append(_evidence(nets, samples))
+            released.append(_evidence(nets, at_release(samples)))
+            early.append(_evidence(nets, cut))
             contact.append(of + before)
             since.append(frames)
             asked_before = np.arange(len(of)) - np.searchsorted(of, of)
@@ -76,17 +76,17 @@ class Foretold:
         return calibrated(asked, GESTURES, released)
 
 
-def _said(of: Hearing, name: str, module: Judged) -> Answers:
+def _said(of: Evidences, name: str, module: Judged) -> Answers:
     """What a network and its second opinion answer together."""
     return of[name].answers(module.decision, module.verifier)
 
 
-def _heard(nets: nn.ModuleDict, samples: Samples) -> Hearing:
-    return {name: Heard.of(nets, name, samples) for name in nets if name != "trajectory"}
+def _evidence(nets: nn.ModuleDict, samples: Samples) -> Evidences:
+    return {name: Evidence.of(nets, name, samples) for name in nets if name != "trajectory"}
 
 
-def _joined(parts: Sequence[Hearing]) -> Hearing:
-    return {name: Heard.join([part[name] for part in parts]) for name in parts[0]}
+def _joined(parts: Sequence[Evidences]) -> Evidences:
+    return {name: Evidence.join([part[name] for part in parts]) for name in parts[0]}
 
 
 def as_in_sessions(samples: Samples) -> NDArray[np.int64]:

@@ -223,7 +223,7 @@ class Verifier(nn.Module):
         self.scale.copy_(values.std(0).clamp(min=1e-3))
 
     def forward(self, cues: Tensor, embedding: Tensor, context: Tensor) -> Tensor:
-        """(B, cues), (B, E), (B, C) -> (B,) log-odds."""
+        """(B, cues), (B, E), (B, K) -> (B,) log-odds that no gesture was meant."""
         values = (torch.cat([cues, embedding, context], 1) - self.mean) / self.scale
         logit: Tensor = self.layers(values.clamp(-6, 6))
         return logit[:, 0]
@@ -240,7 +240,7 @@ class Judged(nn.Module):
         self.verifier = verifier
 
     def forward(self, frames: Tensor, context: Tensor | None = None) -> tuple[Tensor, Tensor, Tensor]:
-        """(B, T, R, C), perhaps (B, C) -> scores (B, G) given that it is a gesture, unknown (B,), embedding (B, E).
+        """(B, T, R, C), perhaps a context (B, K) -> scores (B, G) given a gesture, unknown (B,), embedding (B, E).
 
         The embedding is what the two heads see: the recurrent net's state, then the trajectory net's hidden layer.
         Where there is a verifier, it has the last word on `unknown`, and needs the context.
@@ -248,7 +248,7 @@ class Judged(nn.Module):
         state, hidden = self.net.embed(frames), self.trajectory.embed(frames)
         first, second = self.net.judge(state), self.trajectory.judge(hidden)
         embedding = torch.cat([state, hidden], 1)
-        scores, unknown = self.decision(first, second)
-        if self.verifier is not None and context is not None:
-            unknown = torch.sigmoid(self.verifier(self.decision.cues(first, second)[1], embedding, context))
-        return scores, unknown, embedding
+        if self.verifier is None or context is None:
+            return *self.decision(first, second), embedding
+        scores, cues = self.decision.cues(first, second)
+        return scores.exp(), torch.sigmoid(self.verifier(cues, embedding, context)), embedding

@@ -1,7 +1,7 @@
 """The operating points of a model: thresholds by strictness, and the curve of missed gestures against false ones.
 
-They are chosen on hours of simulated everyday life of people of whom no network knows. Gestures that are mirror images of one
-another share a threshold: the one at which right answers are worth most against wrong and false ones.
+They are chosen on hours of simulated everyday life of people of whom no network knows. Gestures that are mirror images
+of one another share a threshold: the one at which right answers are worth most against wrong and false ones.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from gestured.core.points import STRICTNESS
 from gestured.lab.augment import symmetry_table
-from gestured.lab.decide import Answers, confidence
+from gestured.lab.decide import WRONG, Answers, confidence
+from gestured.lab.everyday.hours import LEVELS
 from gestured.lab.fit import CLASSES, targets
 from gestured.lab.samples import EVERYDAY, Samples
 from gestured.simulator import GESTURES, NONE
@@ -20,8 +21,6 @@ from gestured.simulator import GESTURES, NONE
 # Lost gestures that one false gesture counts as much as, on a day on which some 35 gestures an hour are meant. A budget
 # of false ones alone would give up the taps, which are what everyday life most looks like.
 COSTS = dict(zip(STRICTNESS, (0.1, 0.4, 3.0), strict=True))
-LEVELS = np.round(np.concatenate([np.arange(0.05, 0.95, 0.01), np.arange(0.95, 0.9995, 0.001)]), 4)
-WRONG = 2.0  # lost gestures that a gesture taken for another one counts as much as
 
 
 def operating_points(answers: Answers, lived: Samples, performed: int, hours: float) -> dict[str, Any]:
@@ -56,7 +55,7 @@ def operating_points(answers: Answers, lived: Samples, performed: int, hours: fl
 
 def _by_level(best: NDArray[np.int64], sure: NDArray[np.floating], chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
     """(G, L) how many of the chosen segments are named each gesture with at least each of LEVELS."""
-    counts = [(sure[chosen & (best == g)][:, None] >= LEVELS).sum(axis=0) for g in range(len(GESTURES))]
+    counts = [(sure[chosen & (best == g)][:, None] >= np.array(LEVELS)).sum(axis=0) for g in range(len(GESTURES))]
     return np.array(counts, np.int64)
 
 

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from sklearn.ensemble import RandomForestClassifier
 from torch import Tensor, nn
 
 import gestured
@@ -28,16 +27,17 @@ from gestured.lab.decide import calibration_of, confidence, decided, fit_decisio
 from gestured.lab.digest import code_digest
 from gestured.lab.export import Facts, export_forest, export_net
 from gestured.lab.fit import CLASSES, NETS, RECURRENT, FitConfig, finetune, load_nets, logits, pretrain, targets
-from gestured.lab.forest_graph import forest_outputs
+from gestured.lab.forest import grow_forest
 from gestured.lab.foretold import Foretold
 from gestured.lab.manifest import write_manifest
 from gestured.lab.nets import Judged, Opinion
 from gestured.lab.points import by_strictness, operating_points
+from gestured.lab.quantiles import answer_figures, quantiles
 from gestured.lab.recordings.origin import origins
 from gestured.lab.samples import WINDOW, Samples, join
-from gestured.lab.verifier import Heard, fit_verifier, meant, with_past_of
+from gestured.lab.verifier import Evidence, fit_verifier, taught, with_past_of
 from gestured.model.context import NAMES
-from gestured.model.features import MEASURES, feature_names, measures
+from gestured.model.features import feature_names
 from gestured.record.arrays import read
 from gestured.simulator import GESTURES, NONE, wide
 
@@ -174,14 +174,14 @@ class Trained:
     nets: nn.ModuleDict
     held_out: dict[str, Tensor] | None  # (G, K) logits of each net over the real samples, None without any
     folds: list[nn.ModuleDict] = field(default_factory=list)  # those that had not seen the subjects of `folds`
-    _heard: dict[tuple[str, str], Heard] = field(default_factory=dict)
+    _kept: dict[tuple[str, str], Evidence] = field(default_factory=dict)
 
-    def hear(self, name: str, samples: Samples) -> Heard:
+    def evidence(self, name: str, samples: Samples) -> Evidence:
         """What a network, and the trajectory net beside it, make of samples; each set is asked about once."""
         key = name, samples.digest()
-        if key not in self._heard:
-            self._heard[key] = Heard.of(self.nets, name, samples)
-        return self._heard[key]
+        if key not in self._kept:
+            self._kept[key] = Evidence.of(self.nets, name, samples)
+        return self._kept[key]
 
 
 def learn(plan: TrainingPlan, data: TrainingData, cache: Path, names: Sequence[str] = NETS) -> Trained:
@@ -259,8 +259,8 @@ def judged(
     answers, labels, sets, verifier = decided(decision, first, second), calibrated.labels, calibrated.sets, None
     if data is not None and data.lived is not None:
         alone = data.calibrate.take(targets(data.calibrate) >= 0)
-        taken = trained.hear(name, alone).beside(with_past_of(alone, data.lived, 1))
-        learned = [(trained.hear(name, data.lived), meant(data.lived)), (taken, meant(alone))]
+        taken = trained.evidence(name, alone).beside(with_past_of(alone, data.lived, 1))
+        learned = [(trained.evidence(name, data.lived), taught(data.lived)), (taken, taught(alone))]
         verifier = fit_verifier(decision, learned, 1)
         answers, labels, sets = taken.answers(decision, verifier), labels[: len(alone)], sets[: len(alone)]
     least = threshold(answers, labels, sets)
@@ -271,88 +271,15 @@ def judged(
     return module, calibration_of(decision, least), answer_figures(confidence(answers), labels < len(GESTURES), least)
 
 
-def points_of(module: Judged, nets: nn.ModuleDict, name: str, data: TrainingData, plan: TrainingPlan) -> dict[str, Any]:
+def measured_points(
+    trained: Trained, module: Judged, name: str, data: TrainingData, plan: TrainingPlan
+) -> dict[str, Any]:
     """The metadata `operating_points` of a network with a verifier, on hours of people of whom it knows nothing."""
     assert data.spoken is not None
     assert module.verifier is not None
-    answers = Heard.of(nets, name, data.spoken).answers(module.decision, module.verifier)
+    answers = trained.evidence(name, data.spoken).answers(module.decision, module.verifier)
     performed = sum(meant_on(3, index) for index in range(plan.days_points))
     return operating_points(answers, data.spoken, performed, plan.days_points * DAY_S / 3600.0)
-
-
-def grow_forest(
-    data: TrainingData, plan: TrainingPlan, jobs: int
-) -> tuple[RandomForestClassifier, dict[str, Any], dict[str, Any]]:
-    """The touch-pattern forest of the paper's Table IV (200 trees, depth 9), with a class for what is no gesture.
-
-    Gives what `judged` gives.
-    """
-    wide = len(data.teach) - data.nominal  # the cohort stands at the end
-    chosen = np.random.default_rng(plan.fit.seed).choice(wide, min(plan.forest, wide), replace=False)
-    parts = [data.teach.take(np.concatenate([chosen, np.arange(wide, len(data.teach))]))]
-    if data.real is not None:
-        parts.append(data.real)
-    samples = join(parts)
-    classes = np.minimum(_classes(samples), len(GESTURES))
-    # Each class counts as much as any other, and the real recordings, which know taps and swipes alone, for a fifth.
-    weights = np.where(np.arange(len(samples)) < len(parts[0]), 1.0, 0.2)
-    weights /= np.bincount(classes, weights)[classes]
-    forest = RandomForestClassifier(200, max_depth=9, min_samples_leaf=2, n_jobs=jobs, random_state=plan.fit.seed)
-    forest.fit(samples.features(), classes, sample_weight=weights)
-    labels = np.minimum(_classes(data.calibrate), len(GESTURES))
-    chances = forest.predict_proba(data.calibrate.features())
-    calibration = _forest_calibration(chances, labels)
-    sure = confidence(forest_outputs(chances, len(GESTURES), calibration))
-    return forest, calibration, answer_figures(sure, labels < len(GESTURES), calibration["threshold"])
-
-
-def _classes(samples: Samples) -> NDArray[np.int64]:
-    labels = targets(samples)
-    return np.where(labels < 0, len(CLASSES), labels)
-
-
-def _forest_calibration(chances: NDArray[np.float64], labels: NDArray[np.int64]) -> dict[str, Any]:
-    """Temperature by likelihood; a threshold from which at most 6 % of the calibration gestures are wrong."""
-    known = labels < len(GESTURES)
-    best: tuple[float, dict[str, Any]] | None = None
-    for temperature in np.geomspace(0.2, 2.0, 24):
-        calibration = {"temperature": float(temperature), "unknown_scale": 1.0, "unknown_offset": 0.0}
-        scores, _ = forest_outputs(chances, len(GESTURES), calibration)
-        loss = -float(np.log(np.maximum(scores[known, labels[known]], 1e-9)).mean())
-        if best is None or loss < best[0]:
-            best = loss, calibration
-    assert best is not None
-    calibration = best[1]
-    answers = forest_outputs(chances, len(GESTURES), calibration)
-    sure, wrong = confidence(answers), known & (answers[0].argmax(axis=1) != labels)
-    for least in np.linspace(0.05, 0.95, 91):
-        calibration["threshold"] = round(float(least), 3)
-        if (wrong & (sure >= least)).sum() <= 0.06 * known.sum() and (sure[~known] >= least).mean() <= 0.1:
-            break
-    return calibration
-
-
-QUANTILES = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
-
-
-def quantiles(samples: Samples) -> dict[str, Any]:
-    """What the training gestures looked like, to compare a deployment with."""
-    known = samples.take(samples.labels != "none")
-    found = [measures(known.window(i), WINDOW.rate_hz) for i in range(len(known))]
-    values = {"strength": known.strength} | {name: np.array([one[name] for one in found]) for name in MEASURES}
-    return {"at": list(QUANTILES)} | {name: _at(value) for name, value in values.items()}
-
-
-def _at(values: NDArray[np.floating]) -> list[float]:
-    """The values at `QUANTILES`, of which one number has at least four digits."""
-    return [float(f"{value:.5g}") for value in np.quantile(values, QUANTILES)]
-
-
-def answer_figures(confidence: NDArray[np.floating], known: NDArray[np.bool_], least: float) -> dict[str, Any]:
-    """How a model answers gestures of people whom it has not seen: confidence where it answers, and how often not."""
-    given = confidence[known]
-    answered = given[given >= least] if (given >= least).any() else given
-    return {"confidence": _at(answered), "unknown": round(float((given < least).mean()), 4)}
 
 
 def train(
@@ -374,12 +301,15 @@ def train(
     for name in RECURRENT:
         module, calibration, answered = judged(trained, name, calibrated, data)
         common |= {"kind": name, "calibration": calibration, "quantiles": seen | answered}
-        points = points_of(module, trained.nets, name, data, plan)
+        points = measured_points(trained, module, name, data, plan)
         print(f"{name}\n{by_strictness(points)}", flush=True)
         rule = contacts.rule(name, module, np.array(list(points[USUAL]["thresholds"].values())))
         more: dict[str, Any] = {"classes": CLASSES, "context": NAMES, "operating_points": points, "provisional": rule}
         export_net(module, out / f"{name}.onnx", Facts(**common, **more))
-    forest, calibration, answered = grow_forest(data, plan, jobs)
+    wide = len(data.teach) - data.nominal  # the cohort stands at the end
+    some = np.random.default_rng(plan.fit.seed).choice(wide, min(plan.forest, wide), replace=False)
+    shown = data.teach.take(np.concatenate([some, np.arange(wide, len(data.teach))]))
+    forest, calibration, answered = grow_forest(shown, data.real, data.calibrate, plan.fit.seed, jobs)
     common |= {"kind": "touch_pattern_rf", "calibration": calibration, "quantiles": seen | answered}
     path = out / "touch_pattern_rf.onnx"
     export_forest(forest, path, Facts(**common), feature_names(WINDOW.rows, WINDOW.columns))

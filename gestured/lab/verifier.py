@@ -28,7 +28,7 @@ OTHERS_COST = 0.5  # and all non-gestures that were performed one by one
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class Evidence:
     """What a network, and the trajectory net beside it, make of G samples."""
 
     first: Tensor  # (G, K) logits of the network
@@ -37,7 +37,7 @@ class Heard:
     context: Tensor  # (G, C)
 
     @classmethod
-    def of(cls, nets: nn.ModuleDict, name: str, samples: Samples) -> "Heard":
+    def of(cls, nets: nn.ModuleDict, name: str, samples: Samples) -> "Evidence":
         """Ask both networks."""
         net, trajectory = nets[name], nets["trajectory"]
         assert isinstance(net, Opinion)
@@ -55,18 +55,18 @@ class Heard:
         first, second, embedding = (torch.cat(parts)[back] for parts in zip(*found, strict=True))
         return cls(first, second, embedding, torch.from_numpy(samples.context))
 
-    def beside(self, context: NDArray[np.float32]) -> "Heard":
+    def beside(self, context: NDArray[np.float32]) -> "Evidence":
         """The same segments in other surroundings, (G, C)."""
         return replace(self, context=torch.from_numpy(context))
 
     @classmethod
-    def join(cls, parts: "Sequence[Heard]") -> "Heard":
+    def join(cls, parts: "Sequence[Evidence]") -> "Evidence":
         """What was made of several sets, one after the other."""
         return cls(*(torch.cat([getattr(part, name) for part in parts]) for name in cls.__slots__))
 
-    def take(self, chosen: Tensor) -> "Heard":
+    def take(self, chosen: Tensor) -> "Evidence":
         """Of the chosen segments, a mask or indices."""
-        return Heard(*(getattr(self, name)[chosen] for name in self.__slots__))
+        return Evidence(*(getattr(self, name)[chosen] for name in self.__slots__))
 
     def answers(self, decision: Decision, verifier: Verifier | None) -> Answers:
         """What both say together, after the verifier if there is one."""
@@ -78,7 +78,7 @@ class Heard:
         return scores.exp().numpy(), unknown.numpy()
 
 
-def meant(samples: Samples) -> NDArray[np.int64]:
+def taught(samples: Samples) -> NDArray[np.int64]:
     """(G,) 0 for a gesture, 1 for everyday life, 2 for another non-gesture, -1 for what teaches nothing."""
     kinds = np.full(len(samples), 2)
     kinds[samples.kinds == EVERYDAY] = 1
@@ -95,15 +95,15 @@ def with_past_of(samples: Samples, lived: Samples, seed: int) -> NDArray[np.floa
     return context
 
 
-def fit_verifier(decision: Decision, parts: Sequence[tuple[Heard, NDArray[np.int64]]], seed: int) -> Verifier:
-    """Learn from parts of (what was heard, (G,) classes: 0 a gesture, 1 everyday life, 2 another non-gesture, -1 none).
+def fit_verifier(decision: Decision, parts: Sequence[tuple[Evidence, NDArray[np.int64]]], seed: int) -> Verifier:
+    """Learn from parts of (evidence, what each of its segments teaches, as `taught` says).
 
     Each of the three counts as a whole, however many there are of it.
     """
     y = torch.from_numpy(np.concatenate([kind for _, kind in parts]))
     with torch.no_grad():
-        cues = torch.cat([decision.cues(heard.first, heard.second)[1] for heard, _ in parts])
-    embedding, context = (torch.cat([getattr(heard, name) for heard, _ in parts]) for name in ("embedding", "context"))
+        cues = torch.cat([decision.cues(one.first, one.second)[1] for one, _ in parts])
+    embedding, context = (torch.cat([getattr(one, name) for one, _ in parts]) for name in ("embedding", "context"))
     usable = torch.nonzero(y >= 0)[:, 0]
     counts = torch.bincount(y[usable], minlength=3).clamp(min=1)
     weight = torch.tensor([1.0, EVERYDAY_COST, OTHERS_COST]) / counts * len(usable)

@@ -222,7 +222,7 @@ def test_metadata_that_say_nothing_give_no_verdict(quantiles: dict[str, Any]) ->
 
 
 def test_what_is_measured_is_what_the_lab_measures_of_its_training_data() -> None:
-    train = pytest.importorskip("gestured.lab.train", reason="needs the lab's packages")
+    lab = pytest.importorskip("gestured.lab.quantiles", reason="needs the lab's packages")
     from gestured.lab.samples import WINDOW, Samples
 
     rng = np.random.default_rng(3)
@@ -252,9 +252,9 @@ def test_what_is_measured_is_what_the_lab_measures_of_its_training_data() -> Non
         ends,
         np.zeros((len(windows), 1), np.float32),
     )
-    ours = train.quantiles(samples)
+    ours = lab.quantiles(samples)
     for name in ("strength", *MEASURES):
-        expected = np.quantile([s[name] for s in seen], train.QUANTILES)
+        expected = np.quantile([s[name] for s in seen], lab.QUANTILES)
         assert ours[name] == pytest.approx(expected, rel=0.02, abs=2e-3), name
 
 

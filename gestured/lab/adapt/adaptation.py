@@ -24,7 +24,7 @@ from gestured.lab.adapt.weights import Base
 from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Decision, Judged
 from gestured.lab.samples import Samples
-from gestured.lab.verifier import Heard
+from gestured.lab.verifier import Evidence
 from gestured.simulator import GESTURES
 
 WAYS = (0.25, 0.5, 0.75, 1.0)  # of the way from the old weights to the new ones
@@ -93,7 +93,7 @@ def settled(start: Judged, least: float, own: Own, takes: Simulated, course: Cou
     run.listen(ends)
     samples = replace(own.samples, people=groups.unit_of_samples)
 
-    def answers(decision: Decision, said: Heard) -> Answers:
+    def answers(decision: Decision, said: Evidence) -> Answers:
         return Answers.of(samples, said.answers(decision, start.verifier), groups.unit_of_missed)
 
     of_rows = np.concatenate([groups.of_samples, groups.of_missed])
@@ -120,7 +120,7 @@ class _Run:
     def __init__(self, start: Judged, own: Own, groups: NDArray[np.int64], takes: Simulated) -> None:
         self._start, self._own, self._groups, self._takes = start, own, groups, takes
         self._classes = classes_of(own.samples)
-        self.said: dict[float, Heard] = {}
+        self.said: dict[float, Evidence] = {}
         self._loss: dict[float, NDArray[np.float64]] = {}
 
     def listen(self, ends: list[Judged]) -> None:
@@ -132,7 +132,7 @@ class _Run:
                 opinions(between(self._start, end, way), self._own.samples.take(part))
                 for end, part in zip(ends, parts, strict=True)
             ]
-            self.said[way] = Heard.join(found).take(back)
+            self.said[way] = Evidence.join(found).take(back)
             self._loss[way] = _losses(self._start, self.said[way], self._classes)
 
     def decision(self, end: Judged, others: NDArray[np.bool_]) -> tuple[Decision, float]:
@@ -141,14 +141,14 @@ class _Run:
         check = self._takes.check
         both = opinions(between(self._start, end, way), check)
         rows = torch.from_numpy(others)
-        heard = Heard.join([self.said[way].take(rows), both])
+        evidence = Evidence.join([self.said[way].take(rows), both])
         own, made = int(others.sum()), len(check)
         weight = np.concatenate([np.ones(own), np.full(made, own / made)])  # simulated ones count as much in all
         classes = np.concatenate([self._classes[others], classes_of(check)])
-        return refitted(self._start.decision, heard.first, heard.second, classes, weight), way
+        return refitted(self._start.decision, evidence.first, evidence.second, classes, weight), way
 
 
-def _losses(start: Judged, said: Heard, classes: NDArray[np.int64]) -> NDArray[np.float64]:
+def _losses(start: Judged, said: Evidence, classes: NDArray[np.int64]) -> NDArray[np.float64]:
     """(G,) how little each answer was expected."""
     scores, unknown = said.answers(start.decision, start.verifier)
     known = classes < len(GESTURES)

@@ -23,9 +23,9 @@ from gestured.lab.decide import calibration_of
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
 from gestured.lab.own.command import PEOPLE, teach
+from gestured.lab.quantiles import answer_figures, quantiles
 from gestured.lab.recordings.origin import KEY, origins
 from gestured.lab.samples import WINDOW, Samples
-from gestured.lab.train import answer_figures, quantiles
 from gestured.model.shipped import shipped_name
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES, NONE

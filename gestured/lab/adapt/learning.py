@@ -19,7 +19,7 @@ from gestured.lab.fit import CLASSES, FitConfig, Shown, optimiser_of, step, targ
 from gestured.lab.nets import Judged, Opinion
 from gestured.lab.progress import progress
 from gestured.lab.samples import Samples, join
-from gestured.lab.verifier import Heard
+from gestured.lab.verifier import Evidence
 from gestured.simulator import GESTURES
 
 OTHER = len(CLASSES)  # a non-gesture of a kind that has no class
@@ -71,9 +71,9 @@ def between(start: Judged, end: Judged, share: float) -> Judged:
     return found.eval()
 
 
-def opinions(judged: Judged, samples: Samples) -> Heard:
+def opinions(judged: Judged, samples: Samples) -> Evidence:
     """What the network and its second opinion make of all samples, in their order."""
-    return Heard.of(nn.ModuleDict({"net": judged.net, "trajectory": judged.trajectory}), "net", samples)
+    return Evidence.of(nn.ModuleDict({"net": judged.net, "trajectory": judged.trajectory}), "net", samples)
 
 
 def _batches(

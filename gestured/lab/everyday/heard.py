@@ -7,14 +7,14 @@ from gestured.core.events import Gesture, Onset, Provisional, Unknown
 from gestured.core.facts import Decided
 from gestured.core.front_end import FrontEnd
 from gestured.core.points import Strictness
-from gestured.core.scene import Scene
+from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
 from gestured.core.segmenter import SPENT
 from gestured.core.sensor import Sensor, Told
 from gestured.lab.everyday.stretches import HOUR_S, Stretch
 from gestured.model.model import Model
 from gestured.record.judge import Performed, Said, whose
 
-TAPS = ("one_tap", "double_tap")
+TAPS = (ONE_TAP, DOUBLE_TAP)
 LONGEST_STEP_S = 1.0  # from frame to frame that counts as heard or deaf; in a longer one the sensor was silent
 NOT_READY, RESTARTING, HELD = "not ready", "restarting", "spent"  # in what a sensor is deaf
 

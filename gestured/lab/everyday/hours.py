@@ -14,6 +14,7 @@ from gestured.record.judge import NONE, verdicts
 
 DRAWS = 2000  # of people, for an interval
 FEW = 5  # people; of fewer an interval over them says nothing
+# Thresholds of a curve: closer to one another where few false gestures are left.
 LEVELS = np.round(np.concatenate([np.arange(0.05, 0.95, 0.01), np.arange(0.95, 0.9995, 0.001)]), 4).tolist()
 
 Least = float | Mapping[str, float]  # confidence from which a gesture is published, of all alike or by gesture

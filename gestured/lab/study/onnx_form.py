@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnx
 import torch
 from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingClassifier, RandomForestClassifier
@@ -95,5 +96,9 @@ def quantised(graph: Graph) -> Graph | None:
         logging.disable(logging.WARNING)  # it recommends a step that changes nothing here
         quantize_dynamic(before, after, op_types_to_quantize=["MatMul", "Gemm", "LSTM"], weight_type=QuantType.QInt8)
         logging.disable(logging.NOTSET)
-        data = after.read_bytes()
+        proto = onnx.load(after)
+        kept = [entry for entry in proto.metadata_props if entry.key != "digest"]  # it was of the graph before
+        del proto.metadata_props[:]
+        proto.metadata_props.extend(kept)
+        data = proto.SerializeToString(deterministic=True)
     return Graph(data) if len(data) < len(graph.data) else None
