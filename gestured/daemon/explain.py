@@ -11,13 +11,11 @@ from gestured.core.timing import Timing
 from gestured.daemon.asked import open_ladder
 from gestured.daemon.client import BACKLOG_BYTES
 from gestured.daemon.clients import CLIENTS
-from gestured.daemon.settings import TABLES, TITLES, Part, Settings
+from gestured.daemon.settings import INSIDE, TABLES, TITLES, Part, Settings
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
 from gestured.model import own_file
 from gestured.model.ladder import Ladder, gestures_in_use
-
-INSIDE = {"gestures": ("per_gesture", "use"), "gates": ("gate", "socket")}  # keys that a file has in a table, as this
 
 
 def _felt(wait_s: float, rate_hz: float) -> str:

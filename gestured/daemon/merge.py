@@ -8,23 +8,12 @@ was expected. pydantic-settings would do the merging for 105 ms more at every st
 import errno
 import re
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, get_args, get_origin
 
 from pydantic import ValidationError
 
 from gestured.core.errors import SettingsError
-from gestured.daemon.settings import (
-    FLAGS,
-    TITLES,
-    AddressSettings,
-    ArmingSettings,
-    GatesSettings,
-    GestureSettings,
-    Part,
-    SensorSettings,
-    Settings,
-    ZoneSettings,
-)
+from gestured.daemon.settings import FLAGS, INSIDE, TITLES, Part, Settings
 from gestured.record.files import open_regular
 
 ENVIRONMENT = "GESTURED_"
@@ -112,24 +101,22 @@ def _unknown(key: str, known: tuple[str, ...]) -> str:
 
 
 def _keys_at(place: tuple[Any, ...]) -> tuple[str, ...]:
-    if len(place) < 2:
-        return tuple(TITLES.get(name, name) for name in Settings.model_fields)
-    parts: dict[str, type[Part]] = {
-        "sensors": SensorSettings,
-        "per_gesture": GestureSettings,
-        "addresses": AddressSettings,
-        "arming": ArmingSettings,
-        "gate": GatesSettings,
-    }
-    inner: dict[str, type[Part]] = {"zones": ZoneSettings, "arming": ArmingSettings}
-    part = inner.get(place[2] if len(place) > 3 else "", parts[place[0]])
-    return tuple(part.model_fields)
+    """The keys that can stand beside the last one of a place in the file, as the annotations of settings say it."""
+    part: type[Part] = Settings
+    names = iter(place[:-1])
+    for name in names:
+        kind = part.model_fields[name].annotation
+        part = next(one for one in (kind, *get_args(kind)) if isinstance(one, type) and issubclass(one, Part))
+        if get_origin(kind) is dict:
+            next(names, None)  # what the user calls the table
+    inside = [key for table, key in INSIDE.values() if place[:-1] == (table,)]
+    return tuple(dict.fromkeys([*(TITLES.get(name, name) for name in part.model_fields), *inside]))
 
 
 def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     place = tuple(part for part in problem["loc"] if part not in ("[key]",))
     source = sources.get(str(place[0]), "default")
-    key = ".".join(TITLES.get(part, str(part)) for part in place)
+    key = ".".join((TITLES.get(place[0], str(place[0])), *map(str, place[1:])))
     if problem["type"] == "missing":
         return f"{key} ({source}): is missing"
     if problem["type"] == "extra_forbidden":

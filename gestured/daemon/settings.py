@@ -224,7 +224,9 @@ class Settings(Part):
     gate: GatesSettings = Field(default=GatesSettings(), description="table `[gates]`, in the file only")
 
 
-TABLES = ("sensors", "per_gesture", "addresses", "arming", "gate")  # in the file only
-TITLES = {"per_gesture": "gestures", "gate": "gates"}  # what tables are called in the file, where their key is another
+TABLES = ("sensors", "per_gesture", "addresses", "arming", "gate")  # settings that are tables, in the file only
+# Tables whose title in the file is another than our name for them, since a setting has that name, and their titles.
+TITLES = {"per_gesture": "gestures", "gate": "gates"}
+INSIDE = {"gestures": ("per_gesture", "use"), "gates": ("gate", "socket")}  # those settings: table, and key there
 FLAGS = tuple(name for name in Settings.model_fields if name not in TABLES)
 REPEATED = ("fallback", "publish", "allow")
