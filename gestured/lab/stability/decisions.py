@@ -1,7 +1,7 @@
-"""Every way to run a shipped model, and fewer digits: how many answers differ from those of the same graph in float64.
+"""Shipped models, and windows of fewer digits: how many answers differ from those of the same graph in float64.
 
 The reference evaluates the .onnx file itself with `onnx.reference` (numpy, operator by operator), all its weights,
-constants and casts widened to float64. The torch modules are those that `adapt` starts from.
+constants and casts widened to float64.
 """
 
 from collections.abc import Callable, Sequence
@@ -9,19 +9,16 @@ from typing import Any
 
 import numpy as np
 import onnx
-import torch
 from numpy.typing import NDArray
 from onnx import TensorProto, numpy_helper
 from onnx.reference import ReferenceEvaluator
 from onnx.reference.op_run import OpRun
 
-from gestured.lab.adapt.weights import base_of
 from gestured.lab.decide import Answers
 from gestured.lab.early import published
 from gestured.lab.fit import RECURRENT
 from gestured.lab.samples import WINDOW
 from gestured.lab.stability.segments import segment_cases
-from gestured.lab.study.onnx_form import Graph, quantised
 from gestured.lab.table import Table, Value
 from gestured.model.context import NAMES, calm
 from gestured.model.features import touch_pattern
@@ -57,8 +54,8 @@ def decisions_table(names: Sequence[str], windows: Windows, quick: bool) -> Tabl
         reference = by_reference(data)
         for title, some in sets.items():
             right = answers(reference, name, some)
-            for way, run in ways(name, data, model).items():
-                rows.append((name, f"{len(some)} {title}", way, *difference(answers(run, name, some), right, model)))
+            found = answers(model.run, name, some)
+            rows.append((name, f"{len(some)} {title}", "as the daemon", *difference(found, right, model)))
             half = [window.astype(np.float16).astype(np.float32) for window in some]
             found = answers(model.run, name, half)
             rows.append((name, f"{len(some)} {title}", "float16 windows", *difference(found, right, model)))
@@ -69,42 +66,15 @@ def decisions_table(names: Sequence[str], windows: Windows, quick: bool) -> Tabl
         (
             "Against the same graph in float64, window by window. The extreme windows are those of the table of",
             f"faults, of at most {LONGEST} frames, each once. An answer is the gesture that is published, or none.",
-            "Scores are from 0 to 1. An int8 model fails its self-test: the daemon would refuse it.",
+            "Scores are from 0 to 1.",
         ),
     )
-
-
-def ways(name: str, data: bytes, model: Model) -> dict[str, Run]:
-    """How a shipped model can be run."""
-    found: dict[str, Run] = {"onnxruntime, as the daemon": model.run}
-    if name in RECURRENT:
-        module = base_of(name).judged
-
-        def by_torch(frames: NDArray[Any]) -> Sequence[Any]:
-            with torch.no_grad():
-                around = torch.from_numpy(calm(len(frames), NAMES))
-                return [output.numpy() for output in module(torch.from_numpy(frames), around)]
-
-        found["torch"] = by_torch
-        smaller = quantised(Graph(data))
-        if smaller is not None:
-            found["int8 weights"] = unchecked(smaller.data)
-    return found
 
 
 def by_reference(data: bytes) -> Run:
     """The graph in float64."""
     runner = ReferenceEvaluator(widened(data), new_ops=[GatherElements])
     return lambda values: list(runner.run(["scores", "unknown"], _inputs(runner.input_names, values, np.float64)))
-
-
-def unchecked(data: bytes) -> Run:
-    """A graph whose outputs need not be those of its self-test."""
-    import onnxruntime
-
-    session = onnxruntime.InferenceSession(data, providers=["CPUExecutionProvider"])
-    names = [value.name for value in session.get_inputs()]
-    return lambda values: list(session.run(("scores", "unknown"), _inputs(names, values, np.float32)))
 
 
 def _inputs(names: Sequence[str], values: NDArray[Any], kind: type[np.floating[Any]]) -> dict[str, NDArray[Any]]:
