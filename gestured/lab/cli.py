@@ -24,7 +24,6 @@ PROGRAMS = {
     "evaluate": "gestured.lab.commands",
     "adapt": "gestured.lab.adapt.command",
     "everyday": "gestured.lab.everyday.command",
-    "online": "gestured.lab.online",
     "own": "gestured.lab.own.command",
     "stability": "gestured.lab.stability.command",
     "study": "gestured.lab.study.study",
@@ -110,18 +109,11 @@ def parser() -> argparse.ArgumentParser:
     everyday.add_argument("--seed", type=int, default=FIRST_DAY, help="of the first hour; nothing was trained on the "
                           f"default's (default: {FIRST_DAY})")  # fmt: skip
     everyday.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
-    online = add("online", "start a daemon, send it continuous simulated sessions over UDP, and score its events",
-                 "gestured-lab online --model cnn_lstm --minutes 10")  # fmt: skip
-    online.add_argument("--model", default="cnn_lstm", help="model of the daemon that is started (default: cnn_lstm)")
-    online.add_argument("--minutes", type=float, default=20, help="minutes of sessions (default: 20)")
-    online.add_argument("--idle-minutes", type=float, default=5, help="minutes of an untouched sensor (default: 5)")
-    online.add_argument("--speed", type=float, default=100, help="times real time (default: 100)")
-    online.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (default: 900)")
     stability = add("stability", "measure filters, extreme inputs through the whole path, and models by their answers",
                     "gestured-lab stability --quick")  # fmt: skip
     stability.add_argument("--quick", action="store_true", help="some seconds instead of some minutes")
     study = add("study", "compare every method of the paper, and some beyond it, under several protocols; "
-                "writes one HTML page, study.json and CSV files; goes on where it was interrupted",
+                "writes its tables and figures, study.json and CSV files; goes on where it was interrupted",
                 "gestured-lab study --out report/ --jobs 2")  # fmt: skip
     study.add_argument("--out", type=Path, default=Path("report"), help="folder for the report (default: report)")
     study.add_argument("--seeds", type=int, default=3, help="seeds of each figure of the main tables (default: 3)")

@@ -18,7 +18,7 @@ from gestured.lab.verifier import Evidence
 from gestured.simulator import GESTURES, NONE
 
 Evidences = Mapping[str, Evidence]  # by network, each with the trajectory net beside it
-OTHERS = 0.2  # share of non-gestures among what is performed, as in `gestured-lab online`'s sessions
+OTHERS = 0.2  # share of non-gestures among what is performed, as in the sessions of `gestured.lab.online`
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,7 +60,7 @@ def test_help_needs_no_torch(command: str, tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("line", ["", "fly", "train --jobs many", "train --epochs 3", "online --minutes long"])
+@pytest.mark.parametrize("line", ["", "fly", "train --jobs many", "train --epochs 3", "everyday --hours long"])
 def test_arguments_that_mean_nothing_are_usage_errors(line: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(line.split())
@@ -101,7 +101,7 @@ def test_a_folder_that_cannot_be_made_is_named_before_anything_is_simulated(
 
 def test_a_model_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(tmp_path / "nowhere.onnx")
-    assert main(["online", "--model", path]) == 1
+    assert main(["everyday", path, "--hours", "1"]) == 1
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("gestured-lab:")]
     assert "nowhere.onnx" in line
 
@@ -109,13 +109,13 @@ def test_a_model_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.Captu
 def test_an_interrupted_run_says_that_nothing_finished_is_lost(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from gestured.lab import online
+    from gestured.lab.everyday import command
 
     def interrupt(_: object) -> int:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(online, "run", interrupt)
-    assert main(["online"]) == 130
+    monkeypatch.setattr(command, "run", interrupt)
+    assert main(["everyday"]) == 130
     assert "what is finished is kept" in capsys.readouterr().err
 
 

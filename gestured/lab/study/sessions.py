@@ -67,7 +67,7 @@ def score(model: str, sessions: list[Take], title: str) -> dict[str, Any]:
     """Play every session to a daemon with this model; counts and shares of the gestures that were performed."""
     tallies = []
     for take in progress(sessions, len(sessions), title):
-        events, zero, _ = play(model, take, SPEED)
+        events, zero = play(model, take, SPEED)
         tallies.append(tallied(take, zero, events)[0])
     of = {key: np.array([tally.counts[key] for tally in tallies]) for key in ("right", "wrong", "missed", "false")}
     performed = of["right"] + of["wrong"] + of["missed"]
@@ -89,7 +89,7 @@ def online(
     """The study's models, and the shipped ones."""
     if not plan.minutes:
         return [], []
-    sessions = [take for _, take in takes(plan.minutes, 0.0, FIRST_PERSON)]
+    sessions = list(takes(plan.minutes, FIRST_PERSON))
     folder.mkdir(parents=True, exist_ok=True)
     ours, shipped = [], []
     for name in ("tp_rf", "lstm", "cnn_lstm"):
