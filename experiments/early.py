@@ -13,14 +13,18 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gestured.core.classifier import Classifier
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
-from gestured.core.scene import DOUBLE_TAP, ONE_TAP
+from gestured.core.facts import events_of
+from gestured.core.frames import Frame
+from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
+from gestured.core.sensor import Sensor
 from gestured.lab.dataset import Truth, truths
 from gestured.lab.made_of import made_of
 from gestured.lab.online import NON_GESTURE_SHARE, SESSION_S
 from gestured.lab.progress import progress
-from gestured.lab.study.said import heard
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped, shipped_name
 from gestured.record.judge import owners, verdict
@@ -28,6 +32,14 @@ from gestured.simulator import NONE, Participant, SimulatedSensor, Take, any_sen
 
 HARD = 0.9  # hardness of the simulator's hard sensors
 SETS = ("nominal", "hard", "non-gestures")
+
+
+def heard(times: NDArray[np.float64], frames: NDArray[np.generic], classifier: Classifier) -> list[Event]:
+    """The events of a session, (N,) s and (N, R, C) counts, provisional ones among them."""
+    sensor = Sensor("lab", Scene(classifier.gestures, frames.shape[1:]), classifier)
+    sensor.foresee(asked=True)
+    found = [one for t, values in zip(times, frames, strict=True) for one in sensor.push(Frame(float(t), values))]
+    return events_of([*found, *sensor.flush(float(times[-1]) + 5.0)])
 
 
 @dataclass(slots=True)

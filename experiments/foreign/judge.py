@@ -22,7 +22,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from experiments.early import Ahead, table
+from experiments.early import Ahead, heard, table
 from experiments.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
 from gestured.core.events import Cancelled, Gesture, Onset, Unknown
 from gestured.core.facts import events_of
@@ -32,7 +32,6 @@ from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.lab.dataset import Truth
 from gestured.lab.made_of import made_of, renew
-from gestured.lab.study.said import heard
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.record.judge import Performed, Tally

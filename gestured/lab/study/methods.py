@@ -216,10 +216,6 @@ METHODS: dict[str, Method] = {
              (8e-3, 4e-3), (32,), (0.89, 0.97, 0.93)),
         _net("cnn_gru", "CNN-GRU", "The same convolutions, then gated recurrent units: fewer weights than an LSTM.",
              (8e-3, 4e-3), (32,), None),
-        _net("tcn", "causal TCN", "Dilated causal convolutions over the frames; each answer sees the last 31 of them.",
-             (8e-3, 4e-3), (32,), None),
-        _net("transformer", "small transformer", "Two layers of causal self-attention, four heads, 32 wide.",
-             (5e-3, 2.5e-3), (32,), None),
         Method(
             "trajectory_gb", "trajectory features, gradient boosting", BEYOND,
             "Gradient boosting on where the centroid went, how it turned and how many fingers there were.",

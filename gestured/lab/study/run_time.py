@@ -4,17 +4,13 @@ What is timed are the study's methods and the models that ship (`runners`), wind
 counts is the processor's time, so that other programs on the machine do not. All take turns gesture by gesture, in
 another order each time: cold, 67 ms after the last one, as in a daemon at 15 Hz whose caches other programs have filled
 since; and warm, the same gesture at once again. All are judged on people whom none has learned from, neither the
-study's models, which learned from the whole cohort with shifted copies, nor the shipped ones. Memory is what a fresh
-process grows by, with all libraries loaded, when it takes in the model and answers a few gestures.
+study's models, which learned from the whole cohort with shifted copies, nor the shipped ones.
 """
 
-import importlib
-import multiprocessing
 import os
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
@@ -30,7 +26,7 @@ from gestured.lab.study.cohort import Cohort
 from gestured.lab.study.material import Data
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.runners import Runner, runners
-from gestured.lab.study.views import Values, trajectory_row
+from gestured.lab.study.views import Values
 from gestured.simulator import GESTURES
 
 WARM = 20  # gestures that are answered before anything is timed
@@ -55,7 +51,7 @@ def measure(plan: Plan, tuned: Mapping[str, Values], judges: Cohort, data: Data)
                 **summary(named == truth, people), **told(named, said, truth, people, judges.lost),
                 "cold_us": round(float(np.median(cold)) * 1e6, 1), "median_us": round(float(np.median(warm)) * 1e6, 1),
                 "p95_us": round(float(np.quantile(warm, 0.95)) * 1e6, 1),
-                "memory_bytes": None if plan.quick else grown_by(runner, segments[:WARM]), "file_bytes": runner.size(),
+                "file_bytes": runner.size(),
             })  # fmt: skip
     for row in rows:
         row["front"] = not any(_beats(other, row) for other in rows)
@@ -113,35 +109,3 @@ def _one_core() -> Iterator[None]:
         yield
     finally:
         os.sched_setaffinity(0, cores)
-
-
-def grown_by(runner: Runner, segments: list[Segment]) -> int:
-    """Bytes that a fresh process grows by when it takes in the model and answers some gestures."""
-    context = multiprocessing.get_context("spawn")
-    here, there = context.Pipe()
-    child = context.Process(target=_weigh, args=(there,), daemon=True)
-    child.start()
-    here.send(segments)
-    here.send(runner)
-    grown: int = here.recv()
-    child.join()
-    return grown
-
-
-def _weigh(pipe: Connection) -> None:
-    """In the fresh process: everything that any model needs is loaded before the scales are read."""
-    segments = pipe.recv()
-    for name in ("onnxruntime", "sklearn.ensemble", "sklearn.neighbors", "sklearn.svm", "sklearn.pipeline"):
-        importlib.import_module(name)
-    torch.set_num_threads(1)
-    trajectory_row(WINDOW.apply(segments[0]))  # torch takes its own share at the first call
-    before = _resident()
-    runner = pipe.recv()
-    for segment in segments:
-        runner.answer(segment)
-    pipe.send(_resident() - before)
-
-
-def _resident() -> int:
-    with open("/proc/self/statm") as statm:
-        return int(statm.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")

@@ -1,13 +1,13 @@
 """What is timed: every method, run as well as it can here, and the models that ship.
 
-Networks, forests and boosting run in onnxruntime (one thread), as in the daemon, the rest in scikit-learn.
+Networks and forests run in onnxruntime (one thread), as in the daemon, the rest in scikit-learn.
 """
 
 import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -31,7 +31,7 @@ SHIPPED = {"cnn_lstm": "cnn_lstm", "lstm": "lstm", "tp_rf": "touch_pattern_rf"} 
 
 
 class Runner(Protocol):
-    """One model, from a segment to its answer; sent to another process to be weighed."""
+    """One model, from a segment to its answer."""
 
     method: str
     settings: str
@@ -52,13 +52,11 @@ class Learned:
     method: str
     values: Values
     model: Estimator | onnx_form.Graph
-    from_frames: bool = False  # the graph takes the window itself
     settings: str = TUNED
 
     def answer(self, segment: Segment) -> tuple[int, bool]:
         """As in `Runner`."""
-        window = WINDOW.apply(segment)
-        seen = window[None] if self.from_frames else METHODS[self.method].view.one(window, self.values)
+        seen = METHODS[self.method].view.one(WINDOW.apply(segment), self.values)
         if isinstance(self.model, Estimator):
             return int(self.model.fitted.predict(seen)[0]), True
         return int(self.model.run(seen).argmax()), True
@@ -70,23 +68,18 @@ class Learned:
 
 @dataclass
 class Shipped:
-    """A model that ships, opened when it is first asked."""
+    """A model that ships."""
 
     method: str
     path: Path
+    model: Model
     settings: str = "shipped"
-    _model: Model | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_model": None}
 
     def answer(self, segment: Segment) -> tuple[int, bool]:
         """As in `Runner`, by the model's own threshold."""
-        if self._model is None:
-            self._model = open_model(self.path)
-        found = self._model.classify(segment)
+        found = self.model.classify(segment)
         best = int(found.values.argmax())
-        name = self._model.gestures[best]
+        name = self.model.gestures[best]
         return GESTURES.index(name), found.confidence >= found.threshold
 
     def size(self) -> int:
@@ -110,8 +103,6 @@ def runners(plan: Plan, tuned: Mapping[str, Values], data: Data) -> list[Runner]
         assert isinstance(model, Estimator)
         if method.id.endswith("_rf"):
             out.append(Learned(method.id, values, onnx_form.of_forest(model.fitted)))
-        elif method.id == "trajectory_gb":
-            out.append(Learned(method.id, values, onnx_form.of_boosting(model.fitted), from_frames=True))
         else:
             out.append(Learned(method.id, values, model))
-    return out + [Shipped(method, shipped()[name]) for method, name in SHIPPED.items()]
+    return out + [Shipped(method, shipped()[name], open_model(shipped()[name])) for method, name in SHIPPED.items()]

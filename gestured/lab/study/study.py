@@ -27,11 +27,9 @@ from gestured.lab.study.report.choice import table
 from gestured.lab.study.report.page import write_report
 from gestured.lab.study.report.picture import write_picture
 from gestured.lab.study.run_time import measure
-from gestured.lab.study.said import said
 from gestured.lab.study.sessions import online
 from gestured.lab.study.tuning import TUNING, tune
 from gestured.lab.study.views import Values
-from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.record.files import PUBLIC, atomic_write
 from gestured.simulator import GESTURES
@@ -62,10 +60,8 @@ def run(args: argparse.Namespace) -> int:
     study["about"]["command"] = args.words
     args.out.mkdir(parents=True, exist_ok=True)
     write(study, args.out)
-    page = write_report(study, args.out)
-    if study["run_time"]:
-        write_picture(study, args.out)
-    print(json.dumps(study, indent=2) if args.json else f"{page}: {study['machine']['minutes']} minutes")
+    tables_path = write_report(study, args.out)
+    print(json.dumps(study, indent=2) if args.json else f"{tables_path}: {study['machine']['minutes']} minutes")
     return 0
 
 
@@ -73,7 +69,7 @@ def _kept(path: Path) -> dict[str, Any]:
     """What an earlier run wrote. Raises GesturedError where it is not that."""
     try:
         found = json.loads(path.read_text())
-        needed = ("about", "machine", "methods", "run_time", "said", "online", "online_shipped")
+        needed = ("about", "machine", "methods", "run_time", "online", "online_shipped")
         return {name: found[name] for name in needed}
     except (ValueError, KeyError, TypeError) as error:
         raise GesturedError(f"--draw: {path}: expected study.json or operating-points.json: {error!r}") from None
@@ -127,7 +123,6 @@ def compute(plan: Plan, schedule: Schedule, folder: Path | None, others: Path | 
     )
     judged = (foreign[0], int(foreign[1]["performed"])) if foreign else None
     study["run_time"] = with_fields(study["run_time"], figures, judged)
-    study["said"] = said(open_model(shipped()["cnn_lstm"]), plan.minutes) if plan.minutes else []
     study["online"], study["online_shipped"] = played(plan, tuned, simulated_data, schedule)
     study["machine"]["minutes"] = round((time.monotonic() - start) / 60, 1)
     return study

@@ -49,7 +49,6 @@ def made_study() -> Study:
         ],
         "run_time": [row for method in METHODS for row in _run_time(method)],
         "online": [_online(method) for method in SHIPS],
-        "said": _said(),
         "online_shipped": [_online(method) for method in SHIPS[1:]],
     }  # fmt: skip
 
@@ -109,20 +108,11 @@ def _run_time(method: str) -> list[Study]:
         }  # fmt: skip
         rows.append({
             "method": method, "settings": settings, **_between(right), **field, "median_us": median,
-            "p95_us": 1.4 * median, "cold_us": 2.5 * median, "front": ships, "memory_bytes": int(3000 * median),
+            "p95_us": 1.4 * median, "cold_us": 2.5 * median, "front": ships,
             "file_bytes": int(900 * median),
             "fields": {"simulated": field, "foreign": field, "real": {"wrong": 0.01, "error": 0.04, "performed": 3000}},
         })  # fmt: skip
     return rows
-
-
-def _said() -> list[Study]:
-    rest = {"n": 40, "wrong": 0.01, "low": 0.0, "high": 0.08}
-    return [
-        {"group": group, "kind": kind, **rest, "p10_s": middle - 0.08, "p50_s": middle, "p90_s": middle + 0.08}
-        for group in ("taps", "swipes", "circles", "two fingers")
-        for kind, middle in (("provisional", -0.2), ("final", 0.2))
-    ]
 
 
 def _online(method: str) -> Study:

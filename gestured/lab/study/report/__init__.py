@@ -1,1 +1,1 @@
-"""The report: study.json as a self-contained page and as Markdown (page.py); the picture of error against run time."""
+"""The report: study.json as Markdown with its figures (page.py); the picture of error against run time."""

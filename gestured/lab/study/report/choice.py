@@ -1,4 +1,4 @@
-"""The table below the picture: five models of those that are drawn, and who takes which."""
+"""The table below the picture: the models that ship, and who takes which."""
 
 from . import formats, reading
 from .reading import Row, Study
@@ -6,37 +6,31 @@ from .reading import Row, Study
 FIELDS = ("simulated", "foreign", "real")
 
 
-CHOICES = {  # (method, settings) -> who takes it
-    ("cnn_lstm", "shipped"): "you have no reason to take another: `gestured` runs it unless told otherwise",
-    ("lstm", "shipped"): "the first cannot be used; it is its fallback",
-    ("tp_rf", "shipped"): "neither network can be used; it mostly says `unknown`, so that it is seldom wrong",
-    ("trajectory_gb", "tuned"): "you train your own, and nothing but the ten gestures is ever done: it rejects nothing",
-    ("cnn_gru", "tuned"): "the same, and a decision must take a third of the time",
+CHOICES = {  # method -> who takes the model of it that ships
+    "cnn_lstm": "you have no reason to take another: `gestured` runs it unless told otherwise",
+    "lstm": "the first cannot be used; it is its fallback",
+    "tp_rf": "neither network can be used; it mostly says `unknown`, so that it is seldom wrong",
 }
 HEAD = (
     "| take | if | % wrong: simulated, another generator, real | % wrong or lost (95 % over people) "
-    "| a decision, cold | memory | false events a minute |",
-    "|---|---|---|---|---|---|---|",
+    "| a decision, cold | false events a minute |",
+    "|---|---|---|---|---|---|",
 )
 
 
 def table(study: Study) -> list[str]:
     """Lines of Markdown; a model that was not timed is left out."""
-    rows = {(row["method"], row["settings"]): row for row in study["run_time"]}
+    rows = {row["method"]: row for row in study["run_time"] if row["settings"] == "shipped"}
     return [*HEAD, *(_line(study, rows[one], when) for one, when in CHOICES.items() if one in rows)]
 
 
 def _line(study: Study, row: Row, when: str) -> str:
-    ships = row["settings"] == "shipped"
-    played = {of["method"]: of for of in study["online_shipped" if ships else "online"]}
+    played = {of["method"]: of for of in study["online_shipped"]}
     fields = [row["fields"].get(field, {}) for field in FIELDS]
     wrong = ", ".join(formats.percent(of.get("wrong")) for of in fields)
     error = ", ".join(_with_interval(of) for of in fields)
-    name = f"{reading.title(study, row['method'])}{', ships' if ships else ''}"
-    memory = row["memory_bytes"]
     cells = (
-        name, when, wrong, error, formats.duration(row["cold_us"]),
-        formats.NONE if memory is None else f"{memory / 2**20:.0f} MiB",
+        reading.title(study, row["method"]), when, wrong, error, formats.duration(row["cold_us"]),
         formats.number(played.get(row["method"], {}).get("false_per_minute"), ".4g"),
     )  # fmt: skip
     return f"| {' | '.join(cells)} |"

@@ -1,26 +1,23 @@
-"""operating-points.svg: error against run time in three fields, and error against when it is said."""
+"""operating-points.svg: error against run time in three fields."""
 
 import json
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, FigureBase
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from . import formats, reading
-from .drawing import INK, SOFT, Mark, families, mark_of, sheet, styled, svg
+from .drawing import INK, SOFT, families, mark_of, sheet, styled, svg
 from .reading import Row, Study
 
 FIELDS = {"simulated": "simulated people", "foreign": "another generator's people", "real": "real fingers"}
 LEAST = 0.001  # an error of 0 is drawn here: a logarithm cannot show it
-KINDS = {"provisional": 1, "final": 0}  # kinds of answer, and the filling of their marks
-GROUP_MARKS = {"taps": Mark(0, "f0"), "swipes": Mark(1, "f1"), "circles": Mark(2, "f2"), "two fingers": Mark(3, "f3")}
-WIDTH, HEIGHT = 1060, 860  # pixels
+WIDTH, HEIGHT = 1060, 516  # pixels
 REACH = (0, 10, 20, 32, 46, 62, 80, 100)  # pixels that a name may be moved away from its point
-TITLE = "Error against run time, and error against when it is said"
+TITLE = "Error against run time"
 Name = tuple[bool, float, float, str]  # whether it is bold and chooses first, x, y, the words
 
 
@@ -43,7 +40,6 @@ def points(study: Study) -> Study:
         "machine": study["machine"],
         "methods": {name: {"title": of["title"], "family": of["family"]} for name, of in named.items()},
         "run_time": study["run_time"],
-        "said": study["said"],
         **{name: [_false(row) for row in study[name]] for name in ("online", "online_shipped")},
     }
 
@@ -55,21 +51,16 @@ def _false(row: Row) -> Row:
 def operating_points(study: Study) -> Figure:
     """The picture, of what `points` keeps."""
     rows = study["run_time"]
-    figure = sheet(WIDTH, HEIGHT if study["said"] else HEIGHT * 0.6)
-    upper: FigureBase = figure
-    if study["said"]:
-        parts: Any = figure.subfigures(2, 1, height_ratios=(3, 2))
-        upper = parts[0]
-        _said(parts[1].subplots(), study["said"])
+    figure = sheet(WIDTH, HEIGHT)
     fields = [field for field in FIELDS if any(field in row["fields"] for row in rows)]
-    panels = upper.subplots(1, len(fields), sharex=True, sharey=True, squeeze=False)[0]
+    panels = figure.subplots(1, len(fields), sharex=True, sharey=True, squeeze=False)[0]
     names = []
     for axes, field in zip(panels, fields, strict=True):
-        axes.set_title(f"A  {FIELDS[field]}: error, per cent", color=INK, fontweight="bold")
+        axes.set_title(f"{FIELDS[field]}: error, per cent", color=INK, fontweight="bold")
         names.append(_run_time(study, axes, [row for row in rows if field in row["fields"]], field))
     label = "run time of a decision on one core: the mark cold, as in a daemon at 15 Hz; the thin end warm"
     panels[len(panels) // 2].set_xlabel(label)
-    _legend(study, upper, rows)
+    _legend(study, figure, rows)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for axes, some in zip(panels, names, strict=True):
@@ -130,32 +121,10 @@ def _place(axes: Axes, names: list[Name]) -> None:
             text.remove()
 
 
-def _legend(study: Study, figure: FigureBase, rows: list[Row]) -> None:
+def _legend(study: Study, figure: Figure, rows: list[Row]) -> None:
     """Which mark is which family, and the marks' parts."""
     marks = families(study, rows)
     lines = [Line2D([], [], **mark.style) for mark, _ in marks]
     lines += [Line2D([], [], linestyle="", marker="_", color=INK, markersize=9)]
     words = [*(words for _, words in marks), "wrong alone, the rest is lost"]
     figure.legend(lines, words, loc="outside lower center", ncols=3, frameon=False)
-
-
-def _said(axes: Axes, said: list[Row]) -> None:
-    axes.set_title("B  the model that ships: error of what it says, per cent", color=INK, fontweight="bold")
-    axes.semilogy()
-    axes.minorticks_off()
-    axes.grid(axis="x")
-    axes.axvline(0.0, color=SOFT, linewidth=1)
-    axes.set_xlabel("seconds after the last touched frame: median, and a line from the first to the last tenth")
-    _in_per_cent(axes)
-    for row in said:
-        mark = GROUP_MARKS[row["group"]]._replace(filling=KINDS[row["kind"]])
-        wrong, low, high = (max(LEAST, row[name]) for name in ("wrong", "low", "high"))
-        axes.plot([row["p10_s"], row["p90_s"]], [wrong] * 2, color=mark.hue, linewidth=1.4, alpha=0.5)
-        axes.plot([row["p50_s"]] * 2, [low, high], color=mark.hue, linewidth=1.4, alpha=0.5)
-        mark.point(axes, row["p50_s"], wrong)
-    groups = [group for group in GROUP_MARKS if any(row["group"] == group for row in said)]
-    kinds = [kind for kind in KINDS if any(row["kind"] == kind for row in said)]
-    marks = {f"{group}, {kind}": GROUP_MARKS[group]._replace(filling=KINDS[kind]) for kind in kinds for group in groups}
-    axes.set_ylim(top=8.0)  # room for the legend
-    handles = [Line2D([], [], **mark.style) for mark in marks.values()]
-    axes.legend(handles, list(marks), loc="upper center", ncols=4, frameon=False)

@@ -13,7 +13,6 @@ PROTOCOLS = {
     "paper": "paper's protocol", "padded": "padded to the longest", "clean": "clean split",
     "participants": "participants held out", "real": "real, subjects held out", "foreign": "another generator",
 }  # fmt: skip
-AUGMENTATIONS = {"none": "no augmentation", "shift": "shifted (Algorithm 1)"}
 SETTINGS = ("paper", "tuned", "shipped")
 SHORT = {" features, ": " ", "k nearest neighbours": "KNN", "support vector machine": "SVM", " (RBF)": ""}  # in figures
 
@@ -40,11 +39,6 @@ def in_order(study: Study, names: Iterable[str]) -> list[str]:
 def cells(study: Study, **wanted: str) -> list[Row]:
     """The cells with these properties."""
     return [row for row in study["cells"] if all(row[key] == value for key, value in wanted.items())]
-
-
-def usual(rows: list[Row]) -> Row | None:
-    """Of a method's rows the one to compare with the paper's: with its settings, or tuned where it gives none."""
-    return min(rows, key=lambda row: SETTINGS.index(row["settings"]), default=None)
 
 
 def lines(study: Study) -> list[tuple[tuple[str, str, str], dict[str, Row]]]:
