@@ -23,6 +23,7 @@ class Finding:
     level: str
     what: str
     remedy: str = ""
+    sensor: str = ""  # that it is about; "" where it is about no single one
 
 
 DROPS = {  # why, and what to do
@@ -45,7 +46,14 @@ def examine_status(status: dict[str, Any], proposed: Sequence[str] = ()) -> Iter
     if proposed:
         what = "what arrives does not fit the settings, and is dropped"
         yield Finding("bad", what, "\n".join(["set in the configuration file, then gesturectl reload:", *proposed]))
-    for look in (_input, _sensors, _gates, _shift, _output):
+    yield from examine_sensors(status)
+    for look in (_shift, _output):
+        yield from look(status)
+
+
+def examine_sensors(status: dict[str, Any]) -> Iterator[Finding]:
+    """What the daemon's answer to `status` shows of what arrives, of its sensors, and of its gates."""
+    for look in (_input, _sensors, _gates):
         yield from look(status)
 
 
@@ -136,7 +144,7 @@ def _sensors(status: dict[str, Any]) -> Iterator[Finding]:
             yield Finding("bad", "no sensor was heard", "gesturectl sniff shows whether anything arrives")
     for name, sensor in status["sensors"].items():
         for found in _sensor(name, sensor):
-            yield Finding(found.level, f"sensor {name}: {found.what}", found.remedy)
+            yield Finding(found.level, f"sensor {name}: {found.what}", found.remedy, name)
 
 
 def _sensor(name: str, sensor: dict[str, Any]) -> Iterator[Finding]:
@@ -164,7 +172,8 @@ def _sensor(name: str, sensor: dict[str, Any]) -> Iterator[Finding]:
             "bad", "its counts fall when it is touched", f"[sensors.{name}] invert = true in the configuration file"
         ),
     }
-    yield words[sensor["state"]](sensor)
+    if sensor["state"] in words:  # else a later daemon's
+        yield words[sensor["state"]](sensor)
     if sensor.get("closed"):
         remedy = "; ".join(f"gesturectl allow {name} --gate {gate}" for gate in sensor["closed"])
         yield Finding("warn", f"is silent, since gates are closed: {', '.join(sensor['closed'])}", remedy)

@@ -1,6 +1,7 @@
 """What the page shows, as the daemon tells who looks on: its state each second, frames of what is looked at, events."""
 
 import threading
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ from gestured.client.control import Control
 from gestured.client.fields import wrong_field
 from gestured.client.lines import Refused
 from gestured.client.web.outbox import Outbox
+from gestured.control.findings import examine_sensors
 from gestured.control.flag import flag, flag_path
 from gestured.core.errors import GesturedError
 
@@ -118,7 +120,7 @@ class Source:
                 words = wrong_field(line)
                 if words is None:
                     self._pass_on(line)
-            except (KeyError, TypeError):
+            except (KeyError, TypeError, AttributeError, ValueError):
                 words = f"a line of the type {line['type']!r} without its fields"
             if words is not None:
                 raise Refused(f"{self._control} says something that gestured does not say: {words}")
@@ -131,8 +133,11 @@ class Source:
                 outbox.frame(line)
         elif line["type"] == "state":
             told = {key: line[key] for key in ("version", "state", "sensors")}
-            self._state = told | {"model": line["model"]["active"], "gestures": line["model"]["gestures"]}
-            self._tell("sensors", self._state)
+            found = [asdict(finding) for finding in examine_sensors(line) if finding.level != "ok"]
+            recorder = line["flight_recorder"]["limit_bytes"] > 0
+            told |= {"model": line["model"]["active"], "findings": found, "flight_recorder": recorder}
+            self._state = told
+            self._tell("sensors", told)
         elif line["type"] == "provisional":
             for outbox in self._lookers(line["sensor"]):
                 outbox.put("event", line)

@@ -50,23 +50,24 @@ async function listen(path, signal, hear, lost) { // server-sent events; EventSo
 // The name of a contact, first and largest: grey while it is a guess, solid when it is said, struck where it is revoked.
 let guess = null;
 
+function headline(text, how, ...notes) {
+  at("name").replaceChildren(text);
+  at("name").className = how;
+  at("name-note").textContent = notes.filter(Boolean).join(", ");
+}
+
 function name(told) { // an event of the sensor that is shown
   const ms = (from, to) => `${Math.round(1000 * (to - from))} ms`;
-  const show = (text, how, ...notes) => {
-    at("name").replaceChildren(text);
-    at("name").className = how;
-    at("name-note").textContent = notes.filter(Boolean).join(", ");
-  };
-  if (told.type === "onset") { guess = null; show("…", "guess", "touched"); }
+  if (told.type === "onset") { guess = null; headline("…", "guess", "touched"); }
   if (told.type === "provisional") {
     guess = told;
-    show(words(told.gesture), "guess", "a guess", percent(told.confidence), `${ms(told.onset, told.decided)} after it began`);
+    headline(words(told.gesture), "guess", "a guess", percent(told.confidence), `${ms(told.onset, told.decided)} after it began`);
   }
-  if (told.type === "cancelled") show("no answer", "unknown", words(told.reason));
+  if (told.type === "cancelled") headline("no answer", "unknown", words(told.reason));
   if (told.type !== "gesture" && told.type !== "unknown") return;
   const guessed = told.provisional && guess?.id === told.id ? guess : null;
   const said = told.type === "gesture";
-  show(said ? words(told.gesture) : "none of these", told.type, said ? percent(told.confidence) : words(told.reason ?? ""),
+  headline(said ? words(told.gesture) : "none of these", told.type, said ? percent(told.confidence) : words([told.reason ?? "", ...told.gates ?? []].join(" ")),
     `${ms(told.offset, told.decided)} after the finger left`, guessed && `${told.provisional}, ${ms(guessed.decided, told.decided)} after the guess`);
   if (told.provisional === "revoked" && guessed) {
     const struck = document.createElement("s");

@@ -1,10 +1,12 @@
 "use strict";
 // The page of `gesturectl view`.
-const KEPT_S = 30, PATH_S = 3, CHART_S = 10, ROWS = 100;
+const KEPT_S = 30, PATH_S = 3, CHART_S = 10, ROWS = 100, HOUR_S = 3600, OUTLIERS = .1; // of the frames, which do not stretch the scale
 const STEPS = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000, 50000, 100000, 1e6, 1e7, 1e9];
 const PHASES = { IDLE: "idle", CONTACT: "contact", RELEASING: "releasing", GAP: "waiting for a second tap", SPENT: "held too long" };
 const SHADES = { IDLE: "#8a94a0", CONTACT: "#e69f00", RELEASING: "#56b4e9", GAP: "#009e73", SPENT: "#cc79a7" }; // Okabe and Ito
-const state = { stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0, early: null };
+const state = { stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0, lies: false };
+const counted = { since: Date.now() / 1000, times: {} }; // by sensor and type: when contacts were answered, s
+
 
 for (const step of STEPS.slice(0, -2)) at("scale").append(new Option(`0 to ${step}`, step));
 
@@ -14,7 +16,9 @@ const kinds = { sensors, frame, event, gone: gone => daemon(gone.reason, true) }
 
 function open(sensor) {
   if (state.stream) state.stream.abort();
-  state.frames = []; state.full = 0; state.sensor = sensor;
+  state.frames = []; state.full = 0; state.sensor = sensor; state.lies = false;
+  headline("…", "guess", "no contact yet");
+  at("scores").tBodies[0].replaceChildren();
   state.stream = new AbortController();
   const query = new URLSearchParams({ sensor, raw: at("raw").checked ? "1" : "0" });
   listen("stream?" + query, state.stream.signal, kinds, reason => daemon(reason, true));
@@ -23,18 +27,33 @@ function open(sensor) {
 function daemon(text, gone) {
   at("state").textContent = text;
   at("state").classList.toggle("gone", gone);
+  if (gone) absent(true);
 }
+
+function absent(is) { document.body.classList.toggle("absent", is); } // what is shown is of before
 
 function sensors(told) {
   daemon(`gestured ${told.version}, ${told.state}, model ${told.model}`, false);
-  const names = Object.keys(told.sensors), select = at("sensor");
+  const names = Object.keys(told.sensors), select = at("sensor"), seen = told.sensors[state.sensor];
   at("sensors").tBodies[0].replaceChildren(...names.map(name => {
     const s = told.sensors[name];
-    const tr = row([name, s.state + (s.touched ? ", touched" : "") + (s.closed?.length ? ", silent" : ""), s.rate_hz.toFixed(1), `${Math.round(1000 * s.jitter_s)} ms`, s.lost ?? 0, s.bad_taxels]);
+    const tr = row([name, s.state + (s.touched ? ", touched" : "") + (s.closed?.length ? ", silent" : ""), s.rate_hz.toFixed(1), `${Math.round(1000 * s.jitter_s)} ms`, s.lost ?? 0, s.bad_taxels,
+      ...["gesture", "unknown", "cancelled"].map(type => counts(name, type))]);
     if (name === state.sensor) tr.className = "now";
     return tr;
   }));
-  heard(told.sensors[state.sensor]);
+  heard(seen);
+  absent(!seen || seen.state === "stale" || seen.state === "no_data");
+  const minutes = Math.round((Date.now() / 1000 - counted.since) / 60);
+  at("since").textContent = minutes < 60 ? `since this page was opened, ${minutes} min ago` : "in the last hour";
+  at("findings").replaceChildren(...told.findings.filter(f => !f.sensor || f.sensor === state.sensor).map(f => {
+    const li = document.createElement("li"), what = document.createElement("strong");
+    what.textContent = f.what;
+    li.append(what, f.remedy && `\n${f.remedy}`);
+    return li;
+  }));
+  at("flag").disabled = at("note").disabled = !told.flight_recorder;
+  if (!told.flight_recorder) at("done").textContent ||= "To flag, start the daemon with --flight-recorder MIB: it keeps the last 30 s.";
   if (names.join("\n") !== [...select.options].map(o => o.value).join("\n")) {
     select.replaceChildren(...names.map(name => new Option(name, name, false, name === state.sensor)));
     if (!names.includes(state.sensor) && names.length) { select.value = names[0]; open(names[0]); }
@@ -52,6 +71,12 @@ function heard(told) { // what the sensor that is looked at listens to, as far a
   at("gate").setAttribute("aria-checked", String(!told?.closed?.includes("view")));
 }
 
+function counts(sensor, type) { // of the last hour
+  const times = counted.times[`${sensor} ${type}`] ??= [];
+  while (times[0] < Date.now() / 1000 - HOUR_S) times.shift();
+  return times.length;
+}
+
 function row(cells) {
   const tr = document.createElement("tr");
   for (const cell of cells) tr.insertCell().textContent = cell;
@@ -63,9 +88,14 @@ function frame(told) {
   frames.push(told);
   while (frames.length && frames[0].time < told.time - KEPT_S) frames.shift();
   if (told.values) {
-    const seen = Math.max(...told.values, 20 * told.noise);
-    if (seen > state.full) state.full = STEPS.find(step => step >= seen) ?? seen;
+    const most = frames.filter(f => f.centroid && f.values).map(f => Math.max(...f.values)).sort((a, b) => a - b);
+    const seen = Math.max(most[Math.floor((1 - OUTLIERS) * (most.length - 1))] ?? 0, 20 * told.noise);
+    state.full = STEPS.find(step => step >= seen) ?? seen;
   }
+  const lies = told.phase === "SPENT";
+  if (lies && !state.lies) headline("something lies here", "unknown", "pressed for 5 s: it is learned after a second in which nothing moves on it");
+  if (!lies && state.lies) headline("…", "guess", "what lay here was taken away, or learned");
+  state.lies = lies;
   if (!state.paused) plan();
 }
 
@@ -83,39 +113,25 @@ function event(told) {
   const body = at("events").tBodies[0];
   body.prepend(row([clock(time), told.sensor, what + verdict + (told.test ? " (test)" : ""), told.confidence === undefined ? "" : percent(told.confidence), latency]));
   while (body.rows.length > ROWS) body.deleteRow(-1);
+  if (told.type in { gesture: 1, unknown: 1, cancelled: 1 } && !told.test) (counted.times[`${told.sensor} ${told.type}`] ??= []).push(Date.now() / 1000);
   if (!mine) return;
   if (told.type === "gate") heard(told);
-  if (told.type === "onset") { provisional("-", ""); at("answer").textContent = "..."; }
-  if (told.type === "provisional") {
-    state.early = told;
-    provisional(`${words(told.gesture)}, ${percent(told.confidence)}`, "waiting");
-  }
-  if (told.provisional && state.early?.id === told.id) {
-    const after = "decided" in told ? `; said ${Math.round(1000 * (told.decided - state.early.decided))} ms before the answer` : "";
-    provisional(`${at("provisional").textContent}: ${told.provisional}${after}`, told.provisional);
-  }
-  if (told.type === "cancelled") at("answer").textContent = what;
-  if (told.type === "gesture" || told.type === "unknown") {
-    const answer = `${what}, ${percent(told.confidence)}`;
-    at("answer").textContent = answer;
-    at("said").textContent = `${answer}, after ${latency}`;
-    scores(told.scores, told.type === "gesture" ? told.gesture : "");
-  }
+  if (state.lies) return;
+  name(told);
+  if (told.scores) scores(told);
 }
 
-function provisional(text, how) {
-  at("provisional").textContent = text;
-  at("provisional").className = how;
-}
-
-function scores(found, answer) {
-  const names = Object.keys(found).sort((a, b) => found[b] - found[a]);
-  at("scores").tBodies[0].replaceChildren(...names.map(name => {
-    const tr = row([words(name), ""]), meter = document.createElement("meter");
-    meter.value = found[name];
-    meter.setAttribute("aria-label", `score of ${words(name)}`);
-    tr.cells[1].append(meter, ` ${percent(found[name])}`);
-    if (name === answer) tr.className = "best";
+function scores(told) { // the best two gestures and what is none, in this order whatever their shares are
+  const [[best, share], second] = Object.entries(told.scores).sort((a, b) => b[1] - a[1]);
+  const known = told.own || !share ? 1 : Math.min(told.confidence / share, 1); // the scores are of what is a gesture
+  const rows = [[best, share * known], ...(second ? [[second[0], second[1] * known]] : []), ["none of these", 1 - known]];
+  if (told.own) rows[0] = [told.gesture, told.confidence];
+  at("scores").tBodies[0].replaceChildren(...rows.map(([what, part]) => {
+    const tr = row([words(what), ""]), meter = document.createElement("meter");
+    meter.value = part;
+    meter.setAttribute("aria-label", `share of ${words(what)}`);
+    tr.cells[1].append(meter, ` ${percent(part)}`);
+    if (what === (told.gesture ?? "none of these")) tr.className = "best";
     return tr;
   }));
 }
@@ -275,7 +291,10 @@ at("when").oninput = () => {
   plan();
 };
 at("flag").onclick = () => act("flag", { note: at("note").value });
-at("recalibrate").onclick = () => act("recalibrate", { sensor: state.sensor });
+at("recalibrate").onclick = () => {
+  const question = `Learn the idle sensor ${state.sensor} anew? It must not be touched for a second, and hears nothing meanwhile.`;
+  if (confirm(question)) act("recalibrate", { sensor: state.sensor });
+};
 at("gate").onclick = () => {
   const silence = at("gate").getAttribute("aria-checked") === "true";
   const question = silence ? `Silence ${state.sensor}? No program hears a gesture of it until its gate "view" is opened.`
