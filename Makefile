@@ -116,8 +116,11 @@ lock: build/tools/.tools  ## the newest versions of what a package brings and is
 site: .venv-dev/.dev  ## the documents as a searchable site in build/site/html
 	@deploy/site/build.sh .venv-dev/bin/python build/site
 
+ros: .venv-dev/.dev .venv-ros/.ros  ## test deploy/ros2 with a real ROS 2 from PyPI, which it installs into .venv-ros (x86_64)
+	@.venv-dev/bin/python -m pytest -rs tests/deploy/test_ros.py $(ARGS)
+
 clean:  ## remove the environments and what tools left behind
-	rm -rf .venv .venv-dev build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	rm -rf .venv .venv-dev .venv-ros build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # $(call venv,DIR): make the environment, or say in one sentence what is missing.
@@ -172,6 +175,13 @@ build/tools/.tools: deploy/locks/build.txt
 .venv-dev/.lab: .venv-dev/.dev
 	$(call install,.venv-dev,$(TORCH),--no-deps --retries 0 --extra-index-url $(TORCH_INDEX) $(TORCH))
 	$(call install,.venv-dev,the lab,-e '.[dev$(,)lab]')
+	@touch $@
+
+# One person's builds of ROS 2 from PyPI, for tests alone; there are some for Python 3.11 to 3.14 on x86_64.
+.venv-ros/.ros: pyproject.toml
+	$(call venv,.venv-ros)
+	$(call install,.venv-ros,ROS 2,-e . colcon-bash colcon-package-selection colcon-ros ros-jazzy-rclpy \
+		ros-jazzy-rmw-fastrtps-cpp ros-jazzy-sensor-msgs ros-jazzy-std-msgs ros-jazzy-std-srvs)
 	@touch $@
 
 .venv-dev/.fuzz: .venv-dev/.dev

@@ -11,6 +11,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", ["launch/gestured.launch.xml"]),
     ],
     install_requires=["gestured"],
     entry_points={"console_scripts": [f"gestures = {NAME}.node:main"]},

@@ -1,53 +1,228 @@
-"""The node `gestures`: each gesture as `std_msgs/String` under gestures/SENSOR. It has not been run (README.md)."""
+"""The node `gestured`: a daemon's events as topics; if asked for, frames from a topic, and gates as services."""
 
-import json
+import socket
 import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import rclpy
+from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import Image
 from std_msgs.msg import String
+from std_srvs.srv import SetBool
 
-import gestured
+from gestured.bridge.counts import Counts
+from gestured.bridge.daemon import GONE, NOTICE_S, Daemon, Line, follow
+from gestured.bridge.gates import OFF, ON, Gate
+from gestured.client.sensor import Form, sent_after_refusal
+from gestured.client.subscriber import Subscriber
+from gestured.core.address import Address, is_sensor
+from gestured.core.errors import GesturedError, SettingsError
+from gestured.core.frames import Frame
 
-KEPT = 10  # messages for a slow subscriber
-SENSORS = 1000  # publishers at most: whoever can send frames can invent names
+from .frames import values_of
+from .names import token
+
+EVENTS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# A publisher of frames may be reliable or not. What waits while this machine is busy is not lost for that.
+FRAMES = QoSProfile(depth=64, reliability=ReliabilityPolicy.BEST_EFFORT)
+WAITING = 1000  # lines of the daemon that wait for this node; then the oldest is lost
+SENSORS = 1000  # that have topics: whoever can send frames can invent names
+WARNED_S = 10.0  # from one warning of a kind to the next
+NONE = [""]  # the parameters' way to say an empty list of texts, which has no type
 
 
-class Gestures(Node):  # type: ignore[misc]  # rclpy is in no package registry
-    """Publishes what a daemon says; its parameter `socket` is the daemon's event socket."""
+class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
+    """Mirrors one daemon. All of ROS happens in the thread that spins; another one reads the daemon's socket."""
 
     def __init__(self) -> None:
+        """Raises GesturedError for parameters that cannot be."""
         super().__init__("gestured")
-        path = self.declare_parameter("socket", "/run/gestured/events.sock").value
-        self._to: dict[str, Any] = {}
-        self.subscriber = gestured.Subscriber(path, types=["gesture"])
-        self._thread = threading.Thread(target=self._hear, daemon=True)
+        self.fault: GesturedError | None = None  # why it has ended by itself
+        path, gates, gate = (
+            self._text("socket", "/run/gestured/events.sock"),
+            self._text("gates"),
+            self._text("gate", "ros"),
+        )
+        self._types, sensors, gestures = (
+            self._texts("types", ["gesture"]),
+            self._texts("sensors"),
+            self._texts("gestures"),
+        )
+        counts = _Counts(self.get_logger())
+        self._gate = Gate(Path(gates), _sensor("gate", gate), counts) if gates else None
+        self._daemon = Daemon(sensors or None, gestures or None, counts)
+        self._status = self.create_publisher(String, "~/status", LATEST)
+        self._topics: dict[tuple[str, str], Any] = {}  # sensor, type of event -> its publisher
+        self._with_topics: set[str] = set()  # sensors
+        self._take_frames(self._texts("frames"), _address("to", self._text("to", "127.0.0.1:9000")))
+        self._say_gone()
+        self._lines: deque[Line] = deque(maxlen=WAITING)
+        self._woken = self.create_guard_condition(self._take)
+        self._subscriber = Subscriber(
+            path,
+            types=[*dict.fromkeys([*self._types, "status"])],
+            sensors=sensors or None,
+            gestures=gestures or None,
+            timeout=NOTICE_S,
+            say=counts.say,
+        )
+        self._thread = threading.Thread(target=self._hear, args=(counts,), daemon=True)
         self._thread.start()
 
-    def _hear(self) -> None:
+    def close(self) -> None:
+        """Hear no daemon any more."""
+        self._subscriber.close()
+        self._thread.join()
+
+    def _text(self, name: str, default: str = "") -> str:
+        return str(self.declare_parameter(name, default).value)
+
+    def _texts(self, name: str, default: list[str] = NONE) -> list[str]:
+        return [text for text in self.declare_parameter(name, default).value if text]
+
+    def _hear(self, counts: Counts) -> None:
         try:
-            for event in self.subscriber:
-                if event["type"] == "gesture":
-                    self._publish(event)
-        except gestured.GesturedError as error:  # what waiting does not heal
-            self.get_logger().fatal(str(error))
+            for line in follow(self._subscriber, counts):
+                self._lines.append(line)
+                self._woken.trigger()
+        except GesturedError as error:  # what waiting does not mend
+            self.fault = error
+            self._woken.trigger()
+
+    def _take(self) -> None:
+        """What the daemon has said."""
+        while self._lines:
+            line = self._lines.popleft()
+            self._daemon.take(line)
+            if "sensor" in line:
+                self._publish(line)
+            elif line["type"] == "status":
+                self._status.publish(String(data=self._daemon.payload(line).decode()))
+                if self._gate is not None:
+                    self._gate.repeat(self._daemon.silent_by(self._gate.name))
+            elif line["type"] == GONE:
+                self._say_gone()
+            for sensor in self._daemon.states:  # before its first gesture, so that it has listeners then
+                self._make_topics(sensor)
+        if self.fault is not None:
+            self.get_logger().fatal(str(self.fault))
             rclpy.try_shutdown()
 
-    def _publish(self, event: dict[str, Any]) -> None:
-        sensor = event["sensor"]
-        if sensor not in self._to and len(self._to) < SENSORS:
-            topic = "gestures/" + "".join(c if c.isalnum() else "_" for c in sensor)  # ROS takes no hyphen
-            self._to[sensor] = self.create_publisher(String, topic, KEPT)
-        if sensor in self._to:
-            self._to[sensor].publish(String(data=json.dumps(event)))
+    def _say_gone(self) -> None:
+        """What whoever comes late is told while no daemon is there."""
+        status = {"type": "status", "state": GONE, "sensors": {}, "time": time.time()}
+        self._status.publish(String(data=self._daemon.payload(status).decode()))
+
+    def _make_topics(self, sensor: str) -> None:
+        if sensor in self._with_topics or len(self._with_topics) >= SENSORS:
+            return
+        self._with_topics.add(sensor)
+        for kind in self._types:
+            if kind != "status":
+                self._topics[sensor, kind] = self.create_publisher(String, f"~/{token(sensor)}/{kind}", EVENTS)
+        if self._gate is not None:
+            self.create_service(SetBool, f"~/{token(sensor)}/listen", partial(self._listen, self._gate, sensor))
+
+    def _publish(self, event: Line) -> None:
+        sensor, kind = event["sensor"], event["type"]
+        self._make_topics(sensor)
+        if (sensor, kind) not in self._topics and sensor in self._with_topics:  # an answer to a provisional event
+            self._topics[sensor, kind] = self.create_publisher(String, f"~/{token(sensor)}/{kind}", EVENTS)
+        if (sensor, kind) in self._topics:
+            self._topics[sensor, kind].publish(String(data=self._daemon.payload(event).decode()))
+
+    def _listen(self, gate: Gate, sensor: str, request: Any, response: Any) -> Any:
+        """Open our gate of a sensor, or close it."""
+        try:
+            closed = gate.obey(sensor, ON if request.data else OFF)
+            response.success, response.message = True, f"closed: {', '.join(closed)}" if closed else "it listens"
+        except GesturedError as error:
+            response.message = str(error)
+        return response
+
+    def _take_frames(self, sensors: list[str], to: Address) -> None:
+        """Send frames of these sensors to the daemon."""
+        if not sensors:
+            return
+        family, kind, _, _, address = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
+        udp = socket.socket(family, kind)
+        udp.setblocking(False)
+        udp.connect(address)
+        for sensor in sensors:
+            topic = f"~/{token(_sensor('frames', sensor))}/frames"
+            self.create_subscription(Image, topic, self._forwarder(sensor, udp, to), FRAMES)
+
+    def _forwarder(self, sensor: str, udp: socket.socket, to: Address) -> Callable[[Any], None]:
+        form, counter = Form(sensor, "float32"), 0
+        warn = partial(self.get_logger().warning, throttle_duration_sec=WARNED_S)
+
+        def forward(image: Any) -> None:
+            nonlocal counter
+            try:
+                values = values_of(image)
+            except ValueError as error:
+                warn(f"an image for {sensor} is dropped: {error}")
+                return
+            counter = (counter + 1) & 0x7FFFFFFF
+            stamp = image.header.stamp
+            moment = stamp.sec + 1e-9 * stamp.nanosec or time.time()
+            try:
+                heard = not sent_after_refusal(udp, form.packet(Frame(0.0, values), counter, moment))
+            except OSError:  # the network is down, or its queue full
+                heard = False
+            if not heard:
+                warn(f"nobody takes frames at {to}: start gestured, or name the parameter `to`")
+
+        return forward
 
 
-def main() -> None:
-    """Run the node until it is ended."""
+class _Counts(Counts):
+    """Says in ROS's log what a bridge would say."""
+
+    def __init__(self, logger: Any) -> None:
+        super().__init__("ros2")
+        self._logger = logger
+
+    def say(self, words: str) -> None:
+        self._logger.info(words)
+
+
+def _sensor(parameter: str, name: str) -> str:
+    if not is_sensor(name):
+        raise SettingsError(f"parameter {parameter}: {name!r}: expected letters, digits, _ and -, at most 64")
+    return name
+
+
+def _address(parameter: str, text: str) -> Address:
+    try:
+        return Address.parse(text)
+    except ValueError as error:
+        raise SettingsError(f"parameter {parameter}: {text!r}: expected {error}") from None
+
+
+def main() -> int:
+    """Run the node until it is ended. The exit status is 1 where waiting does not help."""
     rclpy.init()
-    node = Gestures()
+    try:
+        node = Gestures()
+    except (GesturedError, InvalidParameterTypeException, OSError) as error:
+        rclpy.logging.get_logger("gestured").fatal(str(error))
+        rclpy.try_shutdown()
+        return 1
     try:
         rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):  # ended as asked
+        pass
     finally:
-        node.subscriber.close()
+        node.close()
+        rclpy.try_shutdown()
+    return 0 if node.fault is None else 1

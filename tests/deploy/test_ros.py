@@ -1,0 +1,337 @@
+"""deploy/ros2 on a real ROS 2: built by colcon, started as its users start it, with another node on the other side.
+
+It needs the environment of `make ros`. What needs no ROS is tested without.
+"""
+
+import itertools
+import json
+import re
+import select
+import shutil
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import gestured
+from deploy.ros2.gestured_ros2.frames import values_of
+from deploy.ros2.gestured_ros2.names import sensor_of, token
+from gestured.client.control import Control
+from gestured.core.wire import Addresses, Decoder
+from tests.bridge.conftest import wait
+from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor
+from tests.sockets import GESTURE, HELLO, FakeDaemon
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "deploy" / "ros2"
+PYTHON = ROOT / ".venv-ros" / "bin" / "python"
+NAMES = ["armrest", "armrest-1", "armrest_1", "1st", "_a", "a__b", "a_", "x", "xarmrest_2d1", "-", "9", "__", "A-" * 32]
+names = st.sampled_from(NAMES) | st.text("abxX019_-25df", min_size=1, max_size=64)
+
+
+@given(names)
+def test_a_sensors_name_comes_back_from_its_topic(name: str):
+    part = token(name)
+    assert sensor_of(part) == name  # so no two share a topic
+    assert re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*_?", part)  # neither hidden nor with a double underscore
+
+
+@given(st.text("abx019_-25df", max_size=12))
+def test_what_is_no_sensors_topic_is_refused(part: str):
+    try:
+        name = sensor_of(part)
+    except ValueError as error:
+        assert repr(part) in str(error)
+    else:
+        assert token(name) == part
+
+
+def image(values: Any, **changed: object) -> dict[str, Any]:
+    """An image of a frame, as its fields."""
+    height, width = values.shape
+    fields = {"height": height, "width": width, "encoding": "32FC1", "step": 4 * width, "is_bigendian": 0}
+    return fields | {"data": values.astype("<f4").tobytes().hex()} | changed
+
+
+FRAME = np.arange(81.0).reshape(9, 9)
+WRONG = {
+    "encoding": image(FRAME, encoding="64FC1"),
+    "not a number": image(np.where(FRAME == 3, np.nan, FRAME)),
+    "one row": image(FRAME[:1]),
+    "a side of 65": image(np.zeros((2, 65))),
+    "too few bytes": image(FRAME, data=image(FRAME)["data"][8:]),
+    "too short a step": image(FRAME, step=35, data="00" * 9 * 35),
+}
+
+
+@pytest.mark.parametrize("order", ["<f4", ">f4"])
+@pytest.mark.parametrize("padding", [0, 3])
+def test_a_frame_is_read_whatever_the_rows_end_in(order: str, padding: int):
+    rows = [row.astype(order).tobytes() + b"?" * padding for row in FRAME]
+    fields = image(FRAME, step=36 + padding, is_bigendian=order == ">f4")
+    assert (values_of(SimpleNamespace(**fields | {"data": b"".join(rows)})) == FRAME).all()
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_what_is_no_frame_is_refused_with_what_was_expected(wrong: str):
+    fields = WRONG[wrong] | {"data": bytes.fromhex(WRONG[wrong]["data"])}
+    with pytest.raises(ValueError, match="expected|finite"):
+        values_of(SimpleNamespace(**fields))
+
+
+def test_the_package_says_everywhere_what_it_is():
+    described = ElementTree.parse(PACKAGE / "package.xml").getroot()
+    (version,) = re.findall('version="(.*)"', (PACKAGE / "setup.py").read_text())
+    assert described.findtext("version") == version == gestured.__version__
+    launch = ElementTree.parse(PACKAGE / "launch" / "gestured.launch.xml").getroot()
+    declared = set(re.findall(r'self\._texts?\("(\w+)"', (PACKAGE / "gestured_ros2" / "node.py").read_text()))
+    assert {each.get("name") for each in launch.iter("arg")} == declared
+    assert {each.get("name"): each.get("value") for each in launch.iter("param")} == {
+        name: f"$(var {name})" for name in declared
+    }
+
+
+class Process:
+    """A program of ROS."""
+
+    def __init__(self, folder: Path, command: str) -> None:
+        self.errors = folder / "ros.txt"
+        environment = {"PATH": f"{PYTHON.parent}:/usr/bin:/bin", "HOME": str(folder), "PYTHONPATH": str(ROOT)}
+        with self.errors.open("ab") as errors:
+            self.process = subprocess.Popen(
+                ["bash", "-c", f"export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST PYTHONUNBUFFERED=1; {command}"],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True, env=environment,
+            )  # fmt: skip
+
+    def say(self, **command: object) -> None:
+        self.process.stdin.write(json.dumps(command) + "\n")
+        self.process.stdin.flush()
+
+    def line(self) -> Any:
+        """The next line that it says."""
+        assert self.speaks(DEADLINE_S), self.errors.read_text()
+        return json.loads(self.process.stdout.readline())
+
+    def speaks(self, seconds: float) -> bool:
+        """Whether a line is there, at the latest after that time."""
+        assert self.process.stdout is not None
+        return bool(select.select([self.process.stdout], [], [], seconds)[0])
+
+    def end(self, number: int) -> int:
+        """Its exit status after a signal."""
+        self.process.send_signal(number)
+        return self.process.wait(DEADLINE_S)
+
+
+class Ros:
+    """ROS 2 with our package in it, in a namespace that nobody else has."""
+
+    def __init__(self, folder: Path, workspace: Path) -> None:
+        self.folder, self.space = folder, f"/t{folder.name.translate({45: '_'})}_{id(folder)}"
+        self._setup = f". {workspace}/install/local_setup.bash"
+        self._program = f"exec {workspace}/install/gestured_ros2/lib/gestured_ros2/gestures"
+        self.processes: list[Process] = []
+
+    def node(self, **parameters: object) -> Process:
+        """The node, as `ros2 run` starts it."""
+        given = " ".join(
+            f"-p '{name}:={json.dumps(str(v) if isinstance(v, Path) else v)}'" for name, v in parameters.items()
+        )
+        command = f"{self._setup} && {self._program} --ros-args -r __ns:={self.space} {given}"
+        self.processes.append(Process(self.folder, command))
+        return self.processes[-1]
+
+    def peer(self) -> Process:
+        """The other side, once it is there."""
+        self.processes.append(Process(self.folder, f"exec {PYTHON} {ROOT}/tests/deploy/ros/peer.py"))
+        assert self.processes[-1].line() == {"ready": True}
+        return self.processes[-1]
+
+    def topic(self, *parts: str) -> str:
+        """A name below the node's."""
+        return "/".join((self.space, "gestured", *parts))
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace in which colcon has built the package."""
+    if not PYTHON.exists():
+        pytest.skip("ROS 2 is not in .venv-ros: `make ros` installs it")
+    folder = tmp_path_factory.mktemp("workspace")
+    shutil.copytree(PACKAGE, folder / "src" / "gestured_ros2")
+    command = [PYTHON, "-m", "colcon", "build", "--packages-select", "gestured_ros2"]
+    environment = {"PATH": f"{PYTHON.parent}:/usr/bin:/bin", "HOME": str(folder)}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stderr
+    for file in ("local_setup.bash", "gestured_ros2/share/gestured_ros2/launch/gestured.launch.xml"):
+        assert (folder / "install" / file).exists()
+    return folder
+
+
+@pytest.fixture
+def ros(workspace: Path, tmp_path: Path) -> Iterator[Ros]:
+    """What was started is ended, and no traceback was said."""
+    ros = Ros(tmp_path, workspace)
+    yield ros
+    for each in ros.processes:
+        each.process.kill()
+        each.process.communicate()
+    assert "Traceback" not in (tmp_path / "ros.txt").read_text()
+
+
+def heard(peer: Process, condition: Callable[[dict[str, Any]], bool]) -> list[dict[str, Any]]:
+    """What a node hears, up to the first line that is meant."""
+    lines = [peer.line()]
+    while not condition(lines[-1]):
+        lines.append(peer.line())
+    return lines
+
+
+def test_ros_takes_the_topic_of_each_sensor(ros: Ros):
+    peer = ros.peer()
+    peer.say(invalid=[f"/gestured/{name}/gesture" for name in NAMES])
+    assert peer.line()["invalid"]  # some of them would not do as they are
+    peer.say(invalid=[f"/gestured/{token(name)}/gesture" for name in NAMES])
+    assert peer.line() == {"invalid": []}
+
+
+def test_gestures_of_sensors_with_names_alike_come_apart_and_without_a_gap(ros: Ros, serve):
+    daemon: Daemon = serve()
+    sensors = ("armrest-1", "armrest_1", "1st")
+    topics = {ros.topic(token(name), "gesture"): name for name in sensors}
+    for name in sensors:
+        Sensor(daemon, name).begin()
+    peer, node = ros.peer(), ros.node(socket=daemon.socket)
+    for topic in topics:
+        peer.say(listen=topic, latched=False)
+    seen: dict[str, list[int]] = {name: [] for name in sensors}
+    with Control(Path(daemon.ready["control"])) as control:
+        while min(map(len, seen.values())) < 5:
+            assert node.process.poll() is None, node.errors.read_text()
+            for name in sensors:
+                control.ask("emit", gesture=daemon.client().hello["gestures"][0], sensor=name)
+            while peer.speaks(0.05):
+                line = peer.line()
+                assert line["data"]["sensor"] == topics[line["topic"]] and line["data"]["instance"]
+                seen[line["data"]["sensor"]].append(line["data"]["sequence"])
+    for sequences in seen.values():
+        assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_node_well(ros: Ros, fake: FakeDaemon, number: int):
+    node = ros.node(socket=fake.path)
+    fake.accept()
+    assert node.end(number) == 0
+    assert "Traceback" not in node.errors.read_text()
+
+
+def test_who_comes_late_is_told_the_status_and_that_the_daemon_went_and_returned(ros: Ros, fake: FakeDaemon):
+    ros.node(socket=fake.path, types=["gesture", "unknown"])
+    fake.accept()
+    assert fake.request() == {"subscribe": {"types": ["gesture", "unknown", "status"]}}
+    status = {"type": "status", "state": "ok", "sensors": {"armrest": "ok"}, "model": "cnn_lstm", "time": 1.0}
+    fake.say(status)
+    peer = ros.peer()
+    peer.say(listen=ros.topic("status"), latched=True)
+    assert heard(peer, lambda line: line["data"]["state"] != "gone")[-1]["data"] == status | {"instance": "a"}
+    fake.close()
+    assert heard(peer, lambda line: line["data"]["state"] == "gone")[-1]["data"]["sensors"] == {}
+    fake.accept(HELLO | {"instance": "b"})
+    fake.say(status)
+    assert peer.line()["data"]["instance"] == "b"
+    peer.say(listen=ros.topic("armrest", "gesture"), latched=False)
+    line: dict[str, Any] = {"topic": ""}
+    while not line["topic"].endswith("gesture"):  # the listener is found in its own time
+        fake.say(GESTURE, status)
+        line = peer.line()
+    assert line["data"] == GESTURE | {"instance": "b"}
+
+
+def taken(daemon: Daemon, before: int) -> bool:
+    """Whether the daemon has looked at more frames than before."""
+    return daemon.frames() > before
+
+
+def test_frames_of_a_topic_become_gestures_and_what_is_none_is_dropped(ros: Ros, serve):
+    daemon: Daemon = serve("--clock", "sensor", "--metrics", "127.0.0.1:0", model="cnn_lstm")
+    peer, client, hand = ros.peer(), daemon.client().subscribe("gesture"), Hand()
+    node = ros.node(socket=daemon.socket, frames=["armrest-1"], to=str(daemon.address))
+    topic, moments = ros.topic("xarmrest_2d1", "frames"), itertools.count(1_700_000_000_000_000_000, 66_666_667)
+
+    def publish(frame: Any) -> None:
+        peer.say(image=topic, **image(frame, stamp=divmod(next(moments), 10**9)))
+
+    while not daemon.frames():  # the first ones are lost until both sides know each other
+        publish(hand.frame())
+    for each in WRONG.values():
+        peer.say(image=topic, **each)
+    for frame in [*hand.idle(2.0), *hand.swipe("left"), *hand.idle(1.0)]:
+        before = daemon.frames()
+        publish(frame)
+        wait(partial(taken, daemon, before))
+    (event,) = client.events("gesture", "armrest-1")
+    assert event["gesture"] == "swipe_left" and event["lost"] == 0
+    assert "an image for armrest-1 is dropped: encoding '64FC1': expected '32FC1'" in node.errors.read_text()
+
+
+def test_frames_have_the_numbers_and_the_time_of_their_images(ros: Ros, fake: FakeDaemon, udp):
+    ros.node(socket=fake.path, frames=["armrest"], to=f"127.0.0.1:{udp.getsockname()[1]}")
+    peer, decoder, counters = ros.peer(), Decoder(Addresses(), lambda sensor: FRAME.shape), []
+    while len(counters) < 3:
+        peer.say(image=ros.topic("armrest", "frames"), **image(FRAME, stamp=(1_700_000_000, 250_000_000)))
+        if select.select([udp], [], [], 0.05)[0]:
+            (arrival,), faults = decoder.decode(udp.recv(65536))
+            assert not faults and (arrival.values == FRAME).all() and arrival.timetag == 1_700_000_000.25
+            counters.append(arrival.counter)
+    assert counters == [1, 2, 3]
+
+
+def test_a_service_closes_and_opens_a_gate_in_the_nodes_own_name(ros: Ros, serve, tmp_path: Path):
+    gates = tmp_path / "gates.sock"
+    daemon: Daemon = serve("--gates", gates)
+    Sensor(daemon, "armrest").begin()
+    ros.node(socket=daemon.socket, gates=gates, gate="robot")
+    peer, client = ros.peer(), daemon.client().subscribe("gate")
+    service = ros.topic("armrest", "listen")
+    peer.say(call=service, data=False)
+    assert peer.line() == {"call": service, "success": True, "message": "closed: robot"}
+    assert client.events("gate", "armrest")[-1]["closed"] == ["robot"]
+    peer.say(call=service, data=True)
+    assert peer.line() == {"call": service, "success": True, "message": "it listens"}
+    assert client.events("gate", "armrest")[-1]["closed"] == []
+
+
+def test_a_gate_that_cannot_be_closed_is_told(ros: Ros, serve, tmp_path: Path):
+    daemon: Daemon = serve()
+    Sensor(daemon, "armrest").begin()
+    ros.node(socket=daemon.socket, gates=tmp_path / "nobody.sock")
+    peer = ros.peer()
+    peer.say(call=ros.topic("armrest", "listen"), data=False)
+    answer = peer.line()
+    assert not answer["success"] and str(tmp_path / "nobody.sock") in answer["message"]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({"types": ["gestur"]}, "gestur"),
+        ({"types": "gesture"}, "types"),
+        ({"frames": ["arm rest"]}, "parameter frames: 'arm rest': expected letters, digits, _ and -"),
+        ({"frames": ["armrest"], "to": "9000"}, "parameter to: '9000': expected HOST:PORT"),
+        ({"gates": "/nowhere.sock", "gate": "my gate"}, "parameter gate: 'my gate': expected letters"),
+    ],
+)
+def test_a_parameter_that_cannot_be_ends_the_node_with_one_sentence(ros: Ros, serve, parameters: Any, words: str):
+    node = ros.node(socket=serve().socket, **parameters)
+    assert node.process.wait(DEADLINE_S) == 1
+    assert words in node.errors.read_text()
