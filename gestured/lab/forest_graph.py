@@ -18,6 +18,7 @@ from gestured.core.errors import ModelError
 from gestured.lab.decide import Answers
 
 OPSET = 17
+WHOLE = 65_535  # a leaf's shares are stored as parts of this
 LEAST_CHANCE = 1e-3  # a forest's probabilities are not trusted below this, nor above 1 - this
 
 
@@ -40,8 +41,9 @@ def forest_outputs(probabilities: NDArray[Any], gestures: int, calibration: Mapp
 def forest_graph(forest: RandomForestClassifier, gestures: int, calibration: Mapping[str, Any]) -> onnx.ModelProto:
     """The forest as tables that all trees walk at once, a level of depth at a time.
 
-    Not ONNX's tree ensemble: that is four times as large on disk, takes 200 MiB and more when it is opened
-    and a third of a second (173,000 nodes), and this is walked as exactly.
+    Not ONNX's tree ensemble: that is many times as large on disk, takes 200 MiB and more when it is opened
+    and a third of a second (173,000 nodes), and this is walked as exactly. The file holds the tables in the smallest
+    types that they fit into; what comes before the walk does not depend on the input, and is done once, at opening.
     """
     temperature, scale, offset = _calibration(calibration)
     tables = _flatten(forest)
@@ -51,6 +53,10 @@ def forest_graph(forest: RandomForestClassifier, gestures: int, calibration: Map
         "gesture_end": np.array([gestures], np.int64),
         "axis_one": np.array([1], np.int64),
         "zero": np.array([0], np.int64),
+        "first_axis": np.int64(0),
+        "no_step": np.int32(0),
+        "one_leaf": np.int32(1),
+        "whole": np.float32(WHOLE),
         "least": np.float32(LEAST_CHANCE),
         "most": np.float32(1.0 - LEAST_CHANCE),
         "one": np.float32(1.0),
@@ -64,21 +70,31 @@ def forest_graph(forest: RandomForestClassifier, gestures: int, calibration: Map
         nodes.append(helper.make_node(operator, list(inputs), [output], name=output, **attributes))
         return output
 
+    whole_numbers = {"to": TensorProto.INT32}
+    add("Cast", ["feature"], "feature_of", **whole_numbers)
+    add("Cast", ["step"], "step_of", **whole_numbers)
+    add("Equal", ["step_of", "no_step"], "is_leaf")
+    add("Cast", ["is_leaf"], "leaves", **whole_numbers)
+    add("CumSum", ["leaves", "first_axis"], "leaves_up_to")
+    add("Sub", ["leaves_up_to", "one_leaf"], "leaf")  # a leaf's row; of other nodes it is not asked
     add("Shape", ["features"], "shape")
     add("Gather", ["shape", "zero"], "batch")
     add("Concat", ["batch", "trees"], "walks", axis=0)
     at = add("Expand", ["root", "walks"], "at_0")  # (B, trees): the node at which each tree stands
     for level in range(max(tree.get_depth() for tree in forest.estimators_)):
-        add("Gather", ["feature", at], f"feature_{level}")
+        add("Gather", ["feature_of", at], f"feature_{level}")
         add("GatherElements", ["features", f"feature_{level}"], f"value_{level}", axis=1)
         add("Gather", ["threshold", at], f"threshold_{level}")
         add("Greater", [f"value_{level}", f"threshold_{level}"], f"greater_{level}")
-        add("Cast", [f"greater_{level}"], f"right_{level}", to=TensorProto.INT32)
-        add("Gather", ["left", at], f"left_{level}")
+        add("Cast", [f"greater_{level}"], f"right_{level}", **whole_numbers)
+        add("Gather", ["step_of", at], f"step_{level}")
+        add("Add", [at, f"step_{level}"], f"left_{level}")
         at = add("Add", [f"left_{level}", f"right_{level}"], f"at_{level + 1}")
     add("Gather", ["leaf", at], "row")
-    add("Gather", ["leaf_values", "row"], "votes")  # (B, trees, classes)
-    add("ReduceMean", ["votes"], "probabilities", axes=[1], keepdims=0)
+    add("Gather", ["shares", "row"], "parts")  # (B, trees, classes)
+    add("Cast", ["parts"], "votes", to=TensorProto.FLOAT)
+    add("ReduceMean", ["votes"], "mean_vote", axes=[1], keepdims=0)
+    add("Div", ["mean_vote", "whole"], "probabilities")
     add("Slice", ["probabilities", "gesture_start", "gesture_end", "axis_one"], "named")
     add("Max", ["named", "least"], "named_least")
     add("Log", ["named_least"], "named_log")
@@ -139,35 +155,34 @@ def _calibration(calibration: Mapping[str, Any]) -> tuple[float, float, float]:
 
 
 def _flatten(forest: RandomForestClassifier) -> dict[str, NDArray[Any]]:
-    """All trees in one set of tables. A right child stands behind its left one; a leaf leads to itself."""
-    features, thresholds, lefts, leaves, values, roots = [], [], [], [], [], []
-    base = rows = 0
+    """All trees in one set of tables, a tree after the other. A right child stands behind its left one."""
+    features, thresholds, steps, shares, roots = [], [], [], [], []
+    base = 0
     for estimator in forest.estimators_:
         tree = estimator.tree_
-        count = tree.node_count
         order = [0]  # new number -> old
-        left = np.arange(count)
-        for new in range(count):
+        step = np.zeros(tree.node_count, np.int64)  # how far on the left child stands; a leaf leads to itself
+        for new in range(tree.node_count):
             old = order[new]
             if tree.children_left[old] >= 0:
-                left[new] = len(order)
+                step[new] = len(order) - new
                 order += [tree.children_left[old], tree.children_right[old]]
-        leaf = tree.children_left[order] < 0
-        features.append(np.where(leaf, 0, tree.feature[order]))
-        thresholds.append(np.where(leaf, np.float32(np.inf), rounded_down(tree.threshold[order])))
-        lefts.append(left + base)
-        leaves.append(np.where(leaf, np.cumsum(leaf) - 1 + rows, 0))
-        shares = tree.value[order, 0][leaf]
-        values.append(shares / shares.sum(axis=1, keepdims=True))
+        features.append(np.where(step == 0, 0, tree.feature[order]))
+        thresholds.append(np.where(step == 0, np.float32(np.inf), rounded_down(tree.threshold[order])))
+        steps.append(step)
+        values = tree.value[order, 0][step == 0]
+        shares.append(np.rint(values / values.sum(axis=1, keepdims=True) * WHOLE))
         roots.append(base)
-        base += count
-        rows += int(leaf.sum())
+        base += tree.node_count
     return {
-        "feature": np.concatenate(features).astype(np.int32),
+        "feature": _smallest(np.concatenate(features)),
         "threshold": np.concatenate(thresholds).astype(np.float32),
-        "left": np.concatenate(lefts).astype(np.int32),
-        "leaf": np.concatenate(leaves).astype(np.int32),
-        "leaf_values": np.concatenate(values).astype(np.float32),
+        "step": _smallest(np.concatenate(steps)),
+        "shares": np.concatenate(shares).astype(np.uint16),
         "root": np.array([roots], np.int32),
         "trees": np.array([len(roots)], np.int64),
     }
+
+
+def _smallest(numbers: NDArray[np.int64]) -> NDArray[Any]:
+    return numbers.astype(np.min_scalar_type(numbers.max()))
