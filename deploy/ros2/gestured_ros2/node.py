@@ -1,5 +1,6 @@
 """The node `gestured`: a daemon's events as topics; if asked for, frames from a topic, and gates as services."""
 
+import signal
 import socket
 import threading
 import time
@@ -11,9 +12,11 @@ from typing import Any
 
 import rclpy
 from rclpy.exceptions import InvalidParameterTypeException
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
@@ -47,6 +50,7 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
         """Raises GesturedError for parameters that cannot be."""
         super().__init__("gestured")
         self.fault: GesturedError | None = None  # why it has ended by itself
+        self.ended = Future()  # done, once it shall end
         path, gates, gate = (
             self._text("socket", "/run/gestured/events.sock"),
             self._text("gates"),
@@ -115,7 +119,7 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
                 self._make_topics(sensor)
         if self.fault is not None:
             self.get_logger().fatal(str(self.fault))
-            rclpy.try_shutdown()
+            self.ended.set_result(None)
 
     def _say_gone(self) -> None:
         """What whoever comes late is told while no daemon is there."""
@@ -211,18 +215,32 @@ def _address(parameter: str, text: str) -> Address:
 
 def main() -> int:
     """Run the node until it is ended. The exit status is 1 where waiting does not help."""
-    rclpy.init()
+    # A thread is told of signals: rclpy's own handlers end with a traceback what has not begun to spin.
+    told, tells = socket.socketpair()
+    tells.setblocking(False)
+    signal.set_wakeup_fd(tells.fileno())
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: None)
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = Gestures()
     except (GesturedError, InvalidParameterTypeException, OSError) as error:
         rclpy.logging.get_logger("gestured").fatal(str(error))
         rclpy.try_shutdown()
         return 1
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    threading.Thread(target=_end_when_told, args=(node.ended, told), daemon=True).start()
     try:
-        rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):  # ended as asked
+        executor.spin_until_future_complete(node.ended)
+    except ExternalShutdownException:  # ended as asked
         pass
     finally:
         node.close()
         rclpy.try_shutdown()
     return 0 if node.fault is None else 1
+
+
+def _end_when_told(ended: Any, told: socket.socket) -> None:
+    told.recv(1)
+    ended.set_result(None)
