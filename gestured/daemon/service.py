@@ -169,6 +169,7 @@ class Service:
     def _follow(self) -> None:
         """Have the hub give touch events where somebody asks for them now."""
         named, every = self._clients.asked("touch")
+        named |= self._views.sensors
         every = every or any(output.follows for output in self._outputs)
         self._desk.take(self._hub.follow(None if every else named))
 

@@ -13,6 +13,7 @@ from gestured.core.beside.reading import Reading
 from gestured.core.beside.view import View
 from gestured.core.own import Examples, to_dict
 from gestured.daemon.metrics import Counter, Metrics
+from gestured.daemon.settings import Settings
 from gestured.daemon.snapshot import Snapshot
 
 OPEN = {"armed": None, "closed": (), "until": None}  # of a sensor that always listens
@@ -43,7 +44,7 @@ def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
         },
         "own": dict(snapshot.own),
         "sensors": {
-            name: {**_sensor(reading, snapshot.now), **gates.get(name, OPEN)}
+            name: {**_sensor(reading, snapshot.now), **gates.get(name, OPEN), "zones": _zones(snapshot.settings, name)}
             for name, reading in snapshot.sensors.items()
         },
         "gates": list(snapshot.gates),
@@ -154,6 +155,12 @@ def _sensor(reading: Reading, now: float) -> dict[str, Any]:
         "touched": reading.touched,
         "gestures": reading.sequence,
     }
+
+
+def _zones(settings: Settings, sensor: str) -> dict[str, tuple[float, ...]]:
+    """Left, bottom, right and top edge of each zone of a sensor, in fractions of it."""
+    own = settings.sensors.get(sensor)
+    return {} if own is None else {name: zone.at for name, zone in own.zones.items()}
 
 
 def _by_label(values: Mapping[tuple[str, ...], int]) -> dict[str, int]:

@@ -32,8 +32,8 @@ class Look:
     raw: bool  # counts as they were sent, too
 
     def hears(self, event: Event) -> bool:
-        """Whether the connection is told of an event; of provisional ones only those of the sensors it looks at."""
-        return not isinstance(event, Provisional) or event.sensor in self.sensors
+        """Whether the connection is told of an event; of guesses and fingers only those of the sensors it looks at."""
+        return not isinstance(event, Provisional | Touch) or event.sensor in self.sensors
 
 
 class Views:
@@ -76,11 +76,8 @@ class Views:
             self._expect({name for look in self._looks.values() for name in look.sensors & arrived})
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
-        """Take an event, as a sink, for all who look on. The status is left out, since the state says more.
-
-        Touch events are left out, since who looks on has not asked for them.
-        """
-        if self._looks and not isinstance(event, Status | Touch):
+        """Take an event, as a sink, for all who look on. The status is left out, since the state says more."""
+        if self._looks and not isinstance(event, Status):
             self._said.append((event, epoch, test))
             self._expect(())
 

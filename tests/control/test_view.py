@@ -7,6 +7,7 @@ import re
 import socket
 import subprocess
 import threading
+import tomllib
 from collections.abc import Callable, Iterator
 from email.message import Message
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 
 from gestured.client.control import Control
@@ -21,11 +23,14 @@ from gestured.client.web.door import HEADER, at_home
 from gestured.client.web.server import BODY_BYTES, SHARED, STRANGERS
 from gestured.control.view import NICE
 from gestured.control.view.server import PAGE
+from gestured.control.view.source import Looker
 from gestured.core.address import Address
+from gestured.core.zones import zones_of
 from gestured.record.tape_reader import read
 from tests.control.browser import PROGRAM, Browser
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Frame, Sensor
+from tests.documents.blocks import blocks
 
 FILES = [*SHARED.iterdir(), *PAGE.iterdir()]
 
@@ -98,7 +103,7 @@ class Stream:
 def real(serve, tmp_path: Path) -> Daemon:
     """A daemon that the test alone looks at, with a flight recorder."""
     model = tiny_model.make(tmp_path / "tiny.onnx", provisional=tiny_model.PROVISIONAL)
-    return serve("--clock", "sensor", "--stale-s", 30, "--flight-recorder", 4, model=model)
+    return serve("--clock", "sensor", "--stale-s", 30, "--flight-recorder", 4, "--touch", "true", model=model)
 
 
 @pytest.fixture
@@ -447,6 +452,79 @@ def test_the_scale_comes_back_after_an_outlier(view: Page, real: Daemon, browser
     show(sensor, browser, [mad, *sensor.hand.idle(0.5)])
     perform(sensor, browser, "left")
     assert browser.run("state.full") == 200
+
+
+def test_an_answer_is_drawn_where_it_was_and_a_zone_is_pulled_up_with_the_mouse(
+    start, serve, tmp_path: Path, browser: Browser
+) -> None:
+    config = tmp_path / "gestured.toml"
+    config.write_text("[sensors.arm.zones.left]\nat = [0, 0, 0.5, 1]\n")
+    real = serve(
+        "--clock", "sensor", "--stale-s", 30, "--config", config, model=tiny_model.make(tmp_path / "tiny.onnx")
+    )
+    process = start("view", "--control", real.ready["control"], "--listen", "127.0.0.1:0")
+    browser.size(1400, 900)
+    sensor = follow(Page(process.stdout.readline().decode()), browser, "arm", real)
+    browser.until("over.zones.left?.join() === '0,0,0.5,1'")
+    perform(sensor, browser, "right")
+    said = browser.until("document.getElementById('where').textContent")
+    assert re.fullmatch(r"From 1\d %, 5\d %.* way 0\.\d\d .* \d+ counts, one finger, in the zone left\.", said)
+    box = browser.run("(b => [b.left, b.top, b.width, b.height])(at('matrix').getBoundingClientRect())")
+
+    def pull(*places: tuple[float, float]) -> str:
+        for kind, (x, y) in zip(("mousePressed", "mouseMoved", "mouseReleased"), places, strict=True):
+            at = {"x": box[0] + (x * 8 + 0.5) / 9 * box[2], "y": box[1] + ((1 - y) * 8 + 0.5) / 9 * box[3]}
+            browser.call("Input.dispatchMouseEvent", type=kind, button="left", buttons=1, clickCount=1, **at)
+        return browser.run("document.getElementById('zone-note').textContent")
+
+    assert pull((0.6, 0.9), (1.0, 0.25), (1.0, 0.25)) == ""
+    lines = browser.run("document.getElementById('zone').textContent")
+    pulled = tomllib.loads(lines)["sensors"]["arm"]["zones"]
+    assert pulled["volume"]["at"] == pytest.approx([0.6, 0.25, 1.0, 0.9], abs=0.02)
+    assert zones_of(pulled | {"left": (0, 0, 0.5, 1)})
+    browser.run("navigator.clipboard.writeText = async text => { window.copied = text }")
+    browser.run("document.getElementById('copy').click()")
+    browser.until("document.getElementById('zone-note').textContent.startsWith('Copied')")
+    assert browser.run("window.copied") == lines
+    if folder := os.environ.get("PYTEST_PICTURES"):
+        browser.picture(Path(folder) / "view-zones.png")
+    assert pull((0.3, 0.9), (0.8, 0.25), (0.8, 0.25)) == "It overlaps left: zones must share no place."
+    assert browser.complaints() == []
+
+
+def test_sliders_follow_a_finger(view: Page, real: Daemon, browser: Browser) -> None:
+    """One goes to the finger, the other one begins where it stands; the code is the documents' to the letter."""
+    (shown,) = [block.text for block in blocks() if block.language == "js"]
+    assert shown == (PAGE / "slider.js").read_text()
+    sensor = follow(view, browser, "arm", real)
+    hand = sensor.hand
+    at = "['absolute', 'relative'].map(id => Number(document.getElementById(id).value))"
+    for begin, end in ((1, 3), (5, 6)):
+        before = browser.run(at)[1]
+        for column in np.linspace(begin, end, 10):
+            show(sensor, browser, [hand.frame(4.0, column)])
+        browser.until(f"Math.abs({at}[0] - {end / 8}) < 0.03")
+        assert browser.run(at)[1] == pytest.approx(before + (end - begin) / 8, abs=0.06)
+        show(sensor, browser, hand.idle(1.0))
+    assert browser.complaints() == []
+
+
+def test_moves_of_a_finger_wait_for_a_browser_as_one() -> None:
+    looker = Looker("arm", raw=False)
+    move: dict[str, Any] = {
+        "type": "touch", "id": 1, "touch": 0, "phase": "move", "x": 0.5, "dx": 0.25, "dy": 0.0
+    }  # fmt: skip
+    for told in (move | {"phase": "down"}, move, move | {"touch": 1}, move | {"x": 0.75}):
+        looker.touch(told)
+    looker.put("event", {"type": "gesture"})
+    looker.touch(move | {"phase": "up"})
+    parts = (looker.take(1.0) or b"").split(b"data: ")[1:]
+    sent: list[dict[str, Any]] = [json.loads(part.splitlines()[0]) for part in parts]
+    fingers = [(one["touch"], one["phase"], one["x"], one["dx"]) for one in sent if one["type"] == "touch"]
+    assert fingers == [
+        (0, "down", 0.5, 0.25), (0, "move", 0.75, 0.5), (1, "move", 0.5, 0.25), (0, "up", 0.5, 0.25)
+    ]  # fmt: skip
+    assert move["dx"] == 0.25  # others are shown it, too
 
 
 def test_what_lies_on_a_sensor_is_said(view: Page, real: Daemon, browser: Browser) -> None:

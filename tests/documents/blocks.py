@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-LANGUAGES = ("sh", "python", "c", "cpp", "json", "toml")
+LANGUAGES = ("sh", "python", "c", "cpp", "json", "toml", "js")
 FENCE = re.compile(r"^(?:<!-- (run|checked|not run): (.+?) -->\n)?```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 

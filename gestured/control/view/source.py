@@ -2,6 +2,7 @@
 
 import threading
 from dataclasses import asdict
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,15 @@ class Looker(Outbox):
     def __init__(self, sensor: str, raw: bool) -> None:
         super().__init__()
         self.sensor, self.raw = sensor, raw
+
+    def touch(self, told: dict[str, Any]) -> None:
+        """Where a finger is; a move that waits takes up the next one, so that moves displace nothing."""
+        with self._changed:
+            for _, waits in takewhile(lambda one: one[1].get("phase") == "move", reversed(self._rest)):
+                if (waits["id"], waits["touch"]) == (told["id"], told["touch"]):
+                    waits |= told | {by: waits[by] + told[by] for by in ("dx", "dy")}
+                    return
+        self.put("touch", dict(told))
 
 
 class Source:
@@ -141,6 +151,9 @@ class Source:
         elif line["type"] == "provisional":
             for outbox in self._lookers(line["sensor"]):
                 outbox.put("event", line)
+        elif line["type"] == "touch":
+            for outbox in self._lookers(line["sensor"]):
+                outbox.touch(line)
         else:
             self._tell("event", line)
 

@@ -4,7 +4,7 @@ const KEPT_S = 30, PATH_S = 3, CHART_S = 10, ROWS = 100, HOUR_S = 3600, OUTLIERS
 const STEPS = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000, 50000, 100000, 1e6, 1e7, 1e9];
 const PHASES = { IDLE: "idle", CONTACT: "contact", RELEASING: "releasing", GAP: "waiting for a second tap", SPENT: "held too long" };
 const SHADES = { IDLE: "#8a94a0", CONTACT: "#e69f00", RELEASING: "#56b4e9", GAP: "#009e73", SPENT: "#cc79a7" }; // Okabe and Ito
-const state = { stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0, lies: false };
+const state = { stream: null, sensor: "", frames: [], full: 0, paused: false, moment: 0, dirty: false, drawn: 0, lies: false, sliders: [] };
 const counted = { since: Date.now() / 1000, times: {} }; // by sensor and type: when contacts were answered, s
 
 
@@ -12,11 +12,13 @@ for (const step of STEPS.slice(0, -2)) at("scale").append(new Option(`0 to ${ste
 
 function clock(s) { return new Date(1000 * s).toLocaleTimeString("en-GB") + "." + String(Math.floor(s % 1 * 10)); }
 
-const kinds = { sensors, frame, event, gone: gone => daemon(gone.reason, true) };
+const kinds = { sensors, frame, event, touch: told => state.sliders.forEach(follow => follow(told)), gone: gone => daemon(gone.reason, true) };
 
 function open(sensor) {
   if (state.stream) state.stream.abort();
   state.frames = []; state.full = 0; state.sensor = sensor; state.lies = false;
+  rest();
+  forget();
   headline("…", "guess", "no contact yet");
   at("scores").tBodies[0].replaceChildren();
   state.stream = new AbortController();
@@ -27,8 +29,10 @@ function open(sensor) {
 function daemon(text, gone) {
   at("state").textContent = text;
   at("state").classList.toggle("gone", gone);
-  if (gone) absent(true);
+  if (gone) { absent(true); rest(); }
 }
+
+function rest() { state.sliders = [slider(at("absolute"), false), slider(at("relative"), true)]; } // no finger moves them
 
 function absent(is) { document.body.classList.toggle("absent", is); } // what is shown is of before
 
@@ -43,6 +47,7 @@ function sensors(told) {
     return tr;
   }));
   heard(seen);
+  over.zones = seen?.zones ?? {};
   absent(!seen || seen.state === "stale" || seen.state === "no_data");
   const minutes = Math.round((Date.now() / 1000 - counted.since) / 60);
   at("since").textContent = minutes < 60 ? `since this page was opened, ${minutes} min ago` : "in the last hour";
@@ -119,6 +124,7 @@ function event(told) {
   if (state.lies) return;
   name(told);
   if (told.scores) scores(told);
+  if (told.where) place(told);
 }
 
 function scores(told) { // the best two gestures and what is none, in this order whatever their shares are
@@ -191,19 +197,22 @@ function matrix(now, i, full) {
       g.fillText(String(Math.round(value)), x + side / 2, y + side / 2);
     }
   });
-  if (!sent) path(g, now, i, side, left);
-  const place = `row ${Math.floor(best / columns) + 1}, column ${best % columns + 1}`;
-  canvas.setAttribute("aria-label", `${rows} by ${columns} taxels; strongest ${Math.round(values[best])} counts at ${place}; ${bad.size} bad taxels; ${now.centroid ? "touched" : "not touched"}`);
-}
-
-function path(g, now, i, side, left) {
-  const spots = [];
-  for (let n = i; n >= 0 && state.frames[n].time > now.time - PATH_S; n--) spots.push(state.frames[n]);
-  g.lineCap = "round";
   const stroke = share => { // light on dark, so that it shows on every colour
     g.lineWidth = 5 * devicePixelRatio; g.strokeStyle = `rgb(0 0 0 / ${.6 * share})`; g.stroke();
     g.lineWidth = 2.5 * devicePixelRatio; g.strokeStyle = `rgb(255 255 255 / ${share})`; g.stroke();
   };
+  if (!sent) {
+    path(g, now, i, side, left, stroke);
+    drawOver(g, rows, columns, side, left, now.time, stroke);
+  }
+  const place = `row ${Math.floor(best / columns) + 1}, column ${best % columns + 1}`;
+  canvas.setAttribute("aria-label", `${rows} by ${columns} taxels; strongest ${Math.round(values[best])} counts at ${place}; ${bad.size} bad taxels; ${now.centroid ? "touched" : "not touched"}`);
+}
+
+function path(g, now, i, side, left, stroke) {
+  const spots = [];
+  for (let n = i; n >= 0 && state.frames[n].time > now.time - PATH_S; n--) spots.push(state.frames[n]);
+  g.lineCap = "round";
   for (let n = spots.length - 1; n > 0; n--) {
     const a = spots[n].centroid, b = spots[n - 1].centroid;
     if (!a || !b) continue;
