@@ -2,21 +2,16 @@
 
 import os
 import sys
-from collections import deque
 from typing import Any
 
 import numpy as np
 
-from gestured.client.picture import moving
+from gestured.client.picture import draw, shrunk
 from gestured.client.say import say_drawn, shown
 
 UP, CLEAR_BELOW = "\x1b[{}F", "\x1b[J"
 HIDE, SHOW = "\x1b[?25l", "\x1b[?25h"  # the cursor
-STEPS = (1.0, 2.0, 5.0)  # of a scale, in each power of ten
-NOISE = 20.0  # times the sensor's noise: the smallest scale, so that noise stays dark
-BAR = 20  # characters
-LOUD = 100.0  # noise units that fill the bar
-PATH = 30  # places that are remembered
+NOISE = 20.0  # times the sensor's noise that are drawn brightest at least, so that noise stays dark
 
 
 def in_colour() -> bool:
@@ -57,41 +52,19 @@ class Screen:
 
 
 class Felt:
-    """One sensor as it is felt, beside what is known of it: what the control verb `view` answers, in lines."""
+    """One sensor as it is felt: what the control verb `view` answers, in lines."""
 
     def __init__(self, colour: bool) -> None:
         self._colour = colour
-        self._full = 0.0  # counts; the scale is fixed, and grows with what is seen
-        self._path: deque[tuple[float, float]] = deque(maxlen=PATH)
-        self._t: float | None = None
+        self._full = 0.0  # counts that are drawn brightest: the most that was seen
 
     def lines(self, view: dict[str, Any]) -> list[str]:
         """The picture with its words."""
-        head = [shown(f"{view['sensor']}  {view['state']}"), ""]
+        head = shown(f"{view['sensor']}  {view['state']}")
         if view["values"] is None:
-            return [*head, "the idle sensor is being learned: leave it untouched for a second"]
-        values = np.array(view["values"]).reshape(view["grid"])
-        self._full = max(self._full, _step(max(float(values.max()), NOISE * view["noise"])))
-        if view["t"] != self._t:
-            self._t = view["t"]
-            if view["centroid"] is None:
-                self._path.clear()
-            else:
-                self._path.append(tuple(view["centroid"]))
-        loud = min(view["activity"] / LOUD, 1.0)
-        words = [
-            *head,
-            f"phase     {view['phase'].lower()}",
-            f"activity  {'█' * round(BAR * loud):<{BAR}} {view['activity']:5.1f}",
-            f"          a contact from {view['on']:.1f} on, over below {view['off']:.1f}",
-            f"scale     0 to {self._full:g} counts, {len(view['bad'])} bad taxels",
-        ]
-        picture = moving(values, list(self._path), self._full, self._colour)
-        words += [""] * (len(picture) - len(words))
-        return [f"{row}  {text}".rstrip() for row, text in zip(picture, words, strict=False)]
-
-
-def _step(least: float) -> float:
-    """The next of 1, 2, 5, 10, 20 ... that is not below `least`."""
-    power = 10.0 ** np.floor(np.log10(max(least, 1e-9)))
-    return float(next(step * power for step in (*STEPS, 10.0) if step * power >= least))
+            return [head, "the idle sensor is being learned: leave it untouched for a second"]
+        values = np.array(view["values"], np.float32).reshape(view["grid"])
+        self._full = max(self._full, float(values.max()), NOISE * view["noise"])
+        words = ["", head, f"phase     {view['phase'].lower()}", f"activity  {view['activity']:.1f}", ""]
+        picture = draw(shrunk(np.clip(values / self._full, 0.0, 1.0)), self._colour)
+        return [f"  {row}   {text}".rstrip() for row, text in zip(picture, words, strict=True)]

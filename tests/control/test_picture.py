@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from gestured.client.picture import RAMP, draw, moving, trace
+from gestured.client.picture import draw, trace
 
 
 def swipe_right(rows: int, columns: int) -> np.ndarray:
@@ -45,41 +45,3 @@ def test_with_colour_the_same_size_on_a_screen():
     seen = [re.sub("\x1b\\[[0-9;]*m", "", line) for line in lines]
     assert [len(line) for line in seen] == [9] * 5
     assert all(line.endswith("\x1b[0m") for line in lines)
-
-
-def plain(text: str) -> str:
-    return re.sub("\x1b\\[[0-9;]*m", "", text)
-
-
-@pytest.mark.parametrize(("grid", "zoom"), [((9, 9), 3), ((27, 15), 1), ((2, 2), 14), ((64, 64), 1), ((5, 64), 1)])
-@pytest.mark.parametrize("colour", [True, False])
-def test_a_moving_picture_fits_a_small_terminal(grid, zoom, colour):
-    lines = moving(np.zeros(grid), [], 100.0, colour)
-    assert len({len(plain(line)) for line in lines}) == 1
-    assert len(lines) <= 16 and len(plain(lines[0])) <= 40 and ("\x1b" in lines[0]) == colour
-
-
-def test_the_finger_is_where_it_presses_and_points_where_it_goes():
-    for way, arrow in (((0, 1), "→"), ((0, -1), "←"), ((1, 0), "↓"), ((-1, 0), "↑"), ((1, 1), "↘"), ((-1, 1), "↗")):
-        path = [(4 + n * way[0], 4 + n * way[1]) for n in range(4)]
-        values = np.zeros((9, 9))
-        row, column = path[-1]
-        values[row, column] = 100
-        for colour in (False, True):
-            text = [plain(line) for line in moving(values, path, 100.0, colour)]
-            (line,) = [n for n, one in enumerate(text) if arrow in one]
-            assert line == int((row + 0.5) * 3 / 2) and text[line].index(arrow) // 3 == column
-    still = moving(values, [(4.0, 4.0)] * 5, 100.0, False)
-    assert not any(arrow in line for line in still for arrow in "→←↓↑↘↗↖↙")
-
-
-def test_the_scale_is_fixed_and_the_colours_differ_in_brightness():
-    def grey(code: int) -> float:
-        """The brightness of one of the 216 colours of a terminal."""
-        levels = [0, 95, 135, 175, 215, 255]
-        r, g, b = (levels[(code - 16) // n % 6] for n in (36, 6, 1))
-        return 0.2126 * r + 0.7152 * g + 0.0722 * b
-
-    assert [grey(code) for code in RAMP] == sorted({grey(code) for code in RAMP})
-    half = moving(np.full((9, 9), 50.0), [], 100.0, True)
-    assert half == moving(np.full((9, 9), 500.0), [], 1000.0, True) != moving(np.full((9, 9), 50.0), [], 50.0, True)
