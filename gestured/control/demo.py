@@ -164,18 +164,19 @@ class Show:
             say_json({"type": "summary"} | figures)
         else:
             say_drawn(in_words(figures, self.colour))
-            program = Path(sys.argv[0])
-            programs = program.parent if program.name == "gesturectl" else Path()
+            program = Path(sys.argv[0]).absolute()  # uvx, pipx and make keep it where a shell does not look
+            found = [f'  export PATH="{program.parent}:$PATH"'] if program.name == "gesturectl" else []
             say(
                 "",
                 "Next, a daemon of your own, a sensor that somebody touches, and a listener, each in a terminal",
-                "that begins with this line:",
+                f"that begins with {'these lines' if found else 'this line'}:",
+                *found,
                 "  export GESTURED_SOCKET=/tmp/gestured.sock",
-                f"  {programs / 'gestured'} --model {self.model}",
-                f"  {programs / 'gesturectl'} simulate --sensor armrest",
-                f"  {programs / 'gesturectl'} listen",
-                f"{programs / 'gesturectl'} view shows that sensor in a browser, and",
-                f"{programs / 'gesturectl'} pad makes a sensor of a mouse, a touchscreen or a telephone.",
+                f"  gestured --model {self.model}",
+                "  gesturectl simulate --sensor armrest",
+                "  gesturectl listen",
+                "gesturectl view shows that sensor in a browser, and",
+                "gesturectl pad makes a sensor of a mouse, a touchscreen or a telephone.",
             )
 
     def _draw(self, control: Control) -> None:
