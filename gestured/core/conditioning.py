@@ -52,7 +52,7 @@ class Conditioner:
 
     def look(self, t: float, raw: Array, after: AfterEffect) -> Look:
         """What (N,) counts at `t` s show. `after` says how far textile may still swing below its baseline."""
-        if self.idle.learns_step(raw):
+        if self.idle.smallest and self.idle.learns_step(raw):
             self._review()
         return self._look(t, raw, after)
 

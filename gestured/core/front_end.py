@@ -5,6 +5,7 @@ A front end knows neither its sensor's name nor who asks. Of each contact it giv
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -228,6 +229,8 @@ class FrontEnd:
         segmenter.reset()
         self._cutter.silent()
         self.conditioner.idle.doubt()
+        if self.frame is not None:  # frames that were read together share their memory until the last of them is gone
+            self.frame = replace(self.frame, values=self.frame.values.copy())
         return found
 
     def reset(self) -> list[Found]:

@@ -21,7 +21,7 @@ from gestured.core.listening import Listening
 from gestured.core.owner import Source
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
-from gestured.core.wire import Arrival, Decoder
+from gestured.core.wire import FEW, Arrival, Decoder
 
 FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one that sends
 REMEMBERED = 4096  # sensors that gave up their place, of which the last sequence and id are remembered
@@ -72,9 +72,10 @@ class Hub:
         """Take packets that were found waiting at `now`, each with its source."""
         facts = [] if now < self.gates.due else self._lapse(now)
         waiting: Waiting = {}
-        for packet, source in packets:
+        together = self._together(packets, facts) if len(packets) >= FEW else {}
+        for n, (packet, source) in enumerate(packets):
             try:
-                self._decode(packet, source, now, waiting, facts)
+                self._decode(together.get(n, packet), source, now, waiting, facts)
             except Exception as error:  # the packets before and after this one are good
                 facts.append(Fault(None, error))
         for name, (sensor, arrivals) in waiting.items():
@@ -254,11 +255,20 @@ class Hub:
         self._allowed: dict[str, bool] = {}  # by host
         self._full_until = -math.inf  # s; before that no stranger has been silent for long enough to lose its place
 
-    def _decode(self, packet: bytes, source: Source, now: float, waiting: Waiting, facts: list[Fact]) -> None:
+    def _together(self, packets: Sequence[tuple[bytes, Source]], facts: list[Fact]) -> dict[int, Arrival]:
+        """The frames of packets that can be read together; after a bug each is read by itself."""
+        try:
+            return self._decoder.together([packet for packet, _ in packets])
+        except Exception as error:
+            facts.append(Fault(None, error))
+            return {}
+
+    def _decode(self, found: bytes | Arrival, source: Source, now: float, waiting: Waiting, facts: list[Fact]) -> None:
+        """Take a packet, or the frame that is all it holds where that was read already."""
         if self._scene.allow and not self._may_send(source[0]):
             facts.append(Dropped("not_allowed", source))
             return
-        arrivals, errors = self._decoder.decode(packet, source)
+        arrivals, errors = ([found], []) if isinstance(found, Arrival) else self._decoder.decode(found, source)
         for error in errors:
             facts.append(Dropped(error.reason, source, text=str(error)))
         for arrival in arrivals:

@@ -49,13 +49,13 @@ class Idle:
         self.known = False  # whether an idle second was learned
         self.provisional = False  # whether what was learned is in doubt, and the next stable second replaces it
         self.glance = math.inf  # s, when `mistaken` is to be asked next
+        self.smallest = 0.0  # counts, the smallest change of a sensor that stood still when it was learned; else 0
         self.bare: Bare | None = None  # what the sensor showed before something was laid on it that was learned
         self._settling = Settling()
         self._followed: float | None = None  # s, the last idle frame; None after a contact or a silence
         self._reviewed = 0.0  # s, when the noise was last looked at
         self._learned = 1.0  # counts, `level` as it was learned
         self._quieter = 0  # sum of the weights of the last glances that were quieter
-        self._smallest = 0.0  # counts, the smallest change of a sensor that stood still when it was learned; else 0
         self._shown: Array = np.zeros(taxels)  # the last raw counts, as far as they are needed
 
     def settle(self, t: float, raw: Array, *, rests: bool = False, restless: bool = False) -> Learned | None:
@@ -74,7 +74,7 @@ class Idle:
             self.counts, self.step, self.lively = learned.baseline, learned.step, learned.lively
             self.known, self.provisional = True, not learned.stable
             self._followed = self._reviewed = t
-            self._smallest, self._shown = math.inf if learned.still else 0.0, raw
+            self.smallest, self._shown = math.inf if learned.still else 0.0, raw
             self._set(learned.noise)
             self._quieter, self._learned = 0, self.level
             self.glance = t + GLANCE_S if self.level >= QUIETER * self.step else math.inf  # what moves, moves by a step
@@ -111,19 +111,17 @@ class Idle:
     def learns_step(self, raw: Array) -> bool:
         """Learn the quantisation step, and with it the noise, from (N,) counts of a sensor that stood still so far.
 
-        True if these counts change by less than the smallest step known until now.
+        Asked where there is a `smallest` change. True if these counts change by less than that.
         """
-        if not self._smallest > 0:
-            return False
         moved = raw != self._shown
         changed = raw[moved] - self._shown[moved]
         self._shown = raw
         if not changed.size or np.array_equal(raw, np.rint(raw)):  # whole numbers count in ones, as in `quantum`
             return False
         smallest = max(float(np.abs(changed).min()), RESOLUTION * float(np.abs(raw).max()), LEAST_STEP)
-        if smallest >= self._smallest:
+        if smallest >= self.smallest:
             return False
-        self._smallest = self.step = smallest
+        self.smallest = self.step = smallest
         self._set(np.full_like(self.sigma, smallest))
         return True
 

@@ -84,6 +84,16 @@ class Place(NamedTuple):
     run: int  # byte at which the run or the blob begins
 
 
+class Layout:
+    """How a packet is laid out: its length in bytes, and its messages."""
+
+    __slots__ = ("length", "meaning", "places")
+
+    def __init__(self, length: int, places: list[Place]) -> None:
+        self.length, self.places = length, places
+        self.meaning: Any = None  # what whoever reads such packets has found out about them
+
+
 _new = tuple.__new__  # Message(...) takes twice the time
 _frombuffer = np.frombuffer
 
@@ -93,23 +103,31 @@ class Layouts:
 
     def __init__(self, most_bytes: int = LAYOUTS_BYTES) -> None:
         self._most_bytes = self._room = most_bytes
-        self._known: dict[bytes, tuple[int, list[Place]]] = {}  # by `_key`: a packet's length, and its messages
+        self._known: dict[bytes, Layout] = {}  # by `_key`
 
     def __len__(self) -> int:
         """How many layouts are known."""
         return len(self._known)
 
+    def find(self, data: bytes) -> Layout | None:
+        """The layout of a packet, None where it is not known; what a blob's size says is not looked at."""
+        begin = data[BUNDLED if data.startswith(_BUNDLE) else ALONE]
+        layout = self._known.get(begin) or self._known.get(_key(begin))
+        if layout is None or layout.length != len(data):
+            return None
+        for place in layout.places:
+            if not data.startswith(place[1], place[0]):
+                return None
+        return layout
+
     def read(self, data: bytes, bundled: bool) -> list[Message] | None:
         """The messages of a packet, None where its layout is not known."""
-        begin = data[BUNDLED if bundled else ALONE]
-        layout = self._known.get(begin) or self._known.get(_key(begin))
-        if layout is None or layout[0] != len(data):
+        layout = self.find(data)
+        if layout is None:
             return None
         time, bundle = (timetag(data, 8, len(data)), 0) if bundled else (None, -1)
         messages: list[Message] = []
-        for start, head, address, types, unpack, scalars, dtype, length, run in layout[1]:
-            if not data.startswith(head, start):
-                return None
+        for _, _, address, types, unpack, scalars, dtype, length, run in layout.places:
             args: tuple[Argument, ...] = () if unpack is None else unpack(data, scalars)
             if dtype is not None:
                 args += (_frombuffer(data, dtype, length, run),)
@@ -130,7 +148,7 @@ class Layouts:
             self._known.clear()
             self._room = self._most_bytes
         self._room -= cost
-        self._known[_key(data[BUNDLED if bundled else ALONE])] = (len(data), places)
+        self._known[_key(data[BUNDLED if bundled else ALONE])] = Layout(len(data), places)
 
 
 def _key(begin: bytes) -> bytes:

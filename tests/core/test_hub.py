@@ -1,9 +1,11 @@
 """The one path: whoever goes through the hub uses the same frames and says the same."""
 
+import gc
 import ipaddress
 import math
 import socket
 import statistics
+import tracemalloc
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
@@ -93,6 +95,44 @@ def test_a_second_source_feeds_nothing(crossed: list[Arrived]) -> None:
     assert len(taken) == len(crossed) - 35 and max(float(frame.values.max()) for frame in taken) < 205
     alone = [fact for fact in play(SCENE, [one for one in crossed if one[2] == FIRST]) if isinstance(fact, Event)]
     assert [fact for fact in facts if isinstance(fact, Event)] == alone != []
+
+
+def test_packets_that_are_found_together_decide_what_they_decide_one_by_one() -> None:
+    """Sensors that are swiped over at other moments, beside junk, NaN and a second source."""
+    rng, hubs = np.random.default_rng(25), [Hub(replace(SCENE, frames=False), Sure()) for _ in range(2)]
+    frames = [hand.idle(2.0 + n / 10) + hand.swipe("left") + hand.idle(2.0) for n, hand in enumerate([Hand()] * 8)]
+    events: list[list[Event]] = [[], []]
+    counted: list[list[str]] = [[], []]
+    for k in range(min(map(len, frames))):
+        packets = [(floats(f"/s{n}/pressure", frame[k], 0), FIRST) for n, frame in enumerate(frames)]
+        strange = floats("/s1/pressure", np.full((9, 9), math.nan), 0)
+        packets += [(strange, FIRST), (packets[0][0], SECOND), (rng.bytes(12), FIRST)]
+        packets = [packets[n] for n in rng.permutation(len(packets))]
+        for hub, said, rest, reads in zip(hubs, events, counted, ([packets], [[one] for one in packets]), strict=True):
+            facts = [fact for read in reads for fact in hub.receive(read, k / 15)] + hub.tick(k / 15)
+            said += [fact for fact in facts if isinstance(fact, Event)]
+            rest += sorted(str(fact) for fact in facts if isinstance(fact, Changed | Dropped))
+    assert events[0] == events[1] and counted[0] == counted[1]
+    assert sum(isinstance(event, Gesture) for event in events[0]) == len(frames)
+
+
+def test_a_silent_sensor_keeps_no_others_frames() -> None:
+    """Frames that were read together share memory: each sensor falls silent after another read."""
+    rng, kept = np.random.default_rng(0), []
+    for together in (True, False):
+        hub = Hub(replace(SCENE, grid=(32, 32), frames=False), Sure())
+        gc.collect()
+        tracemalloc.start()
+        for k in range(30):
+            packets = [(floats(f"/s{n}/pressure", rng.normal(100, 2, (32, 32)), 0), FIRST) for n in range(k, 30)]
+            for read in [packets] if together else [[packet] for packet in packets]:
+                hub.receive(read, k / 15)
+        hub.tick(60.0)
+        del packets, read
+        gc.collect()
+        kept.append(tracemalloc.get_traced_memory()[0])
+        tracemalloc.stop()
+    assert kept[0] < 1.1 * kept[1]
 
 
 class Counting(dict[str, Setup]):

@@ -280,6 +280,44 @@ def test_a_strangers_touches_do_not_get_into_a_stream() -> None:
     assert decode.decode(FRAME, source="owner")[0][0].touches == ()
 
 
+def test_packets_that_are_read_together_say_what_each_says_alone() -> None:
+    """Sensors of all forms, grids and lengths of name, in any order; with counters, touches, junk and NaN."""
+    rng = np.random.default_rng(25)
+    grids = dict.fromkeys(("s", "a", "b", "cc", "a-long-name"), (3, 4)) | {"square": (9, 9), "small": (2, 2)}
+    alone, both = (Decoder(Addresses(), grids.__getitem__, keep_touches=False) for _ in range(2))
+    shared = 0
+    for _ in range(100):
+        usual = int(rng.integers(6))  # most packets of a read have one form
+        forms = [usual if rng.random() < 0.8 else int(rng.integers(6)) for _ in range(rng.integers(1, 40))]
+        packets = [_any_packet(rng, name, grids[name], form) for form in forms for name in rng.choice(list(grids), 1)]
+        together = both.together(packets)
+        shared += len(together)
+        for n, packet in enumerate(packets):
+            arrivals, errors = alone.decode(packet)
+            read = both.decode(packet)
+            for one, other in zip(arrivals, [together[n]] if n in together else read[0], strict=True):
+                assert one[0] == other[0] and one[2:] == other[2:] and one.values.dtype == other.values.dtype
+                assert one.values.shape == other.values.shape and one.values.tobytes() == other.values.tobytes()
+            assert [e.reason for e in errors] == [e.reason for e in read[1]] and not (errors and n in together)
+    assert shared > 300
+
+
+def _any_packet(rng: np.random.Generator, sensor: str, grid: tuple[int, int], form: int) -> bytes:
+    values = rng.normal(0, 100, grid[0] * grid[1])
+    if rng.random() < 0.05:
+        values[rng.integers(values.size)] = math.nan
+    counter = int(rng.integers(1000)) if rng.random() < 0.8 else None
+    if form == 0:
+        return pressure(np.rint(np.nan_to_num(values)), counter, sensor, "i")
+    if form == 1:
+        return blob(values.astype(">f4").tobytes(), counter)
+    if form == 2:
+        return rng.bytes(40) if rng.random() < 0.2 else trajectory((1, 2.0, 3.0), sensor=sensor)
+    packet = pressure(values, counter, sensor)
+    touches = [trajectory(*[(1, 2.0, 3.0)] * int(rng.random() < 0.2), sensor=sensor)]
+    return packet if form == 3 else encoding.bundle([packet, *touches], float(rng.integers(1, 2**31)))
+
+
 def test_touches_nobody_wants_are_passed_over() -> None:
     decode = decoder(keep_touches=False)
     packet = encoding.bundle([FRAME, FINGER, encoding.message("/s/trajectory", "if", (1, 1.0))])
