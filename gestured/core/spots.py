@@ -19,6 +19,7 @@ STEP, STEPS = 0.25, 3  # pitches from one offset of the table to the next, and h
 BASE = 0.5  # variance of the flat base in units of a taxel's noise: crosstalk and a palm lift what is around a finger
 SIDE = 2 * STEPS + 1
 TABLES = 64  # tables that are kept: one for each way in which the border cuts the taxels around a peak
+PEAKS = 1024  # places of a peak for which it is kept which taxels are around it: those of several sensors
 SECOND = 0.4  # of the first finger's peak: a second one is at least as strong, since a palm and crosstalk are not
 VALLEY = 0.85  # of the second peak: what lies between two fingers is at most so high
 NOISE = 4.0  # noise units: a lower peak is no second finger
@@ -39,29 +40,30 @@ class Spot(NamedTuple):
 
 def spots(frame: Array, noise: float) -> list[Spot]:
     """The fingers in (R, C) counts above the baseline, the strongest first: one, or two that can be told apart."""
-    columns = frame.shape[1]
-    first = divmod(int(frame.argmax()), columns)
-    second = _second(frame, first, noise)
+    best = int(frame.argmax())
+    first, top = divmod(best, frame.shape[1]), frame.item(best)
+    second = _second(frame, first, top, noise)
     if second is None:
-        return [_spot(frame, first, REACH, int(np.count_nonzero(frame > frame[first] / 2)))]
+        return [_spot(frame, first, REACH, int(np.count_nonzero(frame > top / 2)))]
     near = max(abs(first[0] - second[0]), abs(first[1] - second[1])) <= APART
     rows, across = np.indices(frame.shape)
     nearer = np.hypot(rows - first[0], across - first[1]) < np.hypot(rows - second[0], across - second[1])
     return [
-        _spot(frame, peak, 1 if near else REACH, int(np.count_nonzero((frame > frame[peak] / 2) & own)))
+        _spot(frame, peak, 1 if near else REACH, int(np.count_nonzero((frame > frame.item(peak) / 2) & own)))
         for peak, own in ((first, nearer), (second, ~nearer))
     ]
 
 
-def _second(frame: Array, first: tuple[int, int], noise: float) -> tuple[int, int] | None:
+def _second(frame: Array, first: tuple[int, int], top: float, noise: float) -> tuple[int, int] | None:
     """The peak of a second finger; None where there is none, or it cannot be told from the first."""
     row, column = first
     others = frame.copy()
-    others[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = 0.0
-    down, across = divmod(int(others.argmax()), frame.shape[1])
-    peak = others.item(down, across)
-    if peak < SECOND * frame.item(first) or peak < NOISE * noise:
+    others[row - 1 if row else 0 : row + 2, column - 1 if column else 0 : column + 2] = 0.0
+    at = int(others.argmax())
+    peak = others.item(at)
+    if peak < SECOND * top or peak < NOISE * noise:
         return None
+    down, across = divmod(at, frame.shape[1])
     if peak < frame[max(down - 1, 0) : down + 2, max(across - 1, 0) : across + 2].max():
         return None
     steps = np.linspace(0.0, 1.0, 2 * max(abs(down - row), abs(across - column)) + 1)[1:-1]
@@ -73,15 +75,13 @@ def _second(frame: Array, first: tuple[int, int], noise: float) -> tuple[int, in
 
 def _spot(frame: Array, peak: tuple[int, int], reach: int, area: int) -> Spot:
     (row, column), (rows, columns) = peak, frame.shape
-    above, below = min(reach, row), min(reach, rows - 1 - row)
-    left, right = min(reach, column), min(reach, columns - 1 - column)
-    around = frame[row - above : row + below + 1, column - left : column + right + 1].ravel()
-    fits = _table(above, below, left, right).dot(around)
+    around, table = _around(rows, columns, row, column, reach)
+    fits = table.dot(frame[around].ravel())
     best = int(fits.argmax())
     down, across = divmod(best % SIDE**2, SIDE)
     top, at = fits.item(best), fits.item
-    dy = 0.0 if down in (0, SIDE - 1) else _summit(at(best - SIDE), top, at(best + SIDE))
-    dx = 0.0 if across in (0, SIDE - 1) else _summit(at(best - 1), top, at(best + 1))
+    dy = _summit(at(best - SIDE), top, at(best + SIDE)) if 0 < down < SIDE - 1 else 0.0
+    dx = _summit(at(best - 1), top, at(best + 1)) if 0 < across < SIDE - 1 else 0.0
     down_to, across_to = row + (down - STEPS + dy) * STEP, column + (across - STEPS + dx) * STEP
     return _new(
         Spot,
@@ -93,6 +93,15 @@ def _summit(before: float, top: float, after: float) -> float:
     """Where a parabola through three values is highest, in steps from the middle one."""
     bend = before - 2 * top + after
     return 0.5 * (before - after) / bend if bend < 0 else 0.0
+
+
+@lru_cache(PEAKS)
+def _around(rows: int, columns: int, row: int, column: int, reach: int) -> tuple[tuple[slice, slice], Array]:
+    """The taxels around a peak that a fit looks at, and the table for them."""
+    above, below = min(reach, row), min(reach, rows - 1 - row)
+    left, right = min(reach, column), min(reach, columns - 1 - column)
+    around = slice(row - above, row + below + 1), slice(column - left, column + right + 1)
+    return around, _table(above, below, left, right)
 
 
 @lru_cache(TABLES)

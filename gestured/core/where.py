@@ -37,7 +37,7 @@ def where(segment: Segment, zones: Mapping[str, Zone]) -> Where:
     rows, columns = touched.shape[1:]
     snr = top / max(segment.noise, SMALLEST)
     way = _way(places, RESTS + SHAKE / max(snr, 1.0))
-    start, end = (place(rows, columns, row, column) for row, column in places[[0, -1]].tolist())
+    start, end = (Place(*fractions(rows, columns, row, column)) for row, column in places[[0, -1]].tolist())
     return Where(
         start,
         end,
@@ -55,9 +55,9 @@ def middle(fingers: list[Spot]) -> tuple[float, float]:
     return sum(one.row for one in fingers) / len(fingers), sum(one.column for one in fingers) / len(fingers)
 
 
-def place(rows: int, columns: int, row: float, column: float) -> Place:
+def fractions(rows: int, columns: int, row: float, column: float) -> tuple[float, float]:
     """A row and a column of a grid as fractions of it, to the right and upward."""
-    return Place(round(column / (columns - 1), 4), round(1.0 - row / (rows - 1), 4))
+    return round(column / (columns - 1), 4), round(1.0 - row / (rows - 1), 4)
 
 
 def _way(places: Array, rests: float) -> float:

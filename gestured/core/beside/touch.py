@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.beside.lying import Lying
-from gestured.core.events import Touch
+from gestured.core.events import Place, Touch
 from gestured.core.front_end import FrontEnd
 from gestured.core.spots import Spot, spots
-from gestured.core.where import digits, place
+from gestured.core.where import digits, fractions
 from gestured.core.zones import Zone, zone_at
 
 Array = NDArray[np.float64]
@@ -114,16 +114,17 @@ class Fingers:
 
     def _tell(self, one: Finger, phase: str, reason: str | None = None) -> Touch:
         """What is told of a finger now."""
-        spot, at = one.spot, place(*self._shape, *one.spot[:2])
+        row, column, peak, area = one.spot
+        rows, columns = self._shape
+        x, y = fractions(rows, columns, row, column)
         if phase == "down":
-            one.number, one.told, one.zone = self._count, (at.x, at.y), zone_at(self.zones, at)
+            one.number, one.told, one.zone = self._count, (x, y), zone_at(self.zones, Place(x, y))
             self._count += 1
-        dx, dy = round(at.x - one.told[0], 4), round(at.y - one.told[1], 4)
-        one.told = at.x, at.y
+        (before_x, before_y), one.told = one.told, (x, y)
+        dx, dy = round(x - before_x, 4), round(y - before_y, 4)
         return Touch(
-            self._sensor, self._id, one.number, phase, one.t, at.x, at.y, dx, dy, digits(spot.peak), spot.area,
-            one.zone, reason,
-        )  # fmt: skip
+            self._sensor, self._id, one.number, phase, one.t, x, y, dx, dy, digits(peak), area, one.zone, reason
+        )
 
 
 def _paired(fingers: list[Finger], found: list[Spot]) -> list[tuple[Finger, Spot]]:
