@@ -7,6 +7,7 @@ from gestured.core.timing import Timing
 
 Place = tuple[float, float]  # (row, column) in taxel pitches
 
+RESTS = 0.5  # taxel pitches: a shorter way has no direction, and a finger that goes no further rests
 ON_SHARE = 0.20  # of a contact's peak: a frame of it is strong from there on, and a new contact must exceed it
 RECOVERY_S = 1.0  # time constant with which the after-effect fades, and for how long a contact is followed by it
 AFTER_S = 8.0  # after so long nothing is left of a contact: a firm finger has faded below the noise

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.conditioning import Conditioner, Look
-from gestured.core.contact import Place
+from gestured.core.contact import RESTS, Place
 from gestured.core.frames import UNDISTURBED, Before, Segment
 from gestured.core.taxels import Inspection
 
@@ -26,7 +26,6 @@ HOLE_S = 0.25  # after longer without a frame nobody knows what the finger did m
 HOLE_FRAMES = 2.5  # intervals of the sensor: a slow sensor's hole may last so many, whatever the seconds
 CLEAR_S = 0.45  # the longest hole that a clear path excuses: five frames lost in a row at 15 Hz
 SIDE = 3  # frames at most on each side of a hole from which its way is taken
-RESTS = 0.5  # taxel pitches: a shorter way has no direction, and a finger that goes no further rests
 STRAIGHT = math.radians(40.0)  # angle up to which the way across the hole goes straight on from the way beside it
 BENT = math.radians(75.0)  # angle up to which that holds where both ways bend to the same side, as on a circle
 SLOWEST = 0.75  # times the speed beside the hole: a finger slower than that has turned a corner, or stopped

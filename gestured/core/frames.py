@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+SMALLEST = 1e-30  # counts; the least noise that anything is divided by
 QUIET_S = 10.0  # a contact further ago says nothing of the next one
 
 

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.beside.reading import SMALLEST
-from gestured.core.cutter import RESTS
+from gestured.core.contact import RESTS
 from gestured.core.events import Place, Where
-from gestured.core.frames import Segment
+from gestured.core.frames import SMALLEST, Segment
 from gestured.core.spots import Spot, spots
 from gestured.core.zones import Zone, zone_at
 

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.events import Gate
+from gestured.core.frames import SMALLEST
 from gestured.core.front_end import FrontEnd
 from gestured.core.quantiles import median
 
 # From good to bad.
 STATES = ("ok", "starting", "degraded", "intermittent", "inverted", "stale", "no_data", "faulty")
 SILENT = ("no_data", "stale")  # states of sensors that are not there now
-SMALLEST = 1e-30  # counts; the least noise that anything is divided by
 SHORT_S = 5.0  # a stretch of frames between two silences that is shorter may hold a few gestures alone
 STRETCHES = 3  # short stretches in a row after which a sensor is said to send only while it is touched
 FAULTY = 0.25  # share of the taxels: where so many are bad, what is bridged between them is guesswork
