@@ -572,13 +572,6 @@ def test_lines_of_a_mad_daemon_are_passed_over(bridge, broker, listen, fake):
     wait(lambda: f'gestured_bridge_events_total{{bridge="mqtt",result="wrong"}} {len(MAD)}.0' in page(where))
 
 
-def test_the_greeting_of_something_else_ends_the_bridge(bridge, broker, fake):
-    process = begin(bridge, broker(), fake)
-    fake.accept(HELLO | {"sensors": ["armrest"]})
-    assert process.end() == 1
-    assert "sensors" in process.said() and process.said().count("\n") <= 2
-
-
 def test_a_gesture_of_any_name_can_be_discovered(bridge, broker, listen, fake):
     """A model of one's own may call its gestures anything, a topic of discovery may not."""
     at = broker()

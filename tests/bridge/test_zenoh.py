@@ -108,18 +108,6 @@ def test_no_memory_is_shared(bridge, site, daemon: Daemon):
     assert "/dev/shm/" not in Path(f"/proc/{process.process.pid}/maps").read_text()
 
 
-def test_other_types_and_unknown_keys_are_passed_on(bridge, site, fake):
-    process = begin(bridge, site, fake, "--types", "provisional", "--sensors", "armrest")
-    fake.accept()
-    asked = fake.request()["subscribe"]
-    assert asked == {"types": ["provisional", "status"], "sensors": ["armrest"]}
-    process.ready()
-    fake.say(gesture(1) | {"type": "provisional"}, gesture(1, provisional="confirmed"))
-    assert site.event()[0] == "gestured/car/armrest/provisional"
-    key, event = site.event()  # its answer comes unasked
-    assert (key, event["provisional"]) == ("gestured/car/armrest/gesture", "confirmed")
-
-
 def test_tokens_live_as_daemon_and_sensors_do(bridge, site, fake):
     process = begin(bridge, site, fake)
     fake.accept()
@@ -172,17 +160,6 @@ def test_a_router_that_goes_and_comes_back(bridge, site, fake):
 
     wait(heard)
     assert site.event()[1]["sequence"] == 50
-
-
-def test_a_router_that_is_not_there_yet_is_waited_for(bridge, fake):
-    endpoint = f"tcp/{free_address(socket.SOCK_STREAM)}"
-    process = bridge("zenoh", "--connect", endpoint, "--site", "car", "--socket", fake.path)
-    fake.accept()
-    assert endpoint in process.until("trying again")
-    router = opened("router", listen=endpoint)
-    wait(lambda: fake.say(STATUS) or "Zenoh is there" in process.said(), process.said)
-    process.ready()
-    router.close()
 
 
 def test_peers_need_no_router(bridge, fake):

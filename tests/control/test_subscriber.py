@@ -15,7 +15,6 @@ import pytest
 from gestured.client.control import Control
 from gestured.client.lines import Forbidden, Refused, Unreachable, read_ahead
 from gestured.client.subscriber import LONGEST_S, Subscriber
-from gestured.core.errors import GesturedError
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
 from tests.sockets import GESTURE, HELLO, PATIENCE_S, FakeDaemon
@@ -246,19 +245,3 @@ def test_a_real_daemon_that_is_started_again(tmp_path: Path):
             finally:
                 daemon.stop()
     assert len(set(instances)) == 2
-
-
-@pytest.mark.e2e
-@pytest.mark.parametrize(
-    ("filters", "words"),
-    [
-        ({"types": ["gestrue"]}, r"subscribe\.types: unknown \"gestrue\""),
-        ({"types": "gesture"}, r"subscribe\.types: expected a list"),
-        ({"sensors": ["arm rest"]}, "arm rest"),
-    ],
-)
-def test_what_a_daemon_refuses_is_one_sentence(daemon: Daemon, filters: dict[str, Any], words: str):
-    subscriber = Subscriber(daemon.socket, **filters)
-    with pytest.raises(GesturedError, match=words):
-        next(subscriber)
-    assert list(subscriber) == []

@@ -197,16 +197,6 @@ def test_one_enrolment_at_a_time_and_none_outlives_its_client(begin: Begin, tmp_
     assert ask(daemon, "gestures")["own"]["gestures"] == {"cut": 2}
 
 
-def test_names_that_cannot_be(begin: Begin) -> None:
-    daemon = begin()
-    ready(daemon)
-    with pytest.raises(Refused, match="is a gesture of tiny"):
-        Enrolment(daemon, "swipe_left")
-    for name in ("use", "Slash", "a" * 33):
-        with pytest.raises(Refused, match="is no gesture's name"):
-            Enrolment(daemon, name)
-
-
 def test_the_file_is_private_and_outlives_the_daemon_until_it_is_forgotten(begin: Begin, tmp_path: Path) -> None:
     daemon = begin()
     sensor = ready(daemon)

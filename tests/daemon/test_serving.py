@@ -1,6 +1,5 @@
 """Frames in, events out: what a client of a healthy daemon sees."""
 
-import json
 import select
 import socket
 import time
@@ -15,15 +14,6 @@ from pythonosc.osc_message import OscMessage
 from tests import encoding
 from tests.daemon import harness
 from tests.daemon.harness import Daemon, Sensor
-
-
-def test_hello_comes_first_and_says_who_speaks(shared: Daemon) -> None:
-    Sensor(shared, "greeted").begin().perform("left")
-    shared.client().subscribe("gesture", sensors=["greeted"])
-    first, second = shared.client().hello, shared.client().hello
-    assert first["type"] == "hello" and first["protocol"] == 1 and first["model"] == "tiny"
-    assert first["gestures"][:2] == ["one_tap", "double_tap"] and len(first["gestures"]) == 10
-    assert first["instance"] == second["instance"] and first["version"]
 
 
 def test_a_swipe_is_one_gesture_with_all_fields(shared: Daemon) -> None:
@@ -241,11 +231,3 @@ def test_the_names_of_metrics_are_an_interface(shared: Daemon) -> None:
     """`metrics.txt` holds name, type and help of each; a change shows in its diff, and in the changelog."""
     found = [line for line in shared.get("/metrics")[1].splitlines() if line.startswith("#")]
     assert "\n".join(found) + "\n" == (Path(__file__).parent / "metrics.txt").read_text()
-
-
-def test_health_and_readiness_explain_themselves(shared: Daemon) -> None:
-    status, body = shared.get("/healthz")
-    assert status == 200 and json.loads(body)["healthy"] is True
-    status, body = shared.get("/readyz")
-    assert status == 200 and json.loads(body)["ready"] is True and json.loads(body)["model"] == "tiny"
-    assert shared.get("/nothing")[0] == 404
