@@ -19,6 +19,9 @@ from gestured.core.hub import Hub
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
 from gestured.core.zones import zones_of
+from gestured.simulator import SimulatedSensor
+from gestured.simulator.live import LiveTextile
+from gestured.simulator.people import Press
 from tests import encoding
 from tests.core.test_sensor import DOUBLE, SWIPE, Fake, says
 from tests.core.test_where import drawn
@@ -46,14 +49,12 @@ class Hand:
         self.told: list[Event] = []
         self.rests(2.0)
 
-    def does(self, seconds: float, path: Path, peak: float = 400.0, arm: bool = False) -> list[Touch]:
+    def does(self, seconds: float, path: Path, peak: float = 400.0) -> list[Touch]:
         """Fingers along a path, by the share of the time that has passed; the touch events of that."""
         count, before = round(seconds * self.rate_hz), len(self.told)
         for k in range(count):
             self.t += 1 / self.rate_hz
             values = 300 + self._random.normal(0, 2, (9, 9)) + drawn(*path(k / count), peak=peak)
-            if arm:
-                values += drawn(*((1.0, column) for column in range(9)), peak=500)
             self.told += events_of(self.subject.push(Frame(self.t, values)))
         return [one for one in self.told[before:] if isinstance(one, Touch)]
 
@@ -177,14 +178,28 @@ def test_a_finger_that_keeps_moving_is_one_touch_beyond_the_longest_gesture() ->
 
 
 def test_under_a_resting_arm_touches_belong_to_what_moves() -> None:
-    hand = Hand(sensor())
-    rests = hand.does(4.0, lambda share: [], arm=True)
-    assert rests[-1].phase == "up" and rests[-1].reason == "learned"
-    told = hand.does(20.0, lambda share: [(6, 4 - 2 * math.cos(80 * share))], arm=True)[1:]
-    assert all(abs(8 * (1 - one.y) - 6) < 0.7 for one in told) and len(told) > 200
-    assert max(one.x for one in told) > 0.7 and min(one.x for one in told) < 0.3
-    hand.does(2.0, lambda share: [], arm=True)
-    checked(hand.told)
+    """On the simulated textile, with its blur, lag and noise; the arm trembles."""
+    pad = SimulatedSensor.nominal()
+    textile, subject, (wide, high) = LiveTextile(pad, 1), sensor(), pad.extent
+    t = np.arange(2.0, 30.0, 0.02)
+    tremor = np.random.default_rng(1).normal(0, 0.02, t.size).cumsum()
+    heavy = np.full(t.size, 4.0)
+    arm = Press(t, wide / 2 + tremor, 0.95 * high + tremor, heavy, 0.45 * wide, 9.0, flatness=1.5, finger=False)
+    t = np.arange(8.0, 28.0, 0.02)
+    across, firm = wide * (0.5 - 0.25 * np.cos(4 * t)), np.ones(t.size)
+    finger = Press(t, across, 0.3 * high * firm, firm, 5.5, 5.5)
+    times = np.arange(1, 32 * 15) / 15
+    told = events_of(one for t in times for one in subject.push(Frame(t, textile.frame(t, [arm, finger]))))
+    checked(told)
+    touches = [one for one in told if isinstance(one, Touch)]
+    rests, moves = ([one for one in touches if (one.t < 7) == early] for early in (True, False))
+    assert [(one.phase, one.reason) for one in rests if one.phase != "move"] == [("down", None), ("up", "learned")]
+    assert [(one.phase, one.reason) for one in moves if one.phase != "move"] == [("down", None), ("up", None)]
+    assert len(moves) > 290
+    for one in moves[2:-1]:
+        true_x = float(np.interp(one.t - 0.05, finger.t, across)) / pad.pitch_mm - 0.5  # the textile lags
+        true_y = 0.3 * high / pad.pitch_mm - 0.5
+        assert math.dist((8 * one.x, 8 * one.y), (true_x, true_y)) < 0.7
 
 
 def test_beside_a_finger_that_holds_touches_belong_to_the_one_that_moves() -> None:

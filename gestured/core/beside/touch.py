@@ -52,10 +52,13 @@ class Fingers:
         self._lying: Lying | None = None  # since the contact was given up
         self._baseline: Array | None = None  # (N,) counts, as it was before anything of the contact was learned
 
-    def end(self, reason: str | None = None) -> list[Touch]:
-        """The contact is over, or what there is was learned: each finger that was told of is up."""
-        fingers, self._fingers = self._fingers, []
-        return [self._tell(one, "up", reason) for one in fingers if one.number >= 0]
+    def end(self, learned: Array | None = None) -> list[Touch]:
+        """The contact is over, or (R, C) counts of it were `learned`: each finger that was told of is up."""
+        fingers, self._fingers = [one for one in self._fingers if one.number >= 0], []
+        if learned is None:
+            return [self._tell(one, "up") for one in fingers]
+        lie = [learned[round(one.spot.row), round(one.spot.column)] > one.spot.peak / 2 for one in fingers]
+        return [self._tell(one, "up", "learned" if lies else None) for one, lies in zip(fingers, lie, strict=True)]
 
     def see(self, front_end: FrontEnd) -> list[Touch]:
         """The last frame of a front end, in which a contact goes on."""
@@ -68,10 +71,10 @@ class Fingers:
             self._baseline = baseline
         quiet = segmenter.phase.let_go or (given_up and look.activity < segmenter.levels(look.t)[1])
         if given_up and (self._lying is None or baseline is not self._baseline):
-            below, learned = baseline - self._baseline, baseline is not self._baseline
-            self._lying, self._baseline = Lying(look.t, below.reshape(self._shape)), baseline
-            if learned:  # by the front end: all that is there
-                return self.end(None if quiet else "learned")
+            below, learned = (baseline - self._baseline).reshape(self._shape), baseline is not self._baseline
+            self._lying, self._baseline = Lying(look.t, below), baseline
+            if learned:  # by the front end: all that is there, which need not be what was there before
+                return self.end(below)
         if look.t - self._looked < EACH_S:
             return []
         self._looked = look.t
