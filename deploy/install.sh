@@ -87,6 +87,9 @@ put 644 systemd/gestured.tmpfiles.conf "$prefix/lib/tmpfiles.d/gestured.conf"
 (cd "$work/share" && find . -type f) | while read -r file; do
     put 644 "$work/share/$file" "$share/${file#./}"
 done
+for header in deploy/c/*.h; do
+    put 644 "$header" "$prefix/include/$(basename "$header")"
+done
 for file in systemd/osc-output.conf deploy/gestured.toml deploy/prometheus/gestured.rules.yml \
     deploy/prometheus/prometheus.yml deploy/grafana/dashboards/gestured.json docs/*.json docs/*.svg LICENSE NOTICE; do
     put 644 "$file" "$doc/$(basename "$file")"

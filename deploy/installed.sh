@@ -14,6 +14,7 @@ echo "  packages        $prefix/lib/gestured"
 echo "  systemd units   $(folders '/systemd/system')"
 echo "  man pages       $(folders '/man/')"
 echo "  completions     $(folders '-completion/\|/vendor[-_]completions')"
+echo "  C headers       $(folders '/include/')"
 echo "  documents       $(folders '/doc/')"
 echo "  settings        /etc/gestured/gestured.toml (yours: it stays as it is)"
 if [ -n "$root" ]; then

@@ -88,7 +88,8 @@ def test_all_is_roots_and_bound_to_one_python(package: Path):
     depends = subprocess.run(["dpkg-deb", "--field", package, "Depends"], capture_output=True, text=True).stdout
     (minor,) = extensions
     assert f"python3.{minor}" in depends.replace(",", "").split()
-    assert re.search(r"/usr/bin/gestured$", listed, re.MULTILINE)
+    for file in ("bin/gestured", "include/gestured_events.h", "include/gestured_frames.h"):
+        assert re.search(rf"/usr/{file}$", listed, re.MULTILINE)
 
 
 @pytest.fixture(scope="session")
