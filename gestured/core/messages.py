@@ -21,6 +21,11 @@ _UNSAID: dict[tuple[str, str], object] = {
     ("gesture", "own"): False, ("gesture", "where"): None, ("unknown", "where"): None, ("unknown", "gates"): (),
     ("touch", "reason"): None,
 }  # fmt: skip
+# By type: of each field its name, whether it is a time, and the value that is left unsaid.
+_FIELDS = {
+    kind: tuple((one.name, one.name in _STREAM_TIMES, _UNSAID.get((kind, one.name), ...)) for one in fields(cls))
+    for kind, cls in zip(EVENT_TYPES, get_args(Event), strict=True)
+}
 
 
 def json_object(text: str | bytes) -> dict[str, Any] | None:
@@ -42,12 +47,12 @@ def to_json(event: Event, epoch: float, *, test: bool = False) -> bytes:
 
     Raises ValueError for a NaN or an infinity, which no event may hold.
     """
-    line: dict[str, Any] = {"type": event_type(event)}
-    for field in fields(event):
-        value = getattr(event, field.name)
-        if value == _UNSAID.get((line["type"], field.name), ...):
-            continue
-        line[field.name] = value + epoch if field.name in _STREAM_TIMES and value is not None else value
+    kind = event_type(event)
+    line: dict[str, Any] = {"type": kind}
+    for name, is_time, unsaid in _FIELDS[kind]:
+        value = getattr(event, name)
+        if value != unsaid:
+            line[name] = value + epoch if is_time and value is not None else value
     if test:
         line["test"] = True
     return _line(line)
