@@ -45,9 +45,11 @@ def spots(frame: Array, noise: float) -> list[Spot]:
     second = _second(frame, first, top, noise)
     if second is None:
         return [_spot(frame, first, REACH, int(np.count_nonzero(frame > top / 2)))]
-    near = max(abs(first[0] - second[0]), abs(first[1] - second[1])) <= APART
-    rows, across = np.indices(frame.shape)
-    nearer = np.hypot(rows - first[0], across - first[1]) < np.hypot(rows - second[0], across - second[1])
+    down, across = second[0] - first[0], second[1] - first[1]
+    near = max(abs(down), abs(across)) <= APART
+    rows, columns = (np.arange(side) for side in frame.shape)  # below: less far from the first peak than half-way
+    middle = (second[0] ** 2 + second[1] ** 2 - first[0] ** 2 - first[1] ** 2) / 2
+    nearer = (rows * down)[:, None] + columns * across < middle
     return [
         _spot(frame, peak, 1 if near else REACH, int(np.count_nonzero((frame > frame.item(peak) / 2) & own)))
         for peak, own in ((first, nearer), (second, ~nearer))
@@ -66,11 +68,12 @@ def _second(frame: Array, first: tuple[int, int], top: float, noise: float) -> t
     down, across = divmod(at, frame.shape[1])
     if peak < frame[max(down - 1, 0) : down + 2, max(across - 1, 0) : across + 2].max():
         return None
-    steps = np.linspace(0.0, 1.0, 2 * max(abs(down - row), abs(across - column)) + 1)[1:-1]
-    between = frame[
-        np.rint(row + steps * (down - row)).astype(int), np.rint(column + steps * (across - column)).astype(int)
-    ]
-    return (down, across) if between.min() <= VALLEY * peak else None
+    steps = 2 * max(abs(down - row), abs(across - column))
+    for k in range(1, steps):  # along the line between both
+        share = k * (1.0 / steps)
+        if frame.item(round(row + share * (down - row)), round(column + share * (across - column))) <= VALLEY * peak:
+            return down, across
+    return None
 
 
 def _spot(frame: Array, peak: tuple[int, int], reach: int, area: int) -> Spot:
