@@ -72,4 +72,4 @@ def test_the_site_loads_nothing_from_elsewhere(pages: dict[Path, Page]):
 
 def test_its_first_page_shows_a_gesture_and_what_each_model_costs(pages: dict[Path, Page]):
     (first,) = [page for path, page in pages.items() if path.name == "index.html"]
-    assert {"docs/demo.svg", "docs/operating-points.svg"} <= set(first.loads)
+    assert {"docs/demo.svg", "docs/everyday.svg", "docs/operating-points.svg"} <= set(first.loads)
