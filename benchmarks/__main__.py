@@ -19,7 +19,7 @@ def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
 
     return {
         "decode": inside.decode,
-        "datagrams": lambda: traffic.datagrams(model),
+        "datagrams": lambda: [traffic.datagrams(model, 0, 0.3), traffic.datagrams(model, 6, 0.18)],
         "latency": lambda: latency.latency(model),
         "buses": lambda: buses.buses(model),
         "sensors": lambda: [traffic.sensors(model, 1000), traffic.sensors(model, 500)],

@@ -28,6 +28,7 @@ from gestured.model.opening import open_model
 
 CLIENTS = 1000
 STALLED = 50
+TOGETHER = 64  # packets of one read
 
 
 def decode() -> list[Row]:
@@ -36,6 +37,11 @@ def decode() -> list[Row]:
     packet = Form("armrest", plain=True).packet(Frame(0.0, rng.uniform(0, 4000, (9, 9))), 0, 0.0)
     decoder = Decoder(Addresses(), lambda _: Grid(9, 9), keep_touches=False)
     layouts, source = Layouts(), ("127.0.0.1", 40000)
+    read = [
+        Form(f"arm{n}", plain=True).packet(Frame(0.0, rng.uniform(0, 4000, (9, 9))), 0, 0.0) for n in range(TOGETHER)
+    ]
+    for one in read:
+        decoder.decode(one, source)
 
     def theirs() -> None:
         values = np.array(OscMessage(packet).params, np.float32).reshape(9, 9)
@@ -48,11 +54,13 @@ def decode() -> list[Row]:
             lambda: OscMessage(packet),
         ),
         _decode("the same, to a checked 9 x 9 matrix", lambda: decoder.decode(packet, source), theirs),
+        _decode(f"the same, {TOGETHER} sensors in one read", lambda: decoder.together(read), theirs, TOGETHER),
     ]
 
 
-def _decode(figure: str, ours: Callable[[], object], theirs: Callable[[], object]) -> Row:
-    slow, fast = interleaved(lambda: cpu_us(theirs, 2_000), lambda: cpu_us(ours, 20_000), 9)
+def _decode(figure: str, ours: Callable[[], object], theirs: Callable[[], object], frames: int = 1) -> Row:
+    """`ours` decodes so many `frames`, `theirs` one."""
+    slow, fast = interleaved(lambda: cpu_us(theirs, 2_000), lambda: cpu_us(ours, 20_000 // frames) / frames, 9)
     found = ratio(slow, fast)
     return Row(
         figure,

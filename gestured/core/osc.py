@@ -83,6 +83,11 @@ class Place(NamedTuple):
     length: int  # values of the run, or bytes of the blob; 0 for none
     run: int  # byte at which the run or the blob begins
 
+    @property
+    def blob(self) -> bool:
+        """Whether a blob stands there, which says its own size."""
+        return self.dtype is None and self.length > 0
+
 
 class Layout:
     """How a packet is laid out: its length in bytes, and its messages."""

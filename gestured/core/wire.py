@@ -93,10 +93,11 @@ class _Route(NamedTuple):
 
 
 class _Meaning(NamedTuple):
-    """Of packets of one layout that hold one frame as a run of numbers, and beside it nothing that is wanted."""
+    """Of packets of one layout that hold one frame, and beside it nothing that is wanted."""
 
     route: _Route
-    place: Place
+    place: Place  # of the frame's message
+    dtype: np.dtype[Any]  # of the frame's values as they are sent
     form: tuple[object, ...]  # the same for packets whose frames stand in the same place, of the same type and grid
 
 
@@ -168,12 +169,15 @@ class Decoder:
         routes = [self._routes.get((place.address, place.types)) for place in layout.places]
         frames = [(r, p) for r, p in zip(routes, layout.places, strict=True) if r is not None and r.grid is not None]
         known = all(route is not None and route.fault is None for route in routes)
-        blobs = any(place.dtype is None and place.length for place in layout.places)  # each says its own size
-        if self._keep_touches or not known or blobs or len(frames) != 1 or frames[0][1].dtype is None:
+        if self._keep_touches or not known or len(frames) != 1:
             return False
         route, place = frames[0]
-        form = layout.length, place.run, place.length, place.dtype.kind, route.grid, route.counted
-        return _Meaning(route, place, form)
+        rows, columns = route.grid or (0, 0)
+        dtype = place.dtype if place.dtype is not None else _BLOBS.get(place.length / (rows * columns))
+        if dtype is None or any(other.blob for other in layout.places if other is not place):
+            return False
+        form = layout.length, place.run, place.length, place.blob, dtype.kind, route.grid, route.counted
+        return _Meaning(route, place, dtype, form)
 
     def _learn(self, address: str, types: str) -> _Route:
         if len(self._routes) >= _MAX_ROUTES:
@@ -263,17 +267,17 @@ def _frame(message: Message, route: _Route) -> Arrival:
 
 def _frames(packets: list[bytes], members: list[tuple[int, _Meaning]]) -> dict[int, Arrival]:
     """The finite frames of packets whose `form` is the same, by index."""
-    (grid, place) = members[0][1].route.grid, members[0][1].place
+    route, place, dtype, _ = members[0][1]
+    grid = route.grid
     assert grid is not None
     rows, columns = grid
-    words = np.frombuffer(b"".join(packets), place.dtype).reshape(len(packets), -1)  # OSC is aligned to 4 bytes
-    raw = words[:, place.run // 4 : place.run // 4 + place.length]
-    values: NDArray[Any] = raw[:, -rows * columns :].astype(np.float64 if place.dtype.kind == "i" else np.float32)
-    finite = np.isfinite(values).all(axis=1).tolist()
+    taxels, end = rows * columns, place.run + (place.length if place.blob else place.length * dtype.itemsize)
+    raw = np.frombuffer(b"".join(packets), np.uint8).reshape(len(packets), -1)[:, place.run : end].view(dtype)
+    values: NDArray[Any] = raw[:, -taxels:].astype(np.float64 if dtype.kind == "i" else np.float32)
+    good = np.isfinite(values).all(axis=1).tolist()
     found: dict[int, Arrival] = {}
-    for n, ((i, meaning), packet) in enumerate(zip(members, packets, strict=True)):
-        route, place, _ = meaning
-        if finite[n]:
+    for n, ((i, (route, place, _, _)), packet) in enumerate(zip(members, packets, strict=True)):
+        if good[n] and (not place.blob or int.from_bytes(packet[place.run - 4 : place.run], "big") == place.length):
             counter: int | None = None
             if route.counted:
                 counter = int(raw[n, 0]) if place.unpack is None else place.unpack(packet, place.scalars)[0]

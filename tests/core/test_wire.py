@@ -32,9 +32,9 @@ def pressure(values: Sequence[float], counter: int | None = None, sensor: str = 
     return encoding.message(f"/{sensor}/pressure", "i" * counted + tag * len(values), args)
 
 
-def blob(data: bytes, counter: int | None = None) -> bytes:
+def blob(data: bytes, counter: int | None = None, sensor: str = "s") -> bytes:
     counted = counter is not None
-    return encoding.message("/s/pressure", "i" * counted + "b", [counter, data] if counted else [data])
+    return encoding.message(f"/{sensor}/pressure", "i" * counted + "b", [counter, data] if counted else [data])
 
 
 def trajectory(*touches: tuple[int, float, float], sensor: str = "s") -> bytes:
@@ -310,7 +310,9 @@ def _any_packet(rng: np.random.Generator, sensor: str, grid: tuple[int, int], fo
     if form == 0:
         return pressure(np.rint(np.nan_to_num(values)), counter, sensor, "i")
     if form == 1:
-        return blob(values.astype(">f4").tobytes(), counter)
+        kind = ">f4" if rng.random() < 0.2 else ">u2"
+        values = values if kind == ">f4" else np.clip(np.nan_to_num(values), 0, 9e3)
+        return blob(values.astype(kind).tobytes(), counter, sensor)
     if form == 2:
         return rng.bytes(40) if rng.random() < 0.2 else trajectory((1, 2.0, 3.0), sensor=sensor)
     packet = pressure(values, counter, sensor)
