@@ -77,7 +77,7 @@ class Views:
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
         """Take an event, as a sink, for all who look on. The status is left out, since the state says more."""
-        if self._looks and not isinstance(event, Status):
+        if not isinstance(event, Status) and any(look.hears(event) for look in self._looks.values()):
             self._said.append((event, epoch, test))
             self._expect(())
 
