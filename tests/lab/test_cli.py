@@ -127,13 +127,6 @@ def test_progress_passes_everything_on_and_ends_with_all_of_it(capsys: pytest.Ca
     assert "3/3" in err
 
 
-def kinds_of(arguments: Sequence[object]) -> list[str]:
-    """The kinds in all samples among a function's arguments."""
-    from gestured.lab.samples import Samples
-
-    return [str(kind) for one in arguments if isinstance(one, Samples) for kind in one.kinds]
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.usefixtures("lab")
@@ -141,7 +134,6 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Everything that `train` does, with a plan much smaller than --quick, in one process."""
-    from experiments import unseen
     from gestured.lab import train
     from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
     from gestured.lab.fit import FitConfig
@@ -180,34 +172,14 @@ def test_train_makes_three_models_and_evaluate_their_figures(
         assert name in "".join(card.read_text() for card in out.glob("*.md"))
 
     before = {path.name: path.read_bytes() for path in sorted(out.glob("*.onnx"))}
-    seen: list[str] = []  # kinds that whole networks learn from when some are left out
-    with monkeypatch.context() as spied:
-        for step in ("pretrain", "finetune"):
-            was = getattr(train, step)
-            spied.setattr(train, step, lambda *a, was=was: (seen.extend(kinds_of(a)), was(*a))[1])
-        data = train.load_data(plan, cache, None, 1)
-        apart = unseen.whole_left_out(train.learn(plan, data, cache), data, plan, cache, out / "cnn_lstm.onnx")
-    assert seen and not set(apart["kinds"]) & set(seen)
-    assert set(apart["kinds"]) & {str(kind) for kind in made["others", 0].kinds}  # some were there to be learned
-    assert apart["known"]["count"] == apart["heads"]["count"] == apart["whole"]["count"] > 0
-
     for step in ("pretrain", "finetune"):
         monkeypatch.setattr(train, step, lambda *_: pytest.fail("what is done is not done again"))
     capsys.readouterr()
     page = tmp_path / "figures.md"
-    page.write_text("".join(f"<!-- {n}: begin -->\n<!-- {n}: end -->\n" for n in ("figures", "unseen")))
-    with (out / "cnn_lstm.md").open("a") as card:
-        card.write("<!-- unseen: begin -->\n<!-- unseen: end -->\n")
-    program = ["unseen", "--models", str(out), *arguments, "--whole", "--document", str(page)]
-    monkeypatch.setattr(sys, "argv", program)
-    unseen.main()
-    capsys.readouterr()
+    page.write_text("<!-- figures: begin -->\n<!-- figures: end -->\n")
     assert main(["evaluate", "--models", str(out), *arguments, "--document", str(page), "--json"]) == 0
     text = capsys.readouterr().out
     figures = json.loads(text[text.index("\n{\n") :])
-    for document in (page, out / "cnn_lstm.md"):  # what another program has written stays
-        assert f"| {apart['whole']['rejected']:.3f} (" in document.read_text()
-        assert ", ".join(apart["kinds"]) in document.read_text()
     assert figures.keys() == set(LADDER)
     assert set(figures["cnn_lstm"]["real"]) >= {"taps and swipes", "with non-gestures"}
     assert {path.name: path.read_bytes() for path in sorted(out.glob("*.onnx"))} == before

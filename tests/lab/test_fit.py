@@ -186,17 +186,19 @@ def everyone() -> dict[str, Samples]:
     return made
 
 
-@pytest.fixture
-def few(everyone: dict[str, Samples], monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module")
+def data(everyone: dict[str, Samples], tmp_path_factory: pytest.TempPathFactory) -> train.TrainingData:
     def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
         return everyone[stream if stream in ("cohort", "others") else f"{stream}{seed}"]
 
-    monkeypatch.setattr(train, "simulated", simulated)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(train, "simulated", simulated)
+        plan = train.TrainingPlan(wide_check=25)
+        return train.load_data(plan, tmp_path_factory.mktemp("cache"), None, 1)
 
 
-@pytest.mark.usefixtures("few")
-def test_nobody_is_on_two_sides_of_the_split(tmp_path: Path, everyone: dict[str, Samples]) -> None:
-    data = train.load_data(train.TrainingPlan(), tmp_path, None, 1)
+def test_nobody_is_on_two_sides_of_the_split(data: train.TrainingData, everyone: dict[str, Samples]) -> None:
+    assert data.performed["nominal"] == 6 * 90
     assert data.lived is not None
     assert data.spoken is not None
     days = {"lived": data.lived, "spoken": data.spoken}
@@ -212,22 +214,15 @@ def test_nobody_is_on_two_sides_of_the_split(tmp_path: Path, everyone: dict[str,
     assert cohort["wide"] == set()
 
 
-@pytest.mark.usefixtures("few")
-def test_the_plan_counts_what_was_performed(tmp_path: Path) -> None:
-    data = train.load_data(train.TrainingPlan(), tmp_path, None, 1)
-    assert data.performed["nominal"] == 6 * 90
-
-
 def named_people(samples: Samples, people: np.ndarray) -> Samples:
     return replace(samples, people=people)
 
 
-@pytest.mark.usefixtures("few")
 def test_no_real_subject_is_judged_by_a_net_that_has_seen_it(
-    tmp_path: Path, samples: Samples, monkeypatch: pytest.MonkeyPatch
+    data: train.TrainingData, tmp_path: Path, samples: Samples, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     real = named_people(samples, np.arange(len(samples)) % 7)
-    data = replace(train.load_data(train.TrainingPlan(), tmp_path, None, 1), real=real)
+    data = replace(data, real=real)
     taught: list[set[int]] = []
     judged: list[set[int]] = []
 
