@@ -99,10 +99,10 @@ def test_ctrl_c_ends_it(start, udp):
 class Unpaced(Sensor):
     """Sends nothing, and waits for no frame's time."""
 
-    sent: list[np.ndarray] = []
+    felt: list[np.ndarray] = []
 
     def send(self, frames):
-        Unpaced.sent = [frame.values for _, frame in frames]
+        Unpaced.felt = [frame.values for _, frame in frames]
 
 
 @pytest.fixture
@@ -115,7 +115,7 @@ def test_a_day_at_a_place_is_told_as_each_thing_ends(run, unpaced):
     status, out, _ = run(*flags)
     told = [json.loads(line) for line in out.splitlines()]
     ends = [one["offset"] for one in told]
-    assert (status, Unpaced.sent[0].shape) == (0, (7, 5)) and ends == sorted(ends)
+    assert (status, Unpaced.felt[0].shape) == (0, (7, 5)) and ends == sorted(ends)
     kinds = {one["kind"] for one in told}
     assert kinds & set(POSTURES) and kinds & set(GESTURES) and kinds & set(PLACES["table"].rates)
     assert len({one["participant"] for one in told}) == 2  # each ten minutes are another person's
@@ -124,12 +124,12 @@ def test_a_day_at_a_place_is_told_as_each_thing_ends(run, unpaced):
 
 def test_it_says_in_words_what_is_performed_and_the_same_seed_is_the_same(run, unpaced):
     flags = ("simulate", "--kinds", "palm,double_tap", "--speed", "fast", "--seconds", 8)
-    first = run(*flags)[1], Unpaced.sent
+    first = run(*flags)[1], Unpaced.felt
     assert first[0].startswith("performed no gesture (palm), fast") and "\nperformed double_tap, fast" in first[0]
-    again = run(*flags)[1], Unpaced.sent
+    again = run(*flags)[1], Unpaced.felt
     assert np.array_equal(again[1], first[1])
     run(*flags, "--seed", 1)
-    assert not np.array_equal(Unpaced.sent[:100], first[1][:100])
+    assert not np.array_equal(Unpaced.felt[:100], first[1][:100])
 
 
 def test_a_daemon_that_goes_is_said_at_the_end_and_may_come_back(start):

@@ -148,13 +148,14 @@ def test_train_makes_three_models_and_evaluate_their_figures(
             made[stream, seed] = collect(s for i in spread[stream] for s in STREAMS[stream](seed, i))
         return made[stream, seed]
 
+    taken = collect(s for i in range(120) for s in STREAMS["wide"](4, i))
+
     def real(folder: Path | None, recordings: Sequence[Path]) -> tuple[Samples, int]:
-        taken = collect(s for i in range(120) for s in STREAMS["wide"](4, i))
         subjects = np.arange(len(taken)) % 6
         return replace(taken, people=subjects), len(taken) - 10
 
     fit = FitConfig(epochs=2, real_epochs=1, real_samples=64)
-    plan = train.TrainingPlan(80, 80, 80, others=300, forest=200, fit=fit)
+    plan = train.TrainingPlan(80, 80, 80, others=300, days=3, days_points=2, forest=200, fit=fit)
     monkeypatch.setattr(train, "simulated", simulated)
     monkeypatch.setattr(train, "_real", real)
     monkeypatch.setattr(train.TrainingPlan, "quick", classmethod(lambda cls: plan))
