@@ -218,6 +218,17 @@ def test_forest_equals_scikit_learn(classes: int, trees: int, depth: int | None,
     assert model.classify(segment()).values.sum() == pytest.approx(1.0, abs=1e-5)
 
 
+def test_a_forests_file_takes_seven_bytes_a_node_and_two_a_share(tmp_path: Path) -> None:
+    sizes, nodes, shares = [], [], []
+    for trees in (40, 80):  # what both hold besides is left out by their difference
+        trained = forest(6, trees, 9)
+        export_forest(trained, tmp_path / "rf.onnx", Facts(**CARD), FEATURES)
+        sizes.append((tmp_path / "rf.onnx").stat().st_size)
+        nodes.append(sum(tree.tree_.node_count for tree in trained.estimators_))
+        shares.append(6 * sum(tree.get_n_leaves() for tree in trained.estimators_))
+    assert np.diff(sizes) <= 7 * np.diff(nodes) + 2 * np.diff(shares) + 40 * 8  # and where each tree begins
+
+
 def test_values_on_a_threshold_go_where_scikit_learn_sends_them(tmp_path: Path) -> None:
     trained = forest(5)
     export_forest(trained, tmp_path / "rf.onnx", Facts(**CARD), FEATURES)
