@@ -15,7 +15,7 @@ from gestured.model.shipped import shipped
 
 
 def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
-    from benchmarks import buses, inside, latency, replay, scenes, side_by_side, start, traffic, viewers
+    from benchmarks import buses, inside, latency, replay, scenes, side_by_side, small, start, traffic, viewers
 
     return {
         "decode": inside.decode,
@@ -23,6 +23,7 @@ def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
         "latency": lambda: latency.latency(model),
         "buses": lambda: buses.buses(model),
         "sensors": lambda: [traffic.sensors(model, 1000), traffic.sensors(model, 500)],
+        "small": lambda: small.small(model),
         "recognise": lambda: inside.recognise(model),
         "replay": lambda: replay.replay(model),
         "start": lambda: start.start_and_memory(model),
