@@ -98,7 +98,7 @@ def heard(server: "subprocess.Popen[str]") -> str:
     return server.stdout.readline().strip()
 
 
-@pytest.mark.parametrize("command", [["reload"], ["status"], ["status", "--json"], ["emit", "one_tap"], ["doctor"]])
+@pytest.mark.parametrize("command", [["reload"], ["status", "--json"]])
 def test_root_asks_nothing_of_whoever_made_the_default_folder_first(
     run, serve: Serve, seized: Path, command: list[str]
 ) -> None:

@@ -88,6 +88,17 @@ async def turn() -> None:
         await asyncio.sleep(0)
 
 
+async def heard(sock: socket.socket, last: bytes) -> bytes:
+    """All that a client is sent, up to what holds these bytes."""
+    received = b""
+    while last not in received:
+        try:
+            received += sock.recv(1 << 16)
+        except BlockingIOError:
+            await turn()
+    return received
+
+
 def test_a_client_that_reads_nothing_for_long_is_cut_off(listener, monkeypatch) -> None:
     async def main() -> None:
         metrics = Metrics()
@@ -120,13 +131,7 @@ def test_the_backlog_is_bounded_and_drops_the_oldest(listener) -> None:
             for i in range(5000):
                 client.send(b"%06d" % i + b"." * 493 + b"\n")
                 assert client.backlog <= one_client.BACKLOG_BYTES + 500
-            received = b""
-            while b"004999" not in received:
-                try:
-                    received += sock.recv(1 << 16)
-                except BlockingIOError:
-                    await turn()
-            lines = received.split(b"\n")[:-1]
+            lines = (await heard(sock, b"004999")).split(b"\n")[:-1]
             numbers = [int(line[:6]) for line in lines if not line.startswith(b"{")]
             lost = [json.loads(line)["count"] for line in lines if line.startswith(b"{")]
             assert numbers == sorted(numbers) and numbers[-1] == 4999

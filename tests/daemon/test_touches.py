@@ -14,7 +14,7 @@ from gestured.core.events import Touch
 from gestured.core.messages import Subscription
 from gestured.daemon.client import BACKLOG_BYTES
 from tests.daemon.harness import Client, Sensor
-from tests.daemon.test_clients import connect, listener, serve, turn  # noqa: F401 - a fixture among them
+from tests.daemon.test_clients import connect, heard, listener, serve, turn  # noqa: F401 - a fixture among them
 
 FOLLOWS = Subscription(types=frozenset(("touch",)))
 MOVE = Touch("arm", 1, 0, "move", 10.0, 0.5, 0.5, 0.001, 0.0, 100.0, 4, "volume")
@@ -100,13 +100,7 @@ def test_moves_that_wait_for_a_slow_client_are_one_and_displace_nothing(listener
             assert client.backlog == lines < BACKLOG_BYTES  # nothing more waits
             server.publish(replace(MOVE, touch=1, phase="down", dx=0.0), 0.0)
             server.publish(replace(MOVE, phase="up", x=0.6, dx=0.0), 0.0)
-            received = b""
-            while b'"up"' not in received:
-                try:
-                    received += sock.recv(1 << 16)
-                except BlockingIOError:
-                    await turn()
-            found = [json.loads(line) for line in received.splitlines()]
+            found = [json.loads(line) for line in (await heard(sock, b'"up"')).splitlines()]
             told = [one for one in found if one["type"] == "touch"]
             assert [(one["touch"], one["phase"]) for one in told] == [(0, "down"), (1, "down"), (0, "up")]
             assert told[-1]["dx"] == 10.0 and not any(one["type"] == "lost" for one in found)  # all that it moved
