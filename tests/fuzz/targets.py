@@ -16,7 +16,7 @@ from gestured.core.errors import ModelError, ProtocolError
 from gestured.core.frames import Segment
 from gestured.core.messages import parse_subscription
 from gestured.core.stamping import Stamper
-from gestured.core.wire import Addresses, Arrival, Decoder
+from gestured.core.wire import FEW, Addresses, Arrival, Decoder
 from gestured.daemon.client import Client, Server
 from gestured.model.model import Model
 from tests.bounds import little_memory
@@ -44,6 +44,10 @@ def decoder(data: bytes) -> None:
         one._pending.clear()  # touches that wait for a frame: what comes next depends on them
     (arrivals, errors), *others = found
     assert all(_plain(*other) == _plain(arrivals, errors) for other in others), "depends on what came before"
+    unseen = Decoder(Addresses(), lambda name: (9, 9) if name == BIG else (2, 2), keep_touches=False)
+    alone = [unseen.decode(data) for _ in range(FEW)]  # from the second one on by its layout
+    for n, arrival in unseen.together([data] * FEW).items():
+        assert _plain([arrival], []) == _plain(*alone[n]), "read with others it says something else"
     for arrival in arrivals:
         assert arrival.values.shape == ((9, 9) if arrival.sensor == BIG else (2, 2))
         assert np.isfinite(arrival.values).all()
