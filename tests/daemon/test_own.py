@@ -184,6 +184,9 @@ def test_each_example_is_judged_at_once(begin: Begin) -> None:
 def test_one_enrolment_at_a_time_and_none_outlives_its_client(begin: Begin, tmp_path: Path) -> None:
     daemon = begin()
     sensor = ready(daemon)
+    for name, words in (("swipe_left", "is a gesture of tiny"), ("Slash", "is no gesture's name")):
+        with pytest.raises(Refused, match=words):
+            Enrolment(daemon, name)
     first = Enrolment(daemon, "slash")
     sensor.slash()
     assert first.line()["kept"] is True
