@@ -59,9 +59,9 @@ class TrainingPlan:
     cohort: int = len(TRIALS)
     others: int = len(OTHER_TRIALS)
     forest: int = 20_000  # simulated samples for the forest
-    days: int = 500  # of everyday life, twelve minutes of a person each
-    days_calibrate: int = 300  # days to learn the verifier from
-    days_points: int = 300  # days on the nominal sensor to choose the operating points by
+    days: int = 700  # of everyday life, twelve minutes of a person each
+    days_calibrate: int = 600  # days to learn the verifier from
+    days_points: int = 400  # days on the nominal sensor to choose the operating points by
     fit: FitConfig = field(default_factory=FitConfig)
 
     @classmethod

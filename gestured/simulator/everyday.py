@@ -10,23 +10,37 @@ the figures with both.
 """
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from gestured.simulator.cohort import GESTURES, NONE, perform, performed
+from gestured.simulator.cohort import GESTURES, perform, performed
 from gestured.simulator.gestures import one_tap
-from gestured.simulator.kinematics import Array, wander
 from gestured.simulator.occasion import Occasion
+from gestured.simulator.others import Made
 from gestured.simulator.people import Participant, Performance, Press, any_speed, generator
+from gestured.simulator.resting import HAND, NOBODY, POSTURES, THING, rest
 from gestured.simulator.sensor import Act, SimulatedSensor, Take
-from gestured.simulator.strokes import touch_down
+from gestured.simulator.unmeant import (
+    Places,
+    bump,
+    fidget,
+    fold,
+    graze,
+    hands,
+    landing,
+    pat,
+    playing_drum,
+    playing_press,
+    playing_rub,
+    playing_stretch,
+    playing_tap,
+    poke,
+    slide,
+)
 
-STEP_S = 0.04  # time grid of what rests: nothing in it is faster than the road
-BREATH_HZ = 0.25  # an adult at rest
-ROAD_HZ = (1.0, 12.0)  # a body on a seat passes on no more of a road's spectrum (ISO 8608 falls with the square)
-RESEAT_S = 9.0  # between two shifts of what rests; assumed
 TAP_S = 0.3  # what is longer is no tap, whatever was meant (99.7 % of intended touches: Matero and Colley, DIS 2012)
 TAP_TRAVEL = 0.15  # of the pad's shorter side
 APART_S = 0.3  # a gesture that is meant keeps so far from the next thing that the same hand does
@@ -34,29 +48,7 @@ COVERS = 1.6  # standard deviations around the middle of what rests: nobody aims
 AIMS = 6  # places that a person looks for beside what rests, before the gesture is given up; assumed
 FREE_S = (3.0, 6.0)  # a sensor is switched on before somebody lies on it; what is learned with a hand is no idle sensor
 SOON = 0.12  # share of all that leaves after which a gesture is meant within a second; assumed
-
-
-@dataclass(frozen=True)
-class Posture:
-    """Something that rests: for how long, and what it presses with."""
-
-    dwell_s: float  # median; lognormal
-    force: tuple[float, float]  # in normal touches
-    size: tuple[float, float]  # of the pad's shorter side: length and width, one standard deviation
-
-
-NOBODY, HAND, THING = "nobody", "hand", "thing"
-# Dwell times are assumed, but for the armrest's and the door's: forearm laid on, elbow while steering, and pushing off
-# are the three postures that were measured on door armrests (SAE 2007-01-1217).
-POSTURES: Mapping[str, Posture] = {
-    NOBODY: Posture(25.0, (0.0, 0.0), (0.0, 0.0)),
-    "forearm": Posture(40.0, (1.5, 7.0), (0.5, 0.16)),
-    "elbow": Posture(20.0, (2.0, 9.0), (0.18, 0.14)),
-    "push_off": Posture(1.2, (4.0, 12.0), (0.25, 0.2)),
-    HAND: Posture(18.0, (0.8, 3.0), (0.26, 0.17)),
-    "body": Posture(90.0, (1.0, 4.0), (0.6, 0.45)),
-    THING: Posture(60.0, (0.5, 3.0), (0.16, 0.1)),
-}
+HABIT = 0.6  # standard deviation of the logarithm of how often a person does each thing, beside the rate; assumed
 
 
 @dataclass(frozen=True)
@@ -69,45 +61,92 @@ class Place:
     meant: float  # gestures an hour
 
 
+# What may happen anywhere, an hour; all assumed.
+ANYWHERE: Mapping[str, float] = {
+    "sleeve_brush": 15.0,
+    "bump": 20.0,
+    "graze": 20.0,
+    "landing": 12.0,
+    "pat": 5.0,
+    "poke": 3.0,
+    "slide": 3.0,
+    "fold": 6.0,
+    "fidget": 6.0,
+    "hands": 1.5,
+    "wipe": 2.0,
+    "palm": 3.0,
+    "object_put_down": 3.0,
+    "wrinkle": 3.0,
+    "long_press": 2.0,
+    "press_and_slide": 1.0,
+    "idle_tap": 8.0,  # of a free hand, while nobody lies there; one that lies plays by FINGERS
+}
 PLACES: Mapping[str, Place] = {
     "armrest": Place(
         {NOBODY: 3.0, "forearm": 3.0, "elbow": 1.5, HAND: 1.5, "push_off": 0.5},
-        {"sleeve_brush": 30.0, "wipe": 2.0, "bump": 25.0, "object_put_down": 3.0, "wrinkle": 3.0, "idle_tap": 8.0},
+        {**ANYWHERE, "sleeve_brush": 30.0},
         0.06,
         45.0,
     ),
     "door": Place(
         {NOBODY: 4.0, "elbow": 3.0, "forearm": 2.0, "push_off": 1.0, HAND: 1.0},
-        {"sleeve_brush": 30.0, "bump": 30.0, "wipe": 2.0, "palm": 6.0, "idle_tap": 8.0},
+        {**ANYWHERE, "sleeve_brush": 30.0, "bump": 30.0, "palm": 6.0},
         0.09,
         45.0,
     ),
     "seat": Place(
         {"body": 6.0, NOBODY: 1.0, HAND: 0.5, THING: 1.0},
-        {"bump": 25.0, "wrinkle": 25.0, "sleeve_brush": 6.0, "wipe": 3.0, "idle_tap": 4.0},
+        {**ANYWHERE, "wrinkle": 25.0, "fold": 20.0, "idle_tap": 4.0, "fidget": 3.0},
         0.12,
         20.0,
     ),
     "skin": Place(
         {NOBODY: 6.0, HAND: 1.5, "body": 0.5},
-        {"bump": 25.0, "palm": 10.0, "sleeve_brush": 15.0, "wipe": 5.0, "object_put_down": 3.0, "idle_tap": 12.0},
+        {**ANYWHERE, "palm": 10.0, "pat": 12.0, "hands": 6.0, "idle_tap": 12.0},
         0.02,
         90.0,
     ),
     "table": Place(
         {NOBODY: 4.0, "forearm": 2.0, HAND: 2.0, THING: 3.0},
-        {"object_put_down": 25.0, "wipe": 6.0, "sleeve_brush": 20.0, "bump": 10.0, "rubbing": 4.0, "idle_tap": 12.0},
+        {
+            **ANYWHERE,
+            "object_put_down": 15.0,
+            "slide": 20.0,
+            "poke": 6.0,
+            "wipe": 6.0,
+            "fidget": 12.0,
+            "idle_tap": 12.0,
+        },
         0.0,
         60.0,
     ),
 }
 # What the fingers of a hand that rests do, an hour of such rest; assumed.
 FINGERS: Mapping[str, float] = {
-    "idle_tap": 240.0,
-    "drumming": 60.0,
-    "rubbing": 60.0,
-    "slow_touch": 30.0,
-    "scribble": 6.0,
+    "playing_tap": 240.0,
+    "playing_drum": 60.0,
+    "playing_rub": 90.0,
+    "playing_press": 40.0,
+    "playing_stretch": 40.0,
+}
+PLAYED = {
+    "playing_tap": playing_tap,
+    "playing_drum": playing_drum,
+    "playing_rub": playing_rub,
+    "playing_press": playing_press,
+    "playing_stretch": playing_stretch,
+}
+HAPPENING: Mapping[str, Callable[[Occasion], Made]] = {
+    "idle_tap": one_tap,
+    "bump": bump,
+    "graze": graze,
+    "landing": landing,
+    "pat": pat,
+    "poke": poke,
+    "slide": slide,
+    "fold": fold,
+    "fidget": fidget,
+    "hands": hands,
 }
 
 
@@ -132,7 +171,7 @@ def day(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = 
     everything = sorted([*plan.life, *((at, made) for at, made, _ in plan.meant)], key=lambda one: one[0])
     take = plan.of.sensor.record(everything, seconds, plan.of.rng)
     alone = [_truth(start, one) for start, one in plan.life if _like_a_tap(start, one, everything, plan.of.sensor)]
-    contacts = sum(len(one.contacts) for _, one in plan.life)
+    contacts = sum(_touches(one) for _, one in plan.life)
     meant = tuple((_truth(at, one), lay) for at, one, lay in plan.meant)
     return Day(place, plan.of.person.seed, take, contacts, meant, tuple(alone))
 
@@ -163,17 +202,27 @@ class _Life:
         """What nobody means: postures one after the other, and what happens beside them."""
         names, now = list(self.where.postures), float(self.rng.uniform(*FREE_S))
         chances = np.array([self.where.postures[name] for name in names])
+        playing, free = self._habits(FINGERS), [(0.0, now)]
         while now < self.seconds:
             name = names[int(self.rng.choice(len(names), p=chances / chances.sum()))]
-            dwell = float(np.clip(POSTURES[name].dwell_s * self.rng.lognormal(0.0, 0.7), 0.5, 900.0))
-            if name != NOBODY:
-                yield now, self._rest(name, dwell)
-            if name == HAND:
-                for kind, rate in FINGERS.items():
-                    yield from ((now + at, self._happen(kind)) for at in self._times(rate, dwell))
+            dwell = float(np.clip(POSTURES[name].dwell_s * self.rng.lognormal(0.0, 0.8), 0.4, 900.0))
+            if name == NOBODY:
+                free.append((now, now + dwell))
+            else:
+                made, places = self._rest(name, dwell)
+                yield now, made
+                for kind, rate in playing.items() if places else ():
+                    play = partial(PLAYED[kind], places=places)
+                    yield from ((now + at, self._happen(kind, play)) for at in self._times(rate, dwell))
             now += dwell + float(self.rng.uniform(0.3, 3.0))
-        for kind, rate in self.where.rates.items():
-            yield from ((at, self._happen(kind)) for at in self._times(rate, self.seconds))
+        for kind, rate in self._habits(self.where.rates).items():
+            for at in self._times(rate, self.seconds):
+                if kind != "idle_tap" or any(a < at < b for a, b in free):
+                    yield at, self._happen(kind, HAPPENING.get(kind))
+
+    def _habits(self, rates: Mapping[str, float]) -> dict[str, float]:
+        """How often this person does each thing, an hour; over all people as often as `rates` say."""
+        return {kind: rate * float(self.rng.lognormal(-0.5 * HABIT**2, HABIT)) for kind, rate in rates.items()}
 
     def meant(self, life: list[Happening]) -> Iterator[tuple[float, Performance, str]]:
         """Gestures that somebody means with a free hand, each with what lay on the sensor.
@@ -186,7 +235,7 @@ class _Life:
         last = 2.0
         for at in sorted([*self._times(self.where.meant, self.seconds), *soon]):
             under = [one for a, b, one in resting if a - APART_S < at < b + 0.05]
-            made = self._beside(under)
+            made = self._beside(at, life, under)
             if made is None:
                 continue
             begin, end = at - APART_S, at + made.duration_s + APART_S
@@ -201,13 +250,15 @@ class _Life:
                 left = any(b < at <= b + 1.0 for _, b, _ in resting)
                 yield at, made, under[0].kind if under else LEFT if left else NOTHING
 
-    def _beside(self, under: list[Performance]) -> Performance | None:
+    def _beside(self, at: float, life: list[Happening], under: list[Performance]) -> Performance | None:
         """A gesture whose way nothing that rests covers; None where this person finds no place for one."""
         kind = GESTURES[int(self.rng.integers(len(GESTURES)))]
+        began = {id(one): start for start, one in life} if under else {}
+        lying = [(at - began[id(one)], press) for one in under for press in one.contacts]
         for _ in range(AIMS):
             speed, inclination = any_speed(self.rng), int(self.rng.integers(3))
             made = perform(kind, self.person, self.rng, speed, inclination, self.sensor.extent)
-            if not any(_covers(one.contacts[0], press) for one in under for press in made.contacts):
+            if not any(_covers(since, rest, press) for since, rest in lying for press in made.contacts):
                 return made
         return None
 
@@ -216,57 +267,23 @@ class _Life:
         count = int(self.rng.poisson(rate * seconds / 3600.0))
         return [float(at) for at in np.sort(self.rng.uniform(0.0, seconds, count))]
 
-    def _happen(self, kind: str) -> Performance:
-        """One short thing."""
+    def _happen(self, kind: str, make: Callable[[Occasion], Made] | None) -> Performance:
+        """One short thing: what `make` makes, or one of the simulator's non-gestures."""
         speed, inclination = any_speed(self.rng), int(self.rng.integers(3))
-        own = {"bump": _bump, "idle_tap": one_tap}
-        if kind in own:
-            return performed(kind, own[kind], self.person, self.rng, speed, inclination, self.sensor.extent)
+        if make is not None:
+            return performed(kind, make, self.person, self.rng, speed, inclination, self.sensor.extent)
         return perform(kind, self.person, self.rng, speed, inclination, self.sensor.extent)
 
-    def _rest(self, name: str, seconds: float) -> Performance:
-        """Something that rests for a while: it lands, breathes, is re-seated, is shaken, and leaves."""
-        posture, (width, height) = POSTURES[name], self.sensor.extent
-        small = min(width, height)
-        t = np.linspace(0.0, seconds, max(8, math.ceil(seconds / STEP_S) + 1))
-        still = name == THING
-        shifts = 0.0 if still else 1.0
-        ways = [shifts * _reseated(t, self.rng) for _ in range(3)]
-        breath = 0.0 if still else float(self.rng.uniform(0.01, 0.06))
-        shake = (
-            1.0
-            + breath * np.sin(2 * math.pi * (BREATH_HZ * t + self.rng.random()))
-            + self.where.road * wander(t, self.rng, *ROAD_HZ, 8)
-        )
-        level = float(self.rng.uniform(*posture.force)) * self.person.force
-        land, leave = (float(self.rng.uniform(0.05, 0.5)) for _ in range(2))
-        edge = np.clip(t / min(land, 0.4 * seconds), 0.0, 1.0) * np.clip(
-            (seconds - t) / min(leave, 0.4 * seconds), 0.0, 1.0
-        )
-        force = np.maximum(level * edge * shake * np.exp(0.25 * ways[2]), 0.0)
-        x = width * float(self.rng.uniform(0.15, 0.85)) + 0.08 * small * ways[0]
-        y = height * float(self.rng.uniform(0.15, 0.85)) + 0.08 * small * ways[1]
-        length, across = (small * side * float(self.rng.uniform(0.75, 1.3)) for side in posture.size)
-        press = Press(t, x, y, force, length, across, float(self.rng.uniform(0.0, math.pi)), 0.1, 1.3, False)
-        return Performance(name, NONE, (press,), seconds, "normal", int(self.rng.integers(3)), self.person.seed)
+    def _rest(self, name: str, seconds: float) -> tuple[Performance, Places]:
+        """Something that rests for a while; and, of a hand, where its fingers lie."""
+        places: list[Places] = []
 
+        def make(occasion: Occasion) -> list[Press]:
+            made, found = rest(occasion, name, seconds, self.where.road)
+            places.append(found)
+            return made
 
-def _bump(occasion: Occasion) -> list[Press]:
-    """A knee, an elbow or a bag meets the pad for a moment: larger than a fingertip, with no aim."""
-    rng = occasion.rng
-    x, y = occasion.spot(2.0, 2.0, beyond=0.3)
-    press = touch_down(occasion, x, y, float(rng.uniform(0.05, 0.5)), 0.0, float(rng.uniform(0.3, 2.5)))
-    length, width = sorted(rng.uniform(5.0, 22.0, 2))
-    return [replace(press, length=float(width), width=float(length), finger=False)]
-
-
-def _reseated(t: Array, rng: np.random.Generator) -> Array:
-    """A value (n,) that is put anew every few seconds, within a third of a second each time."""
-    moments = np.sort(rng.uniform(0.0, t[-1], int(rng.poisson(t[-1] / RESEAT_S))))
-    way = np.zeros_like(t)
-    for moment, step in zip(moments, rng.normal(0.0, 1.0, moments.size), strict=True):
-        way += step * np.clip((t - moment) / 0.33, 0.0, 1.0)
-    return np.asarray(np.tanh(way))
+        return self._happen(name, make), places[0]
 
 
 @dataclass(frozen=True)
@@ -278,12 +295,24 @@ class Plan:
     meant: list[tuple[float, Performance, str]]
 
 
-def _covers(rest: Press, press: Press) -> bool:
-    """Whether any of a finger's way lies under what rests: within `COVERS` standard deviations of its middle."""
-    dx, dy = press.x - float(np.median(rest.x)), press.y - float(np.median(rest.y))
+def _covers(since: float, rest: Press, press: Press) -> bool:
+    """Whether any of a finger's way lies under what has rested for so many seconds when the finger lands.
+
+    That is within `COVERS` standard deviations of the middle of what rests.
+    """
+    then = press.t + since
+    dx, dy = press.x - np.interp(then, rest.t, rest.x), press.y - np.interp(then, rest.t, rest.y)
     c, s = math.cos(rest.angle), math.sin(rest.angle)
     far = np.hypot((dx * c + dy * s) / (rest.length + press.length), (dy * c - dx * s) / (rest.width + press.width))
     return bool((far < COVERS).any())
+
+
+def _touches(one: Performance) -> int:
+    """How often something touches the pad in a performance: presses that overlap in time count once."""
+    count, until = 0, -math.inf
+    for start, end in sorted((float(press.t[0]), float(press.t[-1])) for press in one.contacts):
+        count, until = count + (start > until), max(until, end)
+    return count
 
 
 def _truth(start: float, one: Performance) -> Act:

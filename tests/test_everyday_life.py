@@ -1,0 +1,42 @@
+"""Everyday life as the simulator draws it: what nobody means is there, often enough, and where it can be."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from gestured.simulator.everyday import ANYWHERE, FINGERS, PLACES, Happening, day, planned
+from gestured.simulator.resting import HAND, NOBODY, POSTURES
+
+HOUR_S = 3600.0
+
+
+@cache
+def life(place: str) -> list[Happening]:
+    """All that nobody means in an hour of somebody at a place."""
+    return planned(1, place, HOUR_S).life
+
+
+def test_all_that_may_happen_happens_somewhere_and_leaves_a_mark_that_a_sensor_can_take() -> None:
+    made = [one for place in PLACES for _, one in life(place)]
+    assert {one.kind for one in made} == {*ANYWHERE, *FINGERS, *POSTURES} - {NOBODY}
+    for one in made:
+        assert one.contacts, one.kind
+        for press in one.contacts:
+            assert np.isfinite([press.x, press.y, press.force]).all() and np.diff(press.t).min() > 0, one.kind
+            assert press.force.min() >= 0 and press.force.max() > 0, one.kind
+
+
+def test_there_are_contacts_enough_and_gestures_among_them() -> None:
+    days = [day(seed, place, HOUR_S / 6) for seed, place in enumerate(PLACES)]
+    assert sum(one.contacts for one in days) / (len(days) / 6) >= 200
+    assert sum(len(one.meant) for one in days) >= 5
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_free_finger_taps_only_where_nobody_lies_and_a_playing_one_only_where_a_hand_does(place: str) -> None:
+    lying = [(at, at + one.duration_s, one.kind) for at, one in life(place) if one.kind in POSTURES]
+    for at, one in life(place):
+        under = {kind for a, b, kind in lying if a <= at < b}
+        assert one.kind != "idle_tap" or not under
+        assert not one.kind.startswith("playing_") or under == {HAND}
