@@ -102,6 +102,8 @@ def parser() -> argparse.ArgumentParser:
     everyday.add_argument("--hours", type=int, default=60, help="of simulated people, an hour each (default: 60)")
     everyday.add_argument("--recordings", **mine, help="instead, hours of your own: tapes of gesturectl record, and "
                           ".npz; where these do not tell what was performed all that is said is false")  # fmt: skip
+    everyday.add_argument("--arming", default="", metavar="GESTURE", help="a gesture that arms the sensor: everybody "
+                          "makes it before each that is meant, and what is not armed is not said")  # fmt: skip
     everyday.add_argument("--strictness", choices=STRICTNESS, default=USUAL, help=f"operating point (default: {USUAL})")
     everyday.add_argument("--svg", type=Path, metavar="FILE", help="draw missed against false, with every threshold")
     everyday.add_argument("--document", type=Path, metavar="PAGE", help="a page whose tables `everyday` are written "

@@ -48,6 +48,7 @@ COVERS = 1.6  # standard deviations around the middle of what rests: nobody aims
 AIMS = 6  # places that a person looks for beside what rests, before the gesture is given up; assumed
 FREE_S = (3.0, 6.0)  # a sensor is switched on before somebody lies on it; what is learned with a hand is no idle sensor
 SOON = 0.12  # share of all that leaves after which a gesture is meant within a second; assumed
+AFTER_WAKE_S = (0.8, 2.0)  # from the gesture that wakes a sensor to the one that is meant; assumed
 HABIT = 0.6  # standard deviation of the logarithm of how often a person does each thing, beside the rate; assumed
 
 
@@ -165,9 +166,12 @@ class Day:
 NOTHING, LEFT = "nothing", "just left"
 
 
-def day(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = None) -> Day:
-    """So many seconds of everyday life at a place; the same for the same seed. Raises KeyError for an unknown place."""
-    plan = planned(seed, place, seconds, sensor)
+def day(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = None, wake: str = "") -> Day:
+    """So many seconds of everyday life at a place; the same for the same seed. Raises KeyError for an unknown place.
+
+    With `wake`, a gesture, everybody makes that one before each gesture that is meant: both stand in `Day.meant`.
+    """
+    plan = planned(seed, place, seconds, sensor, wake)
     everything = sorted([*plan.life, *((at, made) for at, made, _ in plan.meant)], key=lambda one: one[0])
     take = plan.of.sensor.record(everything, seconds, plan.of.rng)
     alone = [_truth(start, one) for start, one in plan.life if _like_a_tap(start, one, everything, plan.of.sensor)]
@@ -176,11 +180,11 @@ def day(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = 
     return Day(place, plan.of.person.seed, take, contacts, meant, tuple(alone))
 
 
-def planned(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = None) -> "Plan":
+def planned(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = None, wake: str = "") -> "Plan":
     """What happens in `day`, before any sensor sees it: a fraction of its work. Raises KeyError as `day` does."""
     where, rng = PLACES[place], generator(seed, 0xDA1, *map(ord, place))
     person = Participant(int(rng.integers(1 << 40)) + 2_000_000)
-    lived = _Life(where, person, sensor or SimulatedSensor.nominal(day=person.seed), rng, seconds)
+    lived = _Life(where, person, sensor or SimulatedSensor.nominal(day=person.seed), rng, seconds, wake)
     life = [one for one in lived.unmeant() if one[0] < seconds]
     return Plan(lived, life, list(lived.meant(life)))
 
@@ -197,6 +201,7 @@ class _Life:
     sensor: SimulatedSensor
     rng: np.random.Generator
     seconds: float
+    wake: str
 
     def unmeant(self) -> Iterator[Happening]:
         """What nobody means: postures one after the other, and what happens beside them."""
@@ -238,7 +243,7 @@ class _Life:
             made = self._beside(at, life, under)
             if made is None:
                 continue
-            begin, end = at - APART_S, at + made.duration_s + APART_S
+            begin, end = at - APART_S, at + made[-1][0] + made[-1][1].duration_s + APART_S
             changes = any(begin < a < end or at < b < end for a, b, _ in resting)
             if (
                 begin > last
@@ -248,17 +253,31 @@ class _Life:
             ):
                 last = end
                 left = any(b < at <= b + 1.0 for _, b, _ in resting)
-                yield at, made, under[0].kind if under else LEFT if left else NOTHING
+                lay = under[0].kind if under else LEFT if left else NOTHING
+                yield from ((at + after, one, lay) for after, one in made)
 
-    def _beside(self, at: float, life: list[Happening], under: list[Performance]) -> Performance | None:
-        """A gesture whose way nothing that rests covers; None where this person finds no place for one."""
+    def _beside(self, at: float, life: list[Happening], under: list[Performance]) -> list[Happening] | None:
+        """A gesture whose way nothing that rests covers, after the one that wakes the sensor where there is such.
+
+        None where this person finds no place for them.
+        """
         kind = GESTURES[int(self.rng.integers(len(GESTURES)))]
         began = {id(one): start for start, one in life} if under else {}
         lying = [(at - began[id(one)], press) for one in under for press in one.contacts]
         for _ in range(AIMS):
-            speed, inclination = any_speed(self.rng), int(self.rng.integers(3))
-            made = perform(kind, self.person, self.rng, speed, inclination, self.sensor.extent)
-            if not any(_covers(since, rest, press) for since, rest in lying for press in made.contacts):
+            made: list[Happening] = []
+            after = 0.0
+            for name in (self.wake, kind) if self.wake else (kind,):
+                speed, inclination = any_speed(self.rng), int(self.rng.integers(3))
+                one = perform(name, self.person, self.rng, speed, inclination, self.sensor.extent)
+                made.append((after, one))
+                after += one.duration_s + (float(self.rng.uniform(*AFTER_WAKE_S)) if self.wake else 0.0)
+            if not any(
+                _covers(since + start, rest, press)
+                for since, rest in lying
+                for start, one in made
+                for press in one.contacts
+            ):
                 return made
         return None
 

@@ -22,7 +22,7 @@ from gestured.lab.everyday.heard import HELD, NOT_READY, RESTARTING, Heard, hear
 from gestured.lab.everyday.hours import FEW, LEVELS, judged, points_of
 from gestured.lab.everyday.picture import draw
 from gestured.lab.everyday.report import figures, tables
-from gestured.lab.everyday.stretches import Stretch, lived
+from gestured.lab.everyday.stretches import WOKEN, Stretch, lived
 from gestured.lab.made_of import LINE
 from gestured.model.shipped import LADDER, shipped
 from gestured.record.arrays import write
@@ -105,6 +105,17 @@ def test_what_counts_at_the_thresholds_is_what_a_daemon_publishes() -> None:
     counts = judged([afternoon()], model.name, points_of(model)["normal"]).said
     assert len(published) == counts["right"] + counts["wrong"] + counts["false"] + counts["apart"] > 0
     assert counts["right"] + counts["wrong"] + counts["missed"] == len(life.meant)
+
+
+def test_an_armed_sensor_says_nothing_but_after_the_gesture_that_arms_it() -> None:
+    life = lived(FIRST, SHORT_S, "double_tap")
+    assert [act.label for act in life.meant[::2]] == ["double_tap"] * (len(life.meant) // 2) and life.meant
+    said = hear(life, command.rungs("cnn_lstm")[:1], "normal", "double_tap").said["cnn_lstm"]
+    armed = 0
+    for one in said:
+        armed = armed or one.gesture == "double_tap"
+        assert armed
+    assert sum(one.performed is not None and one.performed.kind == WOKEN for one in said) > 0
 
 
 def test_a_higher_threshold_says_less_and_misses_more() -> None:

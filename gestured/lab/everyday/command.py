@@ -3,6 +3,7 @@
 import argparse
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -42,24 +43,21 @@ def at(source: str, strictness: Strictness) -> tuple[Model, ...]:
 
 def run(args: argparse.Namespace) -> int:
     """Play, judge, print."""
-    if args.hours < 1:
-        raise GesturedError(f"--hours: expected 1 or more, found {args.hours}")
-    if args.document and args.recordings:
-        raise GesturedError("--document: expected no --recordings, the page's tables are of simulated hours")
-    if args.document and not kept(args.document, "everyday"):
-        raise GesturedError(f"--document: expected a page with the marks of `everyday`, found none in {args.document}")
-    if args.svg and find_spec("matplotlib") is None:
-        raise GesturedError("--svg: matplotlib is missing: pip install 'gestured[lab]', or make lab")
+    block = f"armed by {args.arming}" if args.arming else "everyday"
+    _check(args, block)
     models = at(args.model, args.strictness)
+    if args.arming and args.arming not in models[0].gestures:
+        raise GesturedError(f"--arming: expected one of {', '.join(models[0].gestures)}, found {args.arming!r}")
     if args.recordings:
         work = partial(_recorded, args.recordings, args.model, args.strictness)
         parts = in_processes(work, range(len(args.recordings)), args.jobs, "recordings")
     else:
-        work = partial(_lived, args.model, args.strictness)
+        work = partial(_lived, args.model, args.strictness, args.arming)
         parts = in_processes(work, range(args.seed, args.seed + args.hours), args.jobs, "hours")
     heard = [one for part in parts for one in part]
     if not any(one.seconds for one in heard):
         raise GesturedError(f"{args.recordings[0]}: expected more than one frame")
+    models = models[:1] if args.arming else models
     found = report.figures(heard, models, args.strictness)
     if args.svg:
         from gestured.lab.everyday.picture import draw
@@ -67,12 +65,28 @@ def run(args: argparse.Namespace) -> int:
         with atomic_write(args.svg, PUBLIC) as file:
             file.write(draw(found).encode())
     shown = report.tables(found, "recorded" if args.recordings else "simulated")
+    if args.arming:
+        shown = [replace(shown[0], title=f"{shown[0].title}, armed by {args.arming}"), shown[2]]
     if args.document:
         sources = [shipped().get(model.name, Path(args.model)) for model in models]
         made = made_of(args.words, [*sources, *([args.svg] if args.svg else [])])
-        renew(args.document, "everyday", [made, "", *map(str, shown)])
+        renew(args.document, block, [made, "", *map(str, shown)])
     tell(found, shown, args.json)
     return 0
+
+
+def _check(args: argparse.Namespace, block: str) -> None:
+    """GesturedError for options that do not go together, before anything is played."""
+    if args.hours < 1:
+        raise GesturedError(f"--hours: expected 1 or more, found {args.hours}")
+    if args.document and args.recordings:
+        raise GesturedError("--document: expected no --recordings, the page's tables are of simulated hours")
+    if args.document and not kept(args.document, block):
+        raise GesturedError(f"--document: expected a page with the marks of `{block}`, found none in {args.document}")
+    if args.arming and (args.recordings or args.svg):
+        raise GesturedError("--arming: expected no --recordings and no --svg, its hours are simulated, without a curve")
+    if args.svg and find_spec("matplotlib") is None:
+        raise GesturedError("--svg: matplotlib is missing: pip install 'gestured[lab]', or make lab")
 
 
 def tell(found: report.Figures, shown: Sequence[Table], as_json: bool) -> None:
@@ -80,8 +94,9 @@ def tell(found: report.Figures, shown: Sequence[Table], as_json: bool) -> None:
     print(json.dumps(found) if as_json else "\n".join(map(str, shown)))
 
 
-def _lived(model: str, strictness: Strictness, seed: int) -> list[Heard]:
-    return [hear(lived(seed), at(model, strictness), strictness)]
+def _lived(model: str, strictness: Strictness, wake: str, seed: int) -> list[Heard]:
+    models = at(model, strictness)
+    return [hear(lived(seed, wake=wake), models[:1] if wake else models, strictness, wake)]
 
 
 def _recorded(paths: Sequence[Path], model: str, strictness: Strictness, n: int) -> list[Heard]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from gestured.core.events import Gesture, Onset, Provisional, Unknown
 from gestured.core.facts import Decided
 from gestured.core.front_end import FrontEnd
+from gestured.core.listening import Arming
 from gestured.core.points import Strictness
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
 from gestured.core.segmenter import SPENT
@@ -38,10 +39,16 @@ class Heard:
         return self.seconds / HOUR_S
 
 
-def hear(life: Stretch, models: Sequence[Model], strictness: Strictness) -> Heard:
-    """Play a stretch to the first model, at its operating point, and show what was cut to the others, too."""
+def hear(life: Stretch, models: Sequence[Model], strictness: Strictness, wake: str = "") -> Heard:
+    """Play a stretch to the first model, at its operating point, and show what was cut to the others, too.
+
+    With `wake` that gesture arms the sensor, and only what is published is said.
+    """
     first = models[0]
-    scene = Scene(first.gestures, (9, 9), {"lab": life.setup}, strictness=strictness, tap_gap_s=life.tap_gap_s)
+    arming = Arming(wake) if wake else None
+    scene = Scene(
+        first.gestures, (9, 9), {"lab": life.setup}, strictness=strictness, tap_gap_s=life.tap_gap_s, arming=arming
+    )
     sensor = Sensor("lab", scene, first)
     sensor.foresee(asked=True)
     meant = [act for act in life.meant if act.label in first.gestures]
@@ -57,8 +64,8 @@ def hear(life: Stretch, models: Sequence[Model], strictness: Strictness) -> Hear
             heard.deaf_s[why] = heard.deaf_s.get(why, 0.0) + min(frame.t - last, LONGEST_STEP_S)
         last = frame.t
         onsets += sum(isinstance(one, Onset) for one in told)
-        _take(heard, told, life, models)
-    _take(heard, sensor.flush(last + 5.0), life, models)
+        _take(heard, told, life, models, published=bool(wake))
+    _take(heard, sensor.flush(last + 5.0), life, models, published=bool(wake))
     heard.seconds = last - (last if began is None else began)
     heard.contacts = max(onsets - len(meant), 0) if life.contacts is None else life.contacts
     return heard
@@ -73,14 +80,14 @@ def _deaf(front_end: FrontEnd, *, known: bool) -> str:
     return RESTARTING if front_end.look is not None and front_end.look.shifted else ""
 
 
-def _take(heard: Heard, told: Iterable[Told], life: Stretch, models: Sequence[Model]) -> None:
+def _take(heard: Heard, told: Iterable[Told], life: Stretch, models: Sequence[Model], *, published: bool) -> None:
     answer: Gesture | Unknown | None = None
     for one in told:
         if isinstance(one, Provisional):
             heard.provisional += _whose(one.gesture, one.onset, one.decided, heard.meant, life.taps) is None
         elif isinstance(one, Gesture | Unknown):
             answer = one
-        elif isinstance(one, Decided) and not (isinstance(answer, Unknown) and answer.reason == "hole"):
+        elif isinstance(one, Decided) and not (isinstance(answer, Unknown) and (published or answer.reason == "hole")):
             for model in models:
                 scores = one.scores if model is models[0] else model.classify(one.segment)
                 name = model.gestures[int(scores.values.argmax())]

@@ -1,7 +1,7 @@
 """Hours to be judged: simulated days, recordings (.npz) and tapes, each as a stream of frames with its truth."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gestured.core.errors import RecordingError
@@ -16,6 +16,7 @@ from gestured.record.replay import frames_used, opened
 from gestured.simulator.everyday import PLACES, day
 
 HOUR_S = 3600.0
+WAKING, WOKEN = "the gesture that arms", "within two seconds after it"
 
 
 @dataclass
@@ -32,11 +33,16 @@ class Stretch:
     tap_gap_s: float = Timing().tap_gap_s
 
 
-def lived(seed: int, seconds: float = HOUR_S) -> Stretch:
-    """A simulated day of the person with this seed, at one of the places in turn."""
-    life = day(seed, list(PLACES)[(seed - FIRST) % len(PLACES)], seconds)
+def lived(seed: int, seconds: float = HOUR_S, wake: str = "") -> Stretch:
+    """A simulated day of the person with this seed, at one of the places in turn.
+
+    With `wake` that gesture comes before each that is meant; they are told apart by what lay there, WAKING and WOKEN.
+    """
+    life = day(seed, list(PLACES)[(seed - FIRST) % len(PLACES)], seconds, wake=wake)
     taps = [Performed(NONE, act.kind, act.onset_s, act.offset_s) for act in life.like]
     meant = [Performed(act.label, lay, act.onset_s, act.offset_s) for act, lay in life.meant]
+    if wake:
+        meant = [replace(act, kind=(WAKING, WOKEN)[n % 2]) for n, act in enumerate(meant)]
     frames = map(Frame, life.take.times.tolist(), life.take.frames)
     setup = Setup(grid=life.take.frames[0].shape)
     return Stretch(life.place, str(life.person), frames, setup, meant, taps, life.contacts)
