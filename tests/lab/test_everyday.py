@@ -26,6 +26,7 @@ from gestured.lab.everyday.stretches import WOKEN, Stretch, lived
 from gestured.lab.made_of import LINE
 from gestured.model.shipped import LADDER, shipped
 from gestured.record.arrays import write
+from gestured.record.check import UNNAMED
 from gestured.record.judge import NONE, Performed, Said
 from gestured.record.recordings import Recordings
 from gestured.record.replay import Replay, opened
@@ -65,6 +66,10 @@ def test_what_a_recording_does_not_tell_is_false_and_what_it_tells_is_judged(
     }
     write(tmp_path / "silent.npz", silent)
     write(tmp_path / "told.npz", Recordings(**dict(silent.present()), **marks))
+    marks["event_labels"] = np.full(len(events), UNNAMED)
+    write(tmp_path / "unnamed.npz", Recordings(**dict(silent.present()), **marks))
+    unnamed = said(capsys, "--recordings", tmp_path / "unnamed.npz")
+    assert (unnamed["meant"], unnamed["false_per_hour"]) == (0, 0.0)
     unknown = said(capsys, "--recordings", tmp_path / "silent.npz")
     known = said(capsys, "--recordings", tmp_path / "told.npz")
     assert known["right"] > 0.8 and known["false_per_hour"] < 0.2 * unknown["false_per_hour"]

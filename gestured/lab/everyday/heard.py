@@ -17,6 +17,7 @@ from gestured.record.judge import Performed, Said, whose
 
 TAPS = (ONE_TAP, DOUBLE_TAP)
 LONGEST_STEP_S = 1.0  # from frame to frame that counts as heard or deaf; in a longer one the sensor was silent
+ASIDE_S = 0.2  # beyond the judge's tolerance: nothing within half a second of what nobody can name is counted
 NOT_READY, RESTARTING, HELD = "not ready", "restarting", "spent"  # in what a sensor is deaf
 
 
@@ -39,10 +40,12 @@ class Heard:
         return self.seconds / HOUR_S
 
 
-def hear(life: Stretch, models: Sequence[Model], strictness: Strictness, wake: str = "") -> Heard:
+def hear(
+    life: Stretch, models: Sequence[Model], strictness: Strictness, wake: str = "", *, published: bool = False
+) -> Heard:
     """Play a stretch to the first model, at its operating point, and show what was cut to the others, too.
 
-    With `wake` that gesture arms the sensor, and only what is published is said.
+    With `wake` that gesture arms the sensor. Then, and with `published`, only what is published there is said.
     """
     first = models[0]
     arming = Arming(wake) if wake else None
@@ -64,8 +67,8 @@ def hear(life: Stretch, models: Sequence[Model], strictness: Strictness, wake: s
             heard.deaf_s[why] = heard.deaf_s.get(why, 0.0) + min(frame.t - last, LONGEST_STEP_S)
         last = frame.t
         onsets += sum(isinstance(one, Onset) for one in told)
-        _take(heard, told, life, models, published=bool(wake))
-    _take(heard, sensor.flush(last + 5.0), life, models, published=bool(wake))
+        _take(heard, told, life, models, published=published or bool(wake))
+    _take(heard, sensor.flush(last + 5.0), life, models, published=published or bool(wake))
     heard.seconds = last - (last if began is None else began)
     heard.contacts = max(onsets - len(meant), 0) if life.contacts is None else life.contacts
     return heard
@@ -92,6 +95,8 @@ def _take(heard: Heard, told: Iterable[Told], life: Stretch, models: Sequence[Mo
                 scores = one.scores if model is models[0] else model.classify(one.segment)
                 name = model.gestures[int(scores.values.argmax())]
                 act = _whose(name, one.segment.onset, one.segment.offset, heard.meant, life.taps)
+                if act is None and whose(one.segment.onset - ASIDE_S, one.segment.offset + ASIDE_S, life.unnamed):
+                    continue
                 heard.said[model.name].append(Said(name, scores.confidence, act))
 
 

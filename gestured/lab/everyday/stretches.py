@@ -1,6 +1,6 @@
 """Hours to be judged: simulated days, recordings (.npz) and tapes, each as a stream of frames with its truth."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from gestured.core.scene import Setup
 from gestured.core.timing import Timing
 from gestured.lab.everyday import FIRST
 from gestured.record.arrays import read
-from gestured.record.check import SESSION
+from gestured.record.check import SESSION, UNNAMED
 from gestured.record.judge import NONE, Performed
 from gestured.record.replay import frames_used, opened
 from gestured.simulator.everyday import PLACES, day
@@ -31,6 +31,7 @@ class Stretch:
     taps: list[Performed]  # which nobody meant, but which are taps in truth
     contacts: int | None = None  # that nobody meant; None where only the front end can tell
     tap_gap_s: float = Timing().tap_gap_s
+    unnamed: Sequence[Performed] = ()  # what was performed, but nobody knows what it was
 
 
 def lived(seed: int, seconds: float = HOUR_S, wake: str = "") -> Stretch:
@@ -65,9 +66,10 @@ def _arrays(path: Path) -> Iterator[Stretch]:
         acts = [Performed(str(label), "", float(on), float(off)) for n, label, on, off in told if n == i]
         if whole not in (NONE, SESSION):
             acts.append(Performed(str(whole), "", start, end))
-        meant = [act for act in acts if act.label != NONE]
+        meant = [act for act in acts if act.label not in (NONE, UNNAMED)]
+        unnamed = [act for act in acts if act.label == UNNAMED]
         setup = Setup(grid=found.frames.shape[1:])
-        yield Stretch(path.stem, str(found.subjects[i]), found.stream(i), setup, meant, [])
+        yield Stretch(path.stem, str(found.subjects[i]), found.stream(i), setup, meant, [], unnamed=unnamed)
 
 
 def _tape(path: Path) -> Iterator[Stretch]:
