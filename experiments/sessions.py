@@ -37,12 +37,13 @@ NET = "cnn_lstm"
 def without(part: Trained, data: TrainingData, plan: TrainingPlan, path: Path) -> Model:
     """The networks of a fold, calibrated on simulated people alone, as a file that the daemon would open."""
     module, calibration, answered = decided(part, NET, calibration_set(part, data, plan), data)
+    seen = quantiles(data.teach) | answered
     export_net(
         module,
         path,
         Facts(
             kind=NET, version=gestured.__version__, gestures=list(GESTURES), window=WINDOW, calibration=calibration,
-            training_data="", quantiles=quantiles(data.teach) | answered, classes=CLASSES, context=NAMES,
+            training_data=data.teach.digest(), quantiles=seen, classes=CLASSES, context=NAMES,
             operating_points=measured_points(part, module, NET, data, plan),
         ),
     )  # fmt: skip
