@@ -24,7 +24,9 @@ def write_block(document: Path, folder: Path, figures: Mapping[str, Mapping[str,
     """Renew the table of a folder's models in a document; GesturedError where its marks are missing."""
     files = [*(folder / f"{name}.onnx" for name in figures), folder / NAME]
     rows = [row for name, found in figures.items() for row in _rows(found, f"`{name}.onnx`, ")]
-    renew(document, "figures", [made_of("gestured-lab evaluate --document docs/figures.md", files), "", *HEAD, *rows])
+    real = " --real FOLDER" if any("real" in found for found in figures.values()) else ""
+    command = f"gestured-lab evaluate{real} --document docs/figures.md"
+    renew(document, "figures", [made_of(command, files), "", *HEAD, *rows])
 
 
 MEASURED_APART = ("unseen", "judged")  # parts of a card between marks, which experiments write

@@ -1,8 +1,10 @@
 """What a generated table was made of: one line above it with its command and the digests of models and files.
 
 A test compares the line with the files of the checkout, so that no table outlives the models that it speaks of.
+Where the table stands between marks of its own, the line also holds its digest, which finds figures edited by hand.
 """
 
+import hashlib
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,7 +13,8 @@ from gestured.core.errors import GesturedError
 from gestured.lab.digest import file_digest
 
 SHOWN = 12  # digits of a SHA-256 that are written: no two files of a project share them
-LINE = re.compile(r"<!-- made by `([^`]+)` of ((?:\S+ [0-9a-f]{12}(?:, )?)+) -->")
+LINE = re.compile(r"<!-- made by `([^`]+)` of ((?:\S+ [0-9a-f]{12}(?:, )?)+)(?:; block ([0-9a-f]{12}))? -->")
+BLOCK = re.compile(r"^<!-- ([^:\n]+): begin -->\n(.*?)^<!-- \1: end -->$", re.MULTILINE | re.DOTALL)
 OLDER = "**Made with models that no longer ship, or with older code; to be made again.**"  # stands below such a line
 
 
@@ -21,13 +24,39 @@ def made_of(command: str, files: Iterable[Path]) -> str:
 
 
 def renew(document: Path, name: str, lines: Iterable[str]) -> None:
-    """Put these lines between the marks `name: begin` and `name: end` of a document. GesturedError without them."""
+    """Put these lines between the marks `name: begin` and `name: end` of a document. GesturedError without them.
+
+    A line that `made_of` gave gets the digest of the others. Raises GesturedError also if a table would lose rows: then
+    an argument is missing, and whoever means it empties the block first.
+    """
     begin, end = _marks(name)
     text = document.read_text()
     if text.count(begin) != 1 or text.count(end) != 1:
         raise GesturedError(f"{document}: expected the marks {begin} and {end} once each")
-    block = "\n".join([begin, *lines, end])
+    made = signed("\n".join(lines).splitlines())
+    before, now = (sum(line.startswith("|") for line in some) for some in (kept(document, name).splitlines(), made))
+    if now < before:
+        raise GesturedError(
+            f"{document}: the block {name} has {before} rows of tables, and {now} would replace them; is an argument "
+            "missing, such as --real? Nothing was written"
+        )
+    block = "\n".join([begin, *made, end])
     document.write_text(text[: text.index(begin)] + block + text[text.index(end) + len(end) :])
+
+
+def signed(lines: list[str]) -> list[str]:
+    """The lines of a block; the one that says what they were made of has the digest of the others."""
+    at = next((n for n, line in enumerate(lines) if LINE.fullmatch(line)), None)
+    if at is None:
+        return lines
+    digest = hashlib.sha256("\n".join(lines[:at] + lines[at + 1 :]).encode()).hexdigest()[:SHOWN]
+    return [*lines[:at], LINE.sub(rf"<!-- made by `\1` of \2; block {digest} -->", lines[at]), *lines[at + 1 :]]
+
+
+def edited(text: str) -> list[str]:
+    """The names of the blocks of a text that are not as their command has written them."""
+    blocks = ((name, block.splitlines()) for name, block in BLOCK.findall(text))
+    return [name for name, lines in blocks if any("; block " in line for line in lines) and signed(lines) != lines]
 
 
 def kept(document: Path, name: str) -> str:

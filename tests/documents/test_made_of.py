@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from gestured.lab.made_of import LINE, OLDER, made_of, stale
+from gestured.core.errors import GesturedError
+from gestured.lab.made_of import BLOCK, LINE, OLDER, edited, made_of, renew, stale
 from gestured.lab.recordings.origin import said
 from gestured.model.shipped import shipped
 from tests.documents.blocks import ROOT, documents
@@ -38,9 +39,29 @@ def test_no_table_outlives_its_models(path: Path) -> None:
     assert stale(path.read_text(), files()) == []
 
 
+@pytest.mark.parametrize("path", [*documents(), *CARDS], ids=lambda path: path.name)
+def test_no_generated_block_was_edited(path: Path) -> None:
+    assert edited(path.read_text()) == []
+    blocks = [block for _, block in BLOCK.findall(path.read_text()) if LINE.search(block) and OLDER not in block]
+    assert all(re.search(r"; block [0-9a-f]{12} -->", block) for block in blocks)
+
+
+def test_an_edited_figure_is_found(tmp_path: Path) -> None:
+    page, model = tmp_path / "page.md", tmp_path / "cnn_lstm.onnx"
+    model.write_bytes(b"one")
+    page.write_text("before\n<!-- figures: begin -->\n<!-- figures: end -->\nafter\n")
+    renew(page, "figures", [made_of("make it", [model]), "", "| right | 0.91 |\n| wrong | 0.02 |"])
+    assert edited(page.read_text()) == [] == stale(page.read_text(), [model])
+    page.write_text(page.read_text().replace("0.91", "0.92"))
+    assert edited(page.read_text()) == ["figures"]
+    with pytest.raises(GesturedError, match="2 rows of tables, and 1 would replace"):
+        renew(page, "figures", [made_of("make it", [model]), "", "| right | 0.91 |"])
+    assert edited(page.read_text()) == ["figures"]
+
+
 @pytest.mark.parametrize("name", GENERATED)
 def test_every_generated_table_says_what_it_was_made_of(name: str) -> None:
-    commands = [command for command, _ in LINE.findall((ROOT / name).read_text())]
+    commands = [command for command, *_ in LINE.findall((ROOT / name).read_text())]
     for wanted in GENERATED[name]:
         assert any(command.startswith(wanted) for command in commands), wanted
 
