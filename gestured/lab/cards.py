@@ -3,15 +3,18 @@
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from jinja2 import Environment, PackageLoader
 
+from gestured.lab.fit import REAL_KINDS
 from gestured.lab.made_of import kept, made_of, renew
 from gestured.lab.manifest import NAME
 from gestured.lab.recordings.origin import said
 from gestured.lab.train import TrainingPlan
 from gestured.model.opening import open_model
+from gestured.simulator import NON_GESTURES
 
 
 def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: TrainingPlan) -> None:
@@ -26,9 +29,31 @@ def write_block(document: Path, folder: Path, figures: Mapping[str, Mapping[str,
     rows = [row for name, found in figures.items() for row in _rows(found, f"`{name}.onnx`, ")]
     real = " --real FOLDER" if any("real" in found for found in figures.values()) else ""
     command = f"gestured-lab evaluate{real} --document docs/figures.md"
-    renew(document, "figures", [made_of(command, files), "", *HEAD, *rows])
+    name, found = next(iter(figures.items()))
+    renew(document, "figures", [made_of(command, files), "", *HEAD, *rows, "", *_by_kind(name, found)])
 
 
+def _by_kind(name: str, found: Mapping[str, Any]) -> list[str]:
+    """The share of each kind of non-gesture that is rejected: a table, the worst kind first."""
+    sets = {f"simulated, {test}": values["kinds"] for test, values in found["simulated"].items()}
+    if real := found.get("real", {}).get("kinds"):
+        sets["real"] = {REAL_KINDS.get(kind, ""): share for kind, share in real.items()}
+    shares = {kind: [of.get(kind) for of in sets.values()] for kind in NON_GESTURES}
+    least = {kind: min(known) for kind, row in shares.items() if (known := [one for one in row if one is not None])}
+    worst = sorted(least, key=least.__getitem__)
+    cells = {kind: " | ".join("-" if one is None else f"{one:.3f}" for one in shares[kind]) for kind in worst}
+    rest = fill(f"{', '.join(worst[WORST:]) or 'none'}.", 118).splitlines()
+    return [
+        f"| non-gestures rejected by `{name}.onnx` | {' | '.join(sets)} |",
+        f"|---{'|---' * len(sets)}|",
+        *(f"| {kind} | {cells[kind]} |" for kind in worst[:WORST]),
+        "",
+        f"Of each other kind at least {min((least[kind] for kind in worst[WORST:]), default=1.0):.3f} is rejected:",
+        *rest,
+    ]
+
+
+WORST = 12  # kinds of non-gestures that have a row; always as many, since a table may not lose rows
 MEASURED_APART = ("unseen", "judged")  # parts of a card between marks, which experiments write
 HEAD = (
     "| set | gestures | right\\* | right | wrong | lost | non-gestures | rejected |",

@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ from gestured.lab import progress
 from gestured.lab.cli import main, parser
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
+from gestured.simulator import NON_GESTURES
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = next(action.choices for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
@@ -183,4 +185,6 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     figures = json.loads(text[text.index("\n{\n") :])
     assert figures.keys() == set(LADDER)
     assert set(figures["cnn_lstm"]["real"]) >= {"taps and swipes", "with non-gestures"}
+    asked = set(figures["cnn_lstm"]["simulated"]["wide"]["kinds"]) & set(NON_GESTURES)
+    assert asked and asked <= set(re.findall(r"\w+", page.read_text()))  # the page names what each kind comes to
     assert {path.name: path.read_bytes() for path in sorted(out.glob("*.onnx"))} == before
