@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from gestured.core.errors import GesturedError
-from gestured.core.points import Strictness
+from gestured.core.points import USUAL, Strictness
 from gestured.lab.dataset import in_processes
 from gestured.lab.everyday import report
 from gestured.lab.everyday.heard import Heard, hear
@@ -43,7 +43,8 @@ def at(source: str, strictness: Strictness) -> tuple[Model, ...]:
 
 def run(args: argparse.Namespace) -> int:
     """Play, judge, print."""
-    block = f"armed by {args.arming}" if args.arming else "everyday"
+    of = "" if args.strictness == USUAL else f", {args.strictness}"
+    block = f"armed by {args.arming}{of}" if args.arming else f"everyday{of}"
     _check(args, block)
     models = at(args.model, args.strictness)
     if args.arming and args.arming not in models[0].gestures:
