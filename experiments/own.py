@@ -4,6 +4,7 @@ python -m experiments.own models/cnn_lstm.onnx
 """
 
 import argparse
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +13,12 @@ import numpy as np
 
 from gestured.core.own import EXAMPLES
 from gestured.lab.cli import CACHE
+from gestured.lab.made_of import made_of, renew
 from gestured.lab.own.command import embedding_of
 from gestured.lab.own.learn import Seen, Trial, played_through
 from gestured.lab.own.play import played
 from gestured.lab.own.signs import JUDGED
+from gestured.lab.table import Table
 from gestured.model.prototypes import Space
 
 JUDGES = 12  # people
@@ -47,30 +50,33 @@ def figures(space: Space, trials: Iterator[Trial]) -> list[Figures]:
     return found
 
 
-def table(name: str, found: list[Figures]) -> str:
+def table(name: str, found: list[Figures]) -> Table:
     """The figures for a person."""
-    head = f"{'examples':<10}{'can be enrolled':>17}{'recall':>10}{'others accepted':>17}{'built-in taken':>17}"
-    lines = [f"{name}: gestures that nobody has enrolled before, of people whom nothing was learned from", head]
-    lines += [
-        f"{one.examples:<10}{one.enrolled:>17.3f}{one.recall:>10.3f}{one.accepted:>17.4f}{one.taken:>17.4f}"
+    rows = [
+        (one.examples, f"{one.enrolled:.3f}", f"{one.recall:.3f}", f"{one.accepted:.4f}", f"{one.taken:.4f}")
         for one in found
     ]
-    return "\n".join(lines)
+    head = ("examples", "can be enrolled", "recall", "others accepted", "built-in taken")
+    return Table(f"{name}: kinds of gesture and people from whom nothing was learned", head, rows)
 
 
 def main() -> None:
-    """Print a table for each model."""
+    """Print and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("models", type=Path, nargs="+", metavar="MODEL", help="that gestured-lab own has taught")
+    parser.add_argument("model", type=Path, metavar="MODEL", help="that gestured-lab own has taught")
     parser.add_argument("--cache", type=Path, default=CACHE, help="where finished steps are kept (%(default)s)")
     parser.add_argument("--people", type=int, default=JUDGES, help="who judge (%(default)s)")
+    parser.add_argument("--document", type=Path, metavar="PAGE", help="a page whose table `own` is written anew")
     args = parser.parse_args()
-    for path in args.models:
-        model = embedding_of(path)
-        assert model.space is not None, f"{path}: teach it first: gestured-lab own {path}"
-        seen = Seen.by(model, played(args.cache, args.people, judge=True))
-        trials = (trial for trial in played_through(seen, model.space) if trial.kind in JUDGED)
-        print(table(path.stem, figures(model.space, trials)), flush=True)
+    model = embedding_of(args.model)
+    assert model.space is not None, f"{args.model}: teach it first: gestured-lab own {args.model}"
+    seen = Seen.by(model, played(args.cache, args.people, judge=True))
+    trials = (trial for trial in played_through(seen, model.space) if trial.kind in JUDGED)
+    made = table(args.model.stem, figures(model.space, trials))
+    print(made)
+    if args.document:
+        line = made_of(f"python -m experiments.own {' '.join(sys.argv[1:])}", [args.model])
+        renew(args.document, "own", [line, "", str(made)])
 
 
 if __name__ == "__main__":

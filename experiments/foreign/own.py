@@ -8,8 +8,10 @@ are the same thing each time.
 """
 
 import argparse
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -20,10 +22,13 @@ from gestured.core.classifier import NEAR
 from gestured.core.frames import Segment
 from gestured.core.own import EXAMPLES
 from gestured.lab.dataset import cuts
+from gestured.lab.made_of import made_of, renew
+from gestured.lab.table import Table
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.model.own import Placed
 from gestured.model.prototypes import Array, Prototype, Space, nearest
+from gestured.model.shipped import LADDER, shipped
 
 PERFORMED = (
     "long_press", "scribble", "zigzag", "pinch", "two_finger_tap", "check_mark", "two_finger_sideways",
@@ -72,20 +77,22 @@ def taken(space: Space, prototypes: dict[str, Prototype], chosen: list[Seen]) ->
     return np.array([sum(map(bool, own)), len(own)], np.float64)
 
 
-def judge(model: Model, people: int, level: str) -> None:
-    """Print recall, and what else is taken, by the number of examples."""
+def judge(model: Model, people: int, level: str) -> Table:
+    """Recall by kind and by the number of examples, how many people could enrol it, and what else is taken."""
     space = model.space
     if space is None:
         raise SystemExit(f"{model.name}: has no metadata 'own'")
-    counts = {n: np.zeros(6) for n in SHOWN}
-    by_kind = {kind: np.zeros((len(SHOWN), 2)) for kind in PERFORMED}
+    counts = np.zeros((len(SHOWN), len(PERFORMED), 6))
+    enrolled, tried = np.zeros(len(PERFORMED), int), np.zeros(len(PERFORMED), int)
     for seed in range(people):
         every = list(done(model, seed, level))
-        for kind in PERFORMED:
+        for k, kind in enumerate(PERFORMED):
             mine = [one for one in every if one.kind == kind]
             if len(mine) < TRIALS - 2:
                 continue
-            for n, count in counts.items():
+            tried[k] += 1
+            enrolled[k] += not any(one.claimed for one in mine[:EXAMPLES])
+            for row, n in enumerate(SHOWN):
                 if any(one.claimed for one in mine[:n]):
                     continue
                 prototypes = {kind: Prototype.of(space, np.stack([one.place for one in mine[:n]]))}
@@ -94,28 +101,35 @@ def judge(model: Model, people: int, level: str) -> None:
                     [one for one in every if one.kind in NON_GESTURES and one.kind != kind],
                     [one for one in every if one.kind in GESTURES],
                 )
-                found = np.concatenate([taken(space, prototypes, chosen) for chosen in sets])
-                count += found
-                by_kind[kind][SHOWN.index(n)] += found[:2]
-    print(f"{level}: {'examples':<10}{'recall':>10}{'others accepted':>18}{'built-in taken':>18}")
-    for n, count in counts.items():
-        recall, others, built_in = count[0::2] / np.maximum(count[1::2], 1)
-        print(f"{'':{len(level) + 2}}{n:<10}{recall:>10.3f}{others:>18.4f}{built_in:>18.4f}")
-    for kind, each in by_kind.items():
-        shares = [f"{right / asked:.2f} of {asked:.0f}" if asked else "refused" for right, asked in each]
-        print(f"{'':{len(level) + 2}}{kind:<22}" + "".join(f"{share:>14}" for share in shares))
+                counts[row, k] += np.concatenate([taken(space, prototypes, chosen) for chosen in sets])
+    recall, others, built_in = (counts[:, :, 2 * k] for k in range(3))
+    asked = np.maximum(counts[:, :, 1::2], 1)
+    names = [(kind, f"{enrolled[k]} of {tried[k]}", recall[:, k] / asked[:, k, 0]) for k, kind in enumerate(PERFORMED)]
+    every_kind = counts.sum(axis=1)
+    names.append(("all", f"{enrolled.sum()} of {tried.sum()}", every_kind[:, 0] / np.maximum(every_kind[:, 1], 1)))
+    rows = [(name, of, *(f"{share:.2f}" for share in shares)) for name, of, shares in names]
+    most = [float((part.sum(axis=1) / np.maximum(every_kind[:, 2 * k + 1], 1)).max())
+            for k, part in ((1, others), (2, built_in))]  # fmt: skip
+    note = f"Others accepted: {most[0]:.4f} at most; the model's gestures taken for it: {most[1]:.4f} at most."
+    head = ("kind", f"enrolled from {EXAMPLES}", *(f"recall from {n}" for n in SHOWN))
+    return Table(f"Other hands and sensors, {level}", head, rows, (note,))
 
 
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--model", default="cnn_lstm", help="a shipped name or a path (cnn_lstm)")
+    parser.add_argument("--model", default="cnn_lstm", choices=LADDER, help="a shipped one (cnn_lstm)")
     parser.add_argument("--people", type=int, default=10, help="people (10)")
-    parser.add_argument("--level", nargs="+", default=["nominal"], choices=LEVELS, help="how hard (nominal)")
+    parser.add_argument("--level", default=LEVELS[0], choices=LEVELS, help=f"how hard ({LEVELS[0]})")
+    parser.add_argument(
+        "--document", type=Path, metavar="PAGE", help="a page whose table `other hands` is written anew"
+    )
     args = parser.parse_args()
-    model = open_model(args.model)
-    for level in args.level:
-        judge(model, args.people, level)
+    table = judge(open_model(args.model), args.people, args.level)
+    print(table)
+    if args.document:
+        command = f"python -m experiments.foreign.own {' '.join(sys.argv[1:])}"
+        renew(args.document, "other hands", [made_of(command, [shipped()[args.model]]), "", str(table)])
 
 
 if __name__ == "__main__":
