@@ -23,9 +23,9 @@ from gestured.lab.cards import with_interval
 from gestured.lab.decide import Answers, confidence
 from gestured.lab.evaluate import Evaluation, model_answers, outcome
 from gestured.lab.fit import CLASSES, targets
+from gestured.lab.intervals import interval
 from gestured.lab.made_of import made_of, renew
 from gestured.lab.samples import Samples
-from gestured.lab.study.bootstrap import interval
 from gestured.lab.train import Trained, TrainingData, TrainingPlan, calibration_set, judged, learn
 from gestured.model.opening import open_model
 from gestured.simulator import GESTURES

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from gestured.lab.decide import Answers, confidence
 from gestured.lab.fit import RECURRENT, padded, targets
+from gestured.lab.intervals import interval
 from gestured.lab.samples import Samples
-from gestured.lab.study.bootstrap import interval
 from gestured.lab.train import REAL_SETS, Calibrated, Trained, TrainingData, folds, is_of, judged
 from gestured.lab.verifier import Evidence
 from gestured.model.model import Model

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from gestured.lab import decide
 from gestured.lab.adapt.learning import classes_of
+from gestured.lab.intervals import interval
 from gestured.lab.samples import Samples
-from gestured.lab.study.bootstrap import interval
 from gestured.simulator import NONE
 
 

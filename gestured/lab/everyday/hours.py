@@ -9,10 +9,10 @@ import numpy as np
 
 from gestured.core.points import USUAL
 from gestured.lab.everyday.heard import Heard
+from gestured.lab.intervals import rate
 from gestured.model.model import Model
 from gestured.record.judge import NONE, verdicts
 
-DRAWS = 2000  # of people, for an interval
 FEW = 5  # people; of fewer an interval over them says nothing
 # Thresholds of a curve: closer to one another where few false gestures are left.
 LEVELS = np.round(np.concatenate([np.arange(0.05, 0.95, 0.01), np.arange(0.95, 0.9995, 0.001)]), 4).tolist()
@@ -60,21 +60,9 @@ class Hours:
         self.each[one.person] = hours + one.hours, before + false
 
     def interval(self) -> tuple[float, float]:
-        """95 % of false gestures an hour, people drawn anew; at none the upper end is that of a Poisson count.
-
-        Of fewer than FEW people it is drawn as if false gestures came by chance.
-        """
+        """95 % of false gestures an hour, over people; of fewer than FEW as if they came by chance."""
         hours, false = np.array(list(self.each.values()), float).T
-        if not false.any():
-            return 0.0, 3.0 / self.hours
-        rng = np.random.default_rng([0, 0xE7])
-        if len(hours) < FEW:
-            found = rng.poisson(false.sum(), DRAWS) / self.hours
-        else:
-            drawn = rng.integers(0, len(hours), (DRAWS, len(hours)))
-            found = false[drawn].sum(axis=1) / hours[drawn].sum(axis=1)
-        low, high = np.quantile(found, [0.025, 0.975])
-        return float(low), float(high)
+        return rate([false.sum()], [hours.sum()]) if len(hours) < FEW else rate(false, hours)
 
     def figures(self) -> dict[str, Any]:
         """All of it as JSON values."""

@@ -44,7 +44,7 @@ def tables(found: Figures, kind: str) -> list[Table]:
     """By place, by gesture, by what lay on the sensor, and by threshold; `kind` says whose hours they are."""
     title = f"Everyday contact, {kind}: {found['model']}, {found['strictness']}"
     rows = [_place(name, of) for name, of in (*found["places"].items(), ("all", found))]
-    notes = [f"The interval draws the {found['people']} people anew."] if found["people"] >= FEW else []
+    notes = [f"The interval is over {found['people']} people."] if found["people"] >= FEW else []
     if found["false_per_hour"] == 0:
         notes = ["Nothing false was said; the interval ends at three divided by the hours."]
     deaf = ", ".join(f"{why} {minutes:.2f}" for why, minutes in found["deaf_minutes_per_hour"].items())

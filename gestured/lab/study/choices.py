@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from gestured.lab.intervals import summary
 from gestured.lab.samples import WINDOW, Samples
-from gestured.lab.study.bootstrap import summary
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.cohort import Cohort
 from gestured.lab.study.material import SHIFT, UNCHANGED, Data

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from gestured.core.frames import Segment
+from gestured.lab.intervals import interval, summary
 from gestured.lab.progress import progress
 from gestured.lab.samples import WINDOW
-from gestured.lab.study.bootstrap import interval, summary
 from gestured.lab.study.cohort import Cohort
 from gestured.lab.study.material import Data
 from gestured.lab.study.plan import Plan

@@ -15,11 +15,11 @@ from torch import Tensor, nn
 
 import gestured
 from gestured.lab.export import Facts, export_forest, export_net
+from gestured.lab.intervals import interval
 from gestured.lab.nets import last_active
 from gestured.lab.online import play, takes, tallied
 from gestured.lab.progress import progress
 from gestured.lab.samples import WINDOW
-from gestured.lab.study.bootstrap import interval
 from gestured.lab.study.material import SHIFT, Data, pool
 from gestured.lab.study.methods import METHODS, Estimator
 from gestured.lab.study.plan import Plan

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.lab.study.bootstrap import summary
+from gestured.lab.intervals import summary
 from gestured.lab.study.material import AUGMENTATIONS, SHIFT, UNCHANGED, Data
 from gestured.lab.study.methods import METHODS, Method
 from gestured.lab.study.plan import Plan

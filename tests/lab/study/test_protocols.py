@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gestured.lab.study.bootstrap import interval
+from gestured.lab.intervals import interval, rate
 from gestured.lab.study.material import JUDGE, SHIFT, UNCHANGED, Data
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.protocols import (
@@ -91,17 +91,28 @@ def test_the_seeds_of_a_cell_are_counted_as_one_figure() -> None:
 def test_an_interval_is_over_people_and_not_over_gestures() -> None:
     right = np.array([1, 1, 1, 1, 0, 0, 0, 0], bool)
     share, low, high = interval(right, [0, 0, 0, 0, 1, 1, 1, 1])
-    assert (share, low, high) == (0.5, 0.0, 1.0)
+    assert (share, low, high) == pytest.approx((0.5, 0.0, 1.0), abs=0.01)
     share, low, high = interval(right, [0, 1, 2, 3, 0, 1, 2, 3])
     assert share == low == high == 0.5
 
 
-def test_an_interval_covers_the_truth_as_often_as_it_says() -> None:
+@pytest.mark.parametrize("count", [6, 10, 30])
+def test_an_interval_covers_the_truth_as_often_as_it_says_of_few_people_too(count: int) -> None:
     rng = np.random.default_rng(0)
-    covered = 0
-    for _ in range(200):
-        skill = np.clip(rng.normal(0.8, 0.1, 30), 0, 1)
-        people = np.repeat(np.arange(30), 40)
-        _, low, high = interval(rng.random(1200) < skill[people], people)
-        covered += low <= 0.8 <= high
-    assert 0.88 <= covered / 200 <= 0.99
+    people = np.repeat(np.arange(count), 40)
+    covered = covered_rate = 0
+    for _ in range(500):
+        skill = rng.beta(18.0, 2.0, count)
+        _, low, high = interval(rng.random(40 * count) < skill[people], people)
+        covered += low <= 0.9 <= high
+        hours, often = np.full(count, 2.0), rng.gamma(4.0, 0.5, count)
+        low, high = rate(rng.poisson(often * hours), hours)
+        covered_rate += low <= 2.0 <= high
+    assert 0.92 <= covered / 500 <= 0.98 and 0.92 <= covered_rate / 500 <= 0.98
+
+
+def test_what_was_never_or_always_right_has_an_end_that_its_count_shows() -> None:
+    people = np.repeat(np.arange(6), 10)
+    assert interval(np.zeros(60, bool), people) == (0.0, 0.0, 0.05)
+    assert interval(np.ones(60, bool), people) == (1.0, 0.95, 1.0)
+    assert rate(np.zeros(6), np.full(6, 5.0)) == (0.0, 0.1)

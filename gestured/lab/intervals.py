@@ -1,0 +1,69 @@
+"""95 % intervals over people: gestures of one person are alike, so people are what was drawn.
+
+Drawing six or ten people anew, as the percentile bootstrap does, covers the truth in 83 to 90 % of cases. Here the
+spread of a ratio over people (linearised, with their number less one) is taken with Student's t, on the logit of a
+share and on the logarithm of a rate.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+CONFIDENCE_LEVEL = 0.95
+RULE_OF_THREE = 3.0  # none among n: the truth is at most 3 / n, at 95 %
+
+
+def interval(right: ArrayLike, people: ArrayLike) -> tuple[float, float, float]:
+    """(N,) answers right or not, (N,) who gave the gesture -> share right, and its interval's ends.
+
+    Three times NaN for no gesture at all; from 0 to 1 of one person.
+    """
+    hits, owners = np.asarray(right, np.float64), np.asarray(people)
+    if not len(hits):
+        return float("nan"), float("nan"), float("nan")
+    _, person = np.unique(owners, return_inverse=True)
+    good: NDArray[np.float64] = np.bincount(person, hits)
+    all_of: NDArray[np.float64] = np.bincount(person, np.ones_like(hits))
+    share = float(hits.mean())
+    if len(all_of) < 2:
+        return share, 0.0, 1.0
+    if share in (0.0, 1.0):
+        edge = min(RULE_OF_THREE / len(hits), 1.0)
+        return (share, 0.0, edge) if share == 0.0 else (share, 1.0 - edge, 1.0)
+    wide = _half_width(good, all_of) / (1.0 - share)  # on the logit
+    middle = math.log(share / (1.0 - share))
+    low, high = (1.0 / (1.0 + math.exp(-(middle + way * min(wide, 50.0)))) for way in (-1.0, 1.0))
+    return share, low, high
+
+
+def rate(counts: ArrayLike, hours: ArrayLike) -> tuple[float, float]:
+    """(P,) how often something happened to each person in (P,) hours -> the ends of the rate's interval.
+
+    At none the upper end is that of a Poisson count. Of one person it is drawn as if things came by chance.
+    """
+    found, spent = np.asarray(counts, np.float64), np.asarray(hours, np.float64)
+    if not found.any():
+        return 0.0, RULE_OF_THREE / float(spent.sum())
+    mean = float(found.sum() / spent.sum())
+    wide = _half_width(found, spent) if len(found) > 1 else _normal() / math.sqrt(found.sum())
+    return mean * math.exp(-min(wide, 50.0)), mean * math.exp(min(wide, 50.0))
+
+
+def summary(right: ArrayLike, people: ArrayLike) -> dict[str, float]:
+    """As `interval`, with names, rounded to a hundredth of a per cent; None where there is nothing."""
+    values = interval(right, people)
+    return {name: round(value, 4) for name, value in zip(("right", "low", "high"), values, strict=True)}
+
+
+def _half_width(part: NDArray[np.float64], whole: NDArray[np.float64]) -> float:
+    """Half of the interval of log(sum of part / sum of whole) over (P,) people."""
+    people = len(whole)
+    left = part - part.sum() / whole.sum() * whole
+    spread = math.sqrt(people / (people - 1) * float((left**2).sum())) / float(part.sum())
+    return float(stats.t.ppf((1 + CONFIDENCE_LEVEL) / 2, people - 1)) * spread
+
+
+def _normal() -> float:
+    return float(stats.norm.ppf((1 + CONFIDENCE_LEVEL) / 2))
