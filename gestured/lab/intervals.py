@@ -24,8 +24,7 @@ def interval(right: ArrayLike, people: ArrayLike) -> tuple[float, float, float]:
     if not len(hits):
         return float("nan"), float("nan"), float("nan")
     _, person = np.unique(owners, return_inverse=True)
-    good: NDArray[np.float64] = np.bincount(person, hits)
-    all_of: NDArray[np.float64] = np.bincount(person, np.ones_like(hits))
+    good, all_of = np.bincount(person, hits).astype(np.float64), np.bincount(person).astype(np.float64)
     share = float(hits.mean())
     if len(all_of) < 2:
         return share, 0.0, 1.0

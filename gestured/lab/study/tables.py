@@ -97,10 +97,15 @@ def row(cell: Cell, result: Result) -> dict[str, Any]:
         "method": cell.method, "settings": cell.settings, "augmentation": cell.augmentation,
         "protocol": cell.protocol, "data": cell.data,
         "n": len(result["truth"]) // len(result["shares"]), **summary(right(result), result["person"]),
-        "seeds": len(result["shares"]), "spread": round(float(np.std(result["shares"])), 4),
+        "seeds": len(result["shares"]), "spread": round(_spread(result["shares"]), 4),
         "published": METHODS[cell.method].published.get(cell.augmentation) if cell.data == "simulated" else None,
         "train": result["train"], "seconds": result["seconds"], "confusion": confusion.tolist(),
     }  # fmt: skip
+
+
+def _spread(shares: Sequence[float]) -> float:
+    """The standard deviation over seeds; 0 of one."""
+    return float(np.std(shares, ddof=1)) if len(shares) > 1 else 0.0
 
 
 def copies(found: Mapping[Cell, Result]) -> list[dict[str, Any]]:

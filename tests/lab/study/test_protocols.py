@@ -85,7 +85,9 @@ def test_the_seeds_of_a_cell_are_counted_as_one_figure() -> None:
     found = row(Cell("tp_knn", "tuned", UNCHANGED, CLEAN, "simulated"), both)
     assert both["shares"] == [round(float(right(one).mean()), 4) for one in results]
     assert found["right"] == pytest.approx(np.mean(both["shares"]), abs=1e-3) and found["seeds"] == 2
-    assert found["n"] == len(results[0]["truth"]) and found["spread"] == pytest.approx(np.std(both["shares"]), abs=1e-4)
+    assert found["n"] == len(results[0]["truth"]) and found["spread"] == pytest.approx(
+        np.std(both["shares"], ddof=1), abs=1e-4
+    )
 
 
 def test_an_interval_is_over_people_and_not_over_gestures() -> None:
