@@ -16,7 +16,7 @@ FEW = (
     "tests/daemon/test_start.py::test_the_default_socket_is_the_sessions",
     "tests/daemon/test_start.py::test_settings_that_are_not_valid",
     "tests/daemon/test_start.py::test_explain_says_what_is_loaded_and_what_is_left_out",
-    "tests/daemon/test_start.py::test_a_fallback_must_know_the_same_gestures",
+    "tests/daemon/test_start.py::test_a_model_that_cannot_be_used",
     "tests/control/test_address.py",
     "tests/control/test_listen.py::test_every_type_has_its_line",
     "tests/control/test_operate.py::test_without_a_daemon_each_says_so_in_one_line",
