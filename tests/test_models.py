@@ -17,12 +17,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.core.errors import ModelError
+from gestured.core.own import EXAMPLES
 from gestured.model import file as model_file
 from gestured.model import points
 from gestured.model import process as model_process
 from gestured.model.features import touch_pattern
 from gestured.model.model import Model
 from gestured.model.opening import check, open_model
+from gestured.model.prototypes import Space
 from gestured.model.session import Session
 from gestured.model.shipped import LADDER, shipped
 from tests.daemon import tiny_model
@@ -145,6 +147,14 @@ OTHER_WINDOW = json.dumps(json.loads(WINDOW.to_json()) | {"rows": 8})
 HALF_WINDOW = json.dumps({"rows": 9})
 
 
+def own(**changes: Any) -> str:
+    """The space of one direction of a model with two gestures, changed."""
+    one = np.ones(1)
+    return json.dumps(
+        json.loads(Space(one, one[None], one, np.ones((2, 2, 1)), (0.0,) * EXAMPLES, 1.0, 0.0).to_json()) | changes
+    )
+
+
 @pytest.mark.parametrize(
     ("key", "value"),
     [
@@ -171,6 +181,8 @@ HALF_WINDOW = json.dumps({"rows": 9})
         ("calibration", '{"temperature": NaN}'),
         ("training_data", "yesterday"),
         ("quantiles", "null"),
+        ("own", own(slope=10**400)),
+        ("own", own(thresholds=[10**400] * EXAMPLES)),
         ("provisional", "[]"),
         ("operating_points", "[]"),
         ("operating_points", operating_points().replace("12.0", "NaN")),

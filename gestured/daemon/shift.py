@@ -88,7 +88,7 @@ def _range(quantiles: Mapping[str, Any], name: str) -> tuple[float, float] | Non
     try:
         at, values = np.asarray(quantiles["at"], float), np.asarray(quantiles[name], float)
         low, high = (float(values[np.flatnonzero(at == q)[0]]) for q in (0.01, 0.99))
-    except (KeyError, ValueError, IndexError, TypeError):
+    except (KeyError, ValueError, IndexError, TypeError, OverflowError):
         return None
     if name == "confidence":
         high = math.inf  # surer than in training is no fault

@@ -77,7 +77,7 @@ class Space:
             built_in = _unpacked(told["built_in"]).reshape(2, gestures, inner)
             thresholds = tuple(float(value) for value in told["thresholds"])
             slope, margin = float(told["slope"]), float(told["margin"])
-        except (KeyError, TypeError, ValueError):
+        except (KeyError, TypeError, ValueError, OverflowError):
             raise ValueError("expected mean, directions, between, built_in, thresholds, slope and margin") from None
         if len(thresholds) != EXAMPLES or not all(map(math.isfinite, (*thresholds, slope, margin))) or slope <= 0:
             raise ValueError(f"expected {EXAMPLES} thresholds, a margin and a slope above 0, all finite")

@@ -212,7 +212,14 @@ def test_more_unknown_than_known_is_a_shift_and_a_fallback_says_nothing() -> Non
 
 @pytest.mark.parametrize(
     "quantiles",
-    [{}, {"at": []}, {"at": [0.01, 0.99], "strength": "x"}, {"at": 3}, {"at": [0.01, 0.99], "strength": [2, 1]}],
+    [
+        {},
+        {"at": []},
+        {"at": [0.01, 0.99], "strength": "x"},
+        {"at": 3},
+        {"at": [0.01, 0.99], "strength": [2, 1]},
+        {"at": [0.01, 0.99], "strength": [1, 10**400]},
+    ],  # fmt: skip
 )
 def test_metadata_that_say_nothing_give_no_verdict(quantiles: dict[str, Any]) -> None:
     shift = Shift(quantiles, WINDOW)
