@@ -9,6 +9,7 @@ import pytest
 
 from gestured.control.cli import main
 from gestured.record import tape_reader
+from gestured.record.replay import Mute, Replay, maker, opened
 from tests.opening import in_bounds, refused
 from tests.sockets import free_address
 
@@ -23,6 +24,8 @@ SCENE: dict[str, Any] = {"settings": SETTINGS, "gestures": ["one_tap"], "model":
 ONSET = {"type": "onset", "sensor": "arm", "id": 1, "onset": 5.0}
 TAP = {"type": "gesture", "sensor": "arm", "id": 1, "gesture": "one_tap", "confidence": 0.9, "onset": 5.0,
        "offset": 5.2, "decided": 5.3}  # fmt: skip
+
+GATE = {"type": "gate", "sensor": "arm", "armed": None, "closed": ["door"], "until": None, "since": 0.5}
 
 
 def record(opcode: int, content: bytes) -> bytes:
@@ -165,6 +168,7 @@ WRONG = {
     "confidence": TAP | {"confidence": True},
     "no reason": {"type": "cancelled", "sensor": "arm", "id": 1},
     "large": ONSET | {"onset": 10**400},
+    "until": GATE | {"until": 10**400},
 }
 
 
@@ -173,6 +177,12 @@ def test_what_is_no_event_is_named(tmp_path: Path, kind: str) -> None:
     assert refused("mcap", events(tmp_path / "good.mcap", ONSET, TAP | {"more": [1]}, {"type": "new"})) == ""
     path = events(tmp_path / "a.mcap", ONSET, WRONG[kind])
     assert f"{path}: event 2: expected" in refused("mcap", path)
+
+
+def test_gates_of_tens_of_thousands_of_sensors_take_no_longer_than_their_lines(tmp_path: Path) -> None:
+    lines = [message(2, 10**9, json.dumps(GATE | {"sensor": f"s{k}"}).encode()) for k in range(50_000)]
+    tape, made = opened(write(tmp_path / "a.mcap", CHANNELS, *lines, message(1, 10**9, b"")))
+    assert list(Replay(tape, made.scene, Mute(made.scene.gestures)).events()) == []
 
 
 SCENES: dict[str, dict[str, Any]] = {
@@ -209,7 +219,6 @@ def test_a_scene_that_is_no_json(tmp_path: Path, said: str) -> None:
 
 
 def test_sensors_are_as_many_as_the_daemon_would_have_taken(tmp_path: Path) -> None:
-    from gestured.record.replay import Mute, Replay, maker
     from tests import encoding
 
     packets = [message(1, k * 10**7, encoding.message(f"/s{k}/pressure", "b", [bytes(81)])) for k in range(1000)]

@@ -49,8 +49,11 @@ class Gates:
 
     def put(self, sensor: str, closed: Iterable[str]) -> None:
         """Exactly these are closed for a sensor, until they are opened."""
-        self._of[sensor] = dict.fromkeys(closed, math.inf)
-        self._look()
+        theirs = dict.fromkeys(closed, math.inf)
+        if theirs != self._all:
+            self._of[sensor] = theirs  # nothing of it opens by itself, so that `due` is not looked for among all others
+        else:
+            self._of.pop(sensor, None)
 
     def _told(self, sensor: str | None) -> list[dict[str, float]]:
         if sensor is None:

@@ -7,6 +7,8 @@ from typing import Any
 from gestured.core.address import is_sensor
 from gestured.core.events import Place
 
+MOST_ZONES = 64  # of one sensor: each is held against each other one, and a tape may come from anybody
+
 
 @dataclass(frozen=True, slots=True)
 class Zone:
@@ -32,6 +34,8 @@ def zones_of(told: Mapping[str, Any]) -> dict[str, Zone]:
 
     Raises ValueError, which names the zone, or both where two overlap.
     """
+    if len(told) > MOST_ZONES:
+        raise ValueError(f"zones: expected at most {MOST_ZONES} of a sensor, found {len(told)}")
     zones: dict[str, Zone] = {}
     for name, each in told.items():
         new = zones[name] = _zone(name, each)

@@ -32,6 +32,7 @@ EVENT_SCHEMA: dict[str, Any] = {
         "reason": {"type": "string"},
         "closed": {"type": "array", "items": {"type": "string"}},
         "since": {"type": "number"},
+        "until": {"type": ["number", "null"]},
     },
     "required": ["type"],
 }

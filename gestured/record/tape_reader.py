@@ -17,7 +17,7 @@ LATEST_NS = 1 << 62  # of a packet, since 1970: a day in 2116, which a clock her
 NOBODY = Address("", 0)  # the source of a channel that holds no packets
 HOST_CHARACTERS = 255  # of a sender's name; the DNS allows no more
 LARGEST_NUMBER = 1e11  # of any number in an event; as seconds since 1970 it is a date that Python can print
-FORMS: dict[str, str] = {key: form["type"] for key, form in EVENT_SCHEMA["properties"].items()}
+FORMS: dict[str, str | list[str]] = {key: form["type"] for key, form in EVENT_SCHEMA["properties"].items()}
 # What an event of a type says at least.
 NEEDED = {
     "onset": ("sensor", "id", "onset"),
@@ -115,7 +115,11 @@ def _event(line: bytes, number: int) -> Mapping[str, Any]:
     return event
 
 
-def _right(form: str, value: object) -> bool:
+def _right(form: str | list[str], value: object) -> bool:
+    if isinstance(form, list):
+        return any(_right(one, value) for one in form)
+    if form == "null":
+        return value is None
     if form == "string":
         return isinstance(value, str)
     if form == "array":

@@ -46,6 +46,10 @@ def test_outside_of_every_zone_there_is_none() -> None:
         ({"volume": {"at": [0, 0, 1, 1], "gesture": []}}, "zones.volume: expected a name"),
         ({"volume": {"at": [0, 0, 1, 1], "gestures": "left"}}, "zones.volume: gestures 'left': expected a list"),
         ({"the volume": [0, 0, 1, 1]}, "zones.the volume: expected a name"),
+        (
+            {f"z{k}": [k / 99, 0, (k + 1) / 99, 1] for k in range(99)},
+            "zones: expected at most 64 of a sensor, found 99",
+        ),
     ],
 )
 def test_what_can_be_no_zone_is_named(told: dict[str, Any], says: str) -> None:
