@@ -30,7 +30,7 @@ class Scores:
     unknown: float  # probability that it is none of them
     model: str
     degraded: bool = False  # whether a fallback answered
-    threshold: float = 0.5  # confidence from which the model's calibration has it published, where it has no `points`
+    threshold: float = 0.5  # confidence from which it is published where there are no `points`, or a gesture has armed
     took_s: float = 0.0  # s that the model ran
     own: Match | None = None  # the nearest gesture of the user's own, where there are any
     points: OperatingPoints | None = None  # of the model

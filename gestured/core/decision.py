@@ -48,16 +48,20 @@ class Decision:
         best = max(possible or scores, key=scores.__getitem__)
         return scores, best, scores[best] * (1.0 - answer.unknown) if possible else 0.0
 
-    def threshold(self, gesture: str, answer: Scores) -> float:
-        """The confidence from which an answer is that gesture: the scene's, else that of the model which answers."""
+    def threshold(self, gesture: str, answer: Scores, *, armed: bool) -> float:
+        """The confidence from which an answer is that gesture: the scene's, else that of the model which answers.
+
+        An operating point is for whole days, in which hardly a contact is meant. On a sensor that a gesture has `armed`
+        most are, so the model's one threshold is enough there.
+        """
         point = self._point(answer)
         usual = answer.threshold if point is None else point.thresholds[gesture]
-        return self._thresholds.get(gesture, usual)
+        return self._thresholds.get(gesture, min(usual, answer.threshold) if armed else usual)
 
-    def early(self, gesture: str, answer: Scores) -> float:
+    def early(self, gesture: str, answer: Scores, *, armed: bool) -> float:
         """The confidence from which a provisional event may be that gesture, besides what a `Certainty` asks for."""
         point = self._point(answer)
-        return max(self.threshold(gesture, answer), 0.0 if point is None else point.provisional or 0.0)
+        return max(self.threshold(gesture, answer, armed=armed), 0.0 if point is None else point.provisional or 0.0)
 
     def _point(self, answer: Scores) -> Point | None:
         return None if answer.points is None else answer.points.points[self._strictness]

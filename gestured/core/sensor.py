@@ -181,7 +181,7 @@ class Sensor:
 
     def _decide(self, cut: Cut) -> list[Told]:
         """The answer to a segment, and `Decided` where a classifier gave scores."""
-        name, segment, decision = self.name, cut.segment, self._decision
+        name, segment, decision, listening = self.name, cut.segment, self._decision, self._listening
         answer = self._ask(segment)
         self._asked = None
         if answer is None:
@@ -190,8 +190,9 @@ class Sensor:
         self._placed = None
         scores, best, confidence = decision.best(self.classifier.gestures, answer, at.zone)
         seen = whole(cut.hole_s, self.front_end.interval_s)
-        known = seen and decision.may(best, at.zone) and confidence >= decision.threshold(best, answer)
-        decided, listening = Decided(name, segment, answer, known), self._listening
+        least = decision.threshold(best, answer, armed=segment.onset <= listening.armed_until)
+        known = seen and decision.may(best, at.zone) and confidence >= least
+        decided = Decided(name, segment, answer, known)
         own = answer.own if seen and decision.is_own(answer.own, at.zone, known=known) else None
         if own is not None:
             best, confidence = own.name, own.confidence
@@ -245,9 +246,10 @@ class Sensor:
             return []
         zone = where(preview.segment, self._zones).zone if decision.restricted else None
         _, best, confidence = decision.best(classifier.gestures, answer, zone)
-        least = decision.threshold(best, answer)
+        armed = preview.segment.onset <= self._listening.armed_until
+        least = decision.threshold(best, answer, armed=armed)
         held = decision.too_early(best, preview.segment) or decision.is_own(answer.own, zone, known=confidence >= least)
-        needed = math.inf if held else decision.early(best, answer)
+        needed = math.inf if held else decision.early(best, answer, armed=armed)
         said = foresight.say(preview, certainty, best, confidence, needed)
         return [] if said is None else [said]
 

@@ -11,7 +11,7 @@ from gestured.core.timing import Timing
 from gestured.daemon.asked import open_ladder
 from gestured.daemon.client import BACKLOG_BYTES
 from gestured.daemon.clients import CLIENTS
-from gestured.daemon.settings import INSIDE, TABLES, TITLES, Part, Settings
+from gestured.daemon.settings import INSIDE, TABLES, TITLES, ArmingSettings, Part, Settings
 from gestured.daemon.sockets import RECEIVE_BYTES
 from gestured.daemon.tap import KEPT_S
 from gestured.model import own_file
@@ -128,10 +128,14 @@ def _own(settings: Settings) -> tuple[list[str], list[str]]:
     )
 
 
+def _armed(settings: Settings) -> dict[str, ArmingSettings | None]:
+    """What arms which sensors."""
+    return {"all sensors": settings.arming} | {f"sensor {name}": own.arming for name, own in settings.sensors.items()}
+
+
 def _when(settings: Settings) -> Iterator[str]:
     """What must come before a gesture counts, and what is silent from the start."""
-    every = {"all sensors": settings.arming} | {f"sensor {name}": own.arming for name, own in settings.sensors.items()}
-    for which, arming in every.items():
+    for which, arming in _armed(settings).items():
         if arming is not None:
             yield f"{which}: no gesture counts but {arming.by}, and all for {arming.seconds:g} s after it"
     if settings.gate.start:
@@ -170,6 +174,8 @@ def _strictness(settings: Settings, ladder: Ladder) -> Iterator[str]:
                 f"{rung.name} {name}: {100 * point.missed:.1f} % missed, {point.false_per_hour:.2g} false an hour, "
                 f"in {point.hours:g} hours that were judged"
             )
+        if model.points is not None and any(_armed(settings).values()):
+            yield f"{rung.name}, after a gesture that arms: {model.threshold:.2f} at most, whatever the strictness"
     told = [f"{name} {part.threshold:g}" for name, part in settings.per_gesture.items() if part.threshold is not None]
     if told:
         yield f"before these, thresholds of [gestures]: {', '.join(told)}"

@@ -11,6 +11,7 @@ from typing import Any
 from gestured import __version__
 from gestured.client.say import say
 from gestured.core.errors import GesturedError
+from gestured.core.listening import Arming
 from gestured.core.points import STRICTNESS, USUAL
 from gestured.lab.everyday import FIRST as FIRST_DAY
 from gestured.lab.recordings.flags import add_recordings
@@ -104,6 +105,8 @@ def parser() -> argparse.ArgumentParser:
                           ".npz; where these do not tell what was performed all that is said is false")  # fmt: skip
     everyday.add_argument("--arming", default="", metavar="GESTURE", help="a gesture that arms the sensor: everybody "
                           "makes it before each that is meant, and what is not armed is not said")  # fmt: skip
+    everyday.add_argument("--seconds", type=float, default=Arming("").seconds, metavar="S",
+                          help=f"for so long, since the last gesture (default: {Arming('').seconds:g})")  # fmt: skip
     everyday.add_argument("--strictness", choices=STRICTNESS, default=USUAL, help=f"operating point (default: {USUAL})")
     everyday.add_argument("--svg", type=Path, metavar="FILE", help="draw missed against false, with every threshold")
     everyday.add_argument("--document", type=Path, metavar="PAGE", help="a page whose tables `everyday` are written "

@@ -10,15 +10,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gestured.core.certainty import Certainty
+from gestured.core.classifier import Scores
 from gestured.core.events import Event, Gate, Gesture, Provisional, Unknown
 from gestured.core.facts import Changed, Decided
 from gestured.core.hub import Hub
 from gestured.core.listening import Arming
 from gestured.core.messages import to_json
+from gestured.core.points import OperatingPoints, Point
 from gestured.core.scene import Scene, Setup
 from gestured.record.replay import Replay, opened
 from tests.core.test_foresight import Seer
 from tests.core.test_foresight import recognizer as foreseeing
+from tests.core.test_foresight import says as foretold
 from tests.core.test_hub import FIRST, GESTURES, Arrived, Sure, stream, write
 from tests.core.test_sensor import SWIPE, Fake, answers, recognizer, run, says, swipes
 from tests.daemon.harness import Hand
@@ -140,6 +144,35 @@ def test_the_seconds_run_out_for_what_begins_after_them(pause: float, answer: st
     assert reasons(found)[1:] == [answer]
     told = [event.armed for event in found if isinstance(event, Gate)]
     assert told == ([True, True] if answer == "left" else [True, False])
+
+
+LEAST = st.floats(0.0, 1.0)
+UNSURE, BRIEF = says(0.2, 0.5, 0.3), swipes(2)
+NAMES = ("one_tap", "double_tap", "left", "right")
+
+
+def asking(answer: Scores, least: float) -> Scores:
+    """An answer of a model whose usual operating point asks for so much of each gesture."""
+    return replace(answer, points=OperatingPoints({"normal": Point(dict.fromkeys(NAMES, least), None, 0, 0, 1)}, ()))
+
+
+@given(LEAST, LEAST, st.dictionaries(st.sampled_from(["double_tap", "left"]), LEAST))
+def test_what_follows_the_gesture_that_arms_needs_no_more_than_the_models_threshold(
+    least: float, threshold: float, own: dict[str, float]
+) -> None:
+    told = [replace(asking(each, least), threshold=threshold) for each in (TAPS, UNSURE)]
+    found = reasons(run(recognizer(Fake(told), arming=ARMED, thresholds=own), BRIEF))
+    arms = float(TAPS.values.max()) >= own.get("double_tap", least)
+    heard = arms and own.get("left", min(least, threshold)) <= 0.5
+    assert [name for name in found if name in NAMES] == ["double_tap"] * arms + ["left"] * heard
+
+
+def test_what_follows_the_gesture_that_arms_is_foreseen_as_readily() -> None:
+    low, sure = Certainty(1, (0.0,), (0.3,)), asking(foretold("left", 0.97), 0.9)
+    unsure = replace(asking(foretold("left", 0.7), 0.9), threshold=0.6)
+    seer = Seer(lambda _: unsure if seer.asked > 1 else sure, lambda _: unsure if seer.asked else sure, low)
+    said = run(foreseeing(seer, arming=Arming("left", 3.0)), BRIEF)
+    assert [one.confidence for one in said if isinstance(one, Provisional)] == pytest.approx([0.7])
 
 
 def test_time_alone_disarms_a_sensor_that_sends_nothing() -> None:

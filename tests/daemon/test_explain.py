@@ -13,6 +13,7 @@ from gestured.core.own import Example
 from gestured.core.timing import Timing
 from gestured.daemon.explain import explain
 from gestured.model import own_file
+from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from tests.daemon import tiny_model
 from tests.daemon.parts import settings_of
@@ -92,3 +93,8 @@ def test_what_each_strictness_costs_is_said_for_each_rung_and_what_holds_before_
     ]
     assert "strictness eager, arm strict" in explain(*settings_of(*flags))
     assert "strictness strict, arm strict" in explain(*settings_of(*flags, "--strictness", "strict"))
+    config.write_text('[arming]\nby = "double_tap"')
+    (line,) = [
+        line.strip() for line in explain(*settings_of(*flags)).splitlines() if "after a gesture that arms" in line
+    ]
+    assert line == f"mine, after a gesture that arms: {open_model(path).threshold:.2f} at most, whatever the strictness"

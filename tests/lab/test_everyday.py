@@ -14,6 +14,7 @@ from experiments.foreign import session
 from gestured.core.events import Gesture, Onset
 from gestured.core.facts import events_of
 from gestured.core.frames import Frame
+from gestured.core.listening import Arming
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
 from gestured.lab.cli import main
@@ -22,7 +23,7 @@ from gestured.lab.everyday.heard import HELD, NOT_READY, RESTARTING, Heard, hear
 from gestured.lab.everyday.hours import FEW, LEVELS, judged, points_of
 from gestured.lab.everyday.picture import draw
 from gestured.lab.everyday.report import figures, tables
-from gestured.lab.everyday.stretches import WOKEN, Stretch, lived
+from gestured.lab.everyday.stretches import HEARD, WAKING, WOKEN, Stretch, lived
 from gestured.lab.made_of import LINE
 from gestured.model.shipped import LADDER, shipped
 from gestured.record.arrays import write
@@ -115,12 +116,14 @@ def test_what_counts_at_the_thresholds_is_what_a_daemon_publishes() -> None:
 def test_an_armed_sensor_says_nothing_but_after_the_gesture_that_arms_it() -> None:
     life = lived(FIRST, SHORT_S, "double_tap")
     assert [act.label for act in life.meant[::2]] == ["double_tap"] * (len(life.meant) // 2) and life.meant
-    said = hear(life, command.rungs("cnn_lstm")[:1], "normal", "double_tap").said["cnn_lstm"]
+    heard = hear(life, command.rungs("cnn_lstm")[:1], "normal", Arming("double_tap"))
     armed = 0
-    for one in said:
+    for one in heard.said["cnn_lstm"]:
         armed = armed or one.gesture == "double_tap"
         assert armed
-    assert sum(one.performed is not None and one.performed.kind == WOKEN for one in said) > 0
+    lay = figures([heard], command.rungs("cnn_lstm")[:1], "normal", published=True)["lay"]
+    assert 0 < lay[WOKEN]["right"] <= lay[HEARD]["right"] <= 1
+    assert lay[HEARD]["meant"] == round(lay[WAKING]["right"] * lay[WAKING]["meant"])
 
 
 def test_a_higher_threshold_says_less_and_misses_more() -> None:
@@ -195,6 +198,7 @@ def test_operating_points_of_a_model_are_marked_and_those_it_has_not_are_refused
     ("flags", "words"),
     [
         (["--hours", "0"], "--hours: expected 1 or more, found 0"),
+        (["--seconds", "0"], "--seconds: expected more than 0, at most 3600, found 0"),
         (["--jobs", "0"], "--jobs: expected 1 or more, found 0"),
         (["--recordings", "a.npz", "--document", "p.md"], "--document: expected no --recordings"),
         (["--document", "nowhere.md"], "--document: expected a page with the marks of `everyday`"),

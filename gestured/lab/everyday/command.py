@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from gestured.core.errors import GesturedError
+from gestured.core.listening import LONGEST_S, Arming
 from gestured.core.points import USUAL, Strictness
 from gestured.lab.dataset import in_processes
 from gestured.lab.everyday import report
@@ -44,8 +45,13 @@ def at(source: str, strictness: Strictness) -> tuple[Model, ...]:
 def run(args: argparse.Namespace) -> int:
     """Play, judge, print."""
     of = "" if args.strictness == USUAL else f", {args.strictness}"
-    block = f"armed by {args.arming}{of}" if args.arming else f"everyday{of}"
-    _check(args, block)
+    _check(args)
+    arming = Arming(args.arming, args.seconds) if args.arming else None
+    lasts = "" if arming is None or arming == Arming(arming.by) else f" for {arming.seconds:g} s"
+    armed = "" if arming is None else f"armed by {arming.by}{lasts}"
+    block = f"{armed or 'everyday'}{of}"
+    if args.document and not kept(args.document, block):
+        raise GesturedError(f"--document: expected a page with the marks of `{block}`, found none in {args.document}")
     models = at(args.model, args.strictness)
     if args.arming and args.arming not in models[0].gestures:
         raise GesturedError(f"--arming: expected one of {', '.join(models[0].gestures)}, found {args.arming!r}")
@@ -53,13 +59,13 @@ def run(args: argparse.Namespace) -> int:
         work = partial(_recorded, args.recordings, args.model, args.strictness)
         parts = in_processes(work, range(len(args.recordings)), args.jobs, "recordings")
     else:
-        work = partial(_lived, args.model, args.strictness, args.arming)
+        work = partial(_lived, args.model, args.strictness, arming)
         parts = in_processes(work, range(args.seed, args.seed + args.hours), args.jobs, "hours")
     heard = [one for part in parts for one in part]
     if not any(one.seconds for one in heard):
         raise GesturedError(f"{args.recordings[0]}: expected more than one frame")
     models = models[:1] if args.arming else models
-    found = report.figures(heard, models, args.strictness)
+    found = report.figures(heard, models, args.strictness, published=bool(armed))
     if args.svg:
         from gestured.lab.everyday.picture import draw
 
@@ -67,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
             file.write(draw(found).encode())
     shown = report.tables(found, "recorded" if args.recordings else "simulated")
     if args.arming:
-        shown = [replace(shown[0], title=f"{shown[0].title}, armed by {args.arming}"), shown[2]]
+        shown = [replace(shown[0], title=f"{shown[0].title}, {armed}"), shown[2]]
     if args.document:
         sources = [shipped().get(model.name, Path(args.model)) for model in models]
         made = made_of(args.words, [*sources, *([args.svg] if args.svg else [])])
@@ -76,14 +82,14 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _check(args: argparse.Namespace, block: str) -> None:
+def _check(args: argparse.Namespace) -> None:
     """GesturedError for options that do not go together, before anything is played."""
     if args.hours < 1:
         raise GesturedError(f"--hours: expected 1 or more, found {args.hours}")
     if args.document and args.recordings:
         raise GesturedError("--document: expected no --recordings, the page's tables are of simulated hours")
-    if args.document and not kept(args.document, block):
-        raise GesturedError(f"--document: expected a page with the marks of `{block}`, found none in {args.document}")
+    if not 0 < args.seconds <= LONGEST_S:
+        raise GesturedError(f"--seconds: expected more than 0, at most {LONGEST_S:g}, found {args.seconds:g}")
     if args.arming and (args.recordings or args.svg):
         raise GesturedError("--arming: expected no --recordings and no --svg, its hours are simulated, without a curve")
     if args.svg and find_spec("matplotlib") is None:
@@ -95,9 +101,10 @@ def tell(found: report.Figures, shown: Sequence[Table], as_json: bool) -> None:
     print(json.dumps(found) if as_json else "\n".join(map(str, shown)))
 
 
-def _lived(model: str, strictness: Strictness, wake: str, seed: int) -> list[Heard]:
+def _lived(model: str, strictness: Strictness, arming: Arming | None, seed: int) -> list[Heard]:
     models = at(model, strictness)
-    return [hear(lived(seed, wake=wake), models[:1] if wake else models, strictness, wake)]
+    life = lived(seed, wake=arming.by if arming else "")
+    return [hear(life, models[:1] if arming else models, strictness, arming)]
 
 
 def _recorded(paths: Sequence[Path], model: str, strictness: Strictness, n: int) -> list[Heard]:

@@ -41,14 +41,18 @@ class Heard:
 
 
 def hear(
-    life: Stretch, models: Sequence[Model], strictness: Strictness, wake: str = "", *, published: bool = False
+    life: Stretch,
+    models: Sequence[Model],
+    strictness: Strictness,
+    arming: Arming | None = None,
+    *,
+    published: bool = False,
 ) -> Heard:
     """Play a stretch to the first model, at its operating point, and show what was cut to the others, too.
 
-    With `wake` that gesture arms the sensor. Then, and with `published`, only what is published there is said.
+    With `arming` a gesture arms the sensor. Then, and with `published`, only what is published there is said.
     """
-    first = models[0]
-    arming = Arming(wake) if wake else None
+    first, published = models[0], published or arming is not None
     scene = Scene(
         first.gestures, (9, 9), {"lab": life.setup}, strictness=strictness, tap_gap_s=life.tap_gap_s, arming=arming
     )
@@ -67,8 +71,8 @@ def hear(
             heard.deaf_s[why] = heard.deaf_s.get(why, 0.0) + min(frame.t - last, LONGEST_STEP_S)
         last = frame.t
         onsets += sum(isinstance(one, Onset) for one in told)
-        _take(heard, told, life, models, published=published or bool(wake))
-    _take(heard, sensor.flush(last + 5.0), life, models, published=published or bool(wake))
+        _take(heard, told, life, models, published=published)
+    _take(heard, sensor.flush(last + 5.0), life, models, published=published)
     heard.seconds = last - (last if began is None else began)
     heard.contacts = max(onsets - len(meant), 0) if life.contacts is None else life.contacts
     return heard

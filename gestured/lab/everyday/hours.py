@@ -3,12 +3,14 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from gestured.core.points import USUAL
 from gestured.lab.everyday.heard import Heard
+from gestured.lab.everyday.stretches import HEARD, WOKEN
 from gestured.lab.intervals import rate
 from gestured.model.model import Model
 from gestured.record.judge import NONE, verdicts
@@ -56,6 +58,9 @@ class Hours:
             self.said[how] += 1
             self.meant[act.label, how] += 1
             self.lay[act.kind, how] += 1
+        for wakes, act in pairwise(one.meant):
+            if act.kind == WOKEN and became[id(wakes)] == "right":
+                self.lay[HEARD, became[id(act)]] += 1
         hours, before = self.each.get(one.person, (0.0, 0))
         self.each[one.person] = hours + one.hours, before + false
 

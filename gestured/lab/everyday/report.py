@@ -5,7 +5,7 @@ from typing import Any
 
 from gestured.core.points import USUAL, Strictness
 from gestured.lab.everyday.heard import Heard
-from gestured.lab.everyday.hours import FEW, cost, curve, judged, points_of, shares
+from gestured.lab.everyday.hours import FEW, Least, cost, curve, judged, points_of, shares
 from gestured.lab.table import Table, Value
 from gestured.model.model import Model
 
@@ -14,10 +14,12 @@ SHOWN = (0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99)  # thresholds of the curve that t
 Figures = dict[str, Any]
 
 
-def figures(heard: Sequence[Heard], models: Sequence[Model], strictness: Strictness) -> Figures:
+def figures(
+    heard: Sequence[Heard], models: Sequence[Model], strictness: Strictness, *, published: bool = False
+) -> Figures:
     """What the first model says at an operating point that it has, and the curves of all of them."""
     first = models[0]
-    least = points_of(first)[strictness]
+    least: Least = 0.0 if published else points_of(first)[strictness]
     places = list(dict.fromkeys(one.place for one in heard))
     every = judged(heard, first.name, least)
     meant = {name: shares({how: n for (of, how), n in every.meant.items() if of == name}) for name in first.gestures}

@@ -17,6 +17,7 @@ from gestured.simulator.everyday import PLACES, day
 
 HOUR_S = 3600.0
 WAKING, WOKEN = "the gesture that arms", "within two seconds after it"
+HEARD = f"{WOKEN}, where that one was heard"
 
 
 @dataclass
