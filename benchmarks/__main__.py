@@ -25,6 +25,7 @@ def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
         "sensors": lambda: [traffic.sensors(model, 1000), traffic.sensors(model, 500)],
         "small": lambda: small.small(model),
         "recognise": lambda: inside.recognise(model),
+        "follow": inside.follow,
         "replay": lambda: replay.replay(model),
         "start": lambda: start.start_and_memory(model),
         "imports": start.imports,

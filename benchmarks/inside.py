@@ -18,6 +18,7 @@ from gestured.core.address import Grid
 from gestured.core.events import Gesture
 from gestured.core.frames import Frame
 from gestured.core.front_end import Cut, FrontEnd
+from gestured.core.hub import Hub
 from gestured.core.osc import Layouts
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
@@ -25,9 +26,11 @@ from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.clients import EventServer
 from gestured.daemon.metrics import Metrics
 from gestured.model.opening import open_model
+from gestured.record.replay import Mute
 
 CLIENTS = 1000
 STALLED = 50
+HELD = 60  # frames of a finger that is followed
 TOGETHER = 64  # packets of one read
 
 
@@ -101,6 +104,41 @@ def recognise(model: str) -> Row:
         str(found),
         "<= 3",
         found.median <= 3,
+    )
+
+
+def follow() -> Row:
+    """A frame of a finger that is followed, against one of a finger that nobody follows, both in the hub."""
+    rows, columns = np.mgrid[:9, :9]
+    noise, form = np.random.default_rng(0).normal(0, 2, (2 * HELD, 9, 9)), Form("bench", plain=True)
+    frames = [1000 + each for each in noise]
+    for k in range(HELD):  # after as many of the idle sensor
+        row, column = 4 + 2 * np.sin(k / 9), 1 + 6 * k / HELD
+        frames[HELD + k] += 300 * np.exp(-((rows - row) ** 2 + (columns - column) ** 2) / 1.6)
+    packets = [form.packet(Frame(0.0, frame), 0, 0.0) for frame in frames]
+
+    def played(sensors: tuple[str, ...] | None) -> float:
+        hub = Hub(Scene(("one_tap",), (9, 9), touch=True), Mute(("one_tap",)))
+        hub.foresee(())
+        hub.follow(sensors)
+        stream = enumerate(packets)
+
+        def step() -> None:
+            k, packet = next(stream)
+            hub.receive([(packet, ("127.0.0.1", 40000))], k / 15)
+
+        cpu_us(step, HELD + 1)
+        return cpu_us(step, HELD - 1)
+
+    ours, theirs = interleaved(lambda: played(None), lambda: played(()), 99)
+    found = ratio(ours, theirs)
+    return Row(
+        "a frame of a finger that is followed, in the hub",
+        f"{np.median(ours):.1f} us",
+        f"{np.median(theirs):.1f} us (not followed)",
+        str(found),
+        "<= 1.2",
+        found.median <= 1.2,
     )
 
 
