@@ -80,6 +80,8 @@ def _learned(model: Path, participant: str) -> str:
         origins = said(model)
     except (ValueError, OSError) as error:
         return f"cannot be read: {error}"
+    except ModuleNotFoundError as error:
+        return f"cannot be asked: {error.name} is missing: pip install 'gestured[lab]', or make lab"
     if origins is None:
         return "does not say whose recordings it learned from"
     files = [origin.file for origin in origins if participant in origin.subjects]

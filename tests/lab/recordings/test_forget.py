@@ -130,6 +130,17 @@ def test_what_cannot_be_looked_into_or_kept_whole_is_told(tmp_path: Path, capsys
     assert not (path / "07.npz").exists()  # what can be removed is
 
 
+def test_without_onnx_models_cannot_be_asked_and_recordings_go(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path / "07.npz", of("07"))
+    (tmp_path / "m.onnx").touch()
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    status, out, _ = run(capsys, "07", tmp_path, "--models", tmp_path, "--yes")
+    assert (status, (tmp_path / "07.npz").exists()) == (0, False)
+    assert "m.onnx: cannot be asked: onnx is missing: pip install 'gestured[lab]'" in out
+
+
 def test_models_say_whose_recordings_they_learned_from(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     onnx = pytest.importorskip("onnx")
     path = folder(tmp_path)
