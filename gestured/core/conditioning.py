@@ -4,6 +4,7 @@ Three things are known, each by itself: what the idle sensor shows and how much 
 is (`Activity`), and which taxels are bad (`Taxels`).
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ BELOW_SHARE = 0.3  # of the highest taxel: taxels less deep than that share may 
 DRIFTED = 0.1  # of the activity of what rested: so far the bare sensor may have drifted meanwhile
 WIDE_PEAK = 0.5  # of the highest taxel: the taxels above it tell how wide a contact is
 WIDE, WIDE_TAXELS = 0.1, 6  # share of all taxels, and taxels at least, from which on that is no finger, nor two of them
+WIDE_S = 0.5  # an elbow's few taxels are wide in one frame and not in the next: so long it counts as wide
 SHIFTED, SHIFTED_OF = 3, 20  # taxels: where so many of so many lie far below the baseline, no touch does that
 
 
@@ -48,6 +50,7 @@ class Conditioner:
         self.activity = Activity(rows, columns)
         self.taxels = Taxels(rows, columns)
         self._weight: Array = np.ones(rows * columns)  # 1 / noise, 0 for bad taxels
+        self._wide_at = -math.inf  # s, when what presses was last wider than fingers
         self._deep = hardly_ever(rows * columns)  # noise units below the baseline that are no noise
 
     def look(self, t: float, raw: Array, after: AfterEffect) -> Look:
@@ -102,9 +105,11 @@ class Conditioner:
         return self.activity.place(np.where(self._weight > 0, look.above, 0.0), self.idle.level)
 
     def wide(self, look: Look) -> bool:
-        """Whether what presses is wider than fingers: an arm, a hand, a body, a thing."""
+        """Whether what presses is, or was a moment ago, wider than fingers: an arm, a hand, a body, a thing."""
         pressed = look.above * (self._weight > 0)
-        return int(np.count_nonzero(pressed >= WIDE_PEAK * pressed.max())) >= max(WIDE_TAXELS, WIDE * pressed.size)
+        if int(np.count_nonzero(pressed >= WIDE_PEAK * pressed.max())) >= max(WIDE_TAXELS, WIDE * pressed.size):
+            self._wide_at = look.t
+        return 0 <= look.t - self._wide_at < WIDE_S
 
     def settle(self, t: float, raw: Array, *, rests: bool = False, wide: bool = False) -> bool:
         """Offer a frame that may be idle; true when the sensor was learned from the second that ends here.

@@ -12,6 +12,7 @@ ON_SHARE = 0.20  # of a contact's peak: a frame of it is strong from there on, a
 RECOVERY_S = 1.0  # time constant with which the after-effect fades, and for how long a contact is followed by it
 AFTER_S = 8.0  # after so long nothing is left of a contact: a firm finger has faded below the noise
 SPIKE = 4.0  # times the second highest frame: the most that a peak in one frame alone counts
+SPAN_S = 0.15  # spans in which it is remembered how strongly a contact was pressed lately
 FIRM = 8.0  # times `on`: the least that the second highest frame counts, since a tap may have a single frame
 
 
@@ -33,6 +34,24 @@ class Stretch:
         top, left, bottom, right = min(top, row), min(left, column), max(bottom, row), max(right, column)
         self._box = (top, left, bottom, right)
         self.widest = max(self.widest, math.hypot(bottom - top, right - left))
+
+
+class Lately:
+    """How strongly a contact was pressed a moment ago."""
+
+    __slots__ = ("_since", "_tops")
+
+    def __init__(self, t: float) -> None:
+        self._since = t  # s, when the latest of the spans began
+        self._tops = (0.0, 0.0, 0.0)  # noise units, the highest activity of three spans, the latest last
+
+    def before(self, t: float, activity: float) -> float:
+        """Take a frame at `t` s; the highest activity before its span, 0 where less than two spans had been seen."""
+        older, old, latest = self._tops
+        if t - self._since >= SPAN_S:
+            older, old, latest, self._since = old, latest, 0.0, t
+        self._tops = (older, old, max(latest, activity))
+        return max(older, old) if older else 0.0
 
 
 class AfterEffect:
@@ -104,6 +123,8 @@ class Memory:
     contact: Stretch = field(init=False)  # the contact that goes on, or the last one
     first: Stretch | None = field(init=False)  # the segment's first contact, if `contact` is its second
     quiet_since: float | None = field(init=False)  # s, the first quiet frame since the last touched one
+    lately: Lately = field(init=False)  # how strongly the contact was pressed a moment ago
+    under: float = field(init=False)  # noise units, what lay there faintly before the contact rose out of it
 
     def __post_init__(self) -> None:
         self.after = AfterEffect(self.on)
@@ -112,8 +133,12 @@ class Memory:
     def clear(self) -> None:
         """Remember nothing of earlier contacts."""
         self.after.clear()
-        self.contact = Stretch(0.0)
         self.first = self.quiet_since = None
+        self.rise(0.0)
+
+    def rise(self, t: float, under: float = 0.0) -> None:
+        """A contact begins at `t` s, out of what lies there faintly, as active as `under` noise units."""
+        self.contact, self.lately, self.under = Stretch(t), Lately(t), under
 
     @property
     def onset(self) -> float:

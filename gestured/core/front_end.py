@@ -161,7 +161,8 @@ class FrontEnd:
             return found
         cutter.trim(t)
         if segmenter.phase.touched:
-            conditioner.settle(t, raw, rests=True, wide=conditioner.wide(look))  # what stays becomes the baseline's
+            if conditioner.settle(t, raw, rests=True, wide=conditioner.wide(look)):  # what stays becomes the baseline's
+                found += self._void("held")
         else:
             conditioner.untouched(look, recovering=segmenter.after.recovering(t))
         return found
@@ -175,7 +176,7 @@ class FrontEnd:
         flickering = self.conditioner.taxels.flickering.rubbish or look.t - segmenter.onset < RUBBISH_S
         if self.conditioner.wide(look) and not flickering:
             if self.conditioner.settle(look.t, look.raw, rests=True, wide=True):
-                return self.give_up(look.t)  # an arm that lies still is no gesture, and something else may be
+                return self._void("held")  # an arm that lies still is no gesture, and something else may be
         else:
             self.conditioner.idle.unsettle()
         if not segmenter.phase.let_go or look.t - segmenter.last_touched < DRAFT_S or self.fleeting:
@@ -273,11 +274,16 @@ class FrontEnd:
 
     def _restart(self, *, keep: bool, shown: NDArray[np.float64] | None = None) -> list[Found]:
         """Start clean. `keep`: the frames that may show the idle sensor as it is now count already; so does `shown`."""
-        found = self._cancel("restart") if self.touched else []
-        self.segmenter.reset()
+        found = self._void("restart")
         self.conditioner.idle.forget(keep=keep, shown=shown)
-        self._cutter.clear()
         self._below_since = None
+        return found
+
+    def _void(self, reason: str) -> list[Found]:
+        """The idle sensor is another one from here on: a contact that goes on is over, and nothing is left of it."""
+        found = self._cancel(reason) if self.touched else []
+        self.segmenter.reset()
+        self._cutter.clear()
         return found
 
     def _done(self, deeds: list[Deed], seen: float) -> list[Found]:
@@ -286,6 +292,9 @@ class FrontEnd:
         for action, onset, offset, decided in deeds:
             if action is Action.OPEN:
                 found.append(self._open(onset))
+            elif action is Action.RISE:
+                self._past.end(onset)
+                self._begin(onset)
             elif action is Action.HELD:
                 found.append(Void("held"))
             elif action is Action.LEFT:
@@ -298,9 +307,12 @@ class FrontEnd:
         return found
 
     def _open(self, onset: float) -> Opened:
+        self._begin(onset)
+        return Opened(onset)
+
+    def _begin(self, onset: float) -> None:
         self._cutter.begin(self._past.begin(onset, *self.conditioner.resting()))
         self.conditioner.taxels.flickering.begin(onset)
-        return Opened(onset)
 
     def _close(self, onset: float, offset: float, t: float, seen: float) -> list[Found]:
         """A segment is over, as decided at `t` s: it is cut, unless it was no finger's."""

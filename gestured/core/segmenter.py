@@ -8,7 +8,8 @@ Activity is the strongest spot of a frame in units of noise. The cases, and what
     swipe        ########..         one segment, decided `release_s` after the finger left
     flicker      ###.####..         one contact: a single quiet frame is shorter than `release_s`
     hold         ############...    after `limit_s` cancelled ("held"); nothing more until it is let go
-    object       ###############    cancelled as a hold; the baseline learns it, then the sensor is idle again
+    object       ###############    cancelled as a hold, sooner if it is wide; the baseline learns it: idle again
+    on an edge   ....:::##::::      what lies there faintly, and a finger that rises out of it: a segment of the finger
     silence      ####     ...       cancelled ("silence") after `stale_s` without a frame
     glitch       |                  shorter than any finger at a fast sensor: cancelled ("glitch")
 
@@ -28,6 +29,9 @@ from gestured.core.activity import hardly_ever, rarely
 from gestured.core.contact import ON_SHARE, Memory, Place, Stretch
 from gestured.core.timing import Timing
 
+FAINT = 4.0  # times `on`: what lies there fainter than that for a while is not the beginning of a gesture
+RISE = 2.5  # times what lies there faintly: a contact that rises so high out of it is another one
+SWAY = 1.25  # times what lies there faintly: so far it may rise while the finger is off
 OFF_SHARE = 0.12  # of the contact's peak: below it the finger is off (textile recovers slowly)
 
 
@@ -37,6 +41,7 @@ class Signal(IntEnum):
     QUIET = auto()
     WEAK = auto()
     STRONG = auto()
+    ROSE = auto()  # far above what had lain there faintly, so that is no part of it
     MOVED = auto()  # the second contact is no tap, so it does not belong to the first
     RELEASED = auto()  # quiet for `release_s`
     TAPPED = auto()  # quiet for `release_s` after one tap, so that a second tap may follow
@@ -48,6 +53,7 @@ class Action(IntEnum):
     """What the front end has to do."""
 
     OPEN = auto()  # a contact begins
+    RISE = auto()  # the contact begins only here: what came before lay there already
     CLOSE = auto()  # the segment is over
     SPLIT = auto()  # the first contact is a segment, the second one begins another
     HELD = auto()  # give the contact up: no segment is made of it
@@ -63,9 +69,14 @@ def _untouched(memory: Memory, t: float) -> tuple[float, float]:
 
 
 def _touched(memory: Memory, t: float) -> tuple[float, float]:
-    """A finger is off below a share of its own peak, and back above a larger one: hysteresis."""
-    peak = memory.after.peak
-    return max(memory.on, ON_SHARE * peak), max(memory.off, OFF_SHARE * peak)
+    """A finger is off below a share of its own peak, and back above a larger one: hysteresis.
+
+    Where it rose out of something that lies there faintly, the shares are of what it rose by.
+    """
+    under = memory.under
+    risen = memory.after.peak - under
+    strong = max(memory.on, under + ON_SHARE * risen)
+    return strong, min(strong, max(memory.off, SWAY * under + OFF_SHARE * risen))
 
 
 def _given_up(memory: Memory, t: float) -> tuple[float, float]:
@@ -88,7 +99,8 @@ def _released(memory: Memory) -> Signal:
 def _begin(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
     """The first contact of a segment begins."""
     memory.after.begin()
-    memory.first, memory.contact = None, Stretch(t)
+    memory.first = None
+    memory.rise(t)
     return _press(memory, t, activity, place)
 
 
@@ -100,24 +112,30 @@ def _again(memory: Memory, t: float, activity: float, place: Place | None) -> Si
 
 def _press(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
     """A frame that is pressed strongly: it also tells where."""
-    _touch(memory, t, activity)
+    rose = _touch(memory, t, activity)
     if place is not None:
         memory.contact.follow(place)
-    return _moved(memory)
+    return rose or _moved(memory)
 
 
 def _graze(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
     """A frame that is pressed weakly."""
-    _touch(memory, t, activity)
-    return _moved(memory)
+    return _touch(memory, t, activity) or _moved(memory)
 
 
-def _touch(memory: Memory, t: float, activity: float) -> None:
-    if memory.first is None and memory.after.peak < OFF_SHARE * activity:
-        memory.contact = Stretch(t)  # what came before was too faint to belong to it: a hover, or noise
+def _touch(memory: Memory, t: float, activity: float) -> Signal | None:
+    rose, lay = None, memory.lately.before(t, activity)
+    if memory.first is None:
+        if memory.after.peak < OFF_SHARE * activity:
+            memory.rise(t)  # what came before was too faint to belong to it: a hover, or noise
+        elif 0 < lay <= FAINT * memory.on and activity >= RISE * lay:
+            rose = Signal.ROSE
+            memory.after.begin()
+            memory.rise(t, lay)  # what came before lies there faintly: the edge of an arm that has shifted
     memory.after.touch(activity)
     memory.contact.touched = t
     memory.quiet_since = None
+    return rose
 
 
 def _moved(memory: Memory) -> Signal | None:
@@ -185,6 +203,7 @@ TRANSITIONS: dict[tuple[Phase, Signal], Row] = {
     (CONTACT, S.QUIET): Row(RELEASING, None, _quiet),
     (CONTACT, S.WEAK): Row(CONTACT, None, _graze),
     (CONTACT, S.STRONG): Row(CONTACT, None, _press),
+    (CONTACT, S.ROSE): Row(CONTACT, A.RISE),
     (CONTACT, S.MOVED): Row(CONTACT, A.SPLIT, _part),
     (CONTACT, S.LIMIT): Row(SPENT, A.HELD),
     (RELEASING, S.QUIET): Row(RELEASING),

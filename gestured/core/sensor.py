@@ -155,7 +155,7 @@ class Sensor:
                 self._fingers.begin(self.segments)
                 told.append(Onset(self.name, self.segments, one.onset))
             elif isinstance(one, Ended):
-                told[:0] = self._fingers.end()  # whoever follows a finger hears first that it has left
+                told[:0] = self._fingers.end(self.front_end.baseline)  # a follower hears first that it has left
                 told.append(Release(self.name, self.segments, one.offset))
             else:
                 told += self._decide(one) if isinstance(one, Cut) else [self._cancelled(one.reason)]

@@ -517,6 +517,33 @@ def test_half_of_the_full_scale_in_ten_minutes_is_followed(shape: Shape, sign: f
     assert front_end.bad_taxels == 0
 
 
+@pytest.mark.parametrize("faint", [0.025, 0.03, 0.04])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_swipe_beside_what_lies_there_faintly_is_a_segment_of_its_own(faint: float, seed: int) -> None:
+    """An arm has shifted: its edge presses too faintly for a gesture, and too strongly for an idle sensor."""
+    edge = faint * finger(1, 1, SHAPE)
+    lies: Action = (0.8, lambda share: edge)
+    swiped: Action = (0.4, lambda share: finger(7 - 6 * share, 6, SHAPE) / 4 + edge)
+    _, events = heard(*stream(SHAPE, [quiet(2), lies, swiped, lies, quiet(1)], seed=seed))
+    (found,) = segments(events)
+    assert 2.75 < found.onset < 2.95 and 3.1 < found.offset < 3.3
+    follow_rules(events)
+
+
+@pytest.mark.parametrize("seconds", [2.0, 3.0, 4.0])
+def test_what_is_hardly_wider_than_fingers_is_learned_like_an_arm(seconds: float) -> None:
+    """An elbow: seven taxels that it presses and four at half of that, which noise lifts above and below the half."""
+    elbow = np.zeros(SHAPE)
+    elbow[3:6, 0:2] = elbow[4, 2] = GAIN / 4
+    elbow[[3, 5, 2, 6], [2, 2, 0, 0]] = 0.51 * GAIN / 4
+    lies: Action = (seconds, lambda share: elbow)
+    swiped: Action = (0.4, lambda share: finger(7 - 6 * share, 7, SHAPE) + elbow)
+    _, events = heard(*stream(SHAPE, [quiet(2), lies, swiped, (1.0, lies[1])]))
+    assert kinds(events) == [Opened, Void, Ended, *ONE]
+    (found,) = segments(events)
+    assert abs(found.onset - 2.0 - seconds) < 0.15 and abs(found.offset - 2.4 - seconds) < 0.15
+
+
 @settings(max_examples=40, deadline=None)
 @given(st.floats(2.0, 4.0), st.sampled_from([0.0, 50.0, 250.0, 350.0, 600.0, 2000.0]), seeds)
 def test_a_restart_with_another_baseline_at_any_moment(moment: float, level: float, seed: int) -> None:

@@ -350,6 +350,7 @@ def test_a_sensor_that_cannot_hear_says_what_it_waits_for() -> None:
     assert send(moving) == [
         fine,
         ("degraded", "it was pressed for 5 s, and waits to be let go, or for a second in which nothing moves"),
+        fine,  # what goes on for so long is learned
     ]
     assert send(hand.idle(1.0))[-1] == fine
 

@@ -19,14 +19,11 @@ BESIDE = 3.0  # pitches: what comes up so near to a finger that has left its pla
 
 
 class Lying:
-    """One sensor since `t` s, when its contact was given up or learned by the front end.
+    """One sensor of so many rows and columns since `t` s, when its contact was given up."""
 
-    `below`: (R, C) counts that the front end has made part of the baseline meanwhile.
-    """
-
-    def __init__(self, t: float, below: Array) -> None:
-        self._grid, self._below = np.indices(below.shape), below
-        self._image: Array = np.zeros(below.shape)  # counts of what lies still
+    def __init__(self, t: float, shape: tuple[int, int]) -> None:
+        self._grid = np.indices(shape)
+        self._image: Array = np.zeros(shape)  # counts of what lies still
         self._parts: deque[tuple[Array, Array]] = deque(maxlen=PARTS + 1)  # lowest and highest counts, latest last
         self._begun = t  # s, when the last part began
         self._fingers: list[tuple[tuple[int, int], float]] = []  # those that lie there: strongest taxel, and its counts
@@ -41,7 +38,7 @@ class Lying:
         self._image = np.minimum(self._image, frame)  # it may leave, or give way
         moving = frame - self._image
         row, column = divmod(int(moving.argmax()), frame.shape[1])
-        around = (self._image + self._below)[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3].max()
+        around = self._image[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3].max()
         if moving[row, column] < max(least, CHANGE * around):
             return None
         for at, level in [one for one in self._fingers if frame[one[0]] < LEFT * one[1]]:

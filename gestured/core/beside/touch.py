@@ -52,11 +52,12 @@ class Fingers:
         self._lying: Lying | None = None  # since the contact was given up
         self._baseline: Array | None = None  # (N,) counts, as it was before anything of the contact was learned
 
-    def end(self, learned: Array | None = None) -> list[Touch]:
-        """The contact is over, or (R, C) counts of it were `learned`: each finger that was told of is up."""
+    def end(self, baseline: Array | None = None) -> list[Touch]:
+        """The contact is over: each finger that was told of is up, or was learned, as the (N,) `baseline` now shows."""
         fingers, self._fingers = [one for one in self._fingers if one.number >= 0], []
-        if learned is None:
+        if baseline is None or self._baseline is None or baseline is self._baseline:
             return [self._tell(one, "up") for one in fingers]
+        learned = (baseline - self._baseline).reshape(self._shape)
         lie = [learned[round(one.spot.row), round(one.spot.column)] > one.spot.peak / 2 for one in fingers]
         return [self._tell(one, "up", "learned" if lies else None) for one, lies in zip(fingers, lie, strict=True)]
 
@@ -66,15 +67,12 @@ class Fingers:
         if look is None or look.shifted:
             return []
         self._shape = front_end.rows, front_end.columns
-        given_up, baseline = not segmenter.phase.pending, front_end.baseline
+        given_up = not segmenter.phase.pending
         if self._baseline is None:
-            self._baseline = baseline
+            self._baseline = front_end.baseline
         quiet = segmenter.phase.let_go or (given_up and look.activity < segmenter.levels(look.t)[1])
-        if given_up and (self._lying is None or baseline is not self._baseline):
-            below, learned = (baseline - self._baseline).reshape(self._shape), baseline is not self._baseline
-            self._lying, self._baseline = Lying(look.t, below), baseline
-            if learned:  # by the front end: all that is there, which need not be what was there before
-                return self.end(below)
+        if given_up and self._lying is None:
+            self._lying = Lying(look.t, self._shape)
         if look.t - self._looked < EACH_S:
             return []
         self._looked = look.t
