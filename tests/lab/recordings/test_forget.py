@@ -133,7 +133,7 @@ def test_what_cannot_be_looked_into_or_kept_whole_is_told(tmp_path: Path, capsys
 def test_without_onnx_models_cannot_be_asked_and_recordings_go(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write(tmp_path / "07.npz", of("07"))
+    write(tmp_path / "07.npz", of("07", "07"))
     (tmp_path / "m.onnx").touch()
     monkeypatch.setitem(sys.modules, "onnx", None)
     status, out, _ = run(capsys, "07", tmp_path, "--models", tmp_path, "--yes")
