@@ -27,6 +27,7 @@ class Gate:
         self._path, self._counts = path, counts
         self._said = ""  # why the last command failed
         self._due = 0.0  # monotonic s, when what is closed is repeated
+        self._obeyed = False  # since the daemon's last status: that may have been on its way before it did as we asked
 
     def obey(self, sensor: str, command: str) -> list[str]:
         """Carry out a command; returns the gates of the sensor that are closed now. Raises GesturedError."""
@@ -37,6 +38,7 @@ class Gate:
                     answer = control.ask("inhibit", **which, seconds=ALIVE_S)
                 else:
                     answer = control.ask("allow", **which)
+                self._obeyed = True
                 closed: list[str] = answer["sensors"][sensor]
                 return closed
         except GesturedError as error:
@@ -47,8 +49,12 @@ class Gate:
             raise
 
     def repeat(self, closed: Iterable[str]) -> None:
-        """Repeat, now and then, that the gate is closed for these sensors; the daemon has just said that it is."""
-        if time.monotonic() < self._due:
+        """Repeat, now and then, that the gate is closed for these sensors, as a status of the daemon has just said.
+
+        A status that was on its way while a gate was opened says that it is closed; to repeat that would close it.
+        """
+        obeyed, self._obeyed = self._obeyed, False
+        if obeyed or time.monotonic() < self._due:
             return
         self._due = time.monotonic() + REPEAT_S
         for sensor in closed:

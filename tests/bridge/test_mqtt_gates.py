@@ -138,10 +138,21 @@ def test_a_bridge_repeats_what_the_daemon_says_is_closed_in_its_name(gated: Daem
     with Control(Path(gated.ready["control"])) as operator:
         wait(lambda: operator.ask("status")["overdue"])
         monkeypatch.setattr("gestured.bridge.gates.ALIVE_S", 60.0)
+        gate.repeat(["armrest"])  # as a status says that was on its way
         gate.repeat(["armrest"])
         assert operator.ask("status")["overdue"] == {}
         operator.ask("allow", gate="mqtt")
         gate.repeat(["armrest"])  # too soon
+        assert operator.ask("status")["sensors"]["armrest"]["closed"] == []
+
+
+def test_a_status_that_was_on_its_way_closes_no_gate_that_the_bus_has_opened(gated: Daemon) -> None:
+    known(gated)
+    gate = Gate(Path(gated.ready["gates"]), "mqtt", Counts("mqtt"))
+    gate.obey("armrest", OFF)
+    assert gate.obey("armrest", ON) == []
+    gate.repeat(["armrest"])  # the daemon had written its status before
+    with Control(Path(gated.ready["control"])) as operator:
         assert operator.ask("status")["sensors"]["armrest"]["closed"] == []
 
 
