@@ -21,10 +21,12 @@ FRAMES = (np.uint8, np.uint16, np.int16, np.int32, np.float16, np.float32, np.fl
 def any_recordings(draw: st.DrawFn) -> Recordings:
     lengths = draw(st.lists(st.integers(1, 5), max_size=5))
     n, g = sum(lengths), len(lengths)
-    grid = draw(st.tuples(st.integers(1, 4), st.integers(1, 4)))
+    grid = draw(st.tuples(st.integers(2, 4), st.integers(2, 4)))
     dtype = np.dtype(draw(st.sampled_from(FRAMES)))
-    finite = {"allow_nan": False, "allow_infinity": False} if dtype.kind == "f" else {}
-    frames = draw(hnp.arrays(dtype, (n, *grid), elements=hnp.from_dtype(dtype, **finite)))
+    width = 16 if dtype.itemsize == 2 else 32  # a float64 holds more than a sensor can send
+    floats = st.floats(allow_nan=False, allow_infinity=False, width=width)  # type: ignore[arg-type]
+    elements = floats if dtype.kind == "f" else hnp.from_dtype(dtype)
+    frames = draw(hnp.arrays(dtype, (n, *grid), elements=elements))
     labels = st.from_regex(r"[a-z0-9_]{1,64}", fullmatch=True)
     text = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=5)
     starts = draw(hnp.arrays(np.float64, g, elements=st.floats(-1e6, 1e6)))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gestured.core.address import SIDES
 from gestured.model.metadata import GESTURE_NAME
 from gestured.record.recordings import EVENT, FINGERS, Recordings
 
@@ -15,6 +16,8 @@ UNNAMED = "other"  # the label of what was performed without anybody knowing whi
 MAX_FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; checking their times takes a multiple of their size
 RECORDINGS = 1 << 20  # of a file, and as many events; each of their texts is checked alone
 CHARACTERS = 1024  # of one text
+LATEST_S = 1e11  # of any clock: later than every date, and less than milliseconds since 1970
+LARGEST = float(np.finfo(np.float32).max)  # counts, as a sensor can send them
 DAY = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 # What a field holds, and its shape: N frames of R x C taxels, G recordings, E performed events.
 INTEGERS, COUNTS, ANY, TEXT = "integers", "integers or floats", "numbers or text", "text"
@@ -76,8 +79,9 @@ def check_all_but_frames(r: Recordings) -> None:
 def check_frames(r: Recordings) -> None:
     """What the frames hold; raises Wrong."""
     if r.frames.dtype.kind == "f" and r.frames.size:
-        low, high = r.frames.min(axis=(1, 2)), r.frames.max(axis=(1, 2))  # NaN is both
+        low, high = (ends(r.frames, axis=(1, 2)).astype(np.float64) for ends in (np.min, np.max))  # NaN is both
         _hold([("frames", np.isfinite(low) & np.isfinite(high), "finite values", _owner(r))])
+        _hold([("frames", (low >= -LARGEST) & (high <= LARGEST), "values that a float32 holds", _owner(r))])
 
 
 def structure(r: Recordings) -> None:
@@ -96,8 +100,9 @@ def structure(r: Recordings) -> None:
 
 def shapes(r: Recordings) -> None:
     """Types, shapes and numbers: what can be told before anything is unpacked. Raises Wrong with the field."""
-    if r.frames.ndim != 3 or 0 in r.frames.shape[1:]:
-        raise Wrong(f"frames: expected the shape (N, R, C), found {r.frames.shape}", "frames")
+    if r.frames.ndim != 3 or not all(SIDES[0] <= side <= SIDES[1] for side in r.frames.shape[1:]):
+        sides = f"R and C from {SIDES[0]} to {SIDES[1]}"
+        raise Wrong(f"frames: expected the shape (N, R, C), {sides}, found {r.frames.shape}", "frames")
     if r.offsets.ndim != 1 or not len(r.offsets):
         raise Wrong(f"offsets: expected the shape (G + 1), found {r.offsets.shape}", "offsets")
     n, rows, columns = r.frames.shape
@@ -138,6 +143,7 @@ def _values(r: Recordings) -> Iterator[Right]:
     lengths, owner = np.diff(r.offsets), _owner(r)
     yield "offsets", lengths > 0, "at least one frame", None
     yield "times", np.isfinite(r.times), "finite seconds", owner
+    yield "times", np.abs(r.times) <= LATEST_S, f"seconds, at most {LATEST_S:g}", owner
     later = np.asarray((np.diff(r.times) > 0) | (np.diff(owner) > 0))
     yield "times", later, "strictly increasing seconds", owner[1:]
     yield "labels", _match(GESTURE_NAME, r.labels), "1 to 64 of a-z, 0-9 and _", None

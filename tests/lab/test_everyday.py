@@ -78,6 +78,21 @@ def test_what_a_recording_does_not_tell_is_false_and_what_it_tells_is_judged(
     assert (unknown["meant"], unknown["right"]) == (0, None) and known["meant"] == len(events)
 
 
+def test_a_recording_of_one_frame_is_no_place_and_a_blink_is_no_hour(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, count, rate_hz in (("one", 1, 15.0), ("blink", 300, 1e6), ("good", 60, 15.0)):
+        frames, of = np.zeros((count, 9, 9), np.uint8), {"labels": np.array([NONE]), "subjects": np.array([0])}
+        offsets = np.array([0, count])
+        write(
+            tmp_path / f"{name}.npz", Recordings(frames=frames, times=np.arange(count) / rate_hz, offsets=offsets, **of)
+        )
+    found = said(capsys, "--recordings", tmp_path / "one.npz", tmp_path / "good.npz")
+    assert list(found["places"]) == ["good"] and found["hours"] == round(59 / 15 / 3600, 4)
+    assert main(["everyday", "--jobs", "1", "--recordings", str(tmp_path / "blink.npz")]) == 1
+    assert "blink.npz: expected at least 1 s of frames" in capsys.readouterr().err
+
+
 def test_of_a_tape_all_that_the_daemon_would_publish_is_false(capsys: pytest.CaptureFixture[str]) -> None:
     path = ROOT / "docs" / "demo.mcap"
     tape, maker = opened(path)

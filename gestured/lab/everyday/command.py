@@ -23,6 +23,8 @@ from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped
 from gestured.record.files import PUBLIC, atomic_write
 
+LEAST_S = 1.0  # of all recordings together: what comes in less cannot be told by the hour
+
 
 @cache
 def rungs(source: str) -> tuple[Model, ...]:
@@ -62,8 +64,8 @@ def run(args: argparse.Namespace) -> int:
         work = partial(_lived, args.model, args.strictness, arming)
         parts = in_processes(work, range(args.seed, args.seed + args.hours), args.jobs, "hours")
     heard = [one for part in parts for one in part]
-    if not any(one.seconds for one in heard):
-        raise GesturedError(f"{args.recordings[0]}: expected more than one frame")
+    if sum(one.seconds for one in heard) < LEAST_S:
+        raise GesturedError(f"{args.recordings[0]}: expected at least {LEAST_S:g} s of frames")
     models = models[:1] if args.arming else models
     found = report.figures(heard, models, args.strictness, published=bool(armed))
     if args.svg:

@@ -20,7 +20,7 @@ def figures(
     """What the first model says at an operating point that it has, and the curves of all of them."""
     first = models[0]
     least: Least = 0.0 if published else points_of(first)[strictness]
-    places = list(dict.fromkeys(one.place for one in heard))
+    places = list(dict.fromkeys(one.place for one in heard if one.seconds))
     every = judged(heard, first.name, least)
     meant = {name: shares({how: n for (of, how), n in every.meant.items() if of == name}) for name in first.gestures}
     return {
