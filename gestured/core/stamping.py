@@ -71,8 +71,10 @@ class Stamper:
         `missed`: packets may have been lost on this machine just before. A counter tells how many were this
         sensor's; without one, what fits into the pause counts as lost.
         """
-        if len(arrivals) == 1 and not missed and not self._by_tag:
-            return [self._alone(arrivals[0].counter, arrived)]
+        if len(arrivals) == 1 and not missed:
+            return [self._alone(arrivals[0], arrived)]
+        if self._by_tag and not missed and len({arrival.timetag for arrival in arrivals}) == len(arrivals):
+            return [self._alone(arrival, arrived) for arrival in arrivals]
         before, usual = self._last, self._typical() if missed else math.nan
         stamps: list[Stamp] = []
         run: list[tuple[int, int]] = []  # frames with one time: index, periods since the frame before
@@ -92,21 +94,27 @@ class Stamper:
             stamps[0] = stamps[0]._replace(lost=max(0, round((stamps[0].t - before) / usual) - 1))
         return stamps
 
-    def _alone(self, counter: int | None, arrived: float) -> Stamp:
-        """The stamp of a frame that arrived by itself, by arrival: the same as among others, at half the price."""
+    def _alone(self, arrival: Arrival, arrived: float) -> Stamp:
+        """The stamp of a frame that shares its time with no other: the same as by `_place`, at a third of the price."""
         steps, dropped, restarted = ONE
+        _, _, counter, tag, _ = arrival
         if counter is not None or self._counter is not None:
             steps, dropped, restarted = self._count(counter, arrived - self._arrived)
             if dropped:
                 return Stamp(math.nan, 0, dropped, False, False)
-        t = arrived
-        if self._last is not None:
-            if t > self._last:
-                self._intervals.append((t - self._last) / steps)
-            if t < self._last + self.MIN_STEP_S:
-                t = self._last + self.MIN_STEP_S
-        self._last, self._arrived, self._tag = t, arrived, None
-        return _new(Stamp, (t, max(0, steps - 1), "", restarted, False))
+        t, last, implausible = arrived, self._last, self._by_tag and tag is None
+        if last is not None:
+            if self._by_tag:
+                step = tag - self._tag if tag is not None and self._tag is not None else 0.0
+                if not (0 < step <= self.MAX_STEP_S and last + step <= arrived + self.AHEAD_S):
+                    step, implausible = arrived - self._arrived, tag is None or self._tag is not None
+                t = last + step
+            if t > last:
+                self._intervals.append((t - last) / steps)
+            if t < last + self.MIN_STEP_S:
+                t = last + self.MIN_STEP_S
+        self._last, self._arrived, self._tag = t, arrived, tag
+        return _new(Stamp, (t, steps - 1, "", restarted, implausible))
 
     def _count(self, counter: int | None, pause: float) -> Counted:
         """(periods since the frame before, why it is dropped, whether the sensor restarted)."""
