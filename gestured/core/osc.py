@@ -70,6 +70,15 @@ def timetag(data: bytes, at: int, end: int) -> float | None:
     return float((seconds - _NTP_EPOCH) % 2**32 + fraction * 2**-32)
 
 
+def timetags(rows: NDArray[np.uint8]) -> list[float | None]:
+    """What `timetag` gives of each of (n, 8) bytes."""
+    seconds, fraction = rows.view(">u4").astype(np.int64).T
+    found: list[float | None] = ((seconds - _NTP_EPOCH) % 2**32 + fraction * 2.0**-32).tolist()
+    for n in ((seconds == 0) & (fraction == 1)).nonzero()[0].tolist():
+        found[n] = None
+    return found
+
+
 class Place(NamedTuple):
     """Where one message stands in a packet of a known layout: scalars, then a run of numbers or a blob, or none."""
 

@@ -7,6 +7,7 @@ the sensor), `not_finite`, `too_many_touches`.
 import math
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -98,7 +99,7 @@ class _Meaning(NamedTuple):
     route: _Route
     place: Place  # of the frame's message
     dtype: np.dtype[Any]  # of the frame's values as they are sent
-    form: tuple[object, ...]  # the same for packets whose frames stand in the same place, of the same type and grid
+    form: int  # the same for packets whose frames stand in the same place, of the same type and grid
 
 
 class Decoder:
@@ -115,6 +116,8 @@ class Decoder:
         self._keep_touches = keep_touches
         self._layouts = Layouts()
         self._routes: dict[tuple[str, str], _Route] = {}  # a memo, bounded
+        self._forms: dict[tuple[object, ...], int] = {}  # another one
+        self._numbers = count()
         self._pending: dict[tuple[Hashable, str], tuple[Touch, ...]] = {}  # touches that wait for their frame
 
     def decode(self, packet: bytes, source: Hashable = None) -> tuple[list[Arrival], list[ProtocolError]]:
@@ -150,7 +153,7 @@ class Decoder:
         They are what `decode` gives of each packet, at half the price. A packet that is missing here is for `decode`:
         it is laid out in another way than its neighbours, or its frame is not finite.
         """
-        alike: dict[tuple[object, ...], list[tuple[int, _Meaning]]] = {}
+        alike: dict[int, list[tuple[int, _Meaning]]] = {}
         for i, packet in enumerate(packets):
             layout = self._layouts.find(packet)
             if layout is not None:
@@ -177,7 +180,9 @@ class Decoder:
         if dtype is None or any(other.blob for other in layout.places if other is not place):
             return False
         form = layout.length, place.run, place.length, place.blob, dtype.kind, route.grid, route.counted
-        return _Meaning(route, place, dtype, form)
+        if len(self._forms) >= _MAX_ROUTES:
+            self._forms.clear()
+        return _Meaning(route, place, dtype, self._forms.setdefault(form, next(self._numbers)))
 
     def _learn(self, address: str, types: str) -> _Route:
         if len(self._routes) >= _MAX_ROUTES:
@@ -267,23 +272,28 @@ def _frame(message: Message, route: _Route) -> Arrival:
 
 def _frames(packets: list[bytes], members: list[tuple[int, _Meaning]]) -> dict[int, Arrival]:
     """The finite frames of packets whose `form` is the same, by index."""
-    route, place, dtype, _ = members[0][1]
-    grid = route.grid
-    assert grid is not None
-    rows, columns = grid
-    taxels, end = rows * columns, place.run + (place.length if place.blob else place.length * dtype.itemsize)
-    raw = np.frombuffer(b"".join(packets), np.uint8).reshape(len(packets), -1)[:, place.run : end].view(dtype)
+    _, (route, place, dtype, _) = members[0]
+    assert route.grid is not None
+    taxels, end = math.prod(route.grid), place.run + (place.length if place.blob else place.length * dtype.itemsize)
+    block = np.frombuffer(b"".join(packets), np.uint8).reshape(len(packets), -1)
+    raw = block[:, place.run : end].view(dtype)
     values: NDArray[Any] = raw[:, -taxels:].astype(np.float64 if dtype.kind == "i" else np.float32)
-    good = np.isfinite(values).all(axis=1).tolist()
-    found: dict[int, Arrival] = {}
-    for n, ((i, (route, place, _, _)), packet) in enumerate(zip(members, packets, strict=True)):
-        if good[n] and (not place.blob or int.from_bytes(packet[place.run - 4 : place.run], "big") == place.length):
-            counter: int | None = None
-            if route.counted:
-                counter = int(raw[n, 0]) if place.unpack is None else place.unpack(packet, place.scalars)[0]
-            time = osc.timetag(packet, 8, len(packet)) if place.start else None  # alone, a message begins at 0
-            found[i] = _new(Arrival, (route.sensor, values[n].reshape(rows, columns), counter, time, ()))
-    return found
+    good = np.isfinite(values).all(axis=1)
+    counters: list[int | None] = [None] * len(packets)
+    tags: list[float | None] = [None] * len(packets)
+    if place.blob:
+        good &= block[:, place.run - 4 : place.run].view(">u4")[:, 0] == place.length
+    if route.counted:
+        first = raw if place.unpack is None else block[:, place.scalars : place.scalars + 4].view(">i4")
+        counters = first[:, 0].tolist()
+    if place.start:  # alone, a message begins at 0
+        tags = osc.timetags(block[:, 8:16])
+    rows = zip(members, values.reshape(-1, *route.grid), counters, tags, good.tolist(), strict=True)
+    return {
+        i: _new(Arrival, (meaning.route.sensor, frame, counter, tag, ()))
+        for (i, meaning), frame, counter, tag, finite in rows
+        if finite
+    }
 
 
 def _touches(args: tuple[Argument, ...]) -> tuple[Touch, ...]:
