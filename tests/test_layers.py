@@ -23,6 +23,7 @@ CORE_MAY = {
     "collections",
     "functools",
     "ipaddress",
+    "itertools",
 }
 LAYERS = {"core": 0, "daemon": 2, "control": 2, "bridge": 2, "lab": 2}  # everything else is between them
 LAB_ONLY = {"torch", "sklearn", "onnx", "joblib", "scipy"}

@@ -44,8 +44,8 @@ class Activity:
         self.rows, self.columns = rows, columns
         self.scale = 1.0
         self._down, self._across = _blob(rows), _blob(columns)
-        self._typical = TYPICAL * math.sqrt(2 * math.log(rows * columns))  # median activity where noise is normal
-        self.usual = self._typical  # median activity as it is, before `scale`
+        self.typical = TYPICAL * math.sqrt(2 * math.log(rows * columns))  # median activity where noise is normal
+        self.usual = self.typical  # median activity as it is, before `scale`
 
     def measure(self, scaled: Array) -> tuple[float, float]:
         """Strongest spot (a taxel alone, or with its neighbours) and lowest taxel of (N,) deviations in noise units.
@@ -63,6 +63,14 @@ class Activity:
         common = COMMON if common > COMMON else -COMMON if common < -COMMON else common
         alone, spot = ordered.item(-1) - common, strongest - common * BLOB_GAIN
         return spot if spot > alone else alone, ordered.item(0)
+
+    def measure_all(self, scaled: Array) -> tuple[Array, Array]:
+        """What `measure` gives of each of (n, N) deviations, of as many sensors: (n,) and (n,)."""
+        ordered = np.sort(scaled, axis=1)
+        spots = np.matmul(np.matmul(self._down, scaled.reshape(-1, self.rows, self.columns)), self._across)
+        common = np.minimum(np.maximum(ordered[:, ordered.shape[1] // 2], -COMMON), COMMON)
+        strongest = spots.reshape(scaled.shape).max(axis=1) - common * BLOB_GAIN
+        return np.maximum(strongest, ordered[:, -1] - common), ordered[:, 0]
 
     def place(self, pressed: Array, noise: float) -> tuple[float, float]:
         """Centroid (row, column) of what clearly rises above 0 and above `noise`, of (N,) counts."""
@@ -88,12 +96,12 @@ class Activity:
 
     def follow(self, t: float, since: float, activity: float) -> None:
         """Follow a sensor that was idle from `since` to `t` s and has that activity (noise units) at `t`."""
-        seen = min(activity, SURPRISE * self._typical) * self.scale
+        seen = min(activity, SURPRISE * self.typical) * self.scale
         self.usual += (seen - self.usual) * -math.expm1((since - t) / NOISE_TAU_S)
 
     def review(self) -> None:
         """Put what has become usual into `scale`."""
-        self.scale = min(max(self.usual / self._typical, 1.0), USUAL_AT_MOST)
+        self.scale = min(max(self.usual / self.typical, 1.0), USUAL_AT_MOST)
 
 
 def _blob(size: int) -> Array:

@@ -49,23 +49,23 @@ class Conditioner:
         self.idle = Idle(rows * columns)
         self.activity = Activity(rows, columns)
         self.taxels = Taxels(rows, columns)
-        self._weight: Array = np.ones(rows * columns)  # 1 / noise, 0 for bad taxels
+        self.weight: Array = np.ones(rows * columns)  # 1 / noise, 0 for bad taxels
         self._wide_at = -math.inf  # s, when what presses was last wider than fingers
-        self._deep = hardly_ever(rows * columns)  # noise units below the baseline that are no noise
+        self.deep = hardly_ever(rows * columns)  # noise units below the baseline that are no noise
 
     def look(self, t: float, raw: Array, after: AfterEffect) -> Look:
         """What (N,) counts at `t` s show. `after` says how far textile may still swing below its baseline."""
         if self.idle.smallest and self.idle.learns_step(raw):
-            self._review()
+            self.review()
         return self._look(t, raw, after)
 
     def _look(self, t: float, raw: Array, after: AfterEffect) -> Look:
         above = raw - self.idle.counts
-        scaled = above * self._weight
+        scaled = above * self.weight
         activity, lowest = self.activity.measure(scaled)
-        if not lowest < -self._deep:
+        if not lowest < -self.deep:
             return _new(Look, (t, raw, above, activity, False, False, False))
-        level = max(self._deep, after.level(t))
+        level = max(self.deep, after.level(t))
         burst = lowest < -level
         return Look(t, raw, above, activity, True, burst, burst and _shifted(scaled, level))
 
@@ -81,10 +81,10 @@ class Conditioner:
         weight = self._weigh(bare.sigma)
         left = (look.raw - bare.counts) * weight
         rested = self.activity.measure((idle.counts - bare.counts) * weight)[0]
-        if left.min() < -max(self._deep, DRIFTED * rested) or self.activity.measure(left)[0] > ON_SHARE * rested:
+        if left.min() < -max(self.deep, DRIFTED * rested) or self.activity.measure(left)[0] > ON_SHARE * rested:
             return None  # it lies there, is about to leave, or another thing has happened
         idle.unload(bare, look.raw)
-        self._review()
+        self.review()
         after.leave(rested, look.t)
         return self._look(look.t, look.raw, after)
 
@@ -98,15 +98,15 @@ class Conditioner:
 
     def fallen(self, look: Look) -> float:
         """The activity that the frame would have, were its counts inverted."""
-        return self.activity.measure(-look.above * self._weight)[0]
+        return self.activity.measure(-look.above * self.weight)[0]
 
     def place(self, look: Look) -> tuple[float, float]:
         """Where a frame is pressed, its centroid (row, column); bad taxels are left out."""
-        return self.activity.place(np.where(self._weight > 0, look.above, 0.0), self.idle.level)
+        return self.activity.place(np.where(self.weight > 0, look.above, 0.0), self.idle.level)
 
     def wide(self, look: Look) -> bool:
         """Whether what presses is, or was a moment ago, wider than fingers: an arm, a hand, a body, a thing."""
-        pressed = look.above * (self._weight > 0)
+        pressed = look.above * (self.weight > 0)
         if int(np.count_nonzero(pressed >= WIDE_PEAK * pressed.max())) >= max(WIDE_TAXELS, WIDE * pressed.size):
             self._wide_at = look.t
         return 0 <= look.t - self._wide_at < WIDE_S
@@ -124,9 +124,9 @@ class Conditioner:
         self.taxels.frozen.learn(fine=learned.fine)
         self.taxels.flickering.learn()
         self.activity.unlearn()
-        self._review()
-        self.activity.learn((learned.frames - self.idle.counts) * self._weight)
-        self._review()
+        self.review()
+        self.activity.learn((learned.frames - self.idle.counts) * self.weight)
+        self.review()
         return True
 
     def untouched(self, look: Look, *, recovering: bool) -> None:
@@ -134,12 +134,12 @@ class Conditioner:
         idle, t = self.idle, look.t
         if idle.provisional or look.sunken:
             self.settle(t, look.raw)
-        else:
+        elif idle.offered:
             idle.unsettle()
         flickering = self.taxels.flickering
         if flickering.any or self.taxels.frozen.any:
             self._watch(look)
-        since = idle.idle_since(t)
+        since, idle.followed = idle.followed, t  # None: a contact or a silence lies between
         if since is None:
             return
         self.activity.follow(t, since, look.activity)
@@ -147,7 +147,7 @@ class Conditioner:
             above = np.where(flickering.mask, 0.0, look.above) if flickering.any else look.above
             idle.follow(t, since, above, recovering=recovering)
         if idle.follow_noise(t, look.above):
-            self._review()
+            self.review()
 
     def touched(self, look: Look) -> None:
         """The sensor is touched: the baseline stands still, and taxels that freeze or flicker are found."""
@@ -161,25 +161,36 @@ class Conditioner:
     def judge(self, seen: Inspection) -> None:
         """The contact that was inspected is over: what it says of the taxels counts."""
         if self.taxels.stuck.judge(seen):
-            self._review()
+            self.review()
+
+    @property
+    def sound(self) -> bool:
+        """Whether the idle sensor is known without doubt, with nothing that rests on it and no bad taxel."""
+        idle, taxels = self.idle, self.taxels
+        doubt = idle.provisional or idle.smallest or idle.bare is not None
+        return not (doubt or taxels.count or taxels.frozen.any or taxels.flickering.any)
 
     def _watch(self, look: Look) -> None:
         taxels, idle = self.taxels, self.idle
         frozen = taxels.frozen.watch(look.t, look.raw, look.above, idle.sigma)
         if taxels.flickering.watch(look.t, look.above, idle.level, taxels.bad) or frozen:
-            self._review()
+            self.review()
 
-    def _review(self) -> None:
+    def review(self) -> None:
         """Weigh the taxels anew, from all that is known of them."""
         idle = self.idle
         self.taxels.review(idle.sigma, idle.level)
         self.activity.review()
-        self._weight = self._weigh(idle.sigma)
+        self.weight = self._weigh(idle.sigma)
 
     def _weigh(self, sigma: Array) -> Array:
         """(N,) what a count weighs in noise units, by each taxel's standard deviation; nothing where it is bad."""
-        least = LEAST_SIGMA * float(median(sigma))
-        return np.where(self.taxels.bad, 0.0, 1.0 / (self.activity.scale * np.maximum(sigma, least)))
+        return np.where(self.taxels.bad, 0.0, weigh(sigma, float(median(sigma)), self.activity.scale))
+
+
+def weigh(sigma: Array, level: float | Array, scale: float | Array) -> Array:
+    """(..., N) what a count weighs in noise units, by each taxel's standard deviation and the sensor's."""
+    return np.asarray(1.0 / (scale * np.maximum(sigma, LEAST_SIGMA * level)))
 
 
 def _shifted(scaled: Array, level: float) -> bool:

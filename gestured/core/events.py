@@ -164,3 +164,4 @@ class Status:
 
 
 Event = Onset | Provisional | Gesture | Unknown | Cancelled | Release | Touch | Gate | Status
+ANSWERS = (Gesture, Unknown, Cancelled)  # what a contact ends with; a union would be built with each question

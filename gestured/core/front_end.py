@@ -5,7 +5,7 @@ A front end knows neither its sensor's name nor who asks. Of each contact it giv
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import astuple
 from typing import NamedTuple
 
 import numpy as np
@@ -77,10 +77,14 @@ class FrontEnd:
         self.conditioner = Conditioner(self.rows, self.columns)
         travel = self.timing.tap_travel * min(rows, columns)
         self.segmenter = Segmenter(rows * columns, travel, wait_for_double_tap=wait_for_double_tap, timing=self.timing)
-        self._cutter = Cutter(self.conditioner, travel)
-        self._as_sent = self.mounting == Mounting()
-        self.frame: Frame | None = None  # the last frame that was taken
-        self.look: Look | None = None  # what `frame` shows; None before the idle sensor is known
+        self.cutter = Cutter(self.conditioner, travel)
+        self.as_sent = self.mounting == Mounting()
+        self.shown: NDArray[np.generic] | None = None  # (R, C) counts of the last frame that was taken, as it was sent
+        self.look: Look | None = None  # what they show; None before the idle sensor is known
+        # Whether the sensor is known, undamaged and untouched, and what it shows is in no doubt: then `idle_pass` may
+        # take its next frame, with those of other sensors of this kind and timing.
+        self.calm = False
+        self.kind = (rows, columns, *astuple(self.mounting))
         self.pace = Pace()
         self._past = Past()
         self._below_since: float | None = None  # s, since when the frames lie far below the baseline
@@ -132,11 +136,11 @@ class FrontEnd:
         float32.
         """
         t = frame.t
-        values = frame.values if self._as_sent else self.mounting.frame(frame.values)
+        values = frame.values if self.as_sent else self.mounting.frame(frame.values)
         raw = values.astype(np.float64).reshape(-1)
         found = self._pass(t)
-        conditioner, segmenter, cutter = self.conditioner, self.segmenter, self._cutter
-        self.frame, self.look = frame, None
+        conditioner, segmenter, cutter = self.conditioner, self.segmenter, self.cutter
+        self.shown, self.look, self.calm = frame.values, None, False
         if not conditioner.idle.known:
             if conditioner.settle(t, raw):
                 cutter.settled(t)
@@ -164,13 +168,15 @@ class FrontEnd:
             if conditioner.settle(t, raw, rests=True, wide=conditioner.wide(look)):  # what stays becomes the baseline's
                 found += self._void("held")
         else:
-            conditioner.untouched(look, recovering=segmenter.after.recovering(t))
+            recovering = segmenter.after.recovering(t)
+            conditioner.untouched(look, recovering=recovering)
+            self.calm = conditioner.sound and not (recovering or look.sunken) and self.pace.interval_s > 0
         return found
 
     def _pressed(self, look: Look) -> Sequence[Found]:
         """A frame of a contact whose answer is open."""
         segmenter = self.segmenter
-        if len(self._cutter) > self.timing.limit_frames:
+        if len(self.cutter) > self.timing.limit_frames:
             return self.give_up(look.t)
         self.conditioner.touched(look)
         flickering = self.conditioner.taxels.flickering.rubbish or look.t - segmenter.onset < RUBBISH_S
@@ -181,7 +187,7 @@ class FrontEnd:
             self.conditioner.idle.unsettle()
         if not segmenter.phase.let_go or look.t - segmenter.last_touched < DRAFT_S or self.fleeting:
             return ()
-        segment = self._cutter.draft(segmenter.onset, segmenter.last_touched)
+        segment = self.cutter.draft(segmenter.onset, segmenter.last_touched)
         return () if segment is None else (Shown(segment),)
 
     @property
@@ -205,12 +211,12 @@ class FrontEnd:
 
     def so_far(self) -> Segment | None:
         """All that has come of the contact that goes on; None where nothing is left of it without its bad taxels."""
-        segment = self._cutter.so_far(self.segmenter.onset, self.segmenter.last_touched)
+        segment = self.cutter.so_far(self.segmenter.onset, self.segmenter.last_touched)
         return segment if segment.frames.max() >= self.segmenter.off * segment.noise else None
 
     def hole(self, segment: Segment, t: float) -> float:
         """The longest time in s in which a finger may have done anything unseen, from before a segment to `t` s."""
-        return self._cutter.hole(segment.onset, segment.offset, t)
+        return self.cutter.hole(segment.onset, segment.offset, t)
 
     def give_up(self, t: float) -> list[Found]:
         """A contact that goes on has taken too long by another clock than its frames': it is cancelled as held."""
@@ -228,10 +234,13 @@ class FrontEnd:
             elif segmenter.phase.touched:
                 found += self._cancel("silence")
         segmenter.reset()
-        self._cutter.silent()
+        self.cutter.silent()
         self.conditioner.idle.doubt()
-        if self.frame is not None:  # frames that were read together share their memory until the last of them is gone
-            self.frame = replace(self.frame, values=self.frame.values.copy())
+        self.calm = False
+        if self.shown is not None:  # frames that were read together share their memory until the last of them is gone
+            self.shown = self.shown.copy()
+        if self.look is not None:
+            self.look = self.look._replace(raw=self.look.raw.copy(), above=self.look.above.copy())
         return found
 
     def reset(self) -> list[Found]:
@@ -268,7 +277,7 @@ class FrontEnd:
         """What rested on the sensor and had become part of its baseline has left; a contact until then was its own."""
         found = self._cancel("held") if self.touched else []
         self.segmenter.phase = IDLE
-        self._cutter.clear()
+        self.cutter.clear()
         self._forget_rubbish()
         return found
 
@@ -276,14 +285,14 @@ class FrontEnd:
         """Start clean. `keep`: the frames that may show the idle sensor as it is now count already; so does `shown`."""
         found = self._void("restart")
         self.conditioner.idle.forget(keep=keep, shown=shown)
-        self._below_since = None
+        self._below_since, self.calm = None, False
         return found
 
     def _void(self, reason: str) -> list[Found]:
         """The idle sensor is another one from here on: a contact that goes on is over, and nothing is left of it."""
         found = self._cancel(reason) if self.touched else []
         self.segmenter.reset()
-        self._cutter.clear()
+        self.cutter.clear()
         return found
 
     def _done(self, deeds: list[Deed], seen: float) -> list[Found]:
@@ -311,18 +320,18 @@ class FrontEnd:
         return Opened(onset)
 
     def _begin(self, onset: float) -> None:
-        self._cutter.begin(self._past.begin(onset, *self.conditioner.resting()))
+        self.cutter.begin(self._past.begin(onset, *self.conditioner.resting()))
         self.conditioner.taxels.flickering.begin(onset)
 
     def _close(self, onset: float, offset: float, t: float, seen: float) -> list[Found]:
         """A segment is over, as decided at `t` s: it is cut, unless it was no finger's."""
         if self.pace.longest_s(onset, offset) < self.timing.glitch_s:
             return [Void("glitch"), self._end(offset)]
-        made = self._cutter.cut(onset, offset)
+        made = self.cutter.cut(onset, offset)
         nothing = made.peak < self.segmenter.off * made.segment.noise  # is left without its bad taxels
         if self._forget_rubbish() or nothing:
             return [Void("stuck"), self._end(offset)]
-        return [Cut(made.segment, t, self._cutter.hole(onset, offset, seen)), self._end(offset)]
+        return [Cut(made.segment, t, self.cutter.hole(onset, offset, seen)), self._end(offset)]
 
     def _end(self, offset: float) -> Ended:
         self._past.end(offset)

@@ -10,13 +10,17 @@ raised, since a daemon in a vehicle that dies of one sensor's odd frame helps no
 
 import math
 from collections.abc import Collection, Iterable, Sequence
+from itertools import compress
+from typing import Any
 
 from gestured.core.beside.reading import Reading
 from gestured.core.beside.view import View
 from gestured.core.classifier import Classifier
 from gestured.core.events import Gate
-from gestured.core.facts import Changed, Dropped, Fact, Fault
+from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault
 from gestured.core.gates import Gates
+from gestured.core.idle_pass import FEW as TOGETHER
+from gestured.core.idle_pass import idle_pass
 from gestured.core.listening import Listening
 from gestured.core.owner import Source
 from gestured.core.scene import Scene
@@ -27,7 +31,24 @@ FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one 
 REMEMBERED = 4096  # sensors that gave up their place, of which the last sequence and id are remembered
 HOSTS = 1024  # hosts of which it is remembered whether they may send
 
-Waiting = dict[str, tuple[Sensor, list[Arrival]]]  # by its name: a sensor, and its frames among the packets of one call
+AS_EXPECTED = (0, "", False, False)  # what follows the time in the stamp of a frame before which nothing is missing
+
+_new = tuple.__new__  # Arrived(...) takes twice the time
+
+
+class Waiting:
+    """The frames of a sensor among the packets of one call, of which so many have been taken."""
+
+    __slots__ = ("arrivals", "sensor", "stamps", "taken")
+
+    def __init__(self, sensor: Sensor, first: Arrival) -> None:
+        self.sensor, self.arrivals, self.taken = sensor, [first], 0
+        self.stamps: Any = None  # a list of `Stamp`, or the bug on which that failed; None until it is asked
+
+    def goes_on(self) -> bool:
+        """Whether an idle pass may take the next frame: there is one, and it came as expected."""
+        stamps, taken = self.stamps, self.taken
+        return taken < len(stamps) and stamps[taken][1:] == AS_EXPECTED and self.sensor.front_end.calm
 
 
 class Hub:
@@ -71,25 +92,66 @@ class Hub:
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
         """Take packets that were found waiting at `now`, each with its source."""
         facts = [] if now < self.gates.due else self._lapse(now)
-        waiting: Waiting = {}
-        together = self._together(packets, facts) if len(packets) >= FEW else {}
-        for n, (packet, source) in enumerate(packets):
-            try:
-                self._decode(together.get(n, packet), source, now, waiting, facts)
-            except Exception as error:  # the packets before and after this one are good
-                facts.append(Fault(None, error))
-        for name, (sensor, arrivals) in waiting.items():
-            missed = self._told[name] != self._missed
-            self._told[name] = self._missed
-            if name in self._waits:
-                sensor.elapse(now, facts)
-            sensor.receive(arrivals, now, facts, missed=missed)
-            due = sensor.arrives
+        waiting = self._read(packets, now, facts)
+        if len(waiting) >= TOGETHER:
+            self._idle(waiting, now, facts)
+        for name, one in waiting.items():
+            sensor, arrivals = one.sensor, one.arrivals
+            if one.taken == len(arrivals):
+                facts.append(_new(Arrived, (name, one.taken, 0, 0, 0, 0)))
+                continue
+            if one.stamps is None:
+                if name in self._waits:
+                    sensor.elapse(now, facts)
+                one.stamps = sensor.stamp(arrivals, now, missed=self._told[name] != self._missed)
+                self._told[name] = self._missed
+            due = sensor.receive(arrivals, one.stamps, now, facts, taken=one.taken)
             if due < math.inf:
                 self._waits[name], self._due = sensor, min(self._due, due)
             if (self._asked is None or self._asked) and sensor.looks:
                 self.looks[name] = sensor
         return facts
+
+    def _read(self, packets: Sequence[tuple[bytes, Source]], now: float, facts: list[Fact]) -> dict[str, Waiting]:
+        """The frames of packets, by the names of the sensors that they may feed."""
+        waiting: dict[str, Waiting] = {}
+        together = self._together(packets, facts) if len(packets) >= FEW else {}
+        for n, (packet, source) in enumerate(packets):
+            try:
+                if self._scene.allow and not self._may_send(source[0]):
+                    facts.append(Dropped("not_allowed", source))
+                elif n in together:
+                    self._admit(together[n], source, now, waiting, facts)
+                else:
+                    self._decode(packet, source, now, waiting, facts)
+            except Exception as error:  # the packets before and after this one are good
+                facts.append(Fault(None, error))
+        return waiting
+
+    def _idle(self, waiting: dict[str, Waiting], now: float, facts: list[Fact]) -> None:
+        """Stamp the frames of calm sensors, and take in idle passes those that are idle."""
+        kinds: dict[tuple[int, ...], list[Waiting]] = {}
+        for name, one in waiting.items():
+            if one.sensor.calm and self._told[name] == self._missed:
+                one.stamps = one.sensor.stamp(one.arrivals, now)
+                if not isinstance(one.stamps, Exception) and one.goes_on():
+                    kinds.setdefault(one.sensor.front_end.kind, []).append(one)
+        for going in kinds.values():
+            while len(going) >= TOGETHER:
+                try:
+                    found = idle_pass(
+                        [one.sensor.front_end for one in going],
+                        [one.stamps[one.taken].t for one in going],
+                        [one.arrivals[one.taken].values for one in going],
+                    )
+                except Exception as error:  # a bug: each frame is then taken by itself
+                    facts.append(Fault(None, error))
+                    break
+                going = list(compress(going, found))
+                for one in going:
+                    one.taken += 1
+                    one.sensor.passed(now, facts)
+                going = [one for one in going if one.goes_on()]
 
     def wait(self, now: float) -> list[Fact]:
         """No packets have come until `now`: contacts may be over."""
@@ -263,18 +325,14 @@ class Hub:
             facts.append(Fault(None, error))
             return {}
 
-    def _decode(self, found: bytes | Arrival, source: Source, now: float, waiting: Waiting, facts: list[Fact]) -> None:
-        """Take a packet, or the frame that is all it holds where that was read already."""
-        if self._scene.allow and not self._may_send(source[0]):
-            facts.append(Dropped("not_allowed", source))
-            return
-        arrivals, errors = ([found], []) if isinstance(found, Arrival) else self._decoder.decode(found, source)
+    def _decode(
+        self, packet: bytes, source: Source, now: float, waiting: dict[str, Waiting], facts: list[Fact]
+    ) -> None:
+        arrivals, errors = self._decoder.decode(packet, source)
         for error in errors:
             facts.append(Dropped(error.reason, source, text=str(error)))
         for arrival in arrivals:
-            sensor = self._admit(arrival.sensor, source, now, facts)
-            if sensor is not None:
-                waiting.setdefault(arrival.sensor, (sensor, []))[1].append(arrival)
+            self._admit(arrival, source, now, waiting, facts)
 
     def _may_send(self, host: str) -> bool:
         known = self._allowed.get(host)
@@ -284,24 +342,35 @@ class Hub:
             known = self._allowed[host] = self._scene.may_send(host)
         return known
 
-    def _admit(self, name: str, source: Source, now: float, facts: list[Fact]) -> Sensor | None:
-        """The sensor that a packet of `source` may feed, or None where it may not."""
-        sensor = self._sensors.get(name)
+    def _admit(
+        self, arrival: Arrival, source: Source, now: float, waiting: dict[str, Waiting], facts: list[Fact]
+    ) -> None:
+        """Let a frame wait for its turn, if the `source` that has sent it may feed its sensor."""
+        name = arrival.sensor
+        sensor = self._sensors.get(name) or self._new(name, source, now, facts)
         if sensor is None:
-            if self._full(name, now):
-                facts.append(Dropped("too_many_sensors", source))
-                return None
-            numbers = self._numbers.pop(name, (0, 0))
-            sensor = self._sensors[name] = Sensor(name, self._scene, self._classifier, source, numbers)
-            sensor.foresee(asked=self.foreseen(name), later=self._later)
-            sensor.follow(facts, asked=self._follows(name))
-            self._told[name] = self._missed
-            facts.append(Changed(name, "new", source))
-            sensor.shut(self.gates.of(name), now, facts, armed_until=self._armed.pop(name, -math.inf))
+            return
         if not sensor.owner.admits(source, now, self._scene.stale_s):
             facts.append(Dropped("second_source", source))
-            return None
+            return
         sensor.silent = False
+        if name in waiting:
+            waiting[name].arrivals.append(arrival)
+        else:
+            waiting[name] = Waiting(sensor, arrival)
+
+    def _new(self, name: str, source: Source, now: float, facts: list[Fact]) -> Sensor | None:
+        """A sensor that was not heard before, or None where there is no place for it."""
+        if self._full(name, now):
+            facts.append(Dropped("too_many_sensors", source))
+            return None
+        numbers = self._numbers.pop(name, (0, 0))
+        sensor = self._sensors[name] = Sensor(name, self._scene, self._classifier, source, numbers)
+        sensor.foresee(asked=self.foreseen(name), later=self._later)
+        sensor.follow(facts, asked=self._follows(name))
+        self._told[name] = self._missed
+        facts.append(Changed(name, "new", source))
+        sensor.shut(self.gates.of(name), now, facts, armed_until=self._armed.pop(name, -math.inf))
         return sensor
 
     def _full(self, name: str, now: float) -> bool:

@@ -4,6 +4,7 @@ That is learned from a second in which nothing moved, then followed while the se
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -52,17 +53,19 @@ class Idle:
         self.smallest = 0.0  # counts, the smallest change of a sensor that stood still when it was learned; else 0
         self.bare: Bare | None = None  # what the sensor showed before something was laid on it that was learned
         self._settling = Settling()
-        self._followed: float | None = None  # s, the last idle frame; None after a contact or a silence
-        self._reviewed = 0.0  # s, when the noise was last looked at
-        self._learned = 1.0  # counts, `level` as it was learned
-        self._quieter = 0  # sum of the weights of the last glances that were quieter
-        self._shown: Array = np.zeros(taxels)  # the last raw counts, as far as they are needed
+        self.offered = False  # whether a frame was offered since `unsettle`
+        self.followed: float | None = None  # s, the last idle frame; None after a contact or a silence
+        self.reviewed = 0.0  # s, when the noise was last looked at
+        self.learned = 1.0  # counts, `level` as it was learned
+        self.quieter = 0  # sum of the weights of the last glances that were quieter
+        self.compared: Array = np.zeros(taxels)  # the last raw counts, as far as they are needed
 
     def settle(self, t: float, raw: Array, *, rests: bool = False, restless: bool = False) -> Learned | None:
         """Offer (N,) counts that may be idle; what was learned, if a stable second ends here.
 
         `rests`: something lies there that was not when it was learned; `restless`: it may never lie still.
         """
+        self.offered = True
         learned = self._settling.push(t, raw, patience=restless or not self.known)
         if learned is not None:
             bare = Bare(self.counts, self.sigma) if rests and self.bare is None else self.bare
@@ -73,21 +76,22 @@ class Idle:
             self.bare = bare if bare is not None and _loaded(learned.baseline, bare) else None
             self.counts, self.step, self.lively = learned.baseline, learned.step, learned.lively
             self.known, self.provisional = True, not learned.stable
-            self._followed = self._reviewed = t
-            self.smallest, self._shown = math.inf if learned.still else 0.0, raw
+            self.followed = self.reviewed = t
+            self.smallest, self.compared = math.inf if learned.still else 0.0, raw
             self._set(learned.noise)
-            self._quieter, self._learned = 0, self.level
+            self.quieter, self.learned = 0, self.level
             self.glance = t + GLANCE_S if self.level >= QUIETER * self.step else math.inf  # what moves, moves by a step
         return learned
 
     def unsettle(self) -> None:
         """Forget the frames that `settle` was offered: there is no need, or the sensor is touched."""
         self._settling.clear()
+        self.offered = False
 
     @property
     def doubtful(self) -> bool:
         """Whether the noise was learned from what was no idle sensor, as frames since then show."""
-        return self._quieter >= GLANCES
+        return self.quieter >= GLANCES
 
     def mistaken(self, t: float, raw: Array) -> bool:
         """Whether (N,) counts at `t` s and those before them show that no idle sensor was learned; then it is in doubt.
@@ -97,13 +101,13 @@ class Idle:
         """
         if self.provisional:
             return False
-        jumps = np.abs(raw - self._shown)
+        jumps = np.abs(raw - self.compared)
         jumps = jumps[jumps > 0]
-        self.glance, self._shown = t + GLANCE_S, raw
-        if jumps.size and QUIETER * median(jumps) >= self._learned:
-            self._quieter = 0
+        self.glance, self.compared = t + GLANCE_S, raw
+        if jumps.size and QUIETER * median(jumps) >= self.learned:
+            self.quieter = 0
         elif jumps.size or self.lively:
-            self._quieter += GLANCE if jumps.size else GLANCE_REPEATED
+            self.quieter += GLANCE if jumps.size else GLANCE_REPEATED
         if self.doubtful:
             self.doubt()
         return self.doubtful
@@ -113,9 +117,9 @@ class Idle:
 
         Asked where there is a `smallest` change. True if these counts change by less than that.
         """
-        moved = raw != self._shown
-        changed = raw[moved] - self._shown[moved]
-        self._shown = raw
+        moved = raw != self.compared
+        changed = raw[moved] - self.compared[moved]
+        self.compared = raw
         if not changed.size or np.array_equal(raw, np.rint(raw)):  # whole numbers count in ones, as in `quantum`
             return False
         smallest = max(float(np.abs(changed).min()), RESOLUTION * float(np.abs(raw).max()), LEAST_STEP)
@@ -125,11 +129,6 @@ class Idle:
         self._set(np.full_like(self.sigma, smallest))
         return True
 
-    def idle_since(self, t: float) -> float | None:
-        """When the idle frame before that at `t` s was, in s; None where a contact or a silence lies between."""
-        since, self._followed = self._followed, t
-        return since
-
     def follow(self, t: float, since: float, above: Array, *, recovering: bool) -> None:
         """Follow the sensor, idle from `since` until `t` s and then (N,) counts `above` its baseline."""
         tau = RECOVERY_TAU_S if recovering else BASELINE_TAU_S
@@ -137,22 +136,21 @@ class Idle:
 
     def follow_noise(self, t: float, above: Array) -> bool:
         """Follow how much the sensor moves, idle and (N,) counts off its baseline at `t` s; whether it was time to."""
-        if t - self._reviewed < REVIEW_S:
+        if t - self.reviewed < REVIEW_S:
             return False
-        since = max(self._reviewed, t - UNSEEN_S)
-        seen = np.minimum(np.abs(above), OUTLIER * self.sigma) * SIGMA_PER_DEVIATION
-        sigma = self.sigma + (seen - self.sigma) * -math.expm1((since - t) / NOISE_TAU_S)
+        since = max(self.reviewed, t - UNSEEN_S)
+        sigma = self.sigma + (seen(above, self.sigma) - self.sigma) * -math.expm1((since - t) / NOISE_TAU_S)
         self._set(np.maximum(sigma, self.step / 2))  # what shows no noise may have some all the same
-        self._reviewed = t
+        self.reviewed = t
         return True
 
     def hold(self) -> None:
         """The sensor is touched: what passes now is not followed."""
-        self._followed = None
+        self.followed = None
 
     def doubt(self) -> None:
         """Put what was learned in doubt: it holds until the next stable second replaces it."""
-        self.provisional, self._followed = True, None
+        self.provisional, self.followed = True, None
 
     def unload(self, bare: Bare, raw: Array) -> None:
         """What rested has left, as (N,) counts show: the sensor is as it was before, until the next stable second."""
@@ -168,13 +166,38 @@ class Idle:
         """
         self.known = self.provisional = False
         self.bare = None if shown is None else Bare(shown, (self.bare or self).sigma)
-        self._followed = None
+        self.followed = None
         if not keep:
             self._settling.clear()
 
     def _set(self, sigma: Array) -> None:
         self.sigma = sigma
         self.level = float(median(sigma))
+
+
+def mistaken(idles: Sequence[Idle], t: Array, raw: Array) -> list[bool]:
+    """What `Idle.mistaken` says of each of these, none of which is in doubt, by (n, N) counts at (n,) s."""
+    compared = np.concatenate([idle.compared for idle in idles]).reshape(raw.shape)
+    jumps = np.sort(np.abs(raw - compared), axis=1)
+    moved = np.count_nonzero(jumps, axis=1)  # the taxels that did not move are sorted before them
+    first, rows = jumps.shape[1] - moved, np.arange(len(jumps))
+    usual = (jumps[rows, first + (moved - 1) // 2] + jumps[rows, (first + moved // 2) % jumps.shape[1]]) / 2
+    loud = (moved > 0) & (QUIETER * usual >= [idle.learned for idle in idles])
+    found = zip(idles, (t + GLANCE_S).tolist(), raw, moved.tolist(), loud.tolist(), strict=True)
+    for idle, again, shown, some, restless in found:
+        idle.glance, idle.compared = again, shown.copy()
+        if restless:
+            idle.quieter = 0
+        elif some or idle.lively:
+            idle.quieter += GLANCE if some else GLANCE_REPEATED
+        if idle.doubtful:
+            idle.doubt()
+    return [idle.doubtful for idle in idles]
+
+
+def seen(above: Array, sigma: Array) -> Array:
+    """Counts: how much taxels seem to move that are (..., N) counts off their baselines; `sigma` is what is known."""
+    return np.minimum(np.abs(above), OUTLIER * sigma) * SIGMA_PER_DEVIATION
 
 
 def _loaded(baseline: Array, bare: Bare) -> bool:

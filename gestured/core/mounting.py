@@ -26,9 +26,9 @@ class Mounting:
         return (columns, rows) if self.rotate in (90, 270) else (rows, columns)
 
     def frame(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
-        """(R, C) as sent -> (R', C') as a person in front of the sensor sees it."""
+        """(..., R, C) as sent -> (..., R', C') as a person in front of the sensor sees it."""
         if self.invert:
             values = -values.astype(np.float64)
         if self.mirror:
-            values = values[:, ::-1]
-        return np.rot90(values, -(self.rotate // 90)) if self.rotate else values
+            values = values[..., ::-1]
+        return np.rot90(values, -(self.rotate // 90), axes=(-2, -1)) if self.rotate else values

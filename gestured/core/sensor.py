@@ -15,14 +15,14 @@ from gestured.core.beside.view import View, view_of
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.decision import Decision, reason, whole
 from gestured.core.errors import ModelError
-from gestured.core.events import Cancelled, Event, Gate, Gesture, Onset, Release, Unknown, Where
+from gestured.core.events import ANSWERS, Cancelled, Event, Gate, Gesture, Onset, Release, Unknown, Where
 from gestured.core.facts import Arrived, Changed, Decided, Fact, Fault, Taken
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown
 from gestured.core.listening import INHIBITED, Listening
 from gestured.core.owner import Owner, Source
 from gestured.core.scene import Scene
-from gestured.core.stamping import Stamper
+from gestured.core.stamping import Stamp, Stamper
 from gestured.core.where import where
 from gestured.core.wire import Arrival
 
@@ -266,16 +266,50 @@ class Sensor:
         self.segments += 1
         return self.numbers
 
-    def receive(self, arrivals: Sequence[Arrival], now: float, facts: list[Fact], *, missed: bool) -> None:
-        """Take frames that were found waiting at `now`; `missed`: this machine may have had no room for others."""
+    @property
+    def calm(self) -> bool:
+        """Whether an idle frame may be taken in an idle pass; see `FrontEnd.calm`."""
+        waits = self._listening.armed or self._foresight.wanted is not None
+        return self.front_end.calm and not waits and not self._scene.frames
+
+    def stamp(self, arrivals: Sequence[Arrival], now: float, *, missed: bool = False) -> list[Stamp] | Exception:
+        """The stamps of frames that were found waiting at `now`, or the bug on which that failed.
+
+        `missed`: this machine may have had no room for others.
+        """
         try:
             stamps = self._stamper.stamp(arrivals, now, missed=missed)
         except Exception as error:
-            self._recover(error, self._stamper.at(now), facts)
-            return
+            return error
         self._vitals.arrived(now, len(arrivals), missed=missed)
-        taken = lost = duplicates = late = implausible = 0
-        for arrival, stamp in zip(arrivals, stamps, strict=True):
+        return stamps
+
+    def passed(self, now: float, facts: list[Fact]) -> None:
+        """An idle pass has taken a frame that arrived at `now`: let those look on whom it may tell something."""
+        if not self._square:
+            try:
+                self._habits.see(self.front_end)
+            except Exception as error:
+                self._recover(error, self._stamper.at(now), facts)
+
+    def receive(
+        self,
+        arrivals: Sequence[Arrival],
+        stamps: list[Stamp] | Exception,
+        now: float,
+        facts: list[Fact],
+        *,
+        taken: int = 0,
+    ) -> float:
+        """Take frames that were found waiting at `now`, with what `stamp` gave of them; gives `arrives` as it is then.
+
+        So many of them, the first ones, were `taken` by idle passes.
+        """
+        if isinstance(stamps, Exception):
+            self._recover(stamps, self._stamper.at(now), facts)
+            return self.arrives
+        lost = duplicates = late = implausible = 0
+        for arrival, stamp in zip(arrivals[taken:], stamps[taken:], strict=True):
             if stamp.dropped:
                 duplicates += stamp.dropped == "duplicate"
                 late += stamp.dropped == "late"
@@ -302,6 +336,7 @@ class Sensor:
         if lost:
             self._lost, self._lost_at = self._lost + lost, now
         facts.append(_new(Arrived, (self.name, taken, lost, duplicates, late, implausible)))
+        return math.inf if self._open is None else self.arrives
 
     @property
     def arrives(self) -> float:
@@ -456,7 +491,7 @@ class Sensor:
         for one in told:
             if isinstance(one, Onset):
                 self._open, self._answered, self._since = one.id, False, now
-            elif isinstance(one, Gesture | Unknown | Cancelled):
+            elif isinstance(one, ANSWERS):
                 self._answered = True
             elif isinstance(one, Release):
                 self._open = None

@@ -51,19 +51,19 @@ class Habits:
 
     def see(self, front_end: FrontEnd) -> None:
         """See the last frame that a front end has taken. Where R equals C, only `Look.burst` says something."""
-        frame, look = front_end.frame, front_end.look
-        if frame is None or look is None:
+        shown, look = front_end.shown, front_end.look
+        if shown is None or look is None:
             return
         if look.burst and (fallen := front_end.conditioner.fallen(look)) >= front_end.segmenter.on:
-            if self.paused(frame.t):
+            if self.paused(look.t):
                 self.falls += 1
                 self._strongest = 0.0, None
-            self._fell, self._falling = frame.t, True
-            self._press(frame.values, fallen)
+            self._fell, self._falling = look.t, True
+            self._press(shown, fallen)
         if front_end.segmenter.phase.pending:
-            self._press(frame.values, look.activity)
-        elif not front_end.touched and not look.shifted and self.paused(frame.t):
-            self._idle = frame.values
+            self._press(shown, look.activity)
+        elif not front_end.touched and not look.shifted and self.paused(look.t):
+            self._idle = shown
 
     def paused(self, t: float) -> bool:
         """Whether no contact in which counts fell goes on at `t` s; one that is over is compared."""

@@ -28,11 +28,11 @@ class View:
 
 def view_of(front_end: FrontEnd, *, raw: bool) -> View | None:
     """A sensor's view now; None before its first frame."""
-    frame, look = front_end.frame, front_end.look
-    if frame is None:
+    shown, look, t = front_end.shown, front_end.look, front_end.pace.last
+    if shown is None or t is None:
         return None
-    phase, (on, off) = front_end.levels(frame.t)
-    found = View(frame.t, phase, on, off, front_end.noise, raw=frame.values if raw else None)
+    phase, (on, off) = front_end.levels(t)
+    found = View(t, phase, on, off, front_end.noise, raw=shown if raw else None)
     if look is None:
         return found
     taxels = front_end.conditioner.taxels

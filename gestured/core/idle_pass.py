@@ -1,0 +1,114 @@
+"""The idle pass: one frame of each of many sensors that nobody touches, as arrays of all of them.
+
+Nearly all frames of many sensors are idle, and a call of numpy costs more than the 81 numbers that it is for. So
+frames of calm sensors that wait together are taken together. What is known of a sensor stays in its own objects: it is
+gathered from them, and what has changed is put back. The pass does what `FrontEnd.push` does with an idle frame of a
+calm sensor, to the last bit: `matmul` of a stack of grids gives what `dot` gives of each, and exponentials are
+`math`'s. Any other frame is left to `push`.
+"""
+
+import math
+from collections.abc import Sequence
+from itertools import compress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.activity import SURPRISE, USUAL_AT_MOST
+from gestured.core.conditioning import Look, weigh
+from gestured.core.front_end import FrontEnd
+from gestured.core.idle import BASELINE_TAU_S, NOISE_TAU_S, REVIEW_S, UNSEEN_S, mistaken, seen
+from gestured.core.quantiles import median
+from gestured.core.taxels import NOISY
+from gestured.core.timing import SHARE
+
+Array = NDArray[np.float64]
+
+FEW = 5  # sensors from which on a pass costs less than their frames one by one
+
+_new = tuple.__new__  # Look(...) takes twice the time
+
+
+def idle_pass(fronts: Sequence[FrontEnd], times: Sequence[float], values: Sequence[NDArray[np.generic]]) -> list[bool]:
+    """Take a frame of each of these calm sensors of one `kind`, where it is idle; whether it was, and was taken.
+
+    Each comes with its time in s, and its (R, C) counts as they were sent. No frame was lost before it.
+    """
+    first, paces = fronts[0], [front.pace for front in fronts]
+    conditioners = [front.conditioner for front in fronts]
+    idles, activities = [one.idle for one in conditioners], [one.activity for one in conditioners]
+    t, last, interval_s, usual, scale, reviewed, glance = np.array((
+        times,
+        [pace.last for pace in paces],
+        [pace.interval_s for pace in paces],
+        [activity.usual for activity in activities],
+        [activity.scale for activity in activities],
+        [idle.reviewed for idle in idles],
+        [idle.glance for idle in idles],
+    ), dtype=np.float64)  # fmt: skip
+    stack: NDArray[np.generic] = np.concatenate(values).reshape(-1, *first.sent)
+    raw = (stack if first.as_sent else first.mounting.frame(stack)).astype(np.float64).reshape(len(fronts), -1)
+    step = t - last
+    taken = (step > 0) & (step <= first.timing.stale_s)
+    due = (taken & (t >= glance)).nonzero()[0]
+    if due.size:
+        taken[due] = np.logical_not(mistaken([idles[n] for n in due.tolist()], t[due], raw[due]))
+    counts = _rows([idle.counts for idle in idles])
+    above = raw - counts
+    strongest, lowest = activities[0].measure_all(above * _rows([one.weight for one in conditioners]))
+    taken &= (strongest < first.segmenter.off) & (lowest >= -first.conditioner.deep)
+
+    ago = np.minimum(-step, 0.0)
+    interval_s += (step - interval_s) * SHARE
+    usual += (np.minimum(strongest, SURPRISE * activities[0].typical) * scale - usual) * _shares(ago, NOISE_TAU_S)
+    counts += above * _shares(ago, BASELINE_TAU_S)[:, np.newaxis]
+    done: list[bool] = taken.tolist()
+    rows = zip(
+        fronts, values, times, paces, idles, activities, raw, above, counts,
+        strongest.tolist(), interval_s.tolist(), usual.tolist(), strict=True,
+    )  # fmt: skip
+    for front, sent, now, pace, idle, activity, shown, higher, baseline, active, interval, mean in compress(rows, done):
+        pace.last, pace.interval_s, activity.usual = now, interval, mean
+        idle.followed, idle.counts = now, baseline.copy()  # a view would keep the rows of all others in memory
+        look = _new(Look, (now, shown, higher, active, False, False, False))
+        front.shown, front.look = sent, look
+        front.cutter.keep(look, 0, None)
+        front.cutter.trim(now)
+    due = (taken & (t - reviewed >= REVIEW_S)).nonzero()[0]
+    if due.size:
+        _review([fronts[n] for n in due.tolist()], t[due], above[due])
+    return done
+
+
+def _review(fronts: Sequence[FrontEnd], t: Array, above: Array) -> None:
+    """Follow the noise of these sensors, (n, N) counts off their baselines at `t` s, and weigh their taxels anew."""
+    conditioners = [front.conditioner for front in fronts]
+    idles, activities = [one.idle for one in conditioners], [one.activity for one in conditioners]
+    sigma, step = _rows([idle.sigma for idle in idles]), np.array([idle.step for idle in idles])
+    since = np.maximum([idle.reviewed for idle in idles], t - UNSEEN_S)
+    sigma += (seen(above, sigma) - sigma) * _shares(since - t, NOISE_TAU_S)[:, np.newaxis]
+    sigma = np.maximum(sigma, step[:, np.newaxis] / 2)
+    level = median(sigma.T)
+    noisy = np.any(sigma > NOISY * level[:, np.newaxis], axis=1)
+    restless = np.array([activity.usual for activity in activities]) / activities[0].typical
+    scale = np.minimum(np.maximum(restless, 1.0), USUAL_AT_MOST)
+    weight = weigh(sigma, level[:, np.newaxis], scale[:, np.newaxis])
+    rows = zip(fronts, t.tolist(), sigma, level.tolist(), scale.tolist(), weight, noisy.tolist(), strict=True)
+    for front, now, deviation, usual, larger, weighed, bad in rows:
+        conditioner = front.conditioner
+        conditioner.idle.reviewed, conditioner.idle.sigma, conditioner.idle.level = now, deviation.copy(), usual
+        if bad:
+            conditioner.review()
+            front.calm = conditioner.sound
+        else:
+            conditioner.activity.scale, conditioner.weight = larger, weighed.copy()
+
+
+def _shares(ago: Array, tau: float) -> Array:
+    """(n,) which share of a difference is followed with that time constant, of (n,) times up to 0 in s."""
+    return np.array([-math.expm1(one) for one in (ago / tau).tolist()])
+
+
+def _rows(each: list[Array]) -> Array:
+    """(n, N) of n times (N,)."""
+    return np.concatenate(each).reshape(len(each), -1)

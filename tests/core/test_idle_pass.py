@@ -1,0 +1,144 @@
+"""The same packets give the same, one by one or all at once: idle frames that wait together go through one pass."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gestured.core import hub as hubs
+from gestured.core.facts import Arrived, Fact, Fault
+from gestured.core.hub import Hub
+from gestured.core.idle_pass import FEW, idle_pass
+from gestured.core.mounting import Mounting
+from gestured.core.scene import Scene, Setup
+from tests import encoding
+from tests.core.test_hub import GESTURES, Sure
+
+SOURCE = ("10.0.0.1", 1)
+EACH = FEW + 2  # sensors of a kind
+SETUPS = {f"plain{n}": Setup() for n in range(EACH)}
+SETUPS |= {f"turned{n}": Setup((4, 7), Mounting(rotate=90, mirror=True, invert=True)) for n in range(EACH)}
+SETUPS |= {f"clock{n}": Setup(clock="sensor") for n in range(EACH)}
+SCENE = Scene(GESTURES, (9, 9), sensors=SETUPS, max_sensors=64)
+Read = tuple[float, list[tuple[str, bytes]]]  # s, and the packets that wait then, with their sensors' names
+
+
+def frames(setup: Setup, rng: np.random.Generator) -> Iterator[NDArray[np.float64] | None]:
+    """Counts of a sensor to which about everything happens; None where it sends nothing."""
+    grid, sign = setup.grid or SCENE.grid, -1 if setup.mounting.invert else 1
+    y, x = np.mgrid[: grid[0], : grid[1]]
+    base, noise, whole = rng.uniform(100, 300, grid), rng.choice([0.3, 2.0, 30.0]), rng.random() < 0.4
+    stuck, silent, frozen, press, shown = np.zeros(grid, dtype=bool), 0, 0, 0.0, base
+    place, way = np.zeros(2), np.zeros(2)
+    for k in range(210):
+        what = np.searchsorted([0.008, 0.010, 0.011, 0.013, 0.015, 0.017, 0.019], rng.random()) if k > 25 else 7
+        if what == 0:  # a finger comes
+            place, way, press = rng.uniform(0, grid), rng.normal(0, 0.6, 2), rng.uniform(5, 80) * noise
+        elif what == 1:
+            silent = k + int(rng.integers(1, 25))
+        elif what == 2:
+            stuck = rng.random(grid) < 0.05
+        elif what == 3:  # something is laid on it, or leaves
+            base = base + sign * rng.choice([-60, -20, 20]) * noise
+        elif what == 4:
+            noise *= rng.choice([0.2, 3.0])
+        elif what == 6:  # it repeats itself
+            frozen = k + int(rng.integers(5, 60))
+        place, press = place + way, press if rng.random() < 0.8 else 0.0
+        counts = base + sign * press * np.exp(-((y - place[0]) ** 2 + (x - place[1]) ** 2) / 1.6)
+        counts = counts + rng.normal(0, noise, grid) + 1e6 * (what == 5) * (rng.random(grid) < 0.1)
+        shown = np.where(stuck | (k < frozen), shown, np.rint(counts) if whole else counts)
+        yield None if k < silent else shown
+
+
+def reads(seed: int) -> list[Read]:
+    """Frames of all at 15 Hz, within a moment; sensors with a clock of their own send some late, and some twice."""
+    rng, found, late = np.random.default_rng(seed), list[Read](), dict[str, bytes]()
+    streams = {name: frames(setup, rng) for name, setup in SETUPS.items()}
+    for k, each in enumerate(zip(*streams.values(), strict=True)):
+        packets: list[tuple[str, bytes]] = []
+        for name, counts in zip(streams, each, strict=True):
+            if counts is None:
+                continue
+            clock = name.startswith("clock")
+            numbers = [k] * clock + counts.ravel().tolist()
+            packet = encoding.message(f"/{name}/pressure", "i" * clock + "f" * counts.size, numbers)
+            if clock:
+                packet = encoding.bundle([packet], 1.7e9 + k / 15)
+            if clock and name not in late and rng.random() < 0.1:
+                late[name] = packet
+                continue
+            twice = clock and rng.random() < 0.02
+            packets += [(name, one) for one in ([late.pop(name)] if name in late else []) + [packet] * (1 + twice)]
+        found.append((k / 15 + rng.uniform(0, 0.02), packets))
+    return found
+
+
+def play(reads: Sequence[Read], *, together: bool) -> tuple[dict[str, list[Fact]], list[object]]:
+    """What was said of each sensor, but for how its frames arrived; and from time to time all that is known of it."""
+    hub, said, known = Hub(SCENE, Sure()), {name: list[Fact]() for name in SETUPS}, list[object]()
+    counts = {name: np.zeros(5, dtype=int) for name in SETUPS}
+    for n, (now, packets) in enumerate(reads):
+        waiting = [(packet, SOURCE) for _, packet in packets]
+        facts = [
+            fact for some in ([waiting] if together else [[one] for one in waiting]) for fact in hub.receive(some, now)
+        ]
+        for fact in facts + (hub.tick(now) if n % 40 == 39 else hub.wait(now)):
+            if isinstance(fact, Arrived):
+                counts[fact.sensor] += fact[1:]
+            else:
+                said.setdefault(str(getattr(fact, "sensor", None)), []).append(fact)
+        if n % 15 == 14:
+            for name, reading in sorted(hub.readings(now).items()):
+                baseline = b"" if reading.baseline is None else reading.baseline.tobytes()
+                known.append((name, baseline, counts[name].tolist()))  # frames that come one by one have another jitter
+                known.append(repr(replace(reading, jitter_s=0.0, first=None, baseline=None)))
+    return said, known
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_packets_say_the_same_one_by_one_or_all_at_once(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    passed: list[bool] = []
+
+    def watched(*given: Sequence[object]) -> list[bool]:
+        passed.extend(idle_pass(*given))  # type: ignore[arg-type]
+        return passed[-len(given[0]) :]
+
+    monkeypatch.setattr(hubs, "idle_pass", watched)
+    arrived = reads(seed)
+    alone, known_alone = play(arrived, together=False)
+    assert passed == []
+    said, known = play(arrived, together=True)
+    assert passed.count(True) > 1000 < 50 * passed.count(False)
+    assert [repr(one) for one in said.items()] == [repr(one) for one in alone.items()]
+    assert known == known_alone
+
+
+def test_a_bug_in_a_pass_costs_no_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    arrived = reads(0)
+    said, known = play(arrived, together=True)
+    monkeypatch.setattr(hubs, "idle_pass", lambda *_: 1 / 0)
+    buggy, known_too = play(arrived, together=True)
+    assert len(buggy.pop("None")) > 100
+    assert repr((buggy, known_too)) == repr((said, known))
+
+
+def test_a_bug_in_one_sensor_is_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever happens to what is known of a sensor, the others are served in the same read."""
+    hub, rng, found = Hub(SCENE, Sure()), np.random.default_rng(0), list[Fact]()
+    names = [name for name in SETUPS if name.startswith("plain")]
+    for n in range(40):
+        values = rng.normal(100.0, 2.0, (len(names), 81)).tolist()
+        packets = [
+            encoding.message(f"/{name}/pressure", "f" * 81, one) for name, one in zip(names, values, strict=True)
+        ]
+        if n == 30:
+            hub._sensors["plain3"].front_end.conditioner.idle.counts = None  # type: ignore[assignment]
+        found = hub.receive([(packet, SOURCE) for packet in packets], n / 15)
+        if n == 30:
+            assert {fact.sensor for fact in found if isinstance(fact, Fault)} <= {None, "plain3"}
+            assert any(isinstance(fact, Fault) for fact in found)
+        taken = {fact.sensor: fact.taken for fact in found if isinstance(fact, Arrived)}
+        assert taken == {name: int(n != 30 or name != "plain3") for name in names}
