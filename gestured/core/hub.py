@@ -275,6 +275,10 @@ class Hub:
         numbers = self._numbers | {name: sensor.numbers for name, sensor in self._sensors.items()}
         return {name: sequence for name, (sequence, _) in numbers.items()}
 
+    def knows(self, sensor: str) -> bool:
+        """Whether a sensor was heard, or is in the scene: whether it has a reading."""
+        return sensor in self._sensors or sensor in self._scene.sensors
+
     def readings(self, now: float) -> dict[str, Reading]:
         """What is known of each sensor, heard or in the scene, at `now`. Any thread may ask."""
         silent = {name: self._unheard(name, now) for name in self._scene.sensors}

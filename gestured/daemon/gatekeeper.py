@@ -79,8 +79,8 @@ class Gatekeeper:
         """Raises Refusal for a sensor that is not known, and for a gate that is not that bridge's own."""
         if bridge is not None and gate != bridge and not gate.startswith(f"{bridge}-"):
             raise Refusal(f"gate {gate!r} is not {bridge}'s own, expected {bridge}, or {bridge}- and more")
-        known = self._hub.readings(time.monotonic())
-        if sensor is not None and sensor not in known:
+        if sensor is not None and not self._hub.knows(sensor):
+            known = self._hub.readings(time.monotonic())
             expected = ", ".join(known) or "none: no sensor was heard, or is configured"
             raise Refusal(f"no sensor {sensor!r}, expected one of {expected}")
 

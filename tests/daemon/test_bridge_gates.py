@@ -1,14 +1,20 @@
 """The bridges' own socket of a real daemon: each closes and opens gates in its own name, and can do nothing else."""
 
+import asyncio
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from gestured.client.control import Control
 from gestured.client.lines import Refused
+from gestured.core.hub import Hub
+from gestured.core.scene import Scene, Setup
+from gestured.daemon.gatekeeper import Gatekeeper
 from gestured.daemon.operations import Operations
+from tests.core.test_hub import GESTURES, Sure
 from tests.daemon.harness import Daemon, Sensor
 
 
@@ -61,6 +67,15 @@ def test_what_is_closed_at_a_start_counts_from_the_next_one_on(daemon: Daemon, t
     with Control(Path(daemon.ready["control"])) as operator:
         assert operator.ask("reload")["awaiting_restart"] == ["gates"]
         assert operator.ask("status")["gates"] == ["seat"]
+
+
+def test_a_sign_of_life_for_one_sensor_looks_at_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bridge repeats what is closed for each sensor by itself, every ten seconds, and there may be a thousand."""
+    hub = Hub(Scene(GESTURES, (9, 9), {"arm": Setup(), "seat": Setup()}), Sure())
+    monkeypatch.setattr(hub, "readings", None)
+    keeper = Gatekeeper(hub, SimpleNamespace(take=list))  # type: ignore[arg-type]
+    reply = asyncio.run(keeper.inhibit(None, "car", "arm", 30.0, "car"))  # type: ignore[arg-type]
+    assert reply == {"gate": "car", "sensors": {"arm": ["car"]}} and hub.gates.of("seat") == {}
 
 
 def test_it_knows_inhibit_and_allow_alone(daemon: Daemon, bridge: Control) -> None:
