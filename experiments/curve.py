@@ -1,6 +1,6 @@
 """How much of the way from a simulation to real people `gestured-lab adapt` goes, by the number of people it is given.
 
-    python -m experiments.curve --cache .cache/lab --real ../shared/data
+    python -m experiments.curve --cache .cache/lab --real FOLDER
 
 The base is the network that `gestured-lab train` had before it saw anybody real; it is taken from the cache of a
 training, as are the networks that left out a third of the real subjects each. Of the subjects that one of these has not
