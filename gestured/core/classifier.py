@@ -6,9 +6,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.core.certainty import Certainty
 from gestured.core.frames import Segment
-from gestured.core.points import OperatingPoints
+from gestured.core.points import Certainty, OperatingPoints
 
 NEAR = 0.5  # confidence from which a segment is a gesture of the user's own, where nothing else is set
 

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from gestured.core.conditioning import Conditioner, Look
 from gestured.core.cutter import Cutter
-from gestured.core.frames import Frame, Segment
+from gestured.core.frames import Frame, Past, Segment
 from gestured.core.mounting import Mounting
-from gestured.core.past import Past
 from gestured.core.segmenter import IDLE, Action, Deed, Segmenter
 from gestured.core.taxels import RUBBISH_S
 from gestured.core.timing import Pace, Timing

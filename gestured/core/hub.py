@@ -13,15 +13,13 @@ from collections.abc import Collection, Iterable, Sequence
 from itertools import compress
 from typing import Any
 
-from gestured.core.beside.reading import Reading
-from gestured.core.beside.view import View
+from gestured.core.beside.reading import Reading, View
 from gestured.core.classifier import Classifier
 from gestured.core.events import Gate
 from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault
-from gestured.core.gates import Gates
 from gestured.core.idle_pass import FEW as TOGETHER
 from gestured.core.idle_pass import idle_pass
-from gestured.core.listening import Listening
+from gestured.core.listening import Gates, Listening
 from gestured.core.owner import Source
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor

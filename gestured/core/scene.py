@@ -16,8 +16,8 @@ from gestured.core.listening import Arming
 from gestured.core.mounting import Mounting
 from gestured.core.points import STRICTNESS, USUAL, Strictness
 from gestured.core.timing import Timing
+from gestured.core.where import Zone, zones_of
 from gestured.core.wire import Addresses
-from gestured.core.zones import Zone, zones_of
 
 ONE_TAP, DOUBLE_TAP = "one_tap", "double_tap"
 TAP_GAP_S = (0.2, 0.6)  # least, most: no hand taps twice faster (at 15 Hz), and taps further apart are two

@@ -9,9 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from gestured.core.beside.foresight import Foresight, Preview
 from gestured.core.beside.habits import Habits
-from gestured.core.beside.reading import Reading, Vitals
+from gestured.core.beside.reading import Reading, View, Vitals, view_of
 from gestured.core.beside.touch import Fingers
-from gestured.core.beside.view import View, view_of
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.decision import Decision, reason, whole
 from gestured.core.errors import ModelError

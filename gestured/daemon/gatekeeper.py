@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from gestured.core.address import is_sensor
 from gestured.core.facts import Fact
-from gestured.core.gates import MOST_GATES
 from gestured.core.hub import Hub
+from gestured.core.listening import MOST_GATES
 from gestured.daemon.caller import Connection
 from gestured.daemon.desk import Desk
 from gestured.daemon.log import Throttle

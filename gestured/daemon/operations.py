@@ -9,7 +9,7 @@ from gestured.core.address import is_sensor
 from gestured.core.beside.reading import Reading
 from gestured.core.events import Gesture, Onset, Place, Provisional, Release, Where
 from gestured.core.hub import Hub
-from gestured.core.zones import zone_at
+from gestured.core.where import zone_at
 from gestured.daemon.caller import Connection
 from gestured.daemon.desk import Desk
 from gestured.daemon.gatekeeper import SENSOR, Gatekeeper

@@ -10,8 +10,8 @@ from gestured.core.listening import LONGEST_S, Arming
 from gestured.core.points import USUAL, Strictness
 from gestured.core.scene import MOST_SENSORS, STALE_S, TAP_GAP_S
 from gestured.core.timing import Timing
+from gestured.core.where import zones_of
 from gestured.core.wire import Addresses
-from gestured.core.zones import zones_of
 from gestured.daemon.values import (
     AddressField,
     DestinationField,

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from gestured import __version__
 from gestured.core.address import Address, Grid
-from gestured.core.beside.reading import Reading
-from gestured.core.beside.view import View
+from gestured.core.beside.reading import Reading, View
 from gestured.core.own import Examples, to_dict
 from gestured.daemon.metrics import Counter, Metrics
 from gestured.daemon.settings import Settings

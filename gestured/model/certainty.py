@@ -4,7 +4,7 @@ import json
 from collections.abc import Collection
 from typing import Any
 
-from gestured.core.certainty import Certainty, Needed
+from gestured.core.points import Certainty, Needed
 
 MOST_IN_A_ROW = 100  # frames; a model that needs more says nothing in time
 MOST_S = 3600.0  # longer than any contact; it also keeps each number within a float's range

@@ -24,7 +24,7 @@ from gestured.core.points import USUAL, Strictness
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
 from gestured.core.timing import Timing
-from gestured.core.zones import zones_of
+from gestured.core.where import zones_of
 from gestured.model import own_file
 from gestured.model.ladder import (
     Ladder,

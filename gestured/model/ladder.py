@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from gestured.core.certainty import Certainty
 from gestured.core.classifier import Scores
 from gestured.core.errors import ModelError, SettingsError
 from gestured.core.frames import Segment
 from gestured.core.own import Examples
-from gestured.core.points import USUAL
+from gestured.core.points import USUAL, Certainty
 from gestured.core.scene import Scene
 from gestured.model.model import Model
 from gestured.model.own import Own

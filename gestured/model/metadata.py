@@ -11,8 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from gestured.core.certainty import Certainty
-from gestured.core.points import OperatingPoints
+from gestured.core.points import Certainty, OperatingPoints
 from gestured.core.window import Window
 from gestured.model.certainty import certainty
 from gestured.model.context import NAMES as CONTEXT

@@ -10,7 +10,7 @@ import pytest
 
 from gestured.client.control import Control
 from gestured.client.lines import Refused
-from gestured.core.gates import MOST_GATES
+from gestured.core.listening import MOST_GATES
 from gestured.record import tape_reader
 from tests.control.conftest import asked
 from tests.daemon.harness import Daemon, Sensor

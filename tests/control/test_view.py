@@ -25,7 +25,7 @@ from gestured.control.view import NICE
 from gestured.control.view.server import PAGE
 from gestured.control.view.source import Looker
 from gestured.core.address import Address
-from gestured.core.zones import zones_of
+from gestured.core.where import zones_of
 from gestured.record.tape_reader import read
 from tests.control.browser import PROGRAM, Browser
 from tests.daemon import tiny_model

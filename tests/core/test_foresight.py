@@ -12,14 +12,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gestured.core.certainty import Certainty
 from gestured.core.classifier import Match, Scores
 from gestured.core.errors import ModelError
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, Unknown
 from gestured.core.facts import Fault, events_of
 from gestured.core.frames import Frame, Segment
 from gestured.core.hub import Hub
-from gestured.core.points import OperatingPoints, Point
+from gestured.core.points import Certainty, OperatingPoints, Point
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.model.certainty import certainty

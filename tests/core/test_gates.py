@@ -10,14 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gestured.core.certainty import Certainty
 from gestured.core.classifier import Scores
 from gestured.core.events import Event, Gate, Gesture, Provisional, Unknown
 from gestured.core.facts import Changed, Decided
 from gestured.core.hub import Hub
 from gestured.core.listening import Arming
 from gestured.core.messages import to_json
-from gestured.core.points import OperatingPoints, Point
+from gestured.core.points import Certainty, OperatingPoints, Point
 from gestured.core.scene import Scene, Setup
 from gestured.record.replay import Replay, opened
 from tests.core.test_foresight import Seer

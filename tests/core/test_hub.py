@@ -17,12 +17,12 @@ import pytest
 
 from benchmarks.house import idle_calls
 from gestured.control.export import sessions_of
-from gestured.core.certainty import Certainty
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, Release, Unknown
 from gestured.core.facts import Changed, Dropped, Taken
 from gestured.core.frames import Segment
 from gestured.core.hub import FORGET_S, Hub
+from gestured.core.points import Certainty
 from gestured.core.scene import Scene, Setup
 from gestured.lab.recordings.live import LiveSensor
 from gestured.record import tape_reader, tape_writer

@@ -18,7 +18,7 @@ from gestured.core.frames import Frame
 from gestured.core.hub import Hub
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
-from gestured.core.zones import zones_of
+from gestured.core.where import zones_of
 from gestured.simulator import SimulatedSensor
 from gestured.simulator.live import LiveTextile
 from gestured.simulator.people import Press

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.core.beside.view import view_of
+from gestured.core.beside.reading import view_of
 from gestured.core.contact import Memory
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd

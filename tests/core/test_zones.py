@@ -12,7 +12,7 @@ from gestured.core.events import Gesture, Place, Unknown
 from gestured.core.facts import events_of
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
-from gestured.core.zones import zone_at, zones_of
+from gestured.core.where import zone_at, zones_of
 from tests.core.test_sensor import SWIPE, Fake, says
 from tests.scenario import frames
 

@@ -15,7 +15,7 @@ from gestured.core.events import Cancelled, Event, Gesture, Place, Provisional, 
 from gestured.core.facts import Decided
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import FrontEnd
-from gestured.core.gates import MOST_GATES
+from gestured.core.listening import MOST_GATES
 from gestured.core.window import Window
 from gestured.daemon.exposition import exposition
 from gestured.daemon.metrics import NAMED_SENSORS, Metrics

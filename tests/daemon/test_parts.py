@@ -19,8 +19,8 @@ from gestured.core.address import Address
 from gestured.core.errors import SettingsError
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
+from gestured.core.where import Zone
 from gestured.core.wire import Decoder
-from gestured.core.zones import Zone
 from gestured.daemon import http, log, udp
 from gestured.daemon.health import Pulse
 from gestured.daemon.http import HttpThread, as_json

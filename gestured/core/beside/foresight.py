@@ -8,10 +8,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
-from gestured.core.certainty import Certainty
 from gestured.core.events import Cancelled, Gesture, Provisional, Unknown
 from gestured.core.frames import Segment
 from gestured.core.front_end import DRAFT_S, FrontEnd
+from gestured.core.points import Certainty
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP
 
 PREVIEW_S = 0.0666  # from one preview to the next: 15 a second, a little less than 1/15 because times are rounded

@@ -1,6 +1,6 @@
-"""What is known of a sensor: at a moment, for status and metrics; and its jitter, silences and drift over time."""
+"""What is known of a sensor: at a moment, for status, metrics and whoever looks at it; and its jitter over time."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,8 @@ from gestured.core.events import Gate
 from gestured.core.frames import SMALLEST
 from gestured.core.front_end import FrontEnd
 from gestured.core.quantiles import median
+
+Array = NDArray[np.float64]
 
 # From good to bad.
 STATES = ("ok", "starting", "degraded", "intermittent", "inverted", "stale", "no_data", "faulty")
@@ -130,3 +132,38 @@ class Vitals:
         if front_end.bad_taxels:
             return "degraded", f"bad taxels are bridged: {front_end.bad_taxels}"
         return "ok", ""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The last frame, and what the segmenter goes by. Grids are as mounted, but for `raw`."""
+
+    t: float  # s, on the stream's clock
+    phase: str
+    on: float  # noise units: the activity from which there is a contact now
+    off: float  # noise units: the activity below which there is none
+    noise: float  # counts
+    values: Array | None = None  # (R, C) counts above the baseline, bad taxels bridged; None before it is learned
+    bad: NDArray[np.bool_] | None = None  # (R, C)
+    activity: float = 0.0  # noise units
+    centroid: tuple[float, float] | None = None  # row and column; None where it is not touched
+    raw: NDArray[np.generic] | None = None  # (R, C) counts as they were sent; on request
+
+
+def view_of(front_end: FrontEnd, *, raw: bool) -> View | None:
+    """A sensor's view now; None before its first frame."""
+    shown, look, t = front_end.shown, front_end.look, front_end.pace.last
+    if shown is None or t is None:
+        return None
+    phase, (on, off) = front_end.levels(t)
+    found = View(t, phase, on, off, front_end.noise, raw=shown if raw else None)
+    if look is None:
+        return found
+    taxels = front_end.conditioner.taxels
+    return replace(
+        found,
+        values=taxels.bridge(look.above[None])[0],
+        bad=taxels.bad.reshape(taxels.rows, taxels.columns),
+        activity=look.activity,
+        centroid=front_end.conditioner.place(look) if look.activity >= off else None,
+    )
