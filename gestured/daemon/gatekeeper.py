@@ -43,8 +43,12 @@ class Gatekeeper:
         return {"inhibit": inhibit, "allow": Verb(self.allow, which, changes=False)}
 
     def overdue(self, now: float) -> dict[str, float]:
-        """By gate that a bridge has closed: for how many s it has owed a sign of life. The gate stays closed."""
-        return {gate: now - due for (gate, _), due in tuple(self._owed.items()) if now > due}
+        """By gate that a bridge has closed, and that is closed still: for how many s it has owed a sign of life."""
+        owed: dict[str, float] = {}
+        for (gate, sensor), due in tuple(self._owed.items()):
+            if now > due and gate in self._hub.gates.of(sensor):
+                owed[gate] = max(owed.get(gate, 0.0), now - due)
+        return owed
 
     async def inhibit(
         self,

@@ -12,6 +12,7 @@ from gestured.client.control import Control
 from gestured.client.lines import Refused
 from gestured.core.hub import Hub
 from gestured.core.scene import Scene, Setup
+from gestured.daemon import gatekeeper
 from gestured.daemon.gatekeeper import Gatekeeper
 from gestured.daemon.operations import Operations
 from tests.core.test_hub import GESTURES, Sure
@@ -76,6 +77,18 @@ def test_a_sign_of_life_for_one_sensor_looks_at_no_other(monkeypatch: pytest.Mon
     keeper = Gatekeeper(hub, SimpleNamespace(take=list))  # type: ignore[arg-type]
     reply = asyncio.run(keeper.inhibit(None, "car", "arm", 30.0, "car"))  # type: ignore[arg-type]
     assert reply == {"gate": "car", "sensors": {"arm": ["car"]}} and hub.gates.of("seat") == {}
+
+
+def test_only_what_is_closed_still_is_overdue_since_its_first_sensor(monkeypatch: pytest.MonkeyPatch) -> None:
+    hub = Hub(Scene(GESTURES, (9, 9), {"arm": Setup(), "seat": Setup()}), Sure())
+    keeper = Gatekeeper(hub, SimpleNamespace(take=list))  # type: ignore[arg-type]
+    monkeypatch.setattr(gatekeeper, "time", SimpleNamespace(monotonic=lambda: 100.0))
+    for sensor, seconds in (("arm", 1.0), ("seat", 20.0)):
+        asyncio.run(keeper.inhibit(None, "car", sensor, seconds, "car"))  # type: ignore[arg-type]
+    assert keeper.overdue(150.0) == {"car": 49.0}
+    asyncio.run(keeper.inhibit(None, "car", None, 10.0))  # type: ignore[arg-type]  # an operator: for ten seconds
+    hub.tick(111.0)
+    assert hub.gates.named == set() and keeper.overdue(150.0) == {}
 
 
 def test_it_knows_inhibit_and_allow_alone(daemon: Daemon, bridge: Control) -> None:
