@@ -39,7 +39,7 @@ class ControlServer:
         """`guarded`: the account at the other end is looked at, too, and not only the rights of the socket's file."""
         self._sock, self._verbs, self._guarded = sock, verbs, guarded
         self._throttle, self._journal = Throttle(), Throttle(burst=LOGGED)
-        self._open: set[asyncio.StreamWriter] = set()
+        self._open: dict[asyncio.StreamWriter, asyncio.Task[None] | None] = {}  # connections, each with its task
         self._served = 0  # connections that hold one of the places
         self._ended = False
         self._streaming = False  # whether a stream is being sent: one at a time, since each keeps its lines in memory
@@ -50,23 +50,25 @@ class ControlServer:
         self._server = await asyncio.start_unix_server(self._serve, sock=self._sock, limit=MAX_REQUEST_BYTES, **STAYS)
 
     def close(self) -> None:
-        """Hang up and take no more requests, since what a verb looks at may be closed from now on."""
+        """Hang up, and give up what was asked: what a verb looks at or changes may be closed from now on."""
         self._ended = True
         self._server.close()
-        for writer in tuple(self._open):
+        for writer, task in tuple(self._open.items()):
             writer.close()
+            if task is not None:
+                task.cancel()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._open.add(writer)
+        self._open[writer] = asyncio.current_task()
         try:
             who = peer_of(writer.get_extra_info("socket"))
             places = OPERATORS + (OPERATORS_KEPT if who.ours else 0)
             if self._guarded and not who.may:
                 self._throttle.warn("control refused", "peer", uid=who.uid, pid=who.pid)
-                writer.write(_refusal("only root, the daemon's user and its group may control it"))
+                _write(writer, _refusal("only root, the daemon's user and its group may control it"))
             elif self._served >= places:
                 self._throttle.warn("control refused", "places", uid=who.uid, pid=who.pid, limit=places)
-                writer.write(_refusal(f"more than {places} connections"))
+                _write(writer, _refusal(f"more than {places} connections"))
             else:
                 self._served += 1
                 try:
@@ -79,7 +81,7 @@ class ControlServer:
         except (OSError, asyncio.CancelledError):
             pass  # the operator has gone, or the daemon ends
         finally:
-            self._open.discard(writer)
+            del self._open[writer]
             writer.close()
 
     async def _answer_all(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, who: Peer) -> None:
@@ -89,10 +91,10 @@ class ControlServer:
                 async with asyncio.timeout(None if connection.streams else IDLE_S):
                     line = await reader.readline()
             except TimeoutError:
-                writer.write(_refusal(f"nothing was asked for {IDLE_S:g} s; connect again"))
+                _write(writer, _refusal(f"nothing was asked for {IDLE_S:g} s; connect again"))
                 return
             except ValueError:  # the rest of a line that is too long cannot be told from the next line
-                writer.write(_refusal(f"a request has at most {MAX_REQUEST_BYTES} bytes"))
+                _write(writer, _refusal(f"a request has at most {MAX_REQUEST_BYTES} bytes"))
                 return
             if not line:
                 connection.end()
@@ -106,7 +108,7 @@ class ControlServer:
             try:
                 name, parameters = parse_request(line, self._verbs)
             except Refusal as refusal:
-                writer.write(_refusal(str(refusal)))
+                _write(writer, _refusal(str(refusal)))
                 return
             verb = self._verbs[name]
             if verb.changes:
@@ -117,7 +119,7 @@ class ControlServer:
                 return
             found = await self._run(connection, verb, parameters)
             # The answer goes out before the lines that the verb streams.
-            writer.write(json_line(found.answer if isinstance(found, ReplyStream) else found))
+            _write(writer, json_line(found.answer if isinstance(found, ReplyStream) else found))
         if isinstance(found, ReplyStream):
             self._streaming = True
             try:
@@ -144,7 +146,7 @@ class ControlServer:
             async with self._turn(self._quick):
                 size = 0
                 for line in lines:
-                    writer.write(line)
+                    _write(writer, line)
                     size += len(line)
                     if size >= TURN_BYTES:
                         break
@@ -159,6 +161,12 @@ class ControlServer:
             began = time.perf_counter()
             yield
             await asyncio.sleep(min(time.perf_counter() - began, TURN_PAUSE_S))
+
+
+def _write(writer: asyncio.StreamWriter, line: bytes) -> None:
+    """Write to an operator, unless he has gone: uvloop raises RuntimeError for what is closed."""
+    if not writer.is_closing():
+        writer.write(line)
 
 
 async def _drain(writer: asyncio.StreamWriter) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import uvloop
 
 from gestured.client.control import Control
 from gestured.client.lines import Refused
@@ -245,3 +246,55 @@ def test_who_comes_while_the_daemon_ends_is_asked_nothing(tmp_path: Path) -> Non
         return desk.asked
 
     assert asyncio.run(come()) == []
+
+
+@pytest.mark.parametrize("asked", [b'{"verb":"stream"}\n', b'{"verb":"?"}\n' * 50, b'{"verb":"ask"}\n' * 50])
+def test_who_leaves_while_he_is_answered_is_no_bug(tmp_path: Path, asked: bytes) -> None:
+    """The daemon's own loop refuses to write to whom it has hung up on."""
+
+    async def main() -> list[Any]:
+        wrong: list[Any] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, what: wrong.append(what))
+        async with open_desk(tmp_path) as (_, path):
+            other, asking = await asyncio.open_unix_connection(path)
+            asking.write(b'{"verb":"ask"}\n' * 100)  # so that each of the others waits for his turns
+            with ExitStack() as crowd:
+                for _ in range(5):
+                    rude = crowd.enter_context(socket.socket(socket.AF_UNIX))
+                    rude.connect(path)
+                    rude.sendall(asked)
+                for _ in range(10):
+                    await answer(other)
+            for _ in range(90):
+                await answer(other)
+            asking.close()
+        return wrong
+
+    with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+        assert runner.run(main()) == []
+
+
+def test_what_has_begun_when_the_daemon_ends_does_not_go_on(tmp_path: Path) -> None:
+    """A reload would open anew what the end has closed."""
+    done: list[str] = []
+
+    async def main() -> None:
+        begun, over = asyncio.Event(), asyncio.Event()
+
+        async def reload(connection: Connection) -> Reply:
+            begun.set()
+            await over.wait()
+            done.append("reloaded")
+            return {}
+
+        async with open_desk(tmp_path) as (desk, path):
+            desk.verbs["reload"] = Verb(reload, slow=True)
+            _, writer = await asyncio.open_unix_connection(path)
+            writer.write(b'{"verb":"reload"}\n')
+            await begun.wait()
+        over.set()
+        writer.close()
+        await asyncio.gather(*asyncio.all_tasks() - {asyncio.current_task()}, return_exceptions=True)
+
+    asyncio.run(main())
+    assert done == []
