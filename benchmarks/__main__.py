@@ -15,10 +15,11 @@ from gestured.model.shipped import shipped
 
 
 def _parts(model: str) -> dict[str, Callable[[], Row | list[Row]]]:
-    from benchmarks import buses, inside, latency, replay, scenes, side_by_side, small, start, traffic, viewers
+    from benchmarks import buses, idle, inside, latency, replay, scenes, side_by_side, small, start, traffic, viewers
 
     return {
         "decode": inside.decode,
+        "idle": idle.idle_frames,
         "datagrams": lambda: [traffic.datagrams(model, 0, 0.3), traffic.datagrams(model, 6, 0.18)],
         "latency": lambda: latency.latency(model),
         "buses": lambda: buses.buses(model),

@@ -13,12 +13,11 @@ from collections.abc import Collection, Iterable, Sequence
 from itertools import compress
 from typing import Any
 
+from gestured.core import idle_pass
 from gestured.core.beside.reading import Reading, View
 from gestured.core.classifier import Classifier
 from gestured.core.events import Gate
 from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault
-from gestured.core.idle_pass import FEW as TOGETHER
-from gestured.core.idle_pass import idle_pass
 from gestured.core.listening import Gates, Listening
 from gestured.core.owner import Source
 from gestured.core.scene import Scene
@@ -91,7 +90,7 @@ class Hub:
         """Take packets that were found waiting at `now`, each with its source."""
         facts = [] if now < self.gates.due else self._lapse(now)
         waiting = self._read(packets, now, facts)
-        if len(waiting) >= TOGETHER:
+        if len(waiting) >= idle_pass.FEW:
             self._idle(waiting, now, facts)
         for name, one in waiting.items():
             sensor, arrivals = one.sensor, one.arrivals
@@ -135,9 +134,9 @@ class Hub:
                 if not isinstance(one.stamps, Exception) and one.goes_on():
                     kinds.setdefault(one.sensor.front_end.kind, []).append(one)
         for going in kinds.values():
-            while len(going) >= TOGETHER:
+            while len(going) >= idle_pass.FEW:
                 try:
-                    found = idle_pass(
+                    found = idle_pass.take(
                         [one.sensor.front_end for one in going],
                         [one.stamps[one.taken].t for one in going],
                         [one.arrivals[one.taken].values for one in going],

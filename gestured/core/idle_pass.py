@@ -29,7 +29,7 @@ FEW = 5  # sensors from which on a pass costs less than their frames one by one
 _new = tuple.__new__  # Look(...) takes twice the time
 
 
-def idle_pass(fronts: Sequence[FrontEnd], times: Sequence[float], values: Sequence[NDArray[np.generic]]) -> list[bool]:
+def take(fronts: Sequence[FrontEnd], times: Sequence[float], values: Sequence[NDArray[np.generic]]) -> list[bool]:
     """Take a frame of each of these calm sensors of one `kind`, where it is idle; whether it was, and was taken.
 
     Each comes with its time in s, and its (R, C) counts as they were sent. No frame was lost before it.

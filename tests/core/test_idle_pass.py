@@ -7,17 +7,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gestured.core import hub as hubs
+from gestured.core import idle_pass
 from gestured.core.facts import Arrived, Fact, Fault
 from gestured.core.hub import Hub
-from gestured.core.idle_pass import FEW, idle_pass
 from gestured.core.mounting import Mounting
 from gestured.core.scene import Scene, Setup
 from tests import encoding
 from tests.core.test_hub import GESTURES, Sure
 
 SOURCE = ("10.0.0.1", 1)
-EACH = FEW + 2  # sensors of a kind
+EACH = idle_pass.FEW + 2  # sensors of a kind
 SETUPS = {f"plain{n}": Setup() for n in range(EACH)}
 SETUPS |= {f"turned{n}": Setup((4, 7), Mounting(rotate=90, mirror=True, invert=True)) for n in range(EACH)}
 SETUPS |= {f"clock{n}": Setup(clock="sensor") for n in range(EACH)}
@@ -100,13 +99,13 @@ def play(reads: Sequence[Read], *, together: bool) -> tuple[dict[str, list[Fact]
 
 @pytest.mark.parametrize("seed", range(3))
 def test_packets_say_the_same_one_by_one_or_all_at_once(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    passed: list[bool] = []
+    passed, take = list[bool](), idle_pass.take
 
     def watched(*given: Sequence[object]) -> list[bool]:
-        passed.extend(idle_pass(*given))  # type: ignore[arg-type]
+        passed.extend(take(*given))  # type: ignore[arg-type]
         return passed[-len(given[0]) :]
 
-    monkeypatch.setattr(hubs, "idle_pass", watched)
+    monkeypatch.setattr(idle_pass, "take", watched)
     arrived = reads(seed)
     alone, known_alone = play(arrived, together=False)
     assert passed == []
@@ -119,7 +118,7 @@ def test_packets_say_the_same_one_by_one_or_all_at_once(seed: int, monkeypatch: 
 def test_a_bug_in_a_pass_costs_no_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     arrived = reads(0)
     said, known = play(arrived, together=True)
-    monkeypatch.setattr(hubs, "idle_pass", lambda *_: 1 / 0)
+    monkeypatch.setattr(idle_pass, "take", lambda *_: 1 / 0)
     buggy, known_too = play(arrived, together=True)
     assert len(buggy.pop("None")) > 100
     assert repr((buggy, known_too)) == repr((said, known))
