@@ -1,6 +1,5 @@
 """What can be set. Every key is described here, and nowhere else: help and documents are made from this."""
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -15,6 +14,7 @@ from gestured.core.wire import Addresses
 from gestured.daemon.values import (
     AddressField,
     DestinationField,
+    FileField,
     GateNameField,
     GridField,
     Listed,
@@ -206,7 +206,7 @@ class Settings(Part):
         le=1024,
         description="MiB of memory in which the last 30 s of packets are kept; 0: none are kept",
     )
-    own_gestures: Path | None = Field(
+    own_gestures: FileField | None = Field(
         default=None,
         description="file in which the daemon keeps gestures of your own; by default "
         "$STATE_DIRECTORY/own-gestures.json, else $XDG_STATE_HOME/gestured/own-gestures.json, "

@@ -43,8 +43,17 @@ def _name(of: str) -> BeforeValidator:
 
 
 def _socket(value: object) -> Path:
-    if not isinstance(value, str | Path) or not str(value) or len(os.fsencode(value)) > SOCKET_PATH_BYTES:
-        raise ValueError(f"the path of a Unix socket, at most {SOCKET_PATH_BYTES} bytes long")
+    expected = f"the path of a Unix socket, at most {SOCKET_PATH_BYTES} bytes long"
+    path = _named(value, expected)
+    if len(os.fsencode(path)) > SOCKET_PATH_BYTES:
+        raise ValueError(expected)
+    return path
+
+
+def _named(value: object, expected: str) -> Path:
+    """A path with a name at its end: `/` and `.` have none, and no name holds a NUL."""
+    if not isinstance(value, str | Path) or not Path(value).name or "\0" in str(value):
+        raise ValueError(expected)
     return Path(value)
 
 
@@ -70,3 +79,4 @@ DestinationField = Annotated[Destination, BeforeValidator(_destination)]
 SensorNameField = Annotated[str, _name("sensor")]
 GateNameField = Annotated[str, _name("gate")]
 SocketField = Annotated[Path, BeforeValidator(_socket)]
+FileField = Annotated[Path, BeforeValidator(lambda value: _named(value, "the path of a file"))]
