@@ -13,6 +13,7 @@ from gestured.daemon.desk import Desk
 from gestured.daemon.log import Throttle
 from gestured.daemon.request import Parameter, Refusal, Reply, Verb
 
+BRIDGES_GATES = MOST_GATES // 2  # of these: no bridge can use up the names with which an operator silences sensors
 LOGGED = 8  # log lines of one bridge in log.PERIOD_S; further ones are counted
 LONGEST_S = 1e9  # for which a gate may be closed; some thirty years
 NAME = "name, 1 to 64 of A-Z a-z 0-9 _ -"
@@ -66,6 +67,9 @@ class Gatekeeper:
         named, now = self._hub.gates.named, time.monotonic()
         if gate not in named and len(named) >= MOST_GATES:
             raise Refusal(f"{MOST_GATES} gates are closed already, which is the most there can be; allow one first")
+        theirs = {name for name, _ in self._owed}
+        if bridge is not None and gate not in theirs and len(theirs) >= BRIDGES_GATES:
+            raise Refusal(f"bridges have closed {BRIDGES_GATES} gates already, the most that they can; allow one first")
         if bridge is not None and seconds is not None:
             self._owed[gate, sensor], seconds = now + seconds, None
         return self._done(self._hub.inhibit(sensor, gate, now, seconds or math.inf), gate, sensor, bridge)

@@ -91,6 +91,18 @@ def test_only_what_is_closed_still_is_overdue_since_its_first_sensor(monkeypatch
     assert hub.gates.named == set() and keeper.overdue(150.0) == {}
 
 
+def test_bridges_cannot_use_up_the_gates_of_an_operator(daemon: Daemon, bridge: Control) -> None:
+    for k in range(8):
+        bridge.ask("inhibit", bridge="car", gate=f"car-{k}", seconds=60)
+    with pytest.raises(Refused, match="bridges have closed 8 gates already, the most that they can; allow one first"):
+        bridge.ask("inhibit", bridge="car", gate="car-8", seconds=60)
+    bridge.ask("inhibit", bridge="car", gate="car-7", seconds=60)
+    with Control(Path(daemon.ready["control"])) as operator:
+        assert "door" in operator.ask("inhibit", gate="door")["sensors"]["armrest"]
+    bridge.ask("allow", bridge="car", gate="car-0")
+    bridge.ask("inhibit", bridge="car", gate="car-8", seconds=60)
+
+
 def test_it_knows_inhibit_and_allow_alone(daemon: Daemon, bridge: Control) -> None:
     operators = set(Operations(*[None] * 9).verbs())  # type: ignore[arg-type]
     assert {"reload", "tap", "enrol", "recalibrate", "status"} <= operators
