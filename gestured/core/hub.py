@@ -141,9 +141,9 @@ class Hub:
                         [one.stamps[one.taken].t for one in going],
                         [one.arrivals[one.taken].values for one in going],
                     )
-                except Exception as error:  # a bug: each frame is then taken by itself
+                except Exception as error:  # a bug: what has not been taken is then taken by itself
                     facts.append(Fault(None, error))
-                    break
+                    found = [one.sensor.front_end.pace.last == one.stamps[one.taken].t for one in going]
                 going = list(compress(going, found))
                 for one in going:
                     one.taken += 1

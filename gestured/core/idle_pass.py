@@ -10,6 +10,7 @@ calm sensor, to the last bit: `matmul` of a stack of grids gives what `dot` give
 import math
 from collections.abc import Sequence
 from itertools import compress
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,46 +63,56 @@ def take(fronts: Sequence[FrontEnd], times: Sequence[float], values: Sequence[ND
     interval_s += (step - interval_s) * SHARE
     usual += (np.minimum(strongest, SURPRISE * activities[0].typical) * scale - usual) * _shares(ago, NOISE_TAU_S)
     counts += above * _shares(ago, BASELINE_TAU_S)[:, np.newaxis]
+    due = (taken & (t - reviewed >= REVIEW_S)).nonzero()[0]
+    found = _reviewed([fronts[n] for n in due.tolist()], t[due], above[due], usual[due]) if due.size else None
+    if found is not None:
+        taken[due[found.noisy]] = False  # whose taxels are to be looked at one by one
+    # Up to here nothing of a sensor has changed that `push` does not find again, and from here on each by itself.
     done: list[bool] = taken.tolist()
     rows = zip(
         fronts, values, times, paces, idles, activities, raw, above, counts,
         strongest.tolist(), interval_s.tolist(), usual.tolist(), strict=True,
     )  # fmt: skip
     for front, sent, now, pace, idle, activity, shown, higher, baseline, active, interval, mean in compress(rows, done):
-        pace.last, pace.interval_s, activity.usual = now, interval, mean
-        idle.followed, idle.counts = now, baseline.copy()  # a view would keep the rows of all others in memory
         look = _new(Look, (now, shown, higher, active, False, False, False))
-        front.shown, front.look = sent, look
         front.cutter.keep(look, 0, None)
         front.cutter.trim(now)
-    due = (taken & (t - reviewed >= REVIEW_S)).nonzero()[0]
-    if due.size:
-        _review([fronts[n] for n in due.tolist()], t[due], above[due])
+        front.shown, front.look, activity.usual = sent, look, mean
+        idle.followed, idle.counts = now, baseline.copy()  # a view would keep the rows of all others in memory
+        pace.interval_s, pace.last = interval, now  # at the end: it says that the frame is taken, whatever comes next
+    if found is not None:
+        for n, deviation, level, larger, weighed in zip(due.tolist(), *found[:4], strict=True):
+            if done[n]:
+                idle, conditioner = idles[n], conditioners[n]
+                idle.reviewed, idle.sigma, idle.level = times[n], deviation.copy(), float(level)
+                activities[n].scale, conditioner.weight = float(larger), weighed.copy()
     return done
 
 
-def _review(fronts: Sequence[FrontEnd], t: Array, above: Array) -> None:
-    """Follow the noise of these sensors, (n, N) counts off their baselines at `t` s, and weigh their taxels anew."""
-    conditioners = [front.conditioner for front in fronts]
-    idles, activities = [one.idle for one in conditioners], [one.activity for one in conditioners]
+class _Reviewed(NamedTuple):
+    """What a review of n sensors gives."""
+
+    sigma: Array  # (n, N) counts
+    level: Array  # (n,) counts
+    scale: Array  # (n,)
+    weight: Array  # (n, N)
+    noisy: NDArray[np.bool_]  # (n,) whether a taxel of the sensor is
+
+
+def _reviewed(fronts: Sequence[FrontEnd], t: Array, above: Array, usual: Array) -> _Reviewed:
+    """The noise of these sensors, (n, N) counts off their baselines at `t` s, followed, and their taxels weighed anew.
+
+    `usual` is how active each of them usually is, with this frame.
+    """
+    idles, typical = [front.conditioner.idle for front in fronts], fronts[0].conditioner.activity.typical
     sigma, step = _rows([idle.sigma for idle in idles]), np.array([idle.step for idle in idles])
     since = np.maximum([idle.reviewed for idle in idles], t - UNSEEN_S)
     sigma += (seen(above, sigma) - sigma) * _shares(since - t, NOISE_TAU_S)[:, np.newaxis]
     sigma = np.maximum(sigma, step[:, np.newaxis] / 2)
     level = median(sigma.T)
     noisy = np.any(sigma > NOISY * level[:, np.newaxis], axis=1)
-    restless = np.array([activity.usual for activity in activities]) / activities[0].typical
-    scale = np.minimum(np.maximum(restless, 1.0), USUAL_AT_MOST)
-    weight = weigh(sigma, level[:, np.newaxis], scale[:, np.newaxis])
-    rows = zip(fronts, t.tolist(), sigma, level.tolist(), scale.tolist(), weight, noisy.tolist(), strict=True)
-    for front, now, deviation, usual, larger, weighed, bad in rows:
-        conditioner = front.conditioner
-        conditioner.idle.reviewed, conditioner.idle.sigma, conditioner.idle.level = now, deviation.copy(), usual
-        if bad:
-            conditioner.review()
-            front.calm = conditioner.sound
-        else:
-            conditioner.activity.scale, conditioner.weight = larger, weighed.copy()
+    scale = np.minimum(np.maximum(usual / typical, 1.0), USUAL_AT_MOST)
+    return _Reviewed(sigma, level, scale, weigh(sigma, level[:, np.newaxis], scale[:, np.newaxis]), noisy)
 
 
 def _shares(ago: Array, tau: float) -> Array:
