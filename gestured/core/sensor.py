@@ -357,7 +357,7 @@ class Sensor:
         """Learn the sensor anew; a contact that is open is cancelled."""
         self._vitals.restart()
         self._fresh = True
-        self._add(self.reset(), now, facts)
+        self._run(lambda _: self.reset(), now, facts)
 
     def change(self, scene: Scene, classifier: Classifier, now: float, facts: list[Fact]) -> None:
         """Go on in another scene; what was learned stays where it still holds."""
@@ -366,7 +366,7 @@ class Sensor:
         another_clock = scene.clock_of(self.name) != before.clock_of(self.name)
         alike = (old.sent, old.mounting, old.timing) == (new.sent, new.mounting, new.timing)
         if another_clock or not alike or scene.waits_for_double_tap != before.waits_for_double_tap:
-            self._add(self.reset(), now, facts)
+            self._run(lambda _: self.reset(), now, facts)
             self.front_end, self._habits = new, Habits(*new.sent)
             self._square = new.rows == new.columns
         if another_clock:

@@ -19,7 +19,7 @@ from benchmarks.house import idle_calls
 from gestured.control.export import sessions_of
 from gestured.core.classifier import Classifier, Scores
 from gestured.core.events import Cancelled, Event, Gesture, Onset, Provisional, Release, Unknown
-from gestured.core.facts import Changed, Dropped, Taken
+from gestured.core.facts import Changed, Dropped, Fault, Taken
 from gestured.core.frames import Segment
 from gestured.core.hub import FORGET_S, Hub
 from gestured.core.points import Certainty
@@ -388,3 +388,20 @@ def test_after_a_fault_in_its_stamps_a_contact_ends_by_the_streams_clock(
     facts = hub.receive([(packet, FIRST)], len(frames) / (15 if clock == "arrival" else 150))
     (release,) = [fact for fact in facts if isinstance(fact, Release)]
     assert onset.onset < release.offset < onset.onset + 1.0
+
+
+@pytest.mark.parametrize("act", ["change", "restart"])
+def test_a_sensor_that_is_broken_holds_up_no_reload_and_no_recalibration_of_others(act: str) -> None:
+    hub, hand = Hub(SCENE, Sure()), Hand()
+    shown = hand.idle(2.0)
+    for t, packet, source in sorted(stream("arm", shown, FIRST) + stream("leg", shown, SECOND)):
+        hub.receive([(packet, source)], t)
+    hub._sensors["arm"].front_end.cutter = None  # type: ignore[assignment]
+    if act == "change":
+        facts = hub.change(replace(SCENE, tap_gap_s=0.3), Sure(), 2.1)
+        facts += hub.receive([(floats("/arm/pressure", hand.frame(), 0), FIRST)], 2.2)
+        assert any(isinstance(fact, Taken) for fact in facts), "what is made anew is sound"
+    else:
+        facts = hub.restart(["arm", "leg"], 2.1)
+    assert {fact.sensor for fact in facts if isinstance(fact, Fault)} == {"arm"}
+    assert states(hub, 2.2)["leg"] == "starting"
