@@ -28,6 +28,7 @@ class Source:
 
     cursors: dict[tuple[int, int], Cursor] = field(default_factory=dict)
     frames: int = 0
+    idle: bytes = b""  # a frame without fingers, but for its number at the end: a thousand sensors say it each second
 
 
 class TuioSink(UdpOut):
@@ -72,6 +73,9 @@ class TuioSink(UdpOut):
         source = self._sources[sensor]
         alive = [one.session for one in source.cursors.values()]
         source.frames = (source.frames + 1) % IDS
+        if source.idle and not alive:
+            self.send(source.idle + source.frames.to_bytes(4, "big"))
+            return
         messages = [
             self._out.message(CURSOR, "ss", ("source", f"gestured/{sensor}@{self._host}")),
             self._out.message(CURSOR, "s" + "i" * len(alive), ("alive", *alive)),
@@ -85,4 +89,7 @@ class TuioSink(UdpOut):
             place = (cursor.session, moved.x, 1.0 - moved.y, right, down, faster)
             messages.append(self._out.message(CURSOR, "sifffff", ("set", *place)))
         messages.append(self._out.message(CURSOR, "si", ("fseq", source.frames)))
-        self.send(self._out.bundle(*messages).dgram)
+        packet: bytes = self._out.bundle(*messages).dgram
+        if not alive:
+            source.idle = packet[:-4]
+        self.send(packet)

@@ -78,8 +78,11 @@ def test_each_frame_says_whose_it_is_who_is_alive_and_its_number(udp: socket.soc
     assert [sent()[1:] for _ in "12"] == [[["alive", 0, 1], ["fseq", 4]], [["alive"], ["fseq", 1]]]
     sink.publish(Touch("arm", 7, 0, "up", 11.0, 0.5, 0.875, 0.0, 0.0, 100.0, 4), 0.0)
     assert sent()[1:] == [["alive", 1], ["fseq", 5]]
+    sink.publish(Status("ok", {"leg": "ok"}, "m", 1.0), 0.0)
+    assert sent() == [["source", f"gestured/leg@{socket.gethostname()}"], ["alive"], ["fseq", 2]]
+    assert sent()[1:] == [["alive", 1], ["fseq", 6]]
     sink.close()  # as at a reload: what it has drawn is no more
-    assert sent()[1:] == [["alive"], ["fseq", 6]]
+    assert sent()[1:] == [["alive"], ["fseq", 7]]
 
 
 def test_it_needs_touch_events(tmp_path: Path, model: Path) -> None:
