@@ -111,13 +111,13 @@ class Conditioner:
             self._wide_at = look.t
         return 0 <= look.t - self._wide_at < WIDE_S
 
-    def settle(self, t: float, raw: Array, *, rests: bool = False, wide: bool = False) -> bool:
+    def settle(self, t: float, raw: Array, *, rests: bool = False, restless: bool = False) -> bool:
         """Offer a frame that may be idle; true when the sensor was learned from the second that ends here.
 
-        `rests`: something lies on the sensor that was not there when it was learned; `wide`: no finger, so that it is
-        learned with its movements where it never lies still.
+        `rests`: something lies on the sensor that was not there when it was learned; `restless`: it is no finger that
+        moves, so it is learned with its trembling where it never lies still.
         """
-        learned = self.idle.settle(t, raw, rests=rests, restless=wide)
+        learned = self.idle.settle(t, raw, rests=rests, restless=restless)
         if learned is None:
             return False
         self.taxels.stuck.learn(learned.constant)

@@ -124,6 +124,7 @@ class Memory:
     first: Stretch | None = field(init=False)  # the segment's first contact, if `contact` is its second
     quiet_since: float | None = field(init=False)  # s, the first quiet frame since the last touched one
     lately: Lately = field(init=False)  # how strongly the contact was pressed a moment ago
+    rests: Stretch = field(init=False)  # since when, given up, it has stayed where it is
     under: float = field(init=False)  # noise units, what lay there faintly before the contact rose out of it
 
     def __post_init__(self) -> None:
@@ -138,7 +139,7 @@ class Memory:
 
     def rise(self, t: float, under: float = 0.0) -> None:
         """A contact begins at `t` s, out of what lies there faintly, as active as `under` noise units."""
-        self.contact, self.lately, self.under = Stretch(t), Lately(t), under
+        self.contact, self.rests, self.lately, self.under = Stretch(t), Stretch(t), Lately(t), under
 
     @property
     def onset(self) -> float:

@@ -16,6 +16,7 @@ from gestured.core.cutter import Cutter
 from gestured.core.frames import Frame, Past, Segment
 from gestured.core.mounting import Mounting
 from gestured.core.segmenter import IDLE, Action, Deed, Segmenter
+from gestured.core.settling import PATIENCE_S
 from gestured.core.taxels import RUBBISH_S
 from gestured.core.timing import Pace, Timing
 
@@ -164,7 +165,8 @@ class FrontEnd:
             return found
         cutter.trim(t)
         if segmenter.phase.touched:
-            if conditioner.settle(t, raw, rests=True, wide=conditioner.wide(look)):  # what stays becomes the baseline's
+            rests = conditioner.wide(look) or t - segmenter.rests_since >= PATIENCE_S
+            if conditioner.settle(t, raw, rests=True, restless=rests):  # what stays becomes the baseline's
                 found += self._void("held")
         else:
             recovering = segmenter.after.recovering(t)
@@ -180,7 +182,7 @@ class FrontEnd:
         self.conditioner.touched(look)
         flickering = self.conditioner.taxels.flickering.rubbish or look.t - segmenter.onset < RUBBISH_S
         if self.conditioner.wide(look) and not flickering:
-            if self.conditioner.settle(look.t, look.raw, rests=True, wide=True):
+            if self.conditioner.settle(look.t, look.raw, rests=True, restless=True):
                 return self._void("held")  # an arm that lies still is no gesture, and something else may be
         else:
             self.conditioner.idle.unsettle()

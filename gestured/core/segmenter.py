@@ -32,6 +32,7 @@ from gestured.core.timing import Timing
 FAINT = 4.0  # times `on`: what lies there fainter than that for a while is not the beginning of a gesture
 RISE = 2.5  # times what lies there faintly: a contact that rises so high out of it is another one
 SWAY = 1.25  # times what lies there faintly: so far it may rise while the finger is off
+TREMBLES = 0.5  # times the way that a tap may move: what was given up and moves further does not lie there
 OFF_SHARE = 0.12  # of the contact's peak: below it the finger is off (textile recovers slowly)
 
 
@@ -152,6 +153,10 @@ def _lie(memory: Memory, t: float, activity: float, place: Place | None) -> None
     """What was given up still lies there."""
     memory.quiet_since = None
     memory.contact.touched = t
+    if place is not None:
+        memory.rests.follow(place)
+    if memory.rests.widest > TREMBLES * memory.travel:
+        memory.rests = Stretch(t)  # it moves
 
 
 def _part(memory: Memory, t: float, activity: float, place: Place | None) -> None:
@@ -258,6 +263,11 @@ class Segmenter:
     def second(self) -> bool:
         """Whether the segment's second contact has begun."""
         return self._memory.first is not None
+
+    @property
+    def rests_since(self) -> float:
+        """Since when, in s, what was given up has stayed where it is; since its onset where it never moved."""
+        return self._memory.rests.began
 
     @property
     def last_touched(self) -> float:

@@ -544,6 +544,29 @@ def test_what_is_hardly_wider_than_fingers_is_learned_like_an_arm(seconds: float
     assert abs(found.onset - 2.0 - seconds) < 0.15 and abs(found.offset - 2.4 - seconds) < 0.15
 
 
+@pytest.mark.parametrize("trembles", [0.02, 0.05, 0.1, 0.2])
+def test_something_narrow_that_trembles_is_learned_in_ten_seconds(trembles: float) -> None:
+    """The corner of a bag in a vehicle: it never lies still for a second, and must not keep the sensor deaf."""
+    rng = np.random.default_rng(1)
+
+    def corner(share: float) -> Array:
+        row, column = rng.normal(0, trembles / 2, 2)
+        return 0.4 * (1 + trembles * rng.normal()) * finger(6 + row, 1.5 + column, SHAPE)
+
+    swiped: Action = (0.4, lambda share: finger(7 - 6 * share, 6.5, SHAPE) + corner(share))
+    _, events = heard(*stream(SHAPE, [quiet(2), (11.0, corner), swiped, (1.5, corner)]))
+    assert kinds(events)[:3] == [Opened, Void, Ended] and segments(events)[-1].onset == pytest.approx(13.0, abs=0.15)
+    assert segments(events)[-1].offset == pytest.approx(13.4, abs=0.15)
+
+
+@pytest.mark.parametrize("turns", [4, 10, 20])
+def test_a_finger_that_goes_on_moving_is_never_learned(turns: int) -> None:
+    """A slider: however long it takes, one contact."""
+    moves: Action = (20.0, lambda share: finger(4, 4 + 3 * np.sin(2 * np.pi * turns * share), SHAPE))
+    _, events = heard(*stream(SHAPE, [quiet(2), moves, quiet(2), tap(SHAPE), quiet(1)]))
+    assert kinds(events) == [Opened, Void, Ended, *ONE] and events[2].offset == pytest.approx(22.0, abs=0.15)
+
+
 @settings(max_examples=40, deadline=None)
 @given(st.floats(2.0, 4.0), st.sampled_from([0.0, 50.0, 250.0, 350.0, 600.0, 2000.0]), seeds)
 def test_a_restart_with_another_baseline_at_any_moment(moment: float, level: float, seed: int) -> None:
