@@ -116,6 +116,23 @@ def test_packets_say_the_same_one_by_one_or_all_at_once(seed: int, monkeypatch: 
     assert known == known_alone
 
 
+def test_a_taxel_that_slowly_grows_noisy_is_found_alike() -> None:
+    """So slowly that no frame of it is a touch: only the review of the noise can find it."""
+    names, rng, arrived = [f"plain{n}" for n in range(EACH)], np.random.default_rng(0), list[Read]()
+    for k in range(4000):
+        loud = np.ones((EACH, 81))
+        loud[:3, 40] = np.exp(k / 1000)
+        values = np.rint(100 + 20 * loud * rng.normal(0, 1, loud.shape))
+        packets = [
+            (name, encoding.message(f"/{name}/pressure", "f" * 81, one.tolist()))
+            for name, one in zip(names, values, strict=True)
+        ]
+        arrived.append((k / 15, packets))
+    said, known = play(arrived, together=True)
+    assert repr((said, known)) == repr(play(arrived, together=False))
+    assert sum("bad_taxels=1" in str(one) for one in known) > 10
+
+
 def test_a_bug_in_a_pass_costs_no_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     arrived = reads(0)
     said, known = play(arrived, together=True)
