@@ -3,7 +3,7 @@
 # Two environments: .venv holds the runtime alone (what a vehicle gets), .venv-dev what tests and training need.
 # A stamp in each says that it is complete, so that the second run asks pip for nothing and works offline.
 
-.PHONY: help demo bridges test golden lint bench lab hostile fuzz soak install uninstall system-test \
+.PHONY: help demo bridges test golden lint bench figures lab hostile fuzz soak install uninstall system-test \
 	dist deb release package-test lock site clean
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
@@ -57,6 +57,9 @@ lint: .venv-dev/.dev .venv-dev/.lab  ## ruff and mypy
 
 bench: .venv-dev/.dev .venv-dev/.lab  ## speed as ratios measured side by side, some minutes: ARGS="--only decode start"
 	@.venv-dev/bin/python -m benchmarks $(ARGS)
+
+figures: .venv-dev/.dev .venv-dev/.lab  ## the documents' tables made again, some hours: ARGS=--stale lists what is old
+	@.venv-dev/bin/python -m experiments.figures $(ARGS)
 
 lab: .venv-dev/.dev .venv-dev/.lab  ## what training needs (torch), and how to train
 	@.venv-dev/bin/gestured-lab --help

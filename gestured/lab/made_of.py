@@ -1,7 +1,8 @@
-"""What a generated table was made of: one line above it with its command and the digests of models and files.
+"""What a generated table was made of: one line above it with its command and digests.
 
-A test compares the line with the files of the checkout, so that no table outlives the models that it speaks of.
-Where the table stands between marks of its own, the line also holds its digest, which finds figures edited by hand.
+The digests are of models and files, and of the code that decides. A test compares the line with the files of the
+checkout, so that no table outlives the models that it speaks of. Where the table stands between marks of its own, the
+line also holds its digest, which finds figures edited by hand.
 """
 
 import hashlib
@@ -10,17 +11,26 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from gestured.core.errors import GesturedError
-from gestured.lab.digest import file_digest
+from gestured.lab.digest import code_digest, file_digest
 
 SHOWN = 12  # digits of a SHA-256 that are written: no two files of a project share them
-LINE = re.compile(r"<!-- made by `([^`]+)` of ((?:\S+ [0-9a-f]{12}(?:, )?)+)(?:; block ([0-9a-f]{12}))? -->")
+LINE = re.compile(
+    r"<!-- made by `([^`]+)` of ((?:\S+ [0-9a-f]{12}(?:, )?)+)(?:; code (?P<code>[0-9a-f]{12}))?"
+    r"(?:; block [0-9a-f]{12})? -->"
+)
 BLOCK = re.compile(r"^<!-- ([^:\n]+): begin -->\n(.*?)^<!-- \1: end -->$", re.MULTILINE | re.DOTALL)
 OLDER = "**Made with models that no longer ship, or with older code; to be made again.**"  # stands below such a line
 
 
 def made_of(command: str, files: Iterable[Path]) -> str:
     """The line, for a table that `command` prints of these files."""
-    return f"<!-- made by `{command}` of {', '.join(f'{p.name} {file_digest(p)[:SHOWN]}' for p in files)} -->"
+    of = ", ".join(f"{path.name} {file_digest(path)[:SHOWN]}" for path in files)
+    return f"<!-- made by `{command}` of {of}; code {decides()} -->"
+
+
+def decides() -> str:
+    """The digest of the code that decides, from frames to events, as a line holds it."""
+    return code_digest("gestured.core.sensor")[:SHOWN]
 
 
 def renew(document: Path, name: str, lines: Iterable[str]) -> None:
@@ -50,7 +60,8 @@ def signed(lines: list[str]) -> list[str]:
     if at is None:
         return lines
     digest = hashlib.sha256("\n".join(lines[:at] + lines[at + 1 :]).encode()).hexdigest()[:SHOWN]
-    return [*lines[:at], LINE.sub(rf"<!-- made by `\1` of \2; block {digest} -->", lines[at]), *lines[at + 1 :]]
+    line = re.sub(r"(?:; block [0-9a-f]{12})? -->$", f"; block {digest} -->", lines[at])
+    return [*lines[:at], line, *lines[at + 1 :]]
 
 
 def edited(text: str) -> list[str]:

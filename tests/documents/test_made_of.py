@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from experiments.figures import made, with_data
 from gestured.core.errors import GesturedError
 from gestured.lab.made_of import BLOCK, LINE, OLDER, edited, made_of, renew, stale
 from gestured.lab.recordings.origin import said
@@ -70,7 +71,7 @@ def test_every_generated_table_says_what_it_was_made_of(name: str) -> None:
 def test_a_card_is_its_models(name: str) -> None:
     card = shipped()[name].with_suffix(".md").read_text()
     of = made_of("gestured-lab evaluate", [shipped()[name]])
-    assert re.findall(r"SHA-256 \| `([0-9a-f]{12})", card) == [of.split()[-2]]
+    assert re.findall(r"SHA-256 \| `([0-9a-f]{12})", card) == [LINE.fullmatch(of)[2].split()[-1]]  # type: ignore[index]
     learned = "real development recordings of CapFingerId" in card
     assert learned == any("capfingerid" in one.file for one in said(shipped()[name]) or [])
 
@@ -94,3 +95,24 @@ def test_a_changed_file_is_told_unless_the_document_says_so(tmp_path: Path) -> N
     (said,) = stale(text, [model])
     assert "line 1" in said and "`make it`" in said and "cnn_lstm.onnx" in said
     assert stale(f"{text}\n{OLDER}\n", [model]) == []
+
+
+def test_a_table_of_other_models_or_of_other_code_is_listed(tmp_path: Path) -> None:
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "models").mkdir()
+    (tmp_path / "models" / "manifest.json").write_text("{}")
+    line, page = made_of("make it", shipped().values()), tmp_path / "docs" / "page.md"
+    page.write_text(f"{line}\n{OLDER}\n")
+    assert [one.why for one in made(tmp_path)] == [""]
+    page.write_text(re.sub("(?<=code )[0-9a-f]{12}", "0" * 12, line) + "\n\n" + re.sub("; code .{12}", "", line))
+    assert [one.why for one in made(tmp_path)] == ["made with other code", "does not say with which code"]
+    page.write_text(f"\n{re.sub('(?<=cnn_lstm.onnx )[0-9a-f]{12}', '0' * 12, line)}\n{OLDER}\n")
+    assert [(one.number, one.why) for one in made(tmp_path)] == [(2, "made of another cnn_lstm.onnx")]
+
+
+def test_a_figure_without_its_data_says_what_is_missing(tmp_path: Path) -> None:
+    command = "gestured-lab evaluate --real FOLDER --document docs/figures.md"
+    for folder in (None, tmp_path / "none"):
+        assert "needs the folder of real recordings" in with_data(command, folder)
+    assert with_data(command, tmp_path)[-4:] == ["--real", str(tmp_path), "--document", "docs/figures.md"]
+    assert "none.npz, which is not here" in with_data(f"gestured-lab study --foreign {tmp_path / 'none.npz'}", None)

@@ -1,0 +1,106 @@
+"""`make figures`: every generated table of the documents, by the command that its own line names.
+
+    make figures ARGS=--stale                 what was made of other models or of other code, and why
+    make figures ARGS="--real ~/capfingerid"  make those again, one after the other; what is up to date is left alone
+
+An interrupted pass goes on where it was: what a command has written is up to date, and what a command only prints lies
+in build/figures with the models and the code that it was made with. Each command's duration is printed.
+"""
+
+import argparse
+import hashlib
+import shlex
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from gestured.lab.digest import file_digest
+from gestured.lab.made_of import LINE, decides, stale
+from gestured.model.shipped import shipped
+
+ROOT = Path(__file__).resolve().parents[1]
+KEPT = ROOT / "build" / "figures"
+
+
+class Made(NamedTuple):
+    """A line above a table: its page, its number from 1, its command, and why the table is stale (empty: it is not)."""
+
+    page: Path
+    number: int
+    command: str
+    why: str
+
+
+def made(root: Path) -> Iterator[Made]:
+    """All lines of a checkout that say what a table was made of, the order in which their commands are run."""
+    docs = root / "docs"
+    files = [*shipped().values(), root / "models" / "manifest.json", *docs.glob("*.json"), *docs.glob("*.svg")]
+    for page in [*sorted(docs.glob("*.md")), *sorted((root / "models").glob("*.md"))]:
+        for number, line in enumerate(page.read_text().splitlines(), 1):
+            if match := LINE.fullmatch(line.strip()):
+                others = {found.split(" was made of another ")[1].split()[0] for found in stale(line, files)}
+                why = [f"made of another {name}" for name in sorted(others)]
+                if match["code"] != decides():
+                    why.append("made with other code" if match["code"] else "does not say with which code")
+                yield Made(page, number, match[1], "; ".join(why))
+
+
+def with_data(command: str, real: Path | None) -> list[str] | str:
+    """A command's words, with the folder of real recordings in its place; or a sentence that says what is missing."""
+    words = shlex.split(command)
+    if "--real" in words:
+        if real is None or not real.is_dir():
+            return f'`{command}` needs the folder of real recordings: make figures ARGS="--real FOLDER"'
+        words[words.index("--real") + 1] = str(real)
+    if "--foreign" in words and not Path(given := words[words.index("--foreign") + 1]).is_file():
+        return f"`{command}` needs {given}, which is not here: python -m experiments.foreign.recordings {given}"
+    programs = Path(sys.executable).parent
+    return [str(programs / words[0]) if (programs / words[0]).exists() else words[0], *words[1:]]
+
+
+def run(one: Made, words: list[str]) -> bool:
+    """Run a command and keep what it prints; whether it ended well."""
+    of = f"{one.command} {decides()} {[file_digest(path) for path in shipped().values()]}"
+    key = hashlib.sha256(of.encode()).hexdigest()
+    kept, before, start = KEPT / f"{key[:12]}.txt", one.page.read_bytes(), time.monotonic()
+    if kept.exists():
+        print(f"printed before: {one.command}: {kept}")
+        return True
+    done = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
+    took = f"{time.monotonic() - start:.0f} s"
+    if done.returncode:
+        print(f"failed after {took}: {one.command}", file=sys.stderr)
+    elif one.page.read_bytes() != before:
+        print(f"written in {took}: {one.command}")
+    else:
+        KEPT.mkdir(parents=True, exist_ok=True)
+        kept.write_text(done.stdout)
+        print(f"printed in {took}: {one.command}: {kept}")
+    return not done.returncode
+
+
+def main() -> int:
+    """List what is stale, or make it again; 1 where something is or remains so."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--stale", action="store_true", help="list tables made of other models or code; make none")
+    parser.add_argument("--real", type=Path, metavar="FOLDER", help="the folder of real recordings")
+    args = parser.parse_args()
+    old = [one for one in made(ROOT) if one.why]
+    if args.stale:
+        for one in old:
+            print(f"{one.page.relative_to(ROOT)}:{one.number}: `{one.command}`: {one.why}")
+        return int(bool(old))
+    well = True
+    for one in {one.command: one for one in old}.values():
+        words = with_data(one.command, args.real)
+        if isinstance(words, str):
+            print(words, file=sys.stderr)
+        well &= not isinstance(words, str) and run(one, words)
+    return int(not well)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
