@@ -53,12 +53,12 @@ class Idle:
         self.smallest = 0.0  # counts, the smallest change of a sensor that stood still when it was learned; else 0
         self.bare: Bare | None = None  # what the sensor showed before something was laid on it that was learned
         self._settling = Settling()
-        self.offered = False  # whether a frame was offered since `unsettle`
+        self.offered = False  # whether `settle` was offered a frame since `unsettle`
         self.followed: float | None = None  # s, the last idle frame; None after a contact or a silence
         self.reviewed = 0.0  # s, when the noise was last looked at
         self.learned = 1.0  # counts, `level` as it was learned
         self.quieter = 0  # sum of the weights of the last glances that were quieter
-        self.compared: Array = np.zeros(taxels)  # the last raw counts, as far as they are needed
+        self.compared: Array = np.zeros(taxels)  # (N,) raw counts that those of the next glance are compared with
 
     def settle(self, t: float, raw: Array, *, rests: bool = False, restless: bool = False) -> Learned | None:
         """Offer (N,) counts that may be idle; what was learned, if a stable second ends here.
@@ -103,11 +103,19 @@ class Idle:
             return False
         jumps = np.abs(raw - self.compared)
         jumps = jumps[jumps > 0]
+        moved = jumps.size > 0
+        return self.glanced(t, raw, moved=moved, loud=moved and bool(QUIETER * median(jumps) >= self.learned))
+
+    def glanced(self, t: float, raw: Array, *, moved: bool, loud: bool) -> bool:
+        """Count a glance at `t` s at (N,) counts, in which some taxel `moved`, and taxels moved as when it was learned.
+
+        Whether too many glances were quieter by now; then what was learned is in doubt.
+        """
         self.glance, self.compared = t + GLANCE_S, raw
-        if jumps.size and QUIETER * median(jumps) >= self.learned:
+        if loud:
             self.quieter = 0
-        elif jumps.size or self.lively:
-            self.quieter += GLANCE if jumps.size else GLANCE_REPEATED
+        elif moved or self.lively:
+            self.quieter += GLANCE if moved else GLANCE_REPEATED
         if self.doubtful:
             self.doubt()
         return self.doubtful
@@ -176,27 +184,19 @@ class Idle:
 
 
 def mistaken(idles: Sequence[Idle], t: Array, raw: Array) -> list[bool]:
-    """What `Idle.mistaken` says of each of these, none of which is in doubt, by (n, N) counts at (n,) s."""
+    """What `Idle.mistaken` says of each of n sensors, none of which is in doubt, by (n, N) counts at (n,) s."""
     compared = np.concatenate([idle.compared for idle in idles]).reshape(raw.shape)
     jumps = np.sort(np.abs(raw - compared), axis=1)
     moved = np.count_nonzero(jumps, axis=1)  # the taxels that did not move are sorted before them
     first, rows = jumps.shape[1] - moved, np.arange(len(jumps))
     usual = (jumps[rows, first + (moved - 1) // 2] + jumps[rows, (first + moved // 2) % jumps.shape[1]]) / 2
     loud = (moved > 0) & (QUIETER * usual >= [idle.learned for idle in idles])
-    found = zip(idles, (t + GLANCE_S).tolist(), raw, moved.tolist(), loud.tolist(), strict=True)
-    for idle, again, shown, some, restless in found:
-        idle.glance, idle.compared = again, shown.copy()
-        if restless:
-            idle.quieter = 0
-        elif some or idle.lively:
-            idle.quieter += GLANCE if some else GLANCE_REPEATED
-        if idle.doubtful:
-            idle.doubt()
-    return [idle.doubtful for idle in idles]
+    found = zip(idles, t.tolist(), raw, (moved > 0).tolist(), loud.tolist(), strict=True)
+    return [idle.glanced(now, shown.copy(), moved=some, loud=as_loud) for idle, now, shown, some, as_loud in found]
 
 
 def seen(above: Array, sigma: Array) -> Array:
-    """Counts: how much taxels seem to move that are (..., N) counts off their baselines; `sigma` is what is known."""
+    """(..., N) counts, the noise that a frame shows of taxels so far off their baselines; `sigma`: the noise so far."""
     return np.minimum(np.abs(above), OUTLIER * sigma) * SIGMA_PER_DEVIATION
 
 
