@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gestured.lab.digest import file_digest
-from gestured.lab.made_of import LINE, decides, stale
+from gestured.lab.made_of import LINE, decides, digests, others
 from gestured.model.shipped import shipped
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -35,14 +35,13 @@ class Made(NamedTuple):
 
 
 def made(root: Path) -> Iterator[Made]:
-    """All lines of a checkout that say what a table was made of, the order in which their commands are run."""
+    """All lines of a checkout that say what a table was made of, in the order in which their commands are run."""
     docs = root / "docs"
-    files = [*shipped().values(), root / "models" / "manifest.json", *docs.glob("*.json"), *docs.glob("*.svg")]
+    now = digests([*shipped().values(), root / "models" / "manifest.json", *docs.glob("*.json"), *docs.glob("*.svg")])
     for page in [*sorted(docs.glob("*.md")), *sorted((root / "models").glob("*.md"))]:
         for number, line in enumerate(page.read_text().splitlines(), 1):
             if match := LINE.fullmatch(line.strip()):
-                others = {found.split(" was made of another ")[1].split()[0] for found in stale(line, files)}
-                why = [f"made of another {name}" for name in sorted(others)]
+                why = [f"made of another {name}" for name in others(match, now)]
                 if match["code"] != decides():
                     why.append("made with other code" if match["code"] else "does not say with which code")
                 yield Made(page, number, match[1], "; ".join(why))

@@ -13,7 +13,7 @@ import numpy as np
 
 from gestured.core.own import EXAMPLES
 from gestured.lab.cli import CACHE
-from gestured.lab.made_of import made_of, renew
+from gestured.lab.made_of import command_of, made_of, renew
 from gestured.lab.own.command import embedding_of
 from gestured.lab.own.learn import Seen, Trial, played_through
 from gestured.lab.own.play import played
@@ -75,7 +75,7 @@ def main() -> None:
     made = table(args.model.stem, figures(model.space, trials))
     print(made)
     if args.document:
-        line = made_of(f"python -m experiments.own {' '.join(sys.argv[1:])}", [args.model])
+        line = made_of(command_of(["python", "-m", "experiments.own", *sys.argv[1:]]), [args.model])
         renew(args.document, "own", [line, "", str(made)])
 
 

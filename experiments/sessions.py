@@ -20,7 +20,7 @@ from gestured.lab.everyday.hours import Hours, judged
 from gestured.lab.everyday.stretches import recorded
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
-from gestured.lab.made_of import made_of, renew
+from gestured.lab.made_of import command_of, made_of, renew
 from gestured.lab.quantiles import quantiles
 from gestured.lab.samples import WINDOW
 from gestured.lab.table import Table, Value
@@ -86,7 +86,7 @@ def main() -> None:
     head = ("", "minutes", "meant", "right", "wrong", "missed", "false", "95 % an hour", "deaf min an hour")
     table = Table("Real fingers, whole sessions as streams", head, [*rows, row("all", heard)])
     if args.document:
-        command = f"python -m experiments.sessions {' '.join(sys.argv[1:])}"
+        command = command_of(["python", "-m", "experiments.sessions", *sys.argv[1:]])
         renew(args.document, "sessions", [made_of(command, [args.models / f"{NET}.onnx"]), "", str(table)])
     print(table)
 

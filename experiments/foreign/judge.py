@@ -15,6 +15,7 @@ than one segment or event), or its one segment's label. Takes that nobody can re
 import argparse
 import json
 import math
+import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -31,7 +32,7 @@ from gestured.core.front_end import Cut, FrontEnd, Void
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.lab.dataset import Truth
-from gestured.lab.made_of import made_of, renew
+from gestured.lab.made_of import command_of, made_of, renew
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.record.judge import Performed, Tally
@@ -241,7 +242,7 @@ def show_shipped(args: argparse.Namespace) -> None:
     """Print the table of all shipped models; put it where --document wants it."""
     results = {name: judged(name, args)[0] for name in shipped()}
     rows = {name: [row(name, level, found) for level, found in result.items()] for name, result in results.items()}
-    command = f"python -m experiments.foreign.judge --n {args.n} --level {' '.join(args.level)}"
+    command = command_of(["python", "-m", "experiments.foreign.judge", *sys.argv[1:]])
     above = [made_of(command, shipped().values()), "", *HEAD]
     table = [*above, *(line for lines in rows.values() for line in lines)]
     print(json.dumps(results, indent=1) if args.json else "\n".join(table))

@@ -22,7 +22,7 @@ from gestured.core.classifier import NEAR
 from gestured.core.frames import Segment
 from gestured.core.own import EXAMPLES
 from gestured.lab.dataset import cuts
-from gestured.lab.made_of import made_of, renew
+from gestured.lab.made_of import command_of, made_of, renew
 from gestured.lab.table import Table
 from gestured.model.model import Model
 from gestured.model.opening import open_model
@@ -128,7 +128,7 @@ def main() -> None:
     table = judge(open_model(args.model), args.people, args.level)
     print(table)
     if args.document:
-        command = f"python -m experiments.foreign.own {' '.join(sys.argv[1:])}"
+        command = command_of(["python", "-m", "experiments.foreign.own", *sys.argv[1:]])
         renew(args.document, "other hands", [made_of(command, [shipped()[args.model]]), "", str(table)])
 
 

@@ -14,6 +14,7 @@ from gestured.core.errors import GesturedError
 from gestured.core.listening import Arming
 from gestured.core.points import STRICTNESS, USUAL
 from gestured.lab.everyday import FIRST as FIRST_DAY
+from gestured.lab.made_of import command_of
 from gestured.lab.recordings.flags import add_recordings
 
 CACHE = Path(".cache/lab")
@@ -144,7 +145,7 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = parser().parse_args(arguments)
-    args.words = " ".join(["gestured-lab", *(sys.argv[1:] if arguments is None else arguments)])
+    args.words = command_of(["gestured-lab", *(sys.argv[1:] if arguments is None else arguments)])
     try:
         program = _program(args.command)
         _check(args)

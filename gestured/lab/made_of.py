@@ -7,7 +7,8 @@ line also holds its digest, which finds figures edited by hand.
 
 import hashlib
 import re
-from collections.abc import Iterable
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from gestured.core.errors import GesturedError
@@ -24,8 +25,20 @@ OLDER = "**Made with models that no longer ship, or with older code; to be made 
 
 def made_of(command: str, files: Iterable[Path]) -> str:
     """The line, for a table that `command` prints of these files."""
-    of = ", ".join(f"{path.name} {file_digest(path)[:SHOWN]}" for path in files)
+    of = ", ".join(f"{name} {digest}" for name, digest in digests(files).items())
     return f"<!-- made by `{command}` of {of}; code {decides()} -->"
+
+
+def command_of(words: Sequence[str]) -> str:
+    """A command as a page names it: no folder of the machine that ran it, and not on how many of its cores."""
+    left, found = iter(words), list[str]()
+    for word in left:
+        if word in ("--cache", "--jobs", "--real"):
+            next(left, None)
+            found += ["--real", "FOLDER"] if word == "--real" else []
+        else:
+            found.append(word)
+    return shlex.join(found)
 
 
 def decides() -> str:
@@ -83,13 +96,21 @@ def _marks(name: str) -> tuple[str, str]:
 
 def stale(text: str, files: Iterable[Path]) -> list[str]:
     """Of the lines in a text those that name another file than these, and do not say so (`OLDER`), in words."""
-    now = {path.name: file_digest(path)[:SHOWN] for path in files}
-    lines, found = text.splitlines(), []
+    now, lines, found = digests(files), text.splitlines(), list[str]()
     for number, line in enumerate(lines):
         match = LINE.fullmatch(line.strip())
-        if match is None or OLDER in lines[number + 1 : number + 3]:
-            continue
-        for name, digest in (part.split() for part in match[2].split(", ")):
-            if now.get(name) != digest:
-                found.append(f"line {number + 1}: `{match[1]}` was made of another {name} ({digest}); run it again")
+        if match is not None and OLDER not in lines[number + 1 : number + 3]:
+            for name in others(match, now):
+                found.append(f"line {number + 1}: `{match[1]}` was made of another {name}; run it again")
     return found
+
+
+def digests(files: Iterable[Path]) -> dict[str, str]:
+    """The digests of files as a line holds them, by name."""
+    return {path.name: file_digest(path)[:SHOWN] for path in files}
+
+
+def others(line: re.Match[str], now: Mapping[str, str]) -> list[str]:
+    """The names of the files of a `LINE` whose digests are not what they are `now`."""
+    named = (part.split() for part in line[2].split(", "))
+    return [name for name, digest in named if now.get(name) != digest]

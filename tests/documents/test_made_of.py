@@ -7,7 +7,7 @@ import pytest
 
 from experiments.figures import made, with_data
 from gestured.core.errors import GesturedError
-from gestured.lab.made_of import BLOCK, LINE, OLDER, edited, made_of, renew, stale
+from gestured.lab.made_of import BLOCK, LINE, OLDER, command_of, edited, made_of, renew, stale
 from gestured.lab.recordings.origin import said
 from gestured.model.shipped import shipped
 from tests.documents.blocks import ROOT, documents
@@ -95,6 +95,11 @@ def test_a_changed_file_is_told_unless_the_document_says_so(tmp_path: Path) -> N
     (said,) = stale(text, [model])
     assert "line 1" in said and "`make it`" in said and "cnn_lstm.onnx" in said
     assert stale(f"{text}\n{OLDER}\n", [model]) == []
+
+
+def test_a_page_names_no_folder_of_the_machine_that_made_its_table() -> None:
+    words = "gestured-lab evaluate --cache /home/me/cache --real /home/me/data --jobs 2 --document docs/figures.md"
+    assert command_of(words.split()) == "gestured-lab evaluate --real FOLDER --document docs/figures.md"
 
 
 def test_a_table_of_other_models_or_of_other_code_is_listed(tmp_path: Path) -> None:
