@@ -12,9 +12,9 @@ from gestured.core.hub import Hub
 from gestured.core.scene import Scene
 from gestured.record.replay import Mute
 
-SETTLE_S = 1.6  # after which each sensor is known
-READS = 160  # of which the cost is measured
-NEVER = 1 << 30  # sensors: so many do not wait
+SETTLE_S = 1.6  # s, after which each idle sensor is learned
+READS = 160  # reads whose cost is measured, after that
+NEVER = 1 << 30  # sensors, for `idle_pass.FEW`: so many never wait together, so each frame is taken by itself
 
 
 def idle_frames() -> list[Row]:

@@ -112,7 +112,7 @@ def follow() -> Row:
     rows, columns = np.mgrid[:9, :9]
     noise, form = np.random.default_rng(0).normal(0, 2, (2 * HELD, 9, 9)), Form("bench", plain=True)
     frames = [1000 + each for each in noise]
-    for k in range(HELD):  # after as many of the idle sensor
+    for k in range(HELD):  # the first half of the frames shows the idle sensor
         row, column = 4 + 2 * np.sin(k / 9), 1 + 6 * k / HELD
         frames[HELD + k] += 300 * np.exp(-((rows - row) ** 2 + (columns - column) ** 2) / 1.6)
     packets = [form.packet(Frame(0.0, frame), 0, 0.0) for frame in frames]

@@ -24,7 +24,7 @@ from tests.symmetries import Property, doubled, mirrored, on_grid, postponed, ra
 COUNT = 60  # enough that LEAST lets one label differ
 LEAST = 0.98  # of the labels, where a learned net decides
 # Frames that come twice halve the noise that a sensor is measured to have, and the verifier sees how far a contact
-# stands out from it: since it does, one label in twelve changes there between a gesture and unknown.
+# stands out from it. So some labels change there between a gesture and unknown.
 LEAST_DOUBLED = 0.9
 numbers = st.integers(0, COUNT - 1)
 changes = st.one_of(

@@ -27,7 +27,7 @@ class Gate:
         self._path, self._counts = path, counts
         self._said = ""  # why the last command failed
         self._due = 0.0  # monotonic s, when what is closed is repeated
-        self._obeyed = False  # since the daemon's last status: that may have been on its way before it did as we asked
+        self._obeyed = False  # whether the daemon did as asked since its last status; the next may be older than that
 
     def obey(self, sensor: str, command: str) -> list[str]:
         """Carry out a command; returns the gates of the sensor that are closed now. Raises GesturedError."""

@@ -23,7 +23,7 @@ BELOW_SHARE = 0.3  # of the highest taxel: taxels less deep than that share may 
 DRIFTED = 0.1  # of the activity of what rested: so far the bare sensor may have drifted meanwhile
 WIDE_PEAK = 0.5  # of the highest taxel: the taxels above it tell how wide a contact is
 WIDE, WIDE_TAXELS = 0.1, 6  # share of all taxels, and taxels at least, from which on that is no finger, nor two of them
-WIDE_S = 0.5  # an elbow's few taxels are wide in one frame and not in the next: so long it counts as wide
+WIDE_S = 0.5  # s after a wide frame in which a contact counts as wide: an elbow presses about WIDE_TAXELS
 SHIFTED, SHIFTED_OF = 3, 20  # taxels: where so many of so many lie far below the baseline, no touch does that
 
 
@@ -114,8 +114,8 @@ class Conditioner:
     def settle(self, t: float, raw: Array, *, rests: bool = False, restless: bool = False) -> bool:
         """Offer a frame that may be idle; true when the sensor was learned from the second that ends here.
 
-        `rests`: something lies on the sensor that was not there when it was learned; `restless`: it is no finger that
-        moves, so it is learned with its trembling where it never lies still.
+        `rests`: something lies on the sensor that was not there when it was learned. `restless`: that thing is no
+        moving finger, so the sensor is learned with its trembling if no second passes without.
         """
         learned = self.idle.settle(t, raw, rests=rests, restless=restless)
         if learned is None:
@@ -139,7 +139,7 @@ class Conditioner:
         flickering = self.taxels.flickering
         if flickering.any or self.taxels.frozen.any:
             self._watch(look)
-        since, idle.followed = idle.followed, t  # None: a contact or a silence lies between
+        since, idle.followed = idle.followed, t  # `since` is None after a contact or a silence
         if since is None:
             return
         self.activity.follow(t, since, look.activity)

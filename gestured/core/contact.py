@@ -12,7 +12,7 @@ ON_SHARE = 0.20  # of a contact's peak: a frame of it is strong from there on, a
 RECOVERY_S = 1.0  # time constant with which the after-effect fades, and for how long a contact is followed by it
 AFTER_S = 8.0  # after so long nothing is left of a contact: a firm finger has faded below the noise
 SPIKE = 4.0  # times the second highest frame: the most that a peak in one frame alone counts
-SPAN_S = 0.15  # spans in which it is remembered how strongly a contact was pressed lately
+SPAN_S = 0.15  # the length of a span; of three spans it is remembered how strongly the contact was pressed
 FIRM = 8.0  # times `on`: the least that the second highest frame counts, since a tap may have a single frame
 
 
@@ -46,7 +46,7 @@ class Lately:
         self._tops = (0.0, 0.0, 0.0)  # noise units, the highest activity of three spans, the latest last
 
     def before(self, t: float, activity: float) -> float:
-        """Take a frame at `t` s; the highest activity before its span, 0 where less than two spans had been seen."""
+        """Take a frame at `t` s; the highest activity of the two spans before it, 0 where there are not two yet."""
         older, old, latest = self._tops
         if t - self._since >= SPAN_S:
             older, old, latest, self._since = old, latest, 0.0, t
@@ -124,8 +124,8 @@ class Memory:
     first: Stretch | None = field(init=False)  # the segment's first contact, if `contact` is its second
     quiet_since: float | None = field(init=False)  # s, the first quiet frame since the last touched one
     lately: Lately = field(init=False)  # how strongly the contact was pressed a moment ago
-    rests: Stretch = field(init=False)  # since when, given up, it has stayed where it is
-    under: float = field(init=False)  # noise units, what lay there faintly before the contact rose out of it
+    rests: Stretch = field(init=False)  # since when a contact that was given up has stayed in its place
+    under: float = field(init=False)  # noise units, the activity of what lay there before the contact rose above it
 
     def __post_init__(self) -> None:
         self.after = AfterEffect(self.on)
@@ -138,7 +138,7 @@ class Memory:
         self.rise(0.0)
 
     def rise(self, t: float, under: float = 0.0) -> None:
-        """A contact begins at `t` s, out of what lies there faintly, as active as `under` noise units."""
+        """A contact begins at `t` s, above something that lies there with an activity of `under` noise units."""
         self.contact, self.rests, self.lately, self.under = Stretch(t), Stretch(t), Lately(t), under
 
     @property

@@ -28,19 +28,24 @@ FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one 
 REMEMBERED = 4096  # sensors that gave up their place, of which the last sequence and id are remembered
 HOSTS = 1024  # hosts of which it is remembered whether they may send
 
-AS_EXPECTED = (0, "", False, False)  # what follows the time in the stamp of a frame before which nothing is missing
+AS_EXPECTED = (
+    0,
+    "",
+    False,
+    False,
+)  # a stamp without its time, where no frame was lost and the sensor goes on as before
 
 _new = tuple.__new__  # Arrived(...) takes twice the time
 
 
 class Waiting:
-    """The frames of a sensor among the packets of one call, of which so many have been taken."""
+    """The frames of one sensor among the packets of one call; the first `taken` of them are done."""
 
     __slots__ = ("arrivals", "sensor", "stamps", "taken")
 
     def __init__(self, sensor: Sensor, first: Arrival) -> None:
         self.sensor, self.arrivals, self.taken = sensor, [first], 0
-        self.stamps: Any = None  # a list of `Stamp`, or the bug on which that failed; None until it is asked
+        self.stamps: Any = None  # a list of `Stamp`, or the bug that `Sensor.stamp` met; None before it was asked
 
     def goes_on(self) -> bool:
         """Whether an idle pass may take the next frame: there is one, and it came as expected."""
@@ -141,7 +146,7 @@ class Hub:
                         [one.stamps[one.taken].t for one in going],
                         [one.arrivals[one.taken].values for one in going],
                     )
-                except Exception as error:  # a bug: what has not been taken is then taken by itself
+                except Exception as error:  # a bug in the pass: frames that it has not taken are taken one by one
                     facts.append(Fault(None, error))
                     found = [one.sensor.front_end.pace.last == one.stamps[one.taken].t for one in going]
                 going = list(compress(going, found))

@@ -31,9 +31,9 @@ _new = tuple.__new__  # Look(...) takes twice the time
 
 
 def take(fronts: Sequence[FrontEnd], times: Sequence[float], values: Sequence[NDArray[np.generic]]) -> list[bool]:
-    """Take a frame of each of these calm sensors of one `kind`, where it is idle; whether it was, and was taken.
+    """Take one frame of each of n calm sensors of one `FrontEnd.kind`, where the frame is idle; (n,) whether it was.
 
-    Each comes with its time in s, and its (R, C) counts as they were sent. No frame was lost before it.
+    `times` are in s, `values` (R, C) counts as they were sent. No frame was lost before any of them.
     """
     first, paces = fronts[0], [front.pace for front in fronts]
     conditioners = [front.conditioner for front in fronts]
@@ -66,8 +66,9 @@ def take(fronts: Sequence[FrontEnd], times: Sequence[float], values: Sequence[ND
     due = (taken & (t - reviewed >= REVIEW_S)).nonzero()[0]
     found = _reviewed([fronts[n] for n in due.tolist()], t[due], above[due], usual[due]) if due.size else None
     if found is not None:
-        taken[due[found.noisy]] = False  # whose taxels are to be looked at one by one
-    # Up to here nothing of a sensor has changed that `push` does not find again, and from here on each by itself.
+        taken[due[found.noisy]] = False  # `push` looks for the taxels that are bad
+    # So far only glances were counted, so a bug until here costs nothing: `push` can take each frame from the start.
+    # From here on sensors change one after the other, and `pace.last` says of which the frame is taken.
     done: list[bool] = taken.tolist()
     rows = zip(
         fronts, values, times, paces, idles, activities, raw, above, counts,
@@ -79,7 +80,7 @@ def take(fronts: Sequence[FrontEnd], times: Sequence[float], values: Sequence[ND
         front.cutter.trim(now)
         front.shown, front.look, activity.usual = sent, look, mean
         idle.followed, idle.counts = now, baseline.copy()  # a view would keep the rows of all others in memory
-        pace.interval_s, pace.last = interval, now  # at the end: it says that the frame is taken, whatever comes next
+        pace.interval_s, pace.last = interval, now  # the last step: it says that the frame is taken
     if found is not None:
         for n, deviation, level, larger, weighed in zip(due.tolist(), *found[:4], strict=True):
             if done[n]:
@@ -90,13 +91,13 @@ def take(fronts: Sequence[FrontEnd], times: Sequence[float], values: Sequence[ND
 
 
 class _Reviewed(NamedTuple):
-    """What a review of n sensors gives."""
+    """The noise of n sensors after a review, and what follows from it."""
 
     sigma: Array  # (n, N) counts
     level: Array  # (n,) counts
-    scale: Array  # (n,)
-    weight: Array  # (n, N)
-    noisy: NDArray[np.bool_]  # (n,) whether a taxel of the sensor is
+    scale: Array  # (n,) as in `Activity`
+    weight: Array  # (n, N) as `weigh` gives it
+    noisy: NDArray[np.bool_]  # (n,) whether some taxel of the sensor is much noisier than the others
 
 
 def _reviewed(fronts: Sequence[FrontEnd], t: Array, above: Array, usual: Array) -> _Reviewed:
@@ -116,10 +117,10 @@ def _reviewed(fronts: Sequence[FrontEnd], t: Array, above: Array, usual: Array) 
 
 
 def _shares(ago: Array, tau: float) -> Array:
-    """(n,) which share of a difference is followed with that time constant, of (n,) times up to 0 in s."""
+    """(n,) shares of a difference that a follower with time constant `tau` s takes up in (n,) times `-ago` s."""
     return np.array([-math.expm1(one) for one in (ago / tau).tolist()])
 
 
 def _rows(each: list[Array]) -> Array:
-    """(n, N) of n times (N,)."""
+    """n arrays (N,) as the rows of one, (n, N)."""
     return np.concatenate(each).reshape(len(each), -1)

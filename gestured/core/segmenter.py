@@ -9,7 +9,7 @@ Activity is the strongest spot of a frame in units of noise. The cases, and what
     flicker      ###.####..         one contact: a single quiet frame is shorter than `release_s`
     hold         ############...    after `limit_s` cancelled ("held"); nothing more until it is let go
     object       ###############    cancelled as a hold, sooner if it is wide; the baseline learns it: idle again
-    on an edge   ....:::##::::      what lies there faintly, and a finger that rises out of it: a segment of the finger
+    on an edge   ....:::##::::      something faint lies there, and a finger comes beside it: a segment of the finger
     silence      ####     ...       cancelled ("silence") after `stale_s` without a frame
     glitch       |                  shorter than any finger at a fast sensor: cancelled ("glitch")
 
@@ -29,10 +29,10 @@ from gestured.core.activity import hardly_ever, rarely
 from gestured.core.contact import ON_SHARE, Memory, Place, Stretch
 from gestured.core.timing import Timing
 
-FAINT = 4.0  # times `on`: what lies there fainter than that for a while is not the beginning of a gesture
-RISE = 2.5  # times what lies there faintly: a contact that rises so high out of it is another one
-SWAY = 1.25  # times what lies there faintly: so far it may rise while the finger is off
-TREMBLES = 0.5  # times the way that a tap may move: what was given up and moves further does not lie there
+FAINT = 4.0  # times `on`: up to that activity something may lie on the sensor and be no gesture: the edge of an arm
+RISE = 2.5  # times the activity of what lies there: a contact that becomes so active is a finger beside it
+SWAY = 1.25  # times the activity of what lies there: it may grow so far, and still the finger counts as off
+TREMBLES = 0.5  # of the way that a tap may move: a contact that was given up and moves further is a finger, not a thing
 OFF_SHARE = 0.12  # of the contact's peak: below it the finger is off (textile recovers slowly)
 
 
@@ -42,7 +42,7 @@ class Signal(IntEnum):
     QUIET = auto()
     WEAK = auto()
     STRONG = auto()
-    ROSE = auto()  # far above what had lain there faintly, so that is no part of it
+    ROSE = auto()  # far more active than what has lain there for a while: a finger beside it
     MOVED = auto()  # the second contact is no tap, so it does not belong to the first
     RELEASED = auto()  # quiet for `release_s`
     TAPPED = auto()  # quiet for `release_s` after one tap, so that a second tap may follow
@@ -54,7 +54,7 @@ class Action(IntEnum):
     """What the front end has to do."""
 
     OPEN = auto()  # a contact begins
-    RISE = auto()  # the contact begins only here: what came before lay there already
+    RISE = auto()  # the contact begins anew: what was touched before belongs to something that lies there
     CLOSE = auto()  # the segment is over
     SPLIT = auto()  # the first contact is a segment, the second one begins another
     HELD = auto()  # give the contact up: no segment is made of it
@@ -72,7 +72,7 @@ def _untouched(memory: Memory, t: float) -> tuple[float, float]:
 def _touched(memory: Memory, t: float) -> tuple[float, float]:
     """A finger is off below a share of its own peak, and back above a larger one: hysteresis.
 
-    Where it rose out of something that lies there faintly, the shares are of what it rose by.
+    Where something faint lies there as well, the shares are of what the finger adds to its activity.
     """
     under = memory.under
     risen = memory.after.peak - under
@@ -132,7 +132,7 @@ def _touch(memory: Memory, t: float, activity: float) -> Signal | None:
         elif 0 < lay <= FAINT * memory.on and activity >= RISE * lay:
             rose = Signal.ROSE
             memory.after.begin()
-            memory.rise(t, lay)  # what came before lies there faintly: the edge of an arm that has shifted
+            memory.rise(t, lay)  # a finger beside something faint, such as the edge of an arm that has shifted
     memory.after.touch(activity)
     memory.contact.touched = t
     memory.quiet_since = None
@@ -156,7 +156,7 @@ def _lie(memory: Memory, t: float, activity: float, place: Place | None) -> None
     if place is not None:
         memory.rests.follow(place)
     if memory.rests.widest > TREMBLES * memory.travel:
-        memory.rests = Stretch(t)  # it moves
+        memory.rests = Stretch(t)  # a finger that goes on moving does not lie there
 
 
 def _part(memory: Memory, t: float, activity: float, place: Place | None) -> None:
@@ -266,7 +266,7 @@ class Segmenter:
 
     @property
     def rests_since(self) -> float:
-        """Since when, in s, what was given up has stayed where it is; since its onset where it never moved."""
+        """When a contact that was given up moved last, in s; its onset where it has stayed in its place since then."""
         return self._memory.rests.began
 
     @property

@@ -154,7 +154,7 @@ class Sensor:
                 self._fingers.begin(self.segments)
                 told.append(Onset(self.name, self.segments, one.onset))
             elif isinstance(one, Ended):
-                told[:0] = self._fingers.end(self.front_end.baseline)  # a follower hears first that it has left
+                told[:0] = self._fingers.end(self.front_end.baseline)  # the fingers' `up` comes before the release
                 told.append(Release(self.name, self.segments, one.offset))
             else:
                 told += self._decide(one) if isinstance(one, Cut) else [self._cancelled(one.reason)]
@@ -284,7 +284,7 @@ class Sensor:
         return stamps
 
     def passed(self, now: float, facts: list[Fact]) -> None:
-        """An idle pass has taken a frame that arrived at `now`: let those look on whom it may tell something."""
+        """Show `Habits` a frame that an idle pass has taken at `now`: it learns from idle frames, too."""
         if not self._square:
             try:
                 self._habits.see(self.front_end)
@@ -302,7 +302,7 @@ class Sensor:
     ) -> float:
         """Take frames that were found waiting at `now`, with what `stamp` gave of them; gives `arrives` as it is then.
 
-        So many of them, the first ones, were `taken` by idle passes.
+        The first `taken` of them are done: idle passes have taken them.
         """
         if isinstance(stamps, Exception):
             self._recover(stamps, self._stamper.at(now), facts)

@@ -95,7 +95,7 @@ class Stamper:
         return stamps
 
     def _alone(self, arrival: Arrival, arrived: float) -> Stamp:
-        """The stamp of a frame that shares its time with no other: the same as by `_place`, at a third of the price."""
+        """The stamp of a frame that shares its time with no other: the same as by `_place`, with fewer steps."""
         steps, dropped, restarted = ONE
         _, _, counter, tag, _ = arrival
         before = self._counter

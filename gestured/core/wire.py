@@ -116,7 +116,7 @@ class Decoder:
         self._keep_touches = keep_touches
         self._layouts = Layouts()
         self._routes: dict[tuple[str, str], _Route] = {}  # a memo, bounded
-        self._forms: dict[tuple[object, ...], int] = {}  # another one
+        self._forms: dict[tuple[object, ...], int] = {}  # a number for each form, which is compared faster
         self._numbers = count()
         self._pending: dict[tuple[Hashable, str], tuple[Touch, ...]] = {}  # touches that wait for their frame
 

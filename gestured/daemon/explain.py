@@ -129,7 +129,7 @@ def _own(settings: Settings) -> tuple[list[str], list[str]]:
 
 
 def _armed(settings: Settings) -> dict[str, ArmingSettings | None]:
-    """What arms which sensors."""
+    """By which sensors they are for: the settings of what arms them, None where nothing does."""
     return {"all sensors": settings.arming} | {f"sensor {name}": own.arming for name, own in settings.sensors.items()}
 
 

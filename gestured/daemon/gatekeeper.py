@@ -13,7 +13,7 @@ from gestured.daemon.desk import Desk
 from gestured.daemon.log import Throttle
 from gestured.daemon.request import Parameter, Refusal, Reply, Verb
 
-BRIDGES_GATES = MOST_GATES // 2  # of these: no bridge can use up the names with which an operator silences sensors
+BRIDGES_GATES = MOST_GATES // 2  # gates that bridges may keep closed at a time, so that names are left for an operator
 LOGGED = 8  # log lines of one bridge in log.PERIOD_S; further ones are counted
 LONGEST_S = 1e9  # for which a gate may be closed; some thirty years
 NAME = "name, 1 to 64 of A-Z a-z 0-9 _ -"

@@ -28,7 +28,7 @@ class Source:
 
     cursors: dict[tuple[int, int], Cursor] = field(default_factory=dict)
     frames: int = 0
-    idle: bytes = b""  # a frame without fingers, but for its number at the end: a thousand sensors say it each second
+    idle: bytes = b""  # the packet of a frame without fingers, but for its last four bytes, the frame's number
 
 
 class TuioSink(UdpOut):

@@ -170,7 +170,7 @@ class Receiver:
     def _datagrams(self, found: list[tuple[bytes, bytes, Source]], now: float) -> list[Datagram]:
         """The packets that were found with the times of their arrival, which never go back."""
         stamps = b"".join([stamp for _, stamp, _ in found])
-        if len(stamps) == TIMESTAMP.size * len(found):  # all at once: this is a part of each packet's price
+        if len(stamps) == TIMESTAMP.size * len(found):  # all at once, since each packet has one
             seconds, nanoseconds = np.frombuffer(stamps, np.int64).reshape(-1, 2).T
             came = np.minimum(now, np.maximum(self._empty, seconds + nanoseconds / 1e9 - self._wall))
         else:

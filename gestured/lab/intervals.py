@@ -1,7 +1,7 @@
 """95 % intervals over people: gestures of one person are alike, so people are what was drawn.
 
-Drawing six or ten people anew, as the percentile bootstrap does, covers the truth in 83 to 90 % of cases. Here the
-spread of a ratio over people (linearised, with their number less one) is taken with Student's t, on the logit of a
+Drawing six or ten people anew, as the percentile bootstrap does, covers the truth too seldom. Here
+the spread of a ratio over people (linearised, with their number less one) is taken with Student's t, on the logit of a
 share and on the logarithm of a rate.
 """
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 CONFIDENCE_LEVEL = 0.95
-RULE_OF_THREE = 3.0  # none among n: the truth is at most 3 / n, at 95 %
+RULE_OF_THREE = 3.0  # where none of n was counted, the true share is at most 3 / n, at 95 %
 
 
 def interval(right: ArrayLike, people: ArrayLike) -> tuple[float, float, float]:
@@ -40,7 +40,7 @@ def interval(right: ArrayLike, people: ArrayLike) -> tuple[float, float, float]:
 def rate(counts: ArrayLike, hours: ArrayLike) -> tuple[float, float]:
     """(P,) how often something happened to each person in (P,) hours -> the ends of the rate's interval.
 
-    At none the upper end is that of a Poisson count. Of one person it is drawn as if things came by chance.
+    Where nothing happened the upper end is that of a Poisson count. Of one person the interval is that of chance alone.
     """
     found, spent = np.asarray(counts, np.float64), np.asarray(hours, np.float64)
     if not found.any():

@@ -16,7 +16,7 @@ UNNAMED = "other"  # the label of what was performed without anybody knowing whi
 MAX_FRAMES = 1 << 24  # of a file: twelve days at 15 Hz; checking their times takes a multiple of their size
 RECORDINGS = 1 << 20  # of a file, and as many events; each of their texts is checked alone
 CHARACTERS = 1024  # of one text
-LATEST_S = 1e11  # of any clock: later than every date, and less than milliseconds since 1970
+LATEST_S = 1e11  # s, the latest time of a frame: the year 5138, and less than today in milliseconds since 1970
 LARGEST = float(np.finfo(np.float32).max)  # counts, as a sensor can send them
 DAY = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 # What a field holds, and its shape: N frames of R x C taxels, G recordings, E performed events.

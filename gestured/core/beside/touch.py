@@ -22,12 +22,12 @@ Mask = NDArray[np.bool_]
 
 EACH_S = 0.0166  # from one move of a finger to the next: 60 a second, a little less than 1/60 because times are rounded
 GONE_S = 0.1  # a finger that was not seen for so long has left, as in `Timing.release_s`; at 15 Hz two frames
-PART_S = 0.5  # of the time in which a taxel must not have changed
-PARTS = 2  # such times, so a second
-CHANGE = 0.35  # of a taxel's level: what changes by less trembles
-RESTLESS = 8.0  # noise units: nor is that a change
-LEFT = 0.9  # of the level at which it lay: below that a finger has left its place
-BESIDE = 3.0  # pitches: what comes up so near to a finger that has left its place is that finger
+PART_S = 0.5  # s, the length of one part of the time in which a taxel must not have changed
+PARTS = 2  # parts of PART_S: a taxel that has not changed for a second lies still
+CHANGE = 0.35  # of a taxel's level: a taxel that changes by less trembles, and lies still all the same
+RESTLESS = 8.0  # noise units: a taxel that changes by less than that lies still, too
+LEFT = 0.9  # of the level at which a finger lay: where its taxel shows less, the finger has left that place
+BESIDE = 3.0  # taxel pitches: a touch that begins so near to a place that a finger has left is that finger
 
 
 class Lying:
@@ -119,7 +119,7 @@ class Fingers:
         self._baseline: Array | None = None  # (N,) counts, as it was before anything of the contact was learned
 
     def end(self, baseline: Array | None = None) -> list[Touch]:
-        """The contact is over: each finger that was told of is up, or was learned, as the (N,) `baseline` now shows."""
+        """The contact is over: `up` for each finger that was told of. The (N,) `baseline` shows which were learned."""
         fingers, self._fingers = [one for one in self._fingers if one.number >= 0], []
         if baseline is None or self._baseline is None or baseline is self._baseline:
             return [self._tell(one, "up") for one in fingers]

@@ -23,7 +23,7 @@ from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER, shipped
 from gestured.record.files import PUBLIC, atomic_write
 
-LEAST_S = 1.0  # of all recordings together: what comes in less cannot be told by the hour
+LEAST_S = 1.0  # s, the least that all recordings together last: a rate by the hour needs some time
 
 
 @cache
