@@ -10,14 +10,13 @@ raised, since a daemon in a vehicle that dies of one sensor's odd frame helps no
 
 import math
 from collections.abc import Collection, Iterable, Sequence
-from itertools import compress
-from typing import Any
 
 from gestured.core import idle_pass
 from gestured.core.beside.reading import Reading, View
 from gestured.core.classifier import Classifier
 from gestured.core.events import Gate
 from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault
+from gestured.core.idle_pass import Waiting
 from gestured.core.listening import Gates, Listening
 from gestured.core.owner import Source
 from gestured.core.scene import Scene
@@ -28,29 +27,7 @@ FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one 
 REMEMBERED = 4096  # sensors that gave up their place, of which the last sequence and id are remembered
 HOSTS = 1024  # hosts of which it is remembered whether they may send
 
-AS_EXPECTED = (
-    0,
-    "",
-    False,
-    False,
-)  # a stamp without its time, where no frame was lost and the sensor goes on as before
-
 _new = tuple.__new__  # Arrived(...) takes twice the time
-
-
-class Waiting:
-    """The frames of one sensor among the packets of one call; the first `taken` of them are done."""
-
-    __slots__ = ("arrivals", "sensor", "stamps", "taken")
-
-    def __init__(self, sensor: Sensor, first: Arrival) -> None:
-        self.sensor, self.arrivals, self.taken = sensor, [first], 0
-        self.stamps: Any = None  # a list of `Stamp`, or the bug that `Sensor.stamp` met; None before it was asked
-
-    def goes_on(self) -> bool:
-        """Whether an idle pass may take the next frame: there is one, and it came as expected."""
-        stamps, taken = self.stamps, self.taken
-        return taken < len(stamps) and stamps[taken][1:] == AS_EXPECTED and self.sensor.front_end.calm
 
 
 class Hub:
@@ -96,7 +73,8 @@ class Hub:
         facts = [] if now < self.gates.due else self._lapse(now)
         waiting = self._read(packets, now, facts)
         if len(waiting) >= idle_pass.FEW:
-            self._idle(waiting, now, facts)
+            as_before = (one for name, one in waiting.items() if self._told[name] == self._missed)
+            idle_pass.passes(as_before, now, facts)
         for name, one in waiting.items():
             sensor, arrivals = one.sensor, one.arrivals
             if one.taken == len(arrivals):
@@ -129,31 +107,6 @@ class Hub:
             except Exception as error:  # the packets before and after this one are good
                 facts.append(Fault(None, error))
         return waiting
-
-    def _idle(self, waiting: dict[str, Waiting], now: float, facts: list[Fact]) -> None:
-        """Stamp the frames of calm sensors, and take in idle passes those that are idle."""
-        kinds: dict[tuple[int, ...], list[Waiting]] = {}
-        for name, one in waiting.items():
-            if one.sensor.calm and self._told[name] == self._missed:
-                one.stamps = one.sensor.stamp(one.arrivals, now)
-                if not isinstance(one.stamps, Exception) and one.goes_on():
-                    kinds.setdefault(one.sensor.front_end.kind, []).append(one)
-        for going in kinds.values():
-            while len(going) >= idle_pass.FEW:
-                try:
-                    found = idle_pass.take(
-                        [one.sensor.front_end for one in going],
-                        [one.stamps[one.taken].t for one in going],
-                        [one.arrivals[one.taken].values for one in going],
-                    )
-                except Exception as error:  # a bug in the pass: frames that it has not taken are taken one by one
-                    facts.append(Fault(None, error))
-                    found = [one.sensor.front_end.pace.last == one.stamps[one.taken].t for one in going]
-                going = list(compress(going, found))
-                for one in going:
-                    one.taken += 1
-                    one.sensor.passed(now, facts)
-                going = [one for one in going if one.goes_on()]
 
     def wait(self, now: float) -> list[Fact]:
         """No packets have come until `now`: contacts may be over."""

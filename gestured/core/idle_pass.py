@@ -8,26 +8,71 @@ calm sensor, to the last bit: `matmul` of a stack of grids gives what `dot` give
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import compress
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.activity import SURPRISE, USUAL_AT_MOST
 from gestured.core.conditioning import Look, weigh
+from gestured.core.facts import Fact, Fault
 from gestured.core.front_end import FrontEnd
 from gestured.core.idle import BASELINE_TAU_S, NOISE_TAU_S, REVIEW_S, UNSEEN_S, mistaken, seen
 from gestured.core.quantiles import median
+from gestured.core.sensor import Sensor
 from gestured.core.taxels import NOISY
 from gestured.core.timing import SHARE
+from gestured.core.wire import Arrival
 
 Array = NDArray[np.float64]
 
 FEW = 5  # sensors from which on a pass costs less than their frames one by one
+AS_EXPECTED = (0, "", False, False)  # a stamp without its time, where no frame was lost and the sensor goes on
 
 _new = tuple.__new__  # Look(...) takes twice the time
+
+
+class Waiting:
+    """The frames of one sensor among the packets of one call; the first `taken` of them are done."""
+
+    __slots__ = ("arrivals", "sensor", "stamps", "taken")
+
+    def __init__(self, sensor: Sensor, first: Arrival) -> None:
+        self.sensor, self.arrivals, self.taken = sensor, [first], 0
+        self.stamps: Any = None  # a list of `Stamp`, or the bug that `Sensor.stamp` met; None before it was asked
+
+    def goes_on(self) -> bool:
+        """Whether an idle pass may take the next frame: there is one, and it came as expected."""
+        stamps, taken = self.stamps, self.taken
+        return taken < len(stamps) and stamps[taken][1:] == AS_EXPECTED and self.sensor.front_end.calm
+
+
+def passes(waiting: Iterable[Waiting], now: float, facts: list[Fact]) -> None:
+    """Stamp what waits of calm sensors at `now`, and take those frames of it that are idle, a pass for each kind."""
+    kinds: dict[tuple[int, ...], list[Waiting]] = {}
+    for one in waiting:
+        if one.sensor.calm:
+            one.stamps = one.sensor.stamp(one.arrivals, now)
+            if not isinstance(one.stamps, Exception) and one.goes_on():
+                kinds.setdefault(one.sensor.front_end.kind, []).append(one)
+    for going in kinds.values():
+        while len(going) >= FEW:
+            try:
+                found = take(
+                    [one.sensor.front_end for one in going],
+                    [one.stamps[one.taken].t for one in going],
+                    [one.arrivals[one.taken].values for one in going],
+                )
+            except Exception as error:  # a bug in the pass: frames that it has not taken are taken one by one
+                facts.append(Fault(None, error))
+                found = [one.sensor.front_end.pace.last == one.stamps[one.taken].t for one in going]
+            going = list(compress(going, found))
+            for one in going:
+                one.taken += 1
+                one.sensor.passed(now, facts)
+            going = [one for one in going if one.goes_on()]
 
 
 def take(fronts: Sequence[FrontEnd], times: Sequence[float], values: Sequence[NDArray[np.generic]]) -> list[bool]:
