@@ -107,7 +107,8 @@ def parser() -> argparse.ArgumentParser:
     everyday.add_argument("--arming", default="", metavar="GESTURE", help="a gesture that arms the sensor: everybody "
                           "makes it before each that is meant, and what is not armed is not said")  # fmt: skip
     everyday.add_argument("--seconds", type=float, default=Arming("").seconds, metavar="S",
-                          help=f"for so long, since the last gesture (default: {Arming('').seconds:g})")  # fmt: skip
+                          help="how long a gesture keeps the sensor armed, with --arming "
+                          f"(default: {Arming('').seconds:g} s)")  # fmt: skip
     everyday.add_argument("--strictness", choices=STRICTNESS, default=USUAL, help=f"operating point (default: {USUAL})")
     everyday.add_argument("--svg", type=Path, metavar="FILE", help="draw missed against false, with every threshold")
     everyday.add_argument("--document", type=Path, metavar="PAGE", help="a page whose tables `everyday` are written "
