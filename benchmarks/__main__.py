@@ -7,10 +7,11 @@ import platform
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
+from datetime import date
 from pathlib import Path
 
 from benchmarks.timing import Row
-from gestured.lab.made_of import made_of
+from gestured.lab.made_of import made_of, renew
 from gestured.model.shipped import shipped
 
 
@@ -51,6 +52,7 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", metavar="PART", help="parts of the table")
     parser.add_argument("--scenes", action="store_true", help="the table of scenes instead")
     parser.add_argument("--json", action="store_true", help="print the rows as JSON")
+    parser.add_argument("--document", type=Path, metavar="PAGE", help="a page whose table `bench` is written anew")
     args = parser.parse_args()
     if args.scenes:
         from benchmarks import scenes
@@ -61,13 +63,10 @@ def main() -> int:
     unknown = set(args.only or ()) - set(parts)
     if unknown:
         parser.error(f"--only: no part {', '.join(sorted(unknown))}; there are {', '.join(parts)}")
-    rows = []
+    rows, where = [], f"{date.today()}, {machine()}; printed by `make bench`:"
+    told = ["| figure | gestured | against | ratio | to reach | |", "|---|---|---|---|---|---|"]
     if not args.json:
-        print(
-            f"{machine()}\n{made_of('make bench', shipped().values())}\n\n"
-            "| figure | gestured | against | ratio | to reach | |\n|---|---|---|---|---|---|",
-            flush=True,
-        )
+        print(where, "", *told, sep="\n", flush=True)
     for name in args.only or parts:
         try:
             found = parts[name]()
@@ -76,11 +75,14 @@ def main() -> int:
         for row in found if isinstance(found, list) else [found]:
             rows.append(asdict(row))
             verdict = {True: "reached", False: "not reached", None: ""}[row.reached]
+            told.append(f"| {' | '.join((row.figure, row.ours, row.against, row.ratio, row.goal, verdict))} |")
             if not args.json:
-                cells = (row.figure, row.ours, row.against, row.ratio, row.goal, verdict)
-                print("| " + " | ".join(cells) + " |", flush=True)
+                print(told[-1], flush=True)
     if args.json:
         print(json.dumps({"machine": machine(), "rows": rows}, indent=2))
+    if args.document:
+        line = made_of(f'make bench ARGS="--document {args.document}"', shipped().values())
+        renew(args.document, "bench", [line, "", where, "", *told])
     return 0
 
 

@@ -82,9 +82,8 @@ def recognise(model: str) -> Row:
     cuts = [c for t, f in zip(take.sensor_times, take.frames, strict=True) for c in front.push(Frame(float(t), f))]
     segments = [c for c in cuts if isinstance(c, Cut)]
     opened = open_model(model)
-    windows = [opened.metadata.window.apply(c.segment)[np.newaxis] for c in segments]
+    asked = [opened._inputs(opened.metadata.window.apply(c.segment)[np.newaxis], None) for c in segments]
     session: Any = opened._session._session
-    name = session.get_inputs()[0].name
     recognizer = Sensor("bench", Scene(opened.gestures, (9, 9)), opened)
 
     def whole() -> None:
@@ -92,8 +91,8 @@ def recognise(model: str) -> Row:
             recognizer._decide(segment)
 
     def bare() -> None:
-        for window in windows:
-            session.run(None, {name: window})
+        for inputs in asked:
+            session.run(None, inputs)
 
     ours, theirs = interleaved(lambda: cpu_us(whole, 5), lambda: cpu_us(bare, 5), 9)
     found = ratio(ours, theirs)

@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks import inside
 from gestured.core.errors import ModelError
 from gestured.core.own import EXAMPLES
 from gestured.model import file as model_file
@@ -587,3 +588,9 @@ def test_models_that_ship(name: str) -> None:
     )  # fmt: skip
     assert (model.rows, model.columns) == (9, 9)
     assert np.isfinite(model.classify(segment()).values).all()
+
+
+def test_the_bench_asks_a_model_for_what_the_daemon_asks() -> None:
+    """A model may have a further input; the bare run that it is compared with must give it, too."""
+    row = inside.recognise("cnn_lstm")
+    assert float(row.ratio.split()[0]) > 0
