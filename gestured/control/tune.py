@@ -74,10 +74,16 @@ def play(path: Path, model: Model, played: Played) -> None:
     scene = source.scene(model.gestures) if isinstance(source, Labelled) else source.maker.scene
     if not source.tape.packets:
         raise RecordingError(f"{path}: holds no packets")
+    # What was said is to depend on thresholds alone: a gate, or a gesture that arms, would silence contacts for all.
     scene = dataclasses.replace(
-        scene, gestures=model.gestures, thresholds=dict.fromkeys(model.gestures, 0.0), refractory={}
+        scene,
+        gestures=model.gestures,
+        thresholds=dict.fromkeys(model.gestures, 0.0),
+        refractory={},
+        arming=None,
+        sensors={name: dataclasses.replace(setup, arming=None) for name, setup in scene.sensors.items()},
     )
-    replay = Replay(source.tape, scene, model)
+    replay = Replay(dataclasses.replace(source.tape, events=()), scene, model)
     lines = [json.loads(messages.to_json(event, replay.epoch)) for event in replay.events()]
     events = [line for line in lines if line["type"] == "gesture"]
     performed = source.performed() if isinstance(source, Labelled) else []

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gestured.control.cli import main
+from gestured.control.tune import play
 from gestured.control.tuning import THRESHOLDS, Counts, Played, allowed, counted, for_each, proposed, tune
 from gestured.core.errors import GesturedError
 from gestured.core.points import STRICTNESS
@@ -19,6 +20,7 @@ from gestured.model.opening import open_model
 from gestured.record.arrays import write
 from gestured.record.judge import Performed
 from gestured.simulator import GESTURES
+from tests.core import test_gates, test_hub
 from tests.daemon import tiny_model
 from tests.lab.adapt.recorded import whole_session
 from tests.small_model import operating_points
@@ -160,6 +162,21 @@ def test_a_labelled_session_gives_a_table_a_picture_and_settings(
     assert all(row["right"] + row["wrong"] + row["missed"] == found["gestures"] for row in rows)
     assert all(high["missed"] >= low["missed"] for low, high in zip(rows, rows[1:], strict=False))
     assert found["gestures"] >= 10 and rows[0]["right"] >= 0.8 * found["gestures"]
+
+
+def test_hours_in_which_a_sensor_did_not_listen_count_like_all_others(
+    models: dict[bool, Model], tmp_path: Path
+) -> None:
+    """Else a day behind a closed gate would show that any threshold keeps any budget."""
+    shut = {"type": "gate", "sensor": "arm", "armed": None, "closed": ["door"], "until": None, "since": 1e9 - 1.0}
+    armed = {"by": "circle_clockwise"}
+    settings: tuple[dict[str, Any], ...] = {}, {"arming": armed}, {"sensors": {"arm": {"arming": armed}}}
+    said = []
+    for n, told in enumerate(settings):
+        path = test_hub.write(tmp_path / f"{n}.mcap", test_gates.DRIVE, [shut] if n else [], **told)
+        play(path, models[False], played := Played())
+        said.append(played.said)
+    assert len(said[0]) == 6 and said[1:] == said[:1] * 2
 
 
 def test_what_cannot_be_tuned_on_is_one_sentence(
