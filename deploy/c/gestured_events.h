@@ -195,6 +195,13 @@ static inline int gestured_number(const char *json, const char *key, double *num
     return 1;
 }
 
+/* The whole number of a key; 0 where it has none, or one that not even a double holds exactly. */
+static inline int64_t gestured_whole(const char *json, const char *key) {
+    double number = 0;
+    gestured_number(json, key, &number);
+    return number > -9007199254740993.0 && number < 9007199254740993.0 ? (int64_t)number : 0;
+}
+
 /* Whether a key is true, as `own`, `degraded` and `test` may be. */
 static inline int gestured_true(const char *json, const char *key) {
     const char *at = gestured_find(json, key);
@@ -297,7 +304,6 @@ static inline const char *gestured_whole_line(struct gestured_events *events) {
 /* What a line says: an event, nothing for the caller (GESTURED_TIMEOUT), or a refusal. */
 static inline enum gestured_result gestured_read(struct gestured_events *events, const char *line,
                                                  struct gestured_event *event) {
-    double number = 0;
     char reason[151];
     memset(event, 0, sizeof *event);
     event->json = line;
@@ -309,7 +315,7 @@ static inline enum gestured_result gestured_read(struct gestured_events *events,
         return GESTURED_TIMEOUT;
     }
     if (!events->greeted) {
-        if (strcmp(event->type, "hello") || !gestured_number(line, "protocol", &number) || (int)number != 1)
+        if (strcmp(event->type, "hello") || gestured_whole(line, "protocol") != 1)
             return gestured_refuse(events, "it does not speak protocol 1 of gestured");
         gestured_text(line, "instance", events->instance, sizeof events->instance);
         events->greeted = 1;
@@ -327,8 +333,8 @@ static inline enum gestured_result gestured_read(struct gestured_events *events,
     gestured_number(line, "onset", &event->onset);
     gestured_number(line, "offset", &event->offset);
     gestured_number(line, "decided", &event->decided);
-    if (gestured_number(line, "id", &number)) event->id = (int64_t)number;
-    if (gestured_number(line, "sequence", &number)) event->sequence = (int64_t)number;
+    event->id = gestured_whole(line, "id");
+    event->sequence = gestured_whole(line, "sequence");
     return GESTURED_EVENT;
 }
 

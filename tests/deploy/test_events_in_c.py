@@ -18,7 +18,7 @@ from tests.deploy.compilers import CPP, HERE, POSIX, C, compiled
 from tests.sockets import GESTURE, HELLO, FakeDaemon
 
 SOURCE = HERE / "events.c"
-SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g")
+SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all", "-g")
 DAMAGE = (b"", b'"', b"\\", b"{", b"}", b"[", b"]", b",", b":", b"\\u", b"\\ud83d\\u", b"1e999", b"\0", b"\xff")
 LONGEST = 65536  # bytes of a line
 ALL = json.dumps({"types": ["gesture", "unknown", "status"]})
@@ -106,7 +106,10 @@ def test_it_waits_for_a_daemon_that_is_not_there(run, tmp_path: Path):
     fake.listener.close()
 
 
-@pytest.mark.parametrize("first", [HELLO | {"protocol": 2}, GESTURE, b"SSH-2.0-OpenSSH_9.2\n", {"type": "hello"}])
+@pytest.mark.parametrize(
+    "first",
+    [HELLO | {"protocol": 2}, GESTURE, b"SSH-2.0-OpenSSH_9.2\n", {"type": "hello"}, HELLO | {"protocol": 1e300}],
+)
 def test_who_is_no_daemon_of_protocol_1_is_refused(run, fake: FakeDaemon, first: object):
     subscriber = run(fake.path, "")
     fake.accept(first)
@@ -137,6 +140,8 @@ def test_lines_of_any_bytes_cost_themselves_alone(run, fake: FakeDaemon):
     """Whole, cut and changed lines; the sanitizers end the program at a read beyond the buffer."""
     subscriber = run(fake.path, "")
     fake.accept()
+    fake.say(GESTURE | {"id": 1e300, "sequence": -1e300})
+    assert subscriber.line()[4:6] == ["0", "0"]
     chance = random.Random(7)
     sound = json.dumps(GESTURE | {"reason": 'ä\\"\n', "deep": [{"a": [1, {}]}]}).encode()
     for batch in range(100, 200):
