@@ -67,8 +67,7 @@ class Gatekeeper:
         named, now = self._hub.gates.named, time.monotonic()
         if gate not in named and len(named) >= MOST_GATES:
             raise Refusal(f"{MOST_GATES} gates are closed already, which is the most there can be; allow one first")
-        theirs = {name for name, _ in self._owed}
-        if bridge is not None and gate not in theirs and len(theirs) >= BRIDGES_GATES:
+        if bridge is not None and gate not in named and len(named & {name for name, _ in self._owed}) >= BRIDGES_GATES:
             raise Refusal(f"bridges have closed {BRIDGES_GATES} gates already, the most that they can; allow one first")
         if bridge is not None and seconds is not None:
             self._owed[gate, sensor], seconds = now + seconds, None

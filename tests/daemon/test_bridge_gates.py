@@ -103,6 +103,16 @@ def test_bridges_cannot_use_up_the_gates_of_an_operator(daemon: Daemon, bridge: 
     bridge.ask("inhibit", bridge="car", gate="car-8", seconds=60)
 
 
+def test_what_has_opened_by_itself_is_no_gate_that_a_bridge_keeps_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    hub = Hub(Scene(GESTURES, (9, 9), {"arm": Setup()}), Sure())
+    keeper = Gatekeeper(hub, SimpleNamespace(take=list))  # type: ignore[arg-type]
+    monkeypatch.setattr(gatekeeper, "time", SimpleNamespace(monotonic=lambda: 100.0))
+    for k in range(2 * gatekeeper.BRIDGES_GATES):
+        asyncio.run(keeper.inhibit(None, f"car-{k}", "arm", 30.0, "car"))  # type: ignore[arg-type]
+        asyncio.run(keeper.inhibit(None, f"car-{k}", None, 1.0))  # type: ignore[arg-type]  # an operator
+        hub.tick(102.0)
+
+
 def test_it_knows_inhibit_and_allow_alone(daemon: Daemon, bridge: Control) -> None:
     operators = set(Operations(*[None] * 9).verbs())  # type: ignore[arg-type]
     assert {"reload", "tap", "enrol", "recalibrate", "status"} <= operators
