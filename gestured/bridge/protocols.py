@@ -105,7 +105,8 @@ class Csv(Protocol):
         return None
 
 
-PROTOCOLS: dict[str, type[Protocol]] = {"flexitac": FlexiTac, "e256": E256, "osc-slip": OscSlip, "csv": Csv}
+# By the order in which bytes are held against them: E256 is one form of OscSlip, and noise is soonest like FlexiTac.
+PROTOCOLS: dict[str, type[Protocol]] = {"e256": E256, "osc-slip": OscSlip, "csv": Csv, "flexitac": FlexiTac}
 
 
 def numbers(line: bytes) -> list[float]:
@@ -120,7 +121,7 @@ def numbers(line: bytes) -> list[float]:
 
 def looks_like(data: bytes) -> str | None:
     """What bytes look like that no frame was found in; None where like nothing that is known."""
-    for protocol in (E256, OscSlip, Csv, FlexiTac):
+    for protocol in PROTOCOLS.values():
         if words := protocol.fits(data):
             return words
     return None

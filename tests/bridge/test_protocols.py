@@ -11,7 +11,7 @@ from gestured.bridge.readings import Protocol
 
 ROWS, COLUMNS = 4, 5
 SIZE = ROWS * COLUMNS
-GRIDS = {"flexitac": (ROWS, COLUMNS), "e256": (16, 16), "osc-slip": (ROWS, COLUMNS), "csv": (ROWS, COLUMNS)}
+GRIDS = {name: each.grid if each.fixed else (ROWS, COLUMNS) for name, each in PROTOCOLS.items()}
 NAMES = sorted(PROTOCOLS)
 
 
