@@ -15,6 +15,7 @@ from gestured.control.tune import play
 from gestured.control.tuning import THRESHOLDS, Counts, Played, allowed, counted, for_each, proposed, tune
 from gestured.core.errors import GesturedError
 from gestured.core.points import STRICTNESS
+from gestured.core.sensor import ABSENT_S
 from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.record.arrays import write
@@ -177,6 +178,14 @@ def test_hours_in_which_a_sensor_did_not_listen_count_like_all_others(
         play(path, models[False], played := Played())
         said.append(played.said)
     assert len(said[0]) == 6 and said[1:] == said[:1] * 2
+
+
+def test_a_night_in_which_no_packet_came_shows_nothing(models: dict[bool, Model], tmp_path: Path) -> None:
+    later = [(t + 36_000.0, packet, source) for t, packet, source in test_gates.DRIVE]
+    path = test_hub.write(tmp_path / "night.mcap", [*test_gates.DRIVE, *later])
+    play(path, models[False], played := Played())
+    assert played.seconds == pytest.approx(2 * (test_gates.DRIVE[-1][0] - test_gates.DRIVE[0][0]) + ABSENT_S)
+    assert len(played.said) == 12
 
 
 def test_what_cannot_be_tuned_on_is_one_sentence(

@@ -16,7 +16,7 @@ from gestured.core.facts import events_of
 from gestured.core.frames import Frame
 from gestured.core.listening import Arming
 from gestured.core.scene import Scene, Setup
-from gestured.core.sensor import Sensor
+from gestured.core.sensor import ABSENT_S, Sensor
 from gestured.lab.cli import main
 from gestured.lab.everyday import FIRST, command
 from gestured.lab.everyday.heard import HELD, NOT_READY, RESTARTING, Heard, hear
@@ -91,6 +91,19 @@ def test_a_recording_of_one_frame_is_no_place_and_a_blink_is_no_hour(
     assert list(found["places"]) == ["good"] and found["hours"] == round(59 / 15 / 3600, 4)
     assert main(["everyday", "--jobs", "1", "--recordings", str(tmp_path / "blink.npz")]) == 1
     assert "blink.npz: expected at least 1 s of frames" in capsys.readouterr().err
+
+
+def test_a_night_in_which_a_sensor_sent_nothing_shows_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Not that nothing false is said in it."""
+    times = np.concatenate([np.arange(600) / 15, 36_000 + np.arange(600) / 15])
+    offsets, of = np.array([0, 1200]), {"labels": np.array([NONE]), "subjects": np.array([0])}
+    write(
+        tmp_path / "night.npz", Recordings(frames=np.zeros((1200, 9, 9), np.uint8), times=times, offsets=offsets, **of)
+    )
+    found = said(capsys, "--recordings", tmp_path / "night.npz")
+    assert found["hours"] == round((2 * 599 / 15 + ABSENT_S) / 3600, 4)
 
 
 def test_of_a_tape_all_that_the_daemon_would_publish_is_false(capsys: pytest.CaptureFixture[str]) -> None:

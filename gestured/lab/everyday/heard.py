@@ -10,7 +10,7 @@ from gestured.core.listening import Arming
 from gestured.core.points import Strictness
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
 from gestured.core.segmenter import SPENT
-from gestured.core.sensor import Sensor, Told
+from gestured.core.sensor import ABSENT_S, Sensor, Told
 from gestured.lab.everyday.stretches import HOUR_S, Stretch
 from gestured.model.model import Model
 from gestured.record.judge import Performed, Said, whose
@@ -30,7 +30,7 @@ class Heard:
     contacts: int
     meant: list[Performed]
     said: dict[str, list[Said]]  # by model, each at any confidence; of a contact that may be published at all
-    seconds: float = 0.0
+    seconds: float = 0.0  # a sensor that was silent for longer than ABSENT_S was not there
     deaf_s: dict[str, float] = field(default_factory=dict)
     provisional: int = 0  # events of the first model where nothing was meant
 
@@ -61,7 +61,7 @@ def hear(
     meant = [act for act in life.meant if act.label in first.gestures]
     heard = Heard(life.place, life.person, 0, meant, {model.name: [] for model in models})
     began: float | None = None
-    last, known, onsets = 0.0, False, 0
+    last, absent_s, known, onsets = 0.0, 0.0, False, 0
     for frame in life.frames:
         began, last = (frame.t, frame.t) if began is None else (began, last)
         told = sensor.push(frame)
@@ -69,11 +69,12 @@ def hear(
         why = _deaf(sensor.front_end, known=known)
         if why:
             heard.deaf_s[why] = heard.deaf_s.get(why, 0.0) + min(frame.t - last, LONGEST_STEP_S)
+        absent_s += max(frame.t - last - ABSENT_S, 0.0)
         last = frame.t
         onsets += sum(isinstance(one, Onset) for one in told)
         _take(heard, told, life, models, published=published)
     _take(heard, sensor.flush(last + 5.0), life, models, published=published)
-    heard.seconds = last - (last if began is None else began)
+    heard.seconds = last - (last if began is None else began) - absent_s
     heard.contacts = max(onsets - len(meant), 0) if life.contacts is None else life.contacts
     return heard
 
