@@ -281,13 +281,13 @@ def test_memory_that_cannot_be_had_costs_a_sensor_its_contact_and_not_the_proces
     pages = int(Path(f"/proc/{daemon.process.pid}/statm").read_text().split()[0])
     soft, hard = resource.prlimit(daemon.process.pid, resource.RLIMIT_AS)
     resource.prlimit(daemon.process.pid, resource.RLIMIT_AS, (pages * resource.getpagesize() + (8 << 20), hard))
-    crowd = [Sensor(daemon, f"s{i}") for i in range(300)]
-    n = 0
-    while "MemoryError" not in (said := daemon.stderr()) and "socket_error" not in said:
-        assert daemon.process.poll() is None, said[-2000:]
-        n += 1
-        for sensor in crowd:
-            sensor.sock.send(big(sensor.name, n))
+    crowd, said, ends = [], "", ("MemoryError", "socket_error")
+    while not (out := any(word in said for word in ends)) and len(crowd) < 900:
+        crowd.append(Sensor(daemon, f"s{len(crowd)}"))  # one by one: the daemon would not hear a flood of them
+        crowd[-1].sock.send(big(crowd[-1].name, 1))
+        while not any(word in (said := daemon.stderr()) for word in (f'"{crowd[-1].name}"', *ends)):
+            assert daemon.process.poll() is None, said[-2000:]
+    assert out, "there was memory enough"
     resource.prlimit(daemon.process.pid, resource.RLIMIT_AS, (soft, hard))
     again, seen = daemon.client().subscribe("gesture", "status"), []
     while "gesture" not in {line["type"] for line in seen}:  # what waits is worked off first
