@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -48,42 +48,49 @@ def port() -> int:
     return free_address().port
 
 
-@pytest.fixture
+@contextmanager
 def sensor(port: int) -> Iterator[None]:
+    """A simulated sensor; it ends where nobody listens yet."""
     command = [sys.executable, "-m", "gestured.control", "simulate", "--to", f"127.0.0.1:{port}", "--kinds", "one_tap"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        yield
-        process.terminate()
+        try:
+            yield
+        finally:
+            process.terminate()
 
 
 @pytest.mark.slow
-def test_a_session_that_is_ended_and_goes_on(tmp_path: Path, port: int, sensor: None) -> None:
+def test_a_session_that_is_ended_and_goes_on(tmp_path: Path, port: int) -> None:
     trials = order("07", 0, ["one_tap"], 1)
     path = tmp_path / "07.npz"
     with collect(tmp_path, port) as person:
         person.sees("Do you agree?")
         person.types("yes\n")
-        person.sees("Enter when it is in place")
-        person.types("\n")
-        person.sees(f"1/9  {trials[0]}")
-        keeps_one(person)
-        assert read(path).labels.tolist() == ["one_tap"]  # on disk before the next prompt
-        person.sees(f"2/9  {trials[1]}")
-        person.types("q")
-        person.sees("the same command goes on from here")
-        assert person.ends() == 0
+        person.sees("Waiting for the sensor")
+        with sensor(port):
+            person.sees("Enter when it is in place")
+            person.types("\n")
+            person.sees(f"1/9  {trials[0]}")
+            keeps_one(person)
+            assert read(path).labels.tolist() == ["one_tap"]  # on disk before the next prompt
+            person.sees(f"2/9  {trials[1]}")
+            person.types("q")
+            person.sees("the same command goes on from here")
+            assert person.ends() == 0
 
     with collect(tmp_path, port) as person:
         person.sees("gave consent on")
         person.sees("1 of 9 are done already")
-        person.sees("Enter when it is in place")
-        person.types("\n")
-        person.sees(f"2/9  {trials[1]}")
-        keeps_one(person)
-        person.sees("3/9")
-        person.process.send_signal(signal.SIGTERM)
-        person.sees("Ended with 2 recordings")
-        assert person.ends() == 0
+        person.sees("Waiting for the sensor")
+        with sensor(port):
+            person.sees("Enter when it is in place")
+            person.types("\n")
+            person.sees(f"2/9  {trials[1]}")
+            keeps_one(person)
+            person.sees("3/9")
+            person.process.send_signal(signal.SIGTERM)
+            person.sees("Ended with 2 recordings")
+            assert person.ends() == 0
 
     kept = read(path)
     assert kept.speeds is not None and kept.inclinations is not None and kept.consents is not None
