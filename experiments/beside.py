@@ -30,7 +30,7 @@ LAID = ("forearm", "elbow", "hand", "thing")
 WAITS_S = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 30.0)
 FREE_S = 5.0  # the sensor has been idle for so long when something is laid on
 SWIPES = ("swipe_left", "swipe_right", "swipe_up", "swipe_down")
-ROAD = 0.06  # as on the armrest of gestured/simulator/everyday.py
+ROAD = 0.06  # as on the armrest of gestured/simulator/places.py
 MODEL = "cnn_lstm"
 FIRST = 9_000_000  # the first person; nobody learns from them
 
@@ -41,7 +41,7 @@ def case(name: str, wait: float, n: int) -> Stretch:
     sensor = SimulatedSensor.nominal(day=person.seed)
     kind = SWIPES[n % len(SWIPES)]
     while True:
-        lies = performed(name, lambda of: rest(of, name, wait + 6.0, ROAD)[0], person, rng, "normal", 1, sensor.extent)
+        lies = performed(name, lambda of: rest(name, of, wait + 6.0, ROAD)[0], person, rng, "normal", 1, sensor.extent)
         swipe = perform(kind, person, rng, "normal", 1, sensor.extent)
         if not any(_covers(wait, one, press) for one in lies.contacts for press in swipe.contacts):
             break

@@ -5,7 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gestured.simulator.everyday import ANYWHERE, FINGERS, PLACES, Happening, day, planned
+from gestured.simulator.chance import CHANCE, NARROW_MM
+from gestured.simulator.everyday import TAP_S, Happening, day, planned
+from gestured.simulator.places import ANYWHERE, FINGERS, PLACES, Place
 from gestured.simulator.resting import HAND, NOBODY, POSTURES
 
 HOUR_S = 3600.0
@@ -14,21 +16,24 @@ HOUR_S = 3600.0
 @cache
 def life(place: str) -> list[Happening]:
     """All that nobody means in an hour of somebody at a place."""
-    return planned(1, place, HOUR_S).life
+    return planned(1, PLACES[place], HOUR_S).life
 
 
 def test_all_that_may_happen_happens_somewhere_and_leaves_a_mark_that_a_sensor_can_take() -> None:
     made = [one for place in PLACES for _, one in life(place)]
     assert {one.kind for one in made} == {*ANYWHERE, *FINGERS, *POSTURES} - {NOBODY}
-    for one in made:
+    by_chance = [one for place in CHANCE.values() for _, one in planned(1, place, HOUR_S).life]
+    assert {one.kind for one in by_chance} == {"anything", "lies"}
+    for one in made + by_chance:
         assert one.contacts, one.kind
         for press in one.contacts:
             assert np.isfinite([press.x, press.y, press.force]).all() and np.diff(press.t).min() > 0, one.kind
-            assert press.force.min() >= 0 and press.force.max() > 0, one.kind
+            assert press.force.min() >= 0, one.kind
+        assert one in by_chance or max(press.force.max() for press in one.contacts) > 0, one.kind
 
 
 def test_there_are_contacts_enough_and_gestures_among_them() -> None:
-    days = [day(seed, place, HOUR_S / 6) for seed, place in enumerate(PLACES)]
+    days = [day(seed, place, HOUR_S / 6) for seed, place in enumerate(PLACES.values())]
     assert sum(one.contacts for one in days) / (len(days) / 6) >= 200
     assert sum(len(one.meant) for one in days) >= 5
 
@@ -40,3 +45,10 @@ def test_a_free_finger_taps_only_where_nobody_lies_and_a_playing_one_only_where_
         under = {kind for a, b, kind in lying if a <= at < b}
         assert one.kind != "idle_tap" or not under
         assert not one.kind.startswith("playing_") or under == {HAND}
+
+
+@pytest.mark.parametrize("place", CHANCE.values(), ids=list(CHANCE))
+def test_chance_draws_no_tap(place: Place) -> None:
+    lone = [one for _, one in planned(1, place, HOUR_S).life if len(one.contacts) == 1]
+    assert len(lone) > 20
+    assert all(one.contacts[0].length >= NARROW_MM or one.duration_s > TAP_S for one in lone)

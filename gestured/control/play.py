@@ -22,6 +22,7 @@ from gestured.simulator import (
     session,
 )
 from gestured.simulator.everyday import day
+from gestured.simulator.places import PLACES
 
 KINDS = GESTURES + NON_GESTURES + SEQUENCES
 PART_S = 600.0  # what is simulated at a time; between two parts the sensor is off
@@ -43,7 +44,7 @@ def everyday(args: argparse.Namespace, seconds: float | None) -> Iterator[tuple[
 
     def lived(part: int, length: float) -> Take:
         seed = args.seed + part
-        return day(seed, args.everyday, length, _sensor(args, seed)).take
+        return day(seed, PLACES[args.everyday], length, _sensor(args, seed)).take
 
     return _parts(lived, seconds)
 

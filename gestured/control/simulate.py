@@ -14,7 +14,7 @@ from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
 from gestured.simulator import Act
-from gestured.simulator.everyday import PLACES
+from gestured.simulator.places import PLACES
 
 DESCRIPTION = """Send the pressure frames of a simulated person on a simulated textile sensor,
 as OSC over UDP, in real time. Says what is performed as it ends, to be compared

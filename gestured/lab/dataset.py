@@ -6,7 +6,7 @@ matched with what was performed. Simulated sets are cached, keyed by everything 
 
 import multiprocessing
 import signal
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -38,7 +38,9 @@ from gestured.simulator import (
     gesture_take,
     wide,
 )  # fmt: skip
-from gestured.simulator.everyday import PLACES, Day, day, planned
+from gestured.simulator.chance import CHANCE
+from gestured.simulator.everyday import Day, day, planned
+from gestured.simulator.places import PLACES, Place
 from gestured.simulator.variety import any_sensor
 
 T = TypeVar("T")
@@ -122,22 +124,28 @@ def from_day(life: Day) -> list[Sample]:
     return found
 
 
-def _day(seed: int, index: int) -> list[Sample]:
+def _day(places: Mapping[str, Place], seed: int, index: int) -> list[Sample]:
     """Some minutes of somebody's everyday life, on the nominal sensor or on any other."""
-    rng = generator(seed, 0xDA7A, index)
+    rng = generator(seed, 0xDA7A if places is PLACES else 0xDA7B, index)
     if rng.random() >= ANY_SENSOR:
-        return _nominal_day(seed, index)
+        return _nominal_day(seed, index, places)
     sensor = any_sensor(rng, float(rng.random()))
-    return _nominal_day(seed, index, replace(sensor, rate_hz=min(sensor.rate_hz, FASTEST_HZ)))
+    return _nominal_day(seed, index, places, replace(sensor, rate_hz=min(sensor.rate_hz, FASTEST_HZ)))
 
 
 def meant_on(seed: int, index: int) -> int:
     """How many gestures are meant on that day of the stream "nominal_days", cut out or not."""
-    return len(planned(seed * 1_000_000 + index, list(PLACES)[index % len(PLACES)], DAY_S).meant)
+    return len(planned(seed * 1_000_000 + index, _place(PLACES, index), DAY_S).meant)
 
 
-def _nominal_day(seed: int, index: int, sensor: SimulatedSensor | None = None) -> list[Sample]:
-    return from_day(day(seed * 1_000_000 + index, list(PLACES)[index % len(PLACES)], DAY_S, sensor))
+def _place(places: Mapping[str, Place], index: int) -> Place:
+    return list(places.values())[index % len(places)]
+
+
+def _nominal_day(
+    seed: int, index: int, places: Mapping[str, Place] = PLACES, sensor: SimulatedSensor | None = None
+) -> list[Sample]:
+    return from_day(day(seed * 1_000_000 + index, _place(places, index), DAY_S, sensor))
 
 
 def _wide(seed: int, index: int) -> list[Sample]:
@@ -158,7 +166,14 @@ def _cohort(seed: int, index: int) -> list[Sample]:
     return from_take(cohort_take(TRIALS[index], seed))
 
 
-STREAMS = {"days": _day, "nominal_days": _nominal_day, "wide": _wide, "cohort": _cohort, "others": _others}
+STREAMS: dict[str, Callable[[int, int], list[Sample]]] = {
+    "days": partial(_day, PLACES),
+    "days_by_chance": partial(_day, CHANCE),
+    "nominal_days": _nominal_day,
+    "wide": _wide,
+    "cohort": _cohort,
+    "others": _others,
+}
 
 
 def in_processes(make: Callable[[int], T], todo: Sequence[int], jobs: int, title: str) -> Iterator[T]:

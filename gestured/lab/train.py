@@ -61,6 +61,8 @@ class TrainingPlan:
     forest: int = 20_000  # simulated samples for the forest
     days: int = 700  # of everyday life, twelve minutes of a person each
     days_calibrate: int = 600  # days to learn the verifier from
+    chance: int = 350  # days as chance draws them, to learn from
+    chance_calibrate: int = 450  # the same for the verifier
     days_points: int = 400  # days on the nominal sensor to choose the operating points by
     fit: FitConfig = field(default_factory=FitConfig)
 
@@ -71,6 +73,8 @@ class TrainingPlan:
         return cls(
             days=10,
             days_calibrate=10,
+            chance=5,
+            chance_calibrate=5,
             days_points=10,
             wide=1_500,
             wide_calibrate=400,
@@ -105,7 +109,10 @@ def load_data(
         simulated(cache, "wide", seed, count, jobs)
         for seed, count in ((1, plan.wide), (2, plan.wide_calibrate), (3, plan.wide_check))
     )
-    days = simulated(cache, "days", 1, plan.days, jobs)
+    days, lived = (
+        join([simulated(cache, "days", seed, count, jobs), simulated(cache, "days_by_chance", seed, chance, jobs)])
+        for seed, count, chance in ((1, plan.days, plan.chance), (2, plan.days_calibrate, plan.chance_calibrate))
+    )
     cohort = simulated(cache, "cohort", 0, plan.cohort, jobs)
     others = simulated(cache, "others", 0, plan.others, jobs)
     both = join([cohort, others])
@@ -125,7 +132,7 @@ def load_data(
         },
         found and found[0],
         found[1] if found else 0,
-        simulated(cache, "days", 2, plan.days_calibrate, jobs),
+        lived,
         simulated(cache, "nominal_days", 3, plan.days_points, jobs),
     )
 

@@ -5,8 +5,7 @@ that leans, a thing that lies there, nobody. Whatever rests breathes, is re-seat
 road. Beside that, things happen at rates an hour: sleeves, wiping, bumps, things put down, fingers that play. Gestures
 are meant at known times: after quiet, soon after something has left, or beside what rests and does not cover them.
 
-`POSTURES`, `PLACES` and `FINGERS` are one table: each number has its source, or is assumed. Whoever changes one prints
-the figures with both.
+`places` says what rests and happens where. `chance` says the same without any idea of the things.
 """
 
 import math
@@ -17,29 +16,13 @@ from functools import partial
 import numpy as np
 
 from gestured.simulator.cohort import GESTURES, perform, performed
-from gestured.simulator.gestures import one_tap
 from gestured.simulator.occasion import Occasion
 from gestured.simulator.others import Made
 from gestured.simulator.people import Participant, Performance, Press, any_speed, generator
-from gestured.simulator.resting import HAND, NOBODY, POSTURES, THING, rest
+from gestured.simulator.places import FINGERS, PLAYED, Place
+from gestured.simulator.resting import NOBODY
 from gestured.simulator.sensor import Act, SimulatedSensor, Take
-from gestured.simulator.unmeant import (
-    Places,
-    bump,
-    fidget,
-    fold,
-    graze,
-    hands,
-    landing,
-    pat,
-    playing_drum,
-    playing_press,
-    playing_rub,
-    playing_stretch,
-    playing_tap,
-    poke,
-    slide,
-)
+from gestured.simulator.unmeant import Places
 
 TAP_S = 0.3  # what is longer is no tap, whatever was meant (99.7 % of intended touches: Matero and Colley, DIS 2012)
 TAP_TRAVEL = 0.15  # of the pad's shorter side
@@ -50,105 +33,6 @@ FREE_S = (3.0, 6.0)  # a sensor is switched on before somebody lies on it; what 
 SOON = 0.12  # share of all that leaves after which a gesture is meant within a second; assumed
 AFTER_WAKE_S = (0.8, 2.0)  # from the gesture that wakes a sensor to the one that is meant; assumed
 HABIT = 0.6  # standard deviation of the logarithm of how often a person does each thing, beside the rate; assumed
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a sensor is: its postures by share, what happens beside them an hour, and how the road shakes it."""
-
-    postures: Mapping[str, float]
-    rates: Mapping[str, float]  # happenings an hour; all assumed
-    road: float  # of the force, one standard deviation
-    meant: float  # gestures an hour
-
-
-# What may happen anywhere, an hour; all assumed.
-ANYWHERE: Mapping[str, float] = {
-    "sleeve_brush": 15.0,
-    "bump": 20.0,
-    "graze": 20.0,
-    "landing": 12.0,
-    "pat": 5.0,
-    "poke": 3.0,
-    "slide": 3.0,
-    "fold": 6.0,
-    "fidget": 6.0,
-    "hands": 1.5,
-    "wipe": 2.0,
-    "palm": 3.0,
-    "object_put_down": 3.0,
-    "wrinkle": 3.0,
-    "long_press": 2.0,
-    "press_and_slide": 1.0,
-    "idle_tap": 8.0,  # of a free hand, while nobody lies there; one that lies plays by FINGERS
-}
-PLACES: Mapping[str, Place] = {
-    "armrest": Place(
-        {NOBODY: 3.0, "forearm": 3.0, "elbow": 1.5, HAND: 1.5, "push_off": 0.5},
-        {**ANYWHERE, "sleeve_brush": 30.0},
-        0.06,
-        45.0,
-    ),
-    "door": Place(
-        {NOBODY: 4.0, "elbow": 3.0, "forearm": 2.0, "push_off": 1.0, HAND: 1.0},
-        {**ANYWHERE, "sleeve_brush": 30.0, "bump": 30.0, "palm": 6.0},
-        0.09,
-        45.0,
-    ),
-    "seat": Place(
-        {"body": 6.0, NOBODY: 1.0, HAND: 0.5, THING: 1.0},
-        {**ANYWHERE, "wrinkle": 25.0, "fold": 20.0, "idle_tap": 4.0, "fidget": 3.0},
-        0.12,
-        20.0,
-    ),
-    "skin": Place(
-        {NOBODY: 6.0, HAND: 1.5, "body": 0.5},
-        {**ANYWHERE, "palm": 10.0, "pat": 12.0, "hands": 6.0, "idle_tap": 12.0},
-        0.02,
-        90.0,
-    ),
-    "table": Place(
-        {NOBODY: 4.0, "forearm": 2.0, HAND: 2.0, THING: 3.0},
-        {
-            **ANYWHERE,
-            "object_put_down": 15.0,
-            "slide": 20.0,
-            "poke": 6.0,
-            "wipe": 6.0,
-            "fidget": 12.0,
-            "idle_tap": 12.0,
-        },
-        0.0,
-        60.0,
-    ),
-}
-# What the fingers of a hand that rests do, an hour of such rest; assumed.
-FINGERS: Mapping[str, float] = {
-    "playing_tap": 240.0,
-    "playing_drum": 60.0,
-    "playing_rub": 90.0,
-    "playing_press": 40.0,
-    "playing_stretch": 40.0,
-}
-PLAYED = {
-    "playing_tap": playing_tap,
-    "playing_drum": playing_drum,
-    "playing_rub": playing_rub,
-    "playing_press": playing_press,
-    "playing_stretch": playing_stretch,
-}
-HAPPENING: Mapping[str, Callable[[Occasion], Made]] = {
-    "idle_tap": one_tap,
-    "bump": bump,
-    "graze": graze,
-    "landing": landing,
-    "pat": pat,
-    "poke": poke,
-    "slide": slide,
-    "fold": fold,
-    "fidget": fidget,
-    "hands": hands,
-}
 
 
 @dataclass(frozen=True)
@@ -166,8 +50,8 @@ class Day:
 NOTHING, LEFT = "nothing", "just left"
 
 
-def day(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = None, wake: str = "") -> Day:
-    """So many seconds of everyday life at a place; the same for the same seed. Raises KeyError for an unknown place.
+def day(seed: int, place: Place, seconds: float, sensor: SimulatedSensor | None = None, wake: str = "") -> Day:
+    """So many seconds of everyday life at a place; the same for the same seed.
 
     With `wake`, a gesture, everybody makes that one before each gesture that is meant: both stand in `Day.meant`.
     """
@@ -177,14 +61,14 @@ def day(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = 
     alone = [_truth(start, one) for start, one in plan.life if _like_a_tap(start, one, everything, plan.of.sensor)]
     contacts = sum(_touches(one) for _, one in plan.life)
     meant = tuple((_truth(at, one), lay) for at, one, lay in plan.meant)
-    return Day(place, plan.of.person.seed, take, contacts, meant, tuple(alone))
+    return Day(place.name, plan.of.person.seed, take, contacts, meant, tuple(alone))
 
 
-def planned(seed: int, place: str, seconds: float, sensor: SimulatedSensor | None = None, wake: str = "") -> "Plan":
-    """What happens in `day`, before any sensor sees it: a fraction of its work. Raises KeyError as `day` does."""
-    where, rng = PLACES[place], generator(seed, 0xDA1, *map(ord, place))
+def planned(seed: int, place: Place, seconds: float, sensor: SimulatedSensor | None = None, wake: str = "") -> "Plan":
+    """What happens in `day`, before any sensor sees it: a fraction of its work."""
+    rng = generator(seed, 0xDA1, *map(ord, place.name))
     person = Participant(int(rng.integers(1 << 40)) + 2_000_000)
-    lived = _Life(where, person, sensor or SimulatedSensor.nominal(day=person.seed), rng, seconds, wake)
+    lived = _Life(place, person, sensor or SimulatedSensor.nominal(day=person.seed), rng, seconds, wake)
     life = [one for one in lived.unmeant() if one[0] < seconds]
     return Plan(lived, life, list(lived.meant(life)))
 
@@ -210,7 +94,7 @@ class _Life:
         playing, free = self._habits(FINGERS), [(0.0, now)]
         while now < self.seconds:
             name = names[int(self.rng.choice(len(names), p=chances / chances.sum()))]
-            dwell = float(np.clip(POSTURES[name].dwell_s * self.rng.lognormal(0.0, 0.8), 0.4, 900.0))
+            dwell = float(np.clip(self.where.rests[name][1] * self.rng.lognormal(0.0, 0.8), 0.4, 900.0))
             if name == NOBODY:
                 free.append((now, now + dwell))
             else:
@@ -223,7 +107,7 @@ class _Life:
         for kind, rate in self._habits(self.where.rates).items():
             for at in self._times(rate, self.seconds):
                 if kind != "idle_tap" or any(a < at < b for a, b in free):
-                    yield at, self._happen(kind, HAPPENING.get(kind))
+                    yield at, self._happen(kind, self.where.happenings.get(kind))
 
     def _habits(self, rates: Mapping[str, float]) -> dict[str, float]:
         """How often this person does each thing, an hour; over all people as often as `rates` say."""
@@ -234,8 +118,8 @@ class _Life:
 
         Nothing else that moves is in their time, and nothing that rests covers their way.
         """
-        resting = [(at, at + one.duration_s, one) for at, one in life if one.kind in POSTURES]
-        moving = [(at, at + one.duration_s) for at, one in life if one.kind not in POSTURES]
+        resting = [(at, at + one.duration_s, one) for at, one in life if one.kind in self.where.rests]
+        moving = [(at, at + one.duration_s) for at, one in life if one.kind not in self.where.rests]
         soon = [end + float(self.rng.uniform(0.1, 1.0)) for _, end, _ in resting if self.rng.random() < SOON]
         last = 2.0
         for at in sorted([*self._times(self.where.meant, self.seconds), *soon]):
@@ -298,7 +182,7 @@ class _Life:
         places: list[Places] = []
 
         def make(occasion: Occasion) -> list[Press]:
-            made, found = rest(occasion, name, seconds, self.where.road)
+            made, found = self.where.rests[name][0](occasion, seconds, self.where.road)
             places.append(found)
             return made
 

@@ -47,7 +47,7 @@ POSTURES = {
 }
 
 
-def rest(occasion: Occasion, name: str, seconds: float, road: float) -> tuple[list[Press], Places]:
+def rest(name: str, occasion: Occasion, seconds: float, road: float) -> tuple[list[Press], Places]:
     """What rests so long, shaken by so much of its force; and, of a hand, where its fingers lie (mm)."""
     posture, rng, small = POSTURES[name], occasion.rng, occasion.small
     t = np.linspace(0.0, seconds, max(8, math.ceil(seconds / STEP_S) + 1))

@@ -13,7 +13,7 @@ from pythonosc.osc_message import OscMessage
 
 from gestured.client.sensor import Sensor
 from gestured.simulator import GESTURES
-from gestured.simulator.everyday import PLACES
+from gestured.simulator.places import PLACES
 from gestured.simulator.resting import POSTURES
 
 FRAMES = 60  # 4 seconds at 15 Hz

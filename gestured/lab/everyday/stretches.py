@@ -13,7 +13,8 @@ from gestured.record.arrays import read
 from gestured.record.check import SESSION, UNNAMED
 from gestured.record.judge import NONE, Performed
 from gestured.record.replay import frames_used, opened
-from gestured.simulator.everyday import PLACES, day
+from gestured.simulator.everyday import day
+from gestured.simulator.places import PLACES
 
 HOUR_S = 3600.0
 WAKING, WOKEN = "the gesture that arms", "within two seconds after it"
@@ -40,7 +41,7 @@ def lived(seed: int, seconds: float = HOUR_S, wake: str = "") -> Stretch:
 
     With `wake` that gesture comes before each that is meant; they are told apart by what lay there, WAKING and WOKEN.
     """
-    life = day(seed, list(PLACES)[(seed - FIRST) % len(PLACES)], seconds, wake=wake)
+    life = day(seed, list(PLACES.values())[(seed - FIRST) % len(PLACES)], seconds, wake=wake)
     taps = [Performed(NONE, act.kind, act.onset_s, act.offset_s) for act in life.like]
     meant = [Performed(act.label, lay, act.onset_s, act.offset_s) for act, lay in life.meant]
     if wake:
