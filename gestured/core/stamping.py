@@ -47,6 +47,7 @@ class Stamper:
         self._last: float | None = None  # s, the last stamp
         self._arrived = 0.0  # s, the arrival of the frame that was stamped last
         self._tag: float | None = None  # s, the time tag of that frame
+        self._ahead = 0.0  # s, how far that frame was put beyond its tag, which earlier frames had, too
         self._counter: int | None = None  # of the newest frame
         self._late: tuple[int, int] = (0, 0)  # counter of the last late frame, and how many came in a row
 
@@ -108,9 +109,7 @@ class Stamper:
         t, last, implausible = arrived, self._last, self._by_tag and tag is None
         if last is not None:
             if self._by_tag:
-                step = tag - self._tag if tag is not None and self._tag is not None else 0.0
-                if not (0 < step <= self.MAX_STEP_S and last + step <= arrived + self.AHEAD_S):
-                    step, implausible = arrived - self._arrived, tag is None or self._tag is not None
+                step, implausible = self._step(last, tag, arrived)
                 t = last + step
             if t > last:
                 self._intervals.append((t - last) / steps)
@@ -149,14 +148,10 @@ class Stamper:
             end, spacing = arrived, self._typical()
             implausible = self._by_tag and tag is None
         else:
-            step = arrived - self._arrived
+            end = arrived
             if self._by_tag:
-                by_tag = tag - self._tag if tag is not None and self._tag is not None else 0.0
-                if 0 < by_tag <= self.MAX_STEP_S and self._last + by_tag <= arrived + self.AHEAD_S:
-                    step = by_tag
-                else:
-                    implausible = tag is None or self._tag is not None
-            end = self._last + step if self._by_tag else arrived
+                step, implausible = self._step(self._last, tag, arrived)
+                end = self._last + step
             share = (end - self._last) / total
             spacing = min(self._typical(), share) if len(run) > 1 else share
             if share > 0:
@@ -170,6 +165,17 @@ class Stamper:
             last = t
             stamps[i] = Stamp(t, stamps[i].lost, "", stamps[i].restarted, implausible)
         self._last, self._arrived, self._tag = last, arrived, tag
+
+    def _step(self, last: float, tag: float | None, arrived: float) -> tuple[float, bool]:
+        """Seconds since the `last` stamp by the time tag, or else by the arrival; and whether the tag is impossible."""
+        step = tag - self._tag if tag is not None and self._tag is not None else 0.0
+        if 0 < step <= self.MAX_STEP_S and last + step <= arrived + self.AHEAD_S:
+            ahead, self._ahead = self._ahead, 0.0
+            return step - ahead if ahead < step else step, False
+        waited = arrived - self._arrived
+        # A coarse clock shows one time for several frames; what they were put beyond it is no step of the clock.
+        self._ahead = self._ahead + waited if tag is not None and tag == self._tag else 0.0
+        return waited, tag is None or self._tag is not None
 
     def _typical(self) -> float:
         """Seconds between two frames: the median, since a late frame must not count."""

@@ -206,3 +206,19 @@ def test_a_sensors_clock_runs_ahead_by_a_day_at_most() -> None:
     got = stamps(stamper, *[(n * P, [felt(timetag=n * Stamper.MAX_STEP_S)]) for n in range(20_000)])
     assert all(stamp.t <= n * P + Stamper.AHEAD_S for n, stamp in enumerate(got))
     assert not got[100].implausible and got[-1].implausible
+
+
+@given(st.floats(0.001, 0.2), st.floats(0.02, 0.1), st.floats(0, 0.01))
+def test_a_coarse_clock_of_the_sensor_runs_no_faster_than_time(grain: float, period: float, jitter: float) -> None:
+    stamper, rng = Stamper("sensor"), np.random.default_rng(0)
+    true = np.arange(300) * period
+    got = times(
+        stamps(
+            stamper,
+            *[
+                (t + jitter * rng.random(), [felt(n, 1e9 + math.floor(t / grain) * grain)])
+                for n, t in enumerate(true.tolist())
+            ],
+        )
+    )
+    assert got[-1] - got[0] == pytest.approx(true[-1], abs=2 * (grain + period))
