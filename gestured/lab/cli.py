@@ -116,9 +116,12 @@ def parser() -> argparse.ArgumentParser:
     everyday.add_argument("--seed", type=int, default=FIRST_DAY, help="of the first hour; nothing was trained on the "
                           f"default's (default: {FIRST_DAY})")  # fmt: skip
     everyday.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
-    stability = add("stability", "measure filters, extreme inputs through the whole path, and models by their answers",
+    stability = add("stability", "measure filters, extreme and stiff inputs through the whole path, and models by "
+                    "their answers",
                     "gestured-lab stability --quick")  # fmt: skip
-    stability.add_argument("--quick", action="store_true", help="some seconds instead of some minutes")
+    stability.add_argument("--quick", action="store_true", help="half a minute instead of some minutes")
+    stability.add_argument("--document", type=Path, metavar="FILE",
+                           help="a page whose tables are written anew, such as docs/numerics.md")  # fmt: skip
     study = add("study", "compare every method of the paper, and some beyond it, under several protocols; "
                 "writes its tables and figures, study.json and CSV files; goes on where it was interrupted",
                 "gestured-lab study --out report/ --jobs 2")  # fmt: skip

@@ -14,16 +14,19 @@ from onnx import TensorProto, numpy_helper
 from onnx.reference import ReferenceEvaluator
 from onnx.reference.op_run import OpRun
 
+from gestured.lab.dataset import cuts
 from gestured.lab.decide import Answers
 from gestured.lab.early import published
 from gestured.lab.fit import RECURRENT
 from gestured.lab.samples import WINDOW
+from gestured.lab.stability.path import simulated_series
 from gestured.lab.stability.segments import segment_cases
 from gestured.lab.table import Table, Value
 from gestured.model.context import NAMES, calm
 from gestured.model.features import touch_pattern
 from gestured.model.model import Model
 from gestured.model.shipped import shipped
+from gestured.simulator import GESTURES, NON_GESTURES
 
 Windows = Sequence[NDArray[np.float32]]  # (T, R, C) each
 Run = Callable[[NDArray[Any]], Sequence[Any]]  # (B, T, R, C) or (B, F) -> scores (B, G), unknown (B,)
@@ -44,9 +47,20 @@ def extreme_windows(quick: bool) -> Windows:
     return list(kept.values())[:: 5 if quick else 1]
 
 
-def decisions_table(names: Sequence[str], windows: Windows, quick: bool) -> Table:
-    """Shipped models, on windows of simulated gestures and on extreme ones."""
-    sets = {"gestures": windows, "extreme windows": extreme_windows(quick)}
+def performed_windows(count: int, kinds: Sequence[str]) -> Windows:
+    """The windows that the front end cuts out of so many simulated performances."""
+    takes = (series for _, series in simulated_series(count, kinds))
+    return [WINDOW.apply(segment) for take in takes for segment in cuts(take.frames, take.times)]
+
+
+def decisions_table(names: Sequence[str], quick: bool) -> Table:
+    """Shipped models, on windows of simulated gestures and non-gestures and on extreme ones."""
+    count = 10 if quick else 60
+    sets = {
+        "windows of gestures": performed_windows(count, GESTURES),
+        "of non-gestures": performed_windows(2 * count, NON_GESTURES),
+        "extreme ones": extreme_windows(quick),
+    }
     rows: list[tuple[Value, ...]] = []
     for name in names:
         data = shipped()[name].read_bytes()
@@ -64,9 +78,10 @@ def decisions_table(names: Sequence[str], windows: Windows, quick: bool) -> Tabl
         ("model", "input", "way", "answers that differ", "largest change of a score"),
         rows,
         (
-            "Against the same graph in float64, window by window. The extreme windows are those of the table of",
-            f"faults, of at most {LONGEST} frames, each once. An answer is the gesture that is published, or none.",
-            "Scores are from 0 to 1.",
+            "Against the same graph in float64, window by window. Gestures and non-gestures are simulated. Extreme",
+            "windows are of segments of 1e-45 to 1e35 counts, of offsets up to 1e7 times the signal, constant,",
+            "alternating, of one taxel, and on grids from 2 x 2 to 64 x 64; those of at most",
+            f"{LONGEST} frames, each once. An answer is the gesture that is published, or none.",
         ),
     )
 

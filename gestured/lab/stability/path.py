@@ -1,7 +1,7 @@
 """The whole path in one process: frames -> front end -> window -> model -> events; and what to send along it."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,10 +31,10 @@ class Series:
     frames: Array
 
 
-def simulated_series(count: int, seed: int = 41) -> Iterator[tuple[str, Series]]:
-    """So many simulated gestures, ten kinds in turn, a new person and sensor after each ten."""
+def simulated_series(count: int, kinds: Sequence[str] = GESTURES, seed: int = 41) -> Iterator[tuple[str, Series]]:
+    """So many simulated gestures, or other kinds, one after the other, a new person and sensor after each round."""
     for k in range(count):
-        kind, person = GESTURES[k % len(GESTURES)], 7000 + seed * 100 + k // len(GESTURES)
+        kind, person = kinds[k % len(kinds)], 7000 + seed * 100 + k // len(kinds)
         take = gesture_take(kind, Participant(person), SimulatedSensor.nominal(day=person), generator(seed, k))
         yield kind, Series(take.sensor_times, take.frames.astype(np.float64))
 

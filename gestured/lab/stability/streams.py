@@ -62,7 +62,7 @@ def streams(quick: bool) -> Iterator[Case]:
     for shape in ((2, 2), (3, 3), (5, 9), (9, 9), (27, 15), (64, 64)):
         stream, when = swipes(2, shape=shape)
         yield Case("2 x 2 to 64 x 64", stream, when if min(shape) >= LEAST_GRID else ())
-    for frames in (base.frames * 1e-310, (base.frames * 1e-40).astype(np.float32)):
+    for frames in (base.frames * 1e-315, (base.frames * 1e-42).astype(np.float32)):  # below the least normal number
         yield Case("denormals", Series(base.times, frames))
     yield Case("-0.0 for 0", Series(base.times, np.where(clipped.frames == 0, -0.0, clipped.frames)), at, alone=True)
     for place in range(0, 81, few):

@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -20,17 +20,19 @@ def test_a_table_is_markdown() -> None:
     assert rows[-1] == "A note."
 
 
-def test_tables_are_printed_as_they_are_done_or_as_json(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_tables_are_printed_as_they_are_done_or_as_json_and_written_into_a_page(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    def tables(quick: bool) -> Iterator[Table]:
+    def table(quick: bool) -> Table:
         assert quick
-        yield TABLE
+        return TABLE
 
-    monkeypatch.setattr(command, "all_tables", tables)
-    assert command.run(argparse.Namespace(quick=True, json=False)) == 0
+    monkeypatch.setattr(command, "TABLES", {"one": table})
+    page = tmp_path / "page.md"
+    page.write_text("Before.\n<!-- one: begin -->\n<!-- one: end -->\nAfter.\n")
+    args = argparse.Namespace(quick=True, json=False, document=page, words="gestured-lab stability --quick")
+    assert command.run(args) == 0
     assert str(TABLE) in capsys.readouterr().out
-    assert command.run(argparse.Namespace(quick=True, json=True)) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert "cores" in said["measured"]
-    assert said["tables"][0]["rows"][0] == ["ours", 1.234e-16, 3]
+    assert str(TABLE) in page.read_text() and "`gestured-lab stability --quick`" in page.read_text()
+    assert command.run(argparse.Namespace(quick=True, json=True, document=None)) == 0
+    assert json.loads(capsys.readouterr().out)[0]["rows"][0] == ["ours", 1.234e-16, 3]

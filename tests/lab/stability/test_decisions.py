@@ -10,17 +10,19 @@ from onnx import TensorProto
 from gestured.lab.stability import decisions
 from gestured.lab.stability.decisions import by_reference, decisions_table, widened
 from gestured.model.shipped import LADDER, shipped
-from tests.lab.made import gestures
-
-WINDOWS = list(gestures().values())
 
 
 def test_no_answer_of_a_shipped_model_is_another_one() -> None:
-    """On extreme windows, too; and but for windows of fewer digits every score is right, not only finite."""
-    rows: list[Any] = decisions_table(LADDER, WINDOWS, quick=True).rows
-    assert {row[0] for row in rows} == set(LADDER) and len({row[1] for row in rows}) == 2
+    """On extreme windows, too; and of gestures and extreme windows every score is right, not only finite.
+
+    Of a non-gesture one may differ: a taxel at the very threshold of contact is in contact by one bit.
+    """
+    rows: list[Any] = decisions_table(LADDER, quick=True).rows
+    assert {row[0] for row in rows} == set(LADDER) and len({row[1] for row in rows}) == 3
     assert [row for row in rows if row[3]] == []
-    assert max(row[4] for row in rows if not row[2].startswith("float16")) < 1e-5
+    as_the_daemon = {row[1].partition(" ")[2]: row[4] for row in rows if row[2] == "as the daemon" and row[0] == "lstm"}
+    assert as_the_daemon["windows of gestures"] < 1e-5 and as_the_daemon["extreme ones"] < 1e-5
+    assert max(row[4] for row in rows) < 0.2
 
 
 def test_the_table_sees_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,7 +34,7 @@ def test_the_table_sees_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
         return run
 
     monkeypatch.setattr(decisions, "by_reference", turned)
-    rows: list[Any] = decisions_table(["lstm"], WINDOWS, quick=True).rows
+    rows: list[Any] = decisions_table(["lstm"], quick=True).rows
     assert min(row[4] for row in rows) > 1e-3 and max(row[3] for row in rows) > 0
 
 
