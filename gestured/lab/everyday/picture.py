@@ -4,9 +4,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from gestured.lab.everyday.report import RULED, Figures, not_right
-from gestured.lab.study.report.drawing import COLOURS, INK, SOFT, Mark, sheet, styled, svg
+from gestured.lab.study.report.drawing import INK, SOFT, sheet, styled, svg
 
 WIDTH, HEIGHT = 700, 460  # pixels
+MODELS = (("#0067a5", "o"), ("#b9480a", "s"), ("#96498a", "^"), ("#007a5a", "D"))  # colour and mark of each in turn
 LEAST_SHARE = 0.005  # a logarithm cannot show 0; what is less is drawn here
 TITLE = "Missed or wrong against false gestures an hour"
 
@@ -36,14 +37,14 @@ def _figure(found: Figures) -> Figure:
         color=SOFT,
     )  # fmt: skip
     for k, (name, rows) in enumerate(found["curves"].items()):
-        mark = Mark(k % 4, f"f{k % 4}")
+        colour, mark = MODELS[k % len(MODELS)]
         places = [_place(row, least) for row in rows]
-        axes.plot(*zip(*places, strict=True), color=COLOURS[mark.colour], label=name)
+        axes.plot(*zip(*places, strict=True), color=colour, label=name)
         for point, of in found["points"][name].items():
             x, y = _place(of, least)
-            mark.point(axes, x, y)
+            axes.plot([x], [y], mark, color=colour, markersize=9, clip_on=False, zorder=3)
             if k == 0:
-                axes.annotate(point, (x, y), (9, 9), textcoords="offset points", color=mark.hue, fontweight="bold")
+                axes.annotate(point, (x, y), (9, 9), textcoords="offset points", color=colour, fontweight="bold")
     figure.legend(loc="outside lower center", ncols=4, frameon=False)
     return figure
 

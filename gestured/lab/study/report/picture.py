@@ -1,7 +1,7 @@
 """operating-points.svg: error against run time in three fields."""
 
 import json
-from itertools import product
+import math
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -9,16 +9,22 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from . import formats, reading
-from .drawing import INK, SOFT, families, mark_of, sheet, styled, svg
+from gestured.core.timing import Timing
+from gestured.lab.samples import WINDOW
+
+from . import reading
+from .drawing import INK, SOFT, sheet, styled, svg
 from .reading import Row, Study
 
-FIELDS = {"simulated": "simulated people", "foreign": "another generator's people", "real": "real fingers"}
+FIELDS = {"simulated": "simulated people", "foreign": "another generator", "real": "real fingers"}
 LEAST = 0.001  # an error of 0 is drawn here: a logarithm cannot show it
-WIDTH, HEIGHT = 1060, 516  # pixels
-REACH = (0, 10, 20, 32, 46, 62, 80, 100)  # pixels that a name may be moved away from its point
-TITLE = "Error against run time"
-Name = tuple[bool, float, float, str]  # whether it is bold and chooses first, x, y, the words
+WIDTH, HEIGHT = 1060, 430  # pixels
+TITLE = "Error against the time from the last touched frame to the answer"
+FRAME_MS = 1000 / WINDOW.rate_hz
+WAIT_MS = FRAME_MS + 1000 * Timing().release_s  # a contact is over after so much quiet, which a frame shows
+Name = tuple[float, float, bool, str]  # error, time, whether the model ships, words
+LINE = 15  # pixels of a name
+NAMED = 2  # methods beside those that ship, the best ones of a field
 
 
 def write_picture(study: Study, out: Path) -> Path:
@@ -49,82 +55,76 @@ def _false(row: Row) -> Row:
 
 
 def operating_points(study: Study) -> Figure:
-    """The picture, of what `points` keeps."""
+    """The picture, of what `points` keeps: a panel for each field, and one axis of errors for all."""
     rows = study["run_time"]
     figure = sheet(WIDTH, HEIGHT)
     fields = [field for field in FIELDS if any(field in row["fields"] for row in rows)]
     panels = figure.subplots(1, len(fields), sharex=True, sharey=True, squeeze=False)[0]
     names = []
     for axes, field in zip(panels, fields, strict=True):
-        axes.set_title(f"{FIELDS[field]}: error, per cent", color=INK, fontweight="bold")
-        names.append(_run_time(study, axes, [row for row in rows if field in row["fields"]], field))
-    label = "run time of a decision on one core: the mark cold, as in a daemon at 15 Hz; the thin end warm"
-    panels[len(panels) // 2].set_xlabel(label)
-    _legend(study, figure, rows)
+        axes.set_title(FIELDS[field], color=INK, fontweight="bold")
+        names.append(_field(study, axes, [row for row in rows if field in row["fields"]], field))
+    panels[0].set_ylabel("wrong or lost, per cent")
+    panels[len(panels) // 2].set_xlabel(
+        f"ms from a gesture's last touched frame to its answer; a frame lasts {FRAME_MS:.0f} ms"
+    )
+    of = {name: [row["false_per_minute"] * 60 for row in study[name]] for name in ("online_shipped", "online")}
+    words = [f"{what}: {_range(of[name])} false an hour in sessions" for name, what in
+             (("online_shipped", "ships"), ("online", "the study's, reject nothing")) if of[name]]  # fmt: skip
+    parts = [Line2D([], [], marker="o", linestyle="", color=colour, markersize=9) for colour in (INK, SOFT)]
+    parts = [*parts[: len(words)], Line2D([], [], color=SOFT, linewidth=1.4)]
+    words.append("no model is both earlier and better")
+    figure.legend(parts, words, loc="outside lower center", ncols=3, frameon=False)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for axes, some in zip(panels, names, strict=True):
-        _place(axes, some)
+        _name(axes, some)
     return figure
 
 
-def _run_time(study: Study, axes: Axes, rows: list[Row], field: str) -> list[Name]:
-    """Draw one field; returns the names of its points, for `_place`."""
-    names: list[Name] = []
-    axes.loglog()
+def _range(values: list[float]) -> str:
+    low, high = min(values), max(values)
+    return f"{low:.0f}" if round(low) == round(high) else f"{low:.0f} to {high:.0f}"
+
+
+def _field(study: Study, axes: Axes, rows: list[Row], field: str) -> list[Name]:
+    """One field: a point for each model, and the stair of those that no other model beats; the names of a few."""
+    axes.set_yscale("log")
     axes.minorticks_off()
-    axes.grid(axis="x")
-    _in_per_cent(axes)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda time, _: formats.duration(time)))
-    for row in rows:
-        of, ships = row["fields"][field], row["settings"] == "shipped"
-        mark = mark_of(study, row["method"])._replace(filling=3 if ships else 0)
-        error, wrong = max(LEAST, of["error"]), max(LEAST, of["wrong"])
-        low, high = max(LEAST, of.get("error_low", error)), max(LEAST, of.get("error_high", error))
-        cold, warm = row["cold_us"], row["median_us"]
-        axes.plot([warm, cold], [error, error], color=mark.hue, linewidth=1.4, alpha=0.5)
-        axes.plot([cold, cold], [low, high], color=mark.hue, linewidth=1.4, alpha=0.5)
-        if wrong < error:
-            axes.plot([cold, cold], [wrong, error], color=INK, linewidth=1, linestyle=(0, (1, 2)))
-            axes.plot([cold], [wrong], marker="_", color=INK, markersize=9, linestyle="")
-        mark.point(axes, cold, error)
-        names.append((ships, cold, error, reading.title(study, row["method"]) + (", ships" if ships else "")))
+    axes.set_xlim(WAIT_MS - 4, WAIT_MS + FRAME_MS)
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g}" if share <= 1 else ""))
+    found = sorted(_point(study, row, field) for row in rows)
+    front: list[tuple[float, float]] = []
+    for time, error, *_ in found:
+        if not front or error < front[-1][1]:
+            front.append((time, error))
+    axes.step(*zip(*[*front, (WAIT_MS + FRAME_MS, front[-1][1])], strict=True), where="post", color=SOFT, linewidth=1.4)
+    best = sorted(error for _, error, ships, _ in found if not ships)[:NAMED]
+    names: list[Name] = []
+    for time, error, ships, name in found:
+        look = (INK, 9, 4) if ships else (SOFT, 6, 3)
+        axes.plot([time], [error], "o", color=look[0], markersize=look[1], clip_on=False, zorder=look[2])
+        if ships or error in best:
+            names.append((error, time, ships, f"{name}, ships" if ships else name))
     return names
 
 
-def _in_per_cent(axes: Axes) -> None:
-    """Write shares on a logarithmic axis as per cent."""
-    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g}" if share <= 1 else ""))
+def _point(study: Study, row: Row, field: str) -> tuple[float, float, bool, str]:
+    """When a model answers (ms), how often it is wrong or loses a gesture, whether it ships, and its name."""
+    error = max(LEAST, row["fields"][field]["error"])
+    return WAIT_MS + row["cold_us"] / 1000, error, row["settings"] == "shipped", reading.title(study, row["method"])
 
 
-def _place(axes: Axes, names: list[Name]) -> None:
-    """Write each name into the nearest free place around its point; a name that was moved far gets a line to it.
-
-    Bold names choose first. One that finds no place is left out: the table has it.
-    """
-    taken = [line.get_window_extent().padded(2) for line in axes.lines]
-    for first, x, y, words in sorted(names, key=lambda name: (not name[0], name)):
-        for reach, dx, dy in product(REACH, (1, -1, 0), (0, 1, -1)):
-            offset = dx * (9 + 0.4 * reach), dy * (reach + (7 if dx else 16))
-            text = axes.annotate(
-                words, (x, y), offset, textcoords="offset points", ha={1: "left", -1: "right", 0: "center"}[dx],
-                va="center", fontweight="bold" if first else "normal",
-            )  # fmt: skip
-            box = text.get_window_extent()
-            if all(axes.bbox.contains(*corner) for corner in box.corners()) and not box.count_overlaps(taken):
-                taken.append(box)
-                if reach:
-                    line = {"arrowstyle": "-", "color": SOFT, "linewidth": 0.8, "shrinkA": 0}
-                    axes.annotate("", (x, y), offset, textcoords="offset points", arrowprops=line)
-                break
-            text.remove()
-
-
-def _legend(study: Study, figure: Figure, rows: list[Row]) -> None:
-    """Which mark is which family, and the marks' parts."""
-    marks = families(study, rows)
-    lines = [Line2D([], [], **mark.style) for mark, _ in marks]
-    lines += [Line2D([], [], linestyle="", marker="_", color=INK, markersize=9)]
-    words = [*(words for _, words in marks), "wrong alone, the rest is lost"]
-    figure.legend(lines, words, loc="outside lower center", ncols=3, frameon=False)
+def _name(axes: Axes, names: list[Name]) -> None:
+    """Write names beside their points, the lowest first, none over another."""
+    free = -math.inf  # pixels, from which on no name stands
+    for error, time, ships, words in sorted(names):
+        at = float(axes.transData.transform((time, error))[1])
+        up = max(at, free) - at
+        free = at + up + LINE
+        arrow = {"arrowstyle": "-", "color": SOFT, "linewidth": 0.6, "shrinkB": 5}
+        axes.annotate(
+            words, (time, error), (16, up), textcoords="offset points", va="center",
+            fontweight="bold" if ships else "normal", arrowprops=arrow if up else None,
+        )  # fmt: skip
