@@ -7,8 +7,8 @@ Simulated people, of whom no model has learned; nothing that rests covers the wa
 
 import argparse
 from functools import partial
-from pathlib import Path
 
+from experiments.pages import add_document, tell
 from gestured.core.frames import Frame
 from gestured.core.points import USUAL
 from gestured.core.scene import Setup
@@ -17,7 +17,6 @@ from gestured.lab.everyday.command import at
 from gestured.lab.everyday.heard import Heard, hear
 from gestured.lab.everyday.hours import judged, points_of
 from gestured.lab.everyday.stretches import Stretch
-from gestured.lab.made_of import made_of, renew
 from gestured.lab.table import Table
 from gestured.model.shipped import shipped
 from gestured.record.judge import Performed
@@ -63,7 +62,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--people", type=int, default=100, help="for each cell (%(default)s)")
     parser.add_argument("--jobs", type=int, default=2, help="processes (%(default)s)")
-    parser.add_argument("--document", type=Path, metavar="PAGE", help="a page whose table `beside` is written anew")
+    add_document(parser, "beside")
     args = parser.parse_args()
     found = list(in_processes(partial(heard, args.people), range(len(LAID) * len(WAITS_S)), args.jobs, "cells"))
     least = points_of(at(MODEL, USUAL)[0])[USUAL]
@@ -71,12 +70,7 @@ def main() -> None:
     rows = [(f"{wait:g} s", *(f"{share:.2f}" for share in right[k :: len(WAITS_S)])) for k, wait in enumerate(WAITS_S)]
     notes = (f"Shares of {args.people} swipes each that are recognised at {USUAL}.",)
     table = Table("A swipe beside what was laid on so long before", ("laid on before", *LAID), rows, notes)
-    if args.document:
-        line = made_of(
-            f"python -m experiments.beside --people {args.people} --document {args.document}", [shipped()[MODEL]]
-        )
-        renew(args.document, "beside", [line, "", str(table)])
-    print(table)
+    tell(table, [shipped()[MODEL]], "beside", "beside", args.document)
 
 
 if __name__ == "__main__":

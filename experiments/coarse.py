@@ -1,6 +1,6 @@
 """Sensors with few counts: a gesture's peak in 2 to 100 steps, through the whole path.
 
-python -m experiments.coarse
+python -m experiments.coarse --document docs/numerics.md
 """
 
 import argparse
@@ -8,11 +8,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from experiments.pages import add_document, tell
 from gestured.core.classifier import Classifier
 from gestured.lab.stability.path import Series, events, labels, simulated_series
 from gestured.lab.table import Table, Value
 from gestured.model.opening import open_model
-from gestured.model.shipped import LADDER
+from gestured.model.shipped import LADDER, shipped
 
 PEAKS = (2, 3, 4, 6, 10, 30, 100)  # counts
 
@@ -55,7 +56,10 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--takes", type=int, default=60, help="simulated gestures (%(default)s)")
-    print(coarse_table({name: open_model(name) for name in LADDER}, parser.parse_args().takes))
+    add_document(parser, "few counts")
+    args = parser.parse_args()
+    table = coarse_table({name: open_model(name) for name in LADDER}, args.takes)
+    tell(table, shipped().values(), "coarse", "few counts", args.document)
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.pages import add_document, tell
 from gestured.client.sensor import Form
 from gestured.core import messages
 from gestured.core.events import Event
@@ -31,7 +32,8 @@ from gestured.daemon.asked import scene_of
 from gestured.daemon.backlog import Backlog, Datagram
 from gestured.daemon.health import TICK_S
 from gestured.daemon.merge import load_settings
-from gestured.lab.made_of import made_of
+from gestured.lab.progress import progress
+from gestured.lab.table import Table
 from gestured.model.ladder import ladder_for
 from gestured.model.shipped import shipped
 from gestured.record.judge import Performed, Tally
@@ -204,24 +206,20 @@ def main() -> int:
     parser.add_argument("--people", type=int, default=10, help="two minutes each, touched and untouched (default: 10)")
     parser.add_argument("--fault", action="append", choices=tuple(FAULTS), help="only this one; may be repeated")
     parser.add_argument("--json", action="store_true")
+    add_document(parser, "damage")
     args = parser.parse_args()
     log.configure("error")
     bench = Bench(args.model)
     people = range(FIRST, FIRST + args.people)
     takes, idle = [take(person) for person in people], [take(person, touched=False) for person in people]
-    found = []
-    for name in args.fault or FAULTS:
-        found.append(measure(name, takes, idle, bench).figures())
-        if not args.json:  # row by row: it takes a while
-            if len(found) == 1:
-                print(made_of("python -m experiments.damage", [shipped().get(args.model, Path(args.model))]) + "\n")
-                print("| " + " | ".join(found[0]) + " |\n|" + "---|" * len(found[0]))
-            print(
-                "| " + " | ".join("-" if value is None else str(value) for value in found[-1].values()) + " |",
-                flush=True,
-            )
+    faults = args.fault or list(FAULTS)
+    found = [measure(name, takes, idle, bench).figures() for name in progress(faults, len(faults), "faults")]
     if args.json:
         print(json.dumps(found, indent=2))
+    else:
+        rows = [tuple("-" if value is None else value for value in row.values()) for row in found]
+        table = Table("Gestures beside a fault", tuple(found[0]), rows)
+        tell(table, [shipped().get(args.model, Path(args.model))], "damage", "damage", args.document)
     return int(any(figures["of nobody"] or figures["unended"] for figures in found))
 
 

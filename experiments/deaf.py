@@ -16,9 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.damage import FIRST, Bench, damage
+from experiments.pages import add_document, tell
 from gestured.daemon import log
 from gestured.daemon.health import TICK_S
-from gestured.lab.made_of import made_of
+from gestured.lab.progress import progress
+from gestured.lab.table import Table
 from gestured.model.shipped import shipped
 from gestured.record.judge import Performed, Tally
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
@@ -155,18 +157,18 @@ def main() -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--people", type=int, default=10, help="100 seconds each (default: 10)")
+    add_document(parser, "deaf")
     parser.add_argument("--bad", action="append", choices=tuple(BAD), help="only these frames; may be repeated")
     args = parser.parse_args()
     log.configure("error")
     bench = Bench("cnn_lstm")
     takes = [take(person) for person in range(FIRST, FIRST + args.people)]
     sound = [hear(healthy, BAD["none"], seed, bench) for seed, healthy in enumerate(takes)]
-    print(made_of("python -m experiments.deaf", [shipped()["cnn_lstm"]]) + "\n")
-    for number, name in enumerate(args.bad or BAD):
-        row = figures(name, takes, sound, bench)
-        if not number:
-            print("| " + " | ".join(row) + " |\n|" + "---|" * len(row))
-        print("| " + " | ".join(map(str, row.values())) + " |", flush=True)
+    rows = [
+        figures(name, takes, sound, bench) for name in progress(args.bad or BAD, len(args.bad or BAD), "bad frames")
+    ]
+    table = Table("Seconds until a sensor hears again", tuple(rows[0]), [tuple(row.values()) for row in rows])
+    tell(table, [shipped()["cnn_lstm"]], "deaf", "deaf", args.document)
     return 0
 
 

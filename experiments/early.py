@@ -10,11 +10,13 @@ import argparse
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.pages import add_document, tell
 from gestured.core.classifier import Classifier
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Unknown
 from gestured.core.facts import events_of
@@ -22,11 +24,11 @@ from gestured.core.frames import Frame
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
 from gestured.core.sensor import Sensor
 from gestured.lab.dataset import Truth, truths
-from gestured.lab.made_of import made_of
 from gestured.lab.online import NON_GESTURE_SHARE, SESSION_S
 from gestured.lab.progress import progress
+from gestured.lab.table import Table
 from gestured.model.opening import open_model
-from gestured.model.shipped import shipped, shipped_name
+from gestured.model.shipped import shipped
 from gestured.record.judge import owners, verdict
 from gestured.simulator import NONE, Participant, SimulatedSensor, Take, any_sensor, generator, session
 
@@ -142,6 +144,7 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=20, help="minutes of sessions of each kind (%(default)s)")
     parser.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (%(default)s)")
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    add_document(parser, "early")
     args = parser.parse_args()
     model = open_model(args.model)
     count = max(round(args.minutes * 60 / SESSION_S), 1)
@@ -154,25 +157,19 @@ def main() -> None:
     if args.json:
         print(json.dumps(figures, indent=2))
     else:
-        name = shipped_name(args.model)
-        if name is not None:
-            print(made_of("python -m experiments.early", [shipped()[name]]))
-        print(table({which: figures[which] for which in SETS}))
+        made = table("Provisional events, simulated", {which: figures[which] for which in SETS})
+        tell(made, [shipped().get(args.model, Path(args.model))], "early", "early", args.document)
 
 
 HEAD = ("gestures", "right", "wrong", "moved", "early", "events", "confirmed", "moved_median_s", "tap_median_s",
         "taps_confirmed", "events_per_minute")  # fmt: skip
+SHOWN = ("moved, median s", "one tap, median s", "taps confirmed", "events a minute")  # as a page calls the last ones
 
 
-def table(sets: dict[str, dict[str, Any]]) -> str:
-    """One line for each set."""
-    lines = [f"{'set':<14}" + "".join(f"{name:>{len(name) + 2}}" for name in HEAD)]
-    for which, found in sets.items():
-        cells = ("-" if found[name] is None else str(found[name]) for name in HEAD)
-        lines.append(
-            f"{which:<14}" + "".join(f"{cell:>{len(name) + 2}}" for name, cell in zip(HEAD, cells, strict=True))
-        )
-    return "\n".join(lines)
+def table(title: str, sets: dict[str, dict[str, Any]]) -> Table:
+    """One row for each set."""
+    rows = [(name, *("-" if found[key] is None else str(found[key]) for key in HEAD)) for name, found in sets.items()]
+    return Table(title, ("sessions", *HEAD[: -len(SHOWN)], *SHOWN), rows)
 
 
 if __name__ == "__main__":

@@ -4,16 +4,15 @@ python -m experiments.own models/cnn_lstm.onnx
 """
 
 import argparse
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from experiments.pages import add_document, tell
 from gestured.core.own import EXAMPLES
 from gestured.lab.cli import CACHE
-from gestured.lab.made_of import command_of, made_of, renew
 from gestured.lab.own.command import embedding_of
 from gestured.lab.own.learn import Seen, Trial, played_through
 from gestured.lab.own.play import played
@@ -66,17 +65,14 @@ def main() -> None:
     parser.add_argument("model", type=Path, metavar="MODEL", help="that gestured-lab own has taught")
     parser.add_argument("--cache", type=Path, default=CACHE, help="where finished steps are kept (%(default)s)")
     parser.add_argument("--people", type=int, default=JUDGES, help="who judge (%(default)s)")
-    parser.add_argument("--document", type=Path, metavar="PAGE", help="a page whose table `own` is written anew")
+    add_document(parser, "own")
     args = parser.parse_args()
     model = embedding_of(args.model)
     assert model.space is not None, f"{args.model}: teach it first: gestured-lab own {args.model}"
     seen = Seen.by(model, played(args.cache, args.people, judge=True))
     trials = (trial for trial in played_through(seen, model.space) if trial.kind in JUDGED)
     made = table(args.model.stem, figures(model.space, trials))
-    print(made)
-    if args.document:
-        line = made_of(command_of(["python", "-m", "experiments.own", *sys.argv[1:]]), [args.model])
-        renew(args.document, "own", [line, "", str(made)])
+    tell(made, [args.model], "own", "own", args.document)
 
 
 if __name__ == "__main__":

@@ -6,13 +6,13 @@ Frames pass through the daemon's own path, from the first one on. What counts is
 that the recordings do not name (`other`) are neither right nor false, nor is anything within half a second of one.
 """
 
-import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
 import gestured
+from experiments.pages import add_document, tell
 from experiments.trained import options, trained
 from gestured.core.points import USUAL
 from gestured.lab.everyday.heard import Heard, hear
@@ -20,7 +20,6 @@ from gestured.lab.everyday.hours import Hours, judged
 from gestured.lab.everyday.stretches import recorded
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
-from gestured.lab.made_of import command_of, made_of, renew
 from gestured.lab.quantiles import quantiles
 from gestured.lab.samples import WINDOW
 from gestured.lab.table import Table, Value
@@ -64,7 +63,7 @@ def row(name: str, heard: list[Heard]) -> tuple[Value, ...]:
 def main() -> None:
     """Judge each session, print and write the table."""
     parser = options(__doc__)
-    parser.add_argument("--document", type=Path, metavar="PAGE", help="a page whose table `sessions` is written anew")
+    add_document(parser, "sessions")
     args = parser.parse_args()
     if args.real is None:
         parser.error("--real: missing; the folder of real recordings, as docs/training.md has it")
@@ -85,10 +84,7 @@ def main() -> None:
     rows = [row(f"subject {n}", [one for one in heard if int(one.person) == n]) for n in subjects]
     head = ("", "minutes", "meant", "right", "wrong", "missed", "false", "95 % an hour", "deaf min an hour")
     table = Table("Real fingers, whole sessions as streams", head, [*rows, row("all", heard)])
-    if args.document:
-        command = command_of(["python", "-m", "experiments.sessions", *sys.argv[1:]])
-        renew(args.document, "sessions", [made_of(command, [args.models / f"{NET}.onnx"]), "", str(table)])
-    print(table)
+    tell(table, [args.models / f"{NET}.onnx"], "sessions", "sessions", args.document)
 
 
 if __name__ == "__main__":

@@ -7,19 +7,21 @@ import argparse
 import json
 from collections import Counter
 from dataclasses import asdict
+from pathlib import Path
 from statistics import median
 from typing import Any
 
+from experiments.pages import add_document, tell
 from gestured.core.classifier import Classifier
 from gestured.core.events import Gesture
 from gestured.core.frames import Frame
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
 from gestured.core.sensor import Sensor
-from gestured.lab.made_of import made_of
 from gestured.lab.online import tallied
 from gestured.lab.progress import progress
+from gestured.lab.table import Table
 from gestured.model.opening import open_model
-from gestured.model.shipped import shipped, shipped_name
+from gestured.model.shipped import shipped
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 
 WAITS_S = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)
@@ -81,6 +83,9 @@ def figures(model: str, people: int, seed: int) -> list[dict[str, Any]]:
     return rows
 
 
+HEAD = ("`tap_gap_s`", "double taps right", "read as two taps", "single taps right", "a single tap's answer after")
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -88,22 +93,19 @@ def main() -> None:
     parser.add_argument("--people", type=int, default=20, help="participants, two minutes of taps each (%(default)s)")
     parser.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (%(default)s)")
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    add_document(parser, "taps")
     args = parser.parse_args()
     rows = figures(args.model, args.people, args.seed)
     if args.json:
         print(json.dumps(rows, indent=2))
         return
-    name = shipped_name(args.model)
-    if name is not None:
-        print(made_of("python -m experiments.taps", [shipped()[name]]))
-    print("| `tap_gap_s` | double taps right | read as two taps | single taps right | a single tap's answer after |")
-    print("|---|---|---|---|---|")
+    shares = ("double_taps_right", "double_taps_read_as_taps", "taps_right")
+    table = Table("Taps by the time in which a second one counts", HEAD)
     for row in rows:
         after = row["tap_answered_after_s"]
-        print(
-            f"| {row['tap_gap_s']:.2f} s | {row['double_taps_right']:.3f} | {row['double_taps_read_as_taps']:.3f} "
-            f"| {row['taps_right']:.3f} | {'-' if after is None else f'{after:.2f} s'} |"
-        )
+        cells = (f"{row['tap_gap_s']:.2f} s", *(f"{row[share]:.3f}" for share in shares))
+        table.rows.append((*cells, "-" if after is None else f"{after:.2f} s"))
+    tell(table, [shipped().get(args.model, Path(args.model))], "taps", "taps", args.document)
 
 
 if __name__ == "__main__":

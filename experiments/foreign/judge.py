@@ -25,6 +25,7 @@ from typing import Any
 
 from experiments.early import Ahead, heard, table
 from experiments.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
+from experiments.pages import tell
 from gestured.core.events import Cancelled, Gesture, Onset, Unknown
 from gestured.core.facts import events_of
 from gestured.core.frames import Frame, Segment
@@ -344,6 +345,20 @@ def judged(source: str | None, args: argparse.Namespace) -> tuple[dict[str, Any]
     return summary(outcomes, unseen), outcomes
 
 
+def show_provisional(args: argparse.Namespace) -> None:
+    """Print provisional events in sessions of the levels, and of non-gestures."""
+    sets = {level: (level, 0.25) for level in args.level} | {"non-gestures": ("nominal", 1.0)}
+    rows = {
+        name: provisional(args.model, level, share, range(args.first, args.first + (args.sessions or 10))).figures()
+        for name, (level, share) in sets.items()
+    }
+    if args.json:
+        print(json.dumps(rows, indent=1))
+        return
+    made = table("Provisional events, by another generator", rows)
+    tell(made, [shipped().get(args.model, Path(args.model))], "foreign.judge", "early elsewhere", args.document)
+
+
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -368,12 +383,7 @@ def main() -> None:
     if args.provisional and args.model is None:
         parser.error("--provisional: expected a --model")
     if args.provisional:
-        sets = {level: (level, 0.25) for level in args.level} | {"non-gestures": ("nominal", 1.0)}
-        rows = {
-            name: provisional(args.model, level, share, range(args.first, args.first + (args.sessions or 10))).figures()
-            for name, (level, share) in sets.items()
-        }
-        print(json.dumps(rows, indent=1) if args.json else table(rows))
+        show_provisional(args)
         return
     if not (args.model or args.front_end):
         show_shipped(args)

@@ -8,21 +8,19 @@ are the same thing each time.
 """
 
 import argparse
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from experiments.foreign import GESTURES, LEVELS, NON_GESTURES
 from experiments.foreign.hands import Performance, draw_person, perform
 from experiments.foreign.sensors import draw_sensor, record
+from experiments.pages import add_document, tell
 from gestured.core.classifier import NEAR
 from gestured.core.frames import Segment
 from gestured.core.own import EXAMPLES
 from gestured.lab.dataset import cuts
-from gestured.lab.made_of import command_of, made_of, renew
 from gestured.lab.table import Table
 from gestured.model.model import Model
 from gestured.model.opening import open_model
@@ -121,15 +119,10 @@ def main() -> None:
     parser.add_argument("--model", default="cnn_lstm", choices=LADDER, help="a shipped one (cnn_lstm)")
     parser.add_argument("--people", type=int, default=10, help="people (10)")
     parser.add_argument("--level", default=LEVELS[0], choices=LEVELS, help=f"how hard ({LEVELS[0]})")
-    parser.add_argument(
-        "--document", type=Path, metavar="PAGE", help="a page whose table `other hands` is written anew"
-    )
+    add_document(parser, "other hands")
     args = parser.parse_args()
     table = judge(open_model(args.model), args.people, args.level)
-    print(table)
-    if args.document:
-        command = command_of(["python", "-m", "experiments.foreign.own", *sys.argv[1:]])
-        renew(args.document, "other hands", [made_of(command, [shipped()[args.model]]), "", str(table)])
+    tell(table, [shipped()[args.model]], "foreign.own", "other hands", args.document)
 
 
 if __name__ == "__main__":

@@ -142,7 +142,7 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     from gestured.lab.samples import Samples, collect
 
     spread = {"wide": range(80), "cohort": range(0, len(TRIALS), 9), "others": range(0, len(OTHER_TRIALS), 9)}
-    spread |= {"days": range(3), "nominal_days": range(2)}
+    spread |= {"days": range(3), "days_by_chance": range(2), "nominal_days": range(2)}
     made: dict[tuple[str, int], Samples] = {}
 
     def simulated(cache: Path, stream: str, seed: int, count: int, jobs: int = 2) -> Samples:
