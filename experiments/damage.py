@@ -217,7 +217,7 @@ def main() -> int:
     if args.json:
         print(json.dumps(found, indent=2))
     else:
-        rows = [tuple("-" if value is None else value for value in row.values()) for row in found]
+        rows = [tuple("-" if value is None else str(value) for value in row.values()) for row in found]
         table = Table("Gestures beside a fault", tuple(found[0]), rows)
         tell(table, [shipped().get(args.model, Path(args.model))], "damage", "damage", args.document)
     return int(any(figures["of nobody"] or figures["unended"] for figures in found))

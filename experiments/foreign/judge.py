@@ -365,8 +365,8 @@ def main() -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--model", help="a shipped model's name or a path; its figures kind by kind")
     what.add_argument("--front-end", action="store_true", help="segmentation alone; needs no model")
-    what.add_argument(
-        "--document", type=Path, help="a page whose table is renewed, and the shipped models' cards with it"
+    parser.add_argument(
+        "--document", type=Path, metavar="PAGE", help="a page to write; with all models' table, their cards"
     )
     parser.add_argument("--n", type=int, default=40, help="takes of each kind and level (%(default)s)")
     parser.add_argument("--first", type=int, default=0, help="first seed (%(default)s)")
@@ -382,12 +382,11 @@ def main() -> None:
     args = parser.parse_args()
     if args.provisional and args.model is None:
         parser.error("--provisional: expected a --model")
-    if args.provisional:
-        show_provisional(args)
+    if args.provisional or not (args.model or args.front_end):
+        (show_provisional if args.provisional else show_shipped)(args)
         return
-    if not (args.model or args.front_end):
-        show_shipped(args)
-        return
+    if args.document:
+        parser.error("--document: expected neither --model nor --front-end, the page has all models")
     result, outcomes = judged(args.model, args)
     long = (
         [sessions(args.model, lv, args.sessions, args.first) for lv in args.level]
