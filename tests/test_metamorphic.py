@@ -23,9 +23,9 @@ from tests.symmetries import Property, doubled, mirrored, on_grid, postponed, ra
 
 COUNT = 60  # enough that LEAST lets one label differ
 LEAST = 0.98  # of the labels, where a learned net decides
-# Frames that come twice halve the noise that a sensor is measured to have, and the verifier sees how far a contact
-# stands out from it. So some labels change there between a gesture and unknown.
-LEAST_DOUBLED = 0.9
+# Whether a gesture near the threshold is said or unknown is decided by the verifier, which has not learned from windows
+# that are turned, and sees how far a contact stands out from the noise, which frames that come twice halve.
+LEAST_SAID = 0.9
 numbers = st.integers(0, COUNT - 1)
 changes = st.one_of(
     st.integers(-(2**40), 2**40).map(lambda n: postponed(n / 4096)),
@@ -110,8 +110,11 @@ def test_a_sensor_that_is_mounted_otherwise_and_says_so_gives_the_same_events(
     ids=lambda change: change.name,
 )
 def test_the_nets_say_the_same_or_what_it_became(name: str, change: Property) -> None:
-    right = [
-        labels(events(change.apply(stream), net(name))) == renamed(before, change.names)
+    found = [
+        (labels(events(change.apply(stream), net(name))), renamed(before, change.names))
         for stream, before in zip(streams(), said(name), strict=True)
     ]
-    assert sum(right) >= (LEAST_DOUBLED if change.name == doubled().name else LEAST) * len(right)
+    frames_differ = change.name in (mirrored().name, upside_down().name, doubled().name)
+    assert sum(now == then for now, then in found) >= (LEAST_SAID if frames_differ else LEAST) * len(found)
+    named = [(now, then) for now, then in found if "unknown" not in now + then]
+    assert sum(now == then for now, then in named) >= LEAST * len(named)  # no gesture becomes another one

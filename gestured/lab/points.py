@@ -20,7 +20,7 @@ from gestured.simulator import GESTURES, NONE
 
 # Lost gestures that one false gesture counts as much as, on a day on which some 35 gestures an hour are meant. A budget
 # of false ones alone would give up the taps, which are what everyday life most looks like.
-COSTS = dict(zip(STRICTNESS, (0.1, 0.4, 3.0), strict=True))
+COSTS = dict(zip(STRICTNESS, (0.1, 0.25, 3.0), strict=True))
 
 
 def operating_points(answers: Answers, lived: Samples, performed: int, hours: float) -> dict[str, Any]:
