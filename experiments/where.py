@@ -45,7 +45,6 @@ DOWN, FIRM = (
     0.3,
 )  # of a usual press: from there on a finger is on the sensor, and presses so that a frame shows it
 APART = (1.5, 2.0, 2.5, 3.0, 4.0, math.inf)  # pitches between two fingers: edges of the table's rows
-REAL = Path("../shared/data/capfingerid_sessions_dev.npz")
 TOUCHED = 60  # counts of a real frame that shows a finger
 
 
@@ -211,10 +210,10 @@ def several(count: int) -> Table:
     )
 
 
-def real(path: Path, count: int) -> Table | str:
+def real(path: Path | None, count: int) -> Table | str:
     """Real frames against themselves on a coarser grid; or why there are none."""
-    if not path.exists():
-        return f"Real frames were not compared: {path} is not there."
+    if path is None:
+        return "Real frames were not compared: --real names none."
     frames = read(path).frames
     rng = np.random.default_rng(0)
     touched = np.flatnonzero(frames.max(axis=(1, 2)) >= TOUCHED)
@@ -256,7 +255,9 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--takes", type=int, default=300, help="takes for each row (%(default)s)")
-    parser.add_argument("--real", type=Path, default=REAL, metavar="FILE", help="sessions of CapFingerId (%(default)s)")
+    parser.add_argument(
+        "--real", type=Path, metavar="FILE", help="sessions of CapFingerId, capfingerid_sessions_dev.npz"
+    )
     parser.add_argument("--document", type=Path, metavar="PAGE", help="a page with the marks `places: begin` and `end`")
     args = parser.parse_args()
     lines = [str(table) for table in (accuracy(args.takes), several(args.takes), real(args.real, 10 * args.takes))]
