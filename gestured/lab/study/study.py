@@ -14,7 +14,7 @@ import torch
 import gestured
 from gestured.core.errors import GesturedError
 from gestured.lab.digest import file_digest
-from gestured.lab.made_of import made_of, renew
+from gestured.lab.made_of import OLDER, made_of, renew
 from gestured.lab.study import cohort, recorded, tables
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.choices import choices
@@ -47,7 +47,9 @@ def run(args: argparse.Namespace) -> int:
         args.out.mkdir(parents=True, exist_ok=True)
         kept = renewed(_kept(args.draw))
         path = write_picture(kept, args.out)
-        below = [made_of("gestured-lab study", [path, path.with_suffix(".json")]), "", *table(kept)]
+        older = kept["about"]["models"] != {name: file_digest(path) for name, path in shipped().items()}
+        below = [made_of(args.words, [path, path.with_suffix(".json")]), *(["", OLDER] if older else []), ""]
+        below += table(kept)
         if args.document:
             renew(args.document, "choice", below)
         print("\n".join([str(path), *below]))

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from gestured.core.errors import GesturedError
 from gestured.lab import cli
 from gestured.lab.digest import file_digest
-from gestured.lab.made_of import renew, stale
+from gestured.lab.made_of import OLDER, renew, stale
 from gestured.lab.study.report.picture import FIELDS, write_picture
 from gestured.model.shipped import shipped
 from tests.lab.study.made_study import made_study
@@ -94,3 +94,18 @@ def test_what_is_no_study_is_one_sentence(tmp_path: Path, capsys: pytest.Capture
     path.write_text(json.dumps({"about": {}}))
     assert cli.main(["study", "--draw", str(path), "--out", str(tmp_path)]) == 1
     assert capsys.readouterr().err.startswith(f"gestured-lab: --draw: {path}: expected study.json")
+
+
+def test_a_picture_names_the_command_that_draws_it_and_no_folder_of_its_data(
+    tmp_path: Path, undrawn: None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """And its table says so where the models that were measured are not those that ship."""
+    study, kept = made_study(), tmp_path / "study.json"
+    for models, older in (({}, True), ({name: file_digest(path) for name, path in shipped().items()}, False)):
+        study["about"] |= {"models": models, "command": "gestured-lab study --real /home/somebody/data"}
+        kept.write_text(json.dumps(study))
+        assert cli.main(["study", "--draw", str(kept), "--out", str(tmp_path)]) == 0
+        said = capsys.readouterr().out
+        assert "made by `gestured-lab study --draw " in said and (OLDER in said) == older
+        about = json.loads((tmp_path / "operating-points.json").read_text())["about"]
+        assert about["command"] == "gestured-lab study --real FOLDER"

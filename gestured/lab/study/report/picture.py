@@ -2,6 +2,7 @@
 
 import json
 import math
+import shlex
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -10,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from gestured.core.timing import Timing
+from gestured.lab.made_of import command_of
 from gestured.lab.samples import WINDOW
 
 from . import reading
@@ -39,6 +41,7 @@ def write_picture(study: Study, out: Path) -> Path:
 def points(study: Study) -> Study:
     """What the picture is drawn from, and where it comes from: the part of a study that is kept beside it."""
     about = {name: study["about"].get(name) for name in ("command", "version", "seed", "models", "quick")}
+    about["command"] = command_of(shlex.split(about["command"] or ""))  # an older run named its folders
     timed = {row["method"] for row in study["run_time"]}
     named = {name: of for name, of in study["methods"].items() if name in timed}
     return {
