@@ -32,4 +32,4 @@ def test_each_fault_has_a_promise_a_test_and_a_metric(row: str) -> None:
 
 def test_each_fault_that_is_measured_has_its_figures() -> None:
     table = TEXT.split("<!-- damage: begin -->")[1].split("<!-- damage: end -->")[0]
-    assert set(FAULTS) <= set(re.findall(r"^\| ([^|]+?) \|", table, re.MULTILINE))
+    assert set(FAULTS) <= set(re.findall(r"^\| ([^|]+?) +\|", table, re.MULTILINE))

@@ -179,7 +179,9 @@ def everyone() -> dict[str, Samples]:
     people = {person: k for k, (person, *_) in enumerate(OTHER_TRIALS)}
     trials = {trial.participant: trial.index for trial in TRIALS}
     made = {f"wide{seed}": collect(s for i in range(25) for s in STREAMS["wide"](seed, i)) for seed in (1, 2, 3)}
-    for number, (stream, seed) in enumerate((("days", 1), ("days", 2), ("nominal_days", 3))):
+    for number, (stream, seed) in enumerate(
+        (("days", 1), ("days", 2), ("nominal_days", 3), ("days_by_chance", 1), ("days_by_chance", 2))
+    ):
         made[f"{stream}{seed}"] = collect(s for s in STREAMS[stream](seed, 40 + number))
     made["cohort"] = collect(s for i in trials.values() for s in STREAMS["cohort"](0, i))
     made["others"] = collect(s for i in people.values() for s in STREAMS["others"](0, i))
