@@ -170,8 +170,11 @@ class Stamper:
         """Seconds since the `last` stamp by the time tag, or else by the arrival; and whether the tag is impossible."""
         step = tag - self._tag if tag is not None and self._tag is not None else 0.0
         if 0 < step <= self.MAX_STEP_S and last + step <= arrived + self.AHEAD_S:
-            ahead, self._ahead = self._ahead, 0.0
-            return step - ahead if ahead < step else step, False
+            ahead = (
+                self._ahead if self._ahead <= self.REORDER_S else 0.0
+            )  # a clock that stood for longer lost that time
+            self._ahead = max(ahead - step, 0.0)
+            return max(step - ahead, 0.0), False
         waited = arrived - self._arrived
         # A coarse clock shows one time for several frames; what they were put beyond it is no step of the clock.
         self._ahead = self._ahead + waited if tag is not None and tag == self._tag else 0.0

@@ -5,7 +5,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from gestured.core.stamping import Stamp, Stamper
@@ -209,6 +209,7 @@ def test_a_sensors_clock_runs_ahead_by_a_day_at_most() -> None:
 
 
 @given(st.floats(0.001, 0.2), st.floats(0.02, 0.1), st.floats(0, 0.01))
+@example(0.04177775799437271, 0.04177775799437271, 0.0)
 def test_a_coarse_clock_of_the_sensor_runs_no_faster_than_time(grain: float, period: float, jitter: float) -> None:
     stamper, rng = Stamper("sensor"), np.random.default_rng(0)
     true = np.arange(300) * period
