@@ -40,77 +40,77 @@ class Spot(NamedTuple):
 
 def spots(frame: Array, noise: float) -> list[Spot]:
     """The fingers in (R, C) counts above the baseline, the strongest first: one, or two that can be told apart."""
-    best = int(frame.argmax())
-    first, top = divmod(best, frame.shape[1]), frame.item(best)
-    second = _second(frame, first, top, noise)
-    if second is None:
+    shape, first = frame.shape, int(frame.argmax())
+    top = frame.item(first)
+    second = int((frame * _elsewhere(shape, first)).argmax())
+    peak = frame.item(second)
+    if peak < SECOND * top or peak < NOISE * noise or not _parted(frame, first, second):
         return [_spot(frame, first, REACH, (frame > top / 2).tobytes().count(1))]  # np.count_nonzero takes longer
-    down, across = second[0] - first[0], second[1] - first[1]
-    near = max(abs(down), abs(across)) <= APART
-    rows, columns = (np.arange(side) for side in frame.shape)  # below: less far from the first peak than half-way
-    middle = (second[0] ** 2 + second[1] ** 2 - first[0] ** 2 - first[1] ** 2) / 2
-    nearer = (rows * down)[:, None] + columns * across < middle
+    (row, column), (down, across) = divmod(first, shape[1]), divmod(second, shape[1])
+    near = max(abs(down - row), abs(across - column)) <= APART
+    rows, columns = np.indices(shape)  # below: less far from the first peak than half-way
+    nearer = rows * (down - row) + columns * (across - column) < (down**2 + across**2 - row**2 - column**2) / 2
     return [
-        _spot(frame, peak, 1 if near else REACH, int(np.count_nonzero((frame > frame.item(peak) / 2) & own)))
-        for peak, own in ((first, nearer), (second, ~nearer))
+        _spot(frame, at, 1 if near else REACH, int(np.count_nonzero((frame > frame.item(at) / 2) & own)))
+        for at, own in ((first, nearer), (second, ~nearer))
     ]
 
 
-def _second(frame: Array, first: tuple[int, int], top: float, noise: float) -> tuple[int, int] | None:
-    """The peak of a second finger; None where there is none, or it cannot be told from the first."""
-    (row, column), (rows, columns) = first, frame.shape
-    at = int((frame * _elsewhere(rows, columns, row, column)).argmax())
-    peak = frame.item(at)
-    if peak < SECOND * top or peak < NOISE * noise:
-        return None
-    down, across = divmod(at, columns)
+def _parted(frame: Array, first: int, second: int) -> bool:
+    """Whether the second taxel is a peak, and a valley lies between it and the first."""
+    columns, peak = frame.shape[1], frame.item(second)
+    (row, column), (down, across) = divmod(first, columns), divmod(second, columns)
     if peak < frame[max(down - 1, 0) : down + 2, max(across - 1, 0) : across + 2].max():
-        return None
+        return False
     steps = 2 * max(abs(down - row), abs(across - column))
-    for k in range(1, steps):  # along the line between both
-        share = k * (1.0 / steps)
-        if frame.item(round(row + share * (down - row)), round(column + share * (across - column))) <= VALLEY * peak:
-            return down, across
-    return None
+    between = (k * (1.0 / steps) for k in range(1, steps))  # along the line between both
+    places = ((round(row + share * (down - row)), round(column + share * (across - column))) for share in between)
+    return any(frame.item(place) <= VALLEY * peak for place in places)
 
 
-def _spot(frame: Array, peak: tuple[int, int], reach: int, area: int) -> Spot:
-    (row, column), (rows, columns) = peak, frame.shape
-    around, table = _around(rows, columns, row, column, reach)
+def _spot(frame: Array, peak: int, reach: int, area: int) -> Spot:
+    row, column, last_row, last_column, around, table = _around(frame.shape, peak, reach)
     fits = table.dot(frame.take(around))
-    best = int(fits.argmax())
-    down, across = divmod(best % SIDE**2, SIDE)
-    top, at = fits.item(best), fits.item
-    dy = _summit(at(best - SIDE), top, at(best + SIDE)) if 0 < down < SIDE - 1 else 0.0
-    dx = _summit(at(best - 1), top, at(best + 1)) if 0 < across < SIDE - 1 else 0.0
-    down_to, across_to = row + (down - STEPS + dy) * STEP, column + (across - STEPS + dx) * STEP
-    if not (0.0 <= down_to <= rows - 1 and 0.0 <= across_to <= columns - 1):  # beyond the outermost taxels
-        down_to, across_to = min(max(down_to, 0.0), rows - 1.0), min(max(across_to, 0.0), columns - 1.0)
+    best, at = int(fits.argmax()), fits.item
+    down, across, one_down, one_across = _OFFSETS[best]
+    # A parabola through the best fit's neighbours; at the edge of the table these are the best fit itself.
+    top, above, below = at(best), at(best - one_down), at(best + one_down)
+    left, right = at(best - one_across), at(best + one_across)
+    bend, turn = above - 2 * top + below, left - 2 * top + right
+    down_to = row + (down + (0.5 * (above - below) / bend if bend < 0 else 0.0)) * STEP
+    across_to = column + (across + (0.5 * (left - right) / turn if turn < 0 else 0.0)) * STEP
+    if not (0.0 <= down_to <= last_row and 0.0 <= across_to <= last_column):  # beyond the outermost taxels
+        down_to, across_to = min(max(down_to, 0.0), last_row), min(max(across_to, 0.0), last_column)
     return _new(Spot, (down_to, across_to, frame.item(peak), area))
 
 
+def _offset(best: int) -> tuple[int, int, int, int]:
+    """Steps of an entry of the table from the peak, downward and across, and how far it is to its neighbours there."""
+    down, across = divmod(best % SIDE**2, SIDE)
+    return down - STEPS, across - STEPS, SIDE * (0 < down < SIDE - 1), int(0 < across < SIDE - 1)
+
+
+_OFFSETS = [_offset(best) for best in range(len(WIDTHS) * SIDE**2)]
+
+
 @lru_cache(PEAKS)
-def _elsewhere(rows: int, columns: int, row: int, column: int) -> Array:
+def _elsewhere(shape: tuple[int, int], peak: int) -> Array:
     """(R, C) 0 at a peak and the taxels beside it, 1 elsewhere."""
-    found = np.ones((rows, columns))
+    found = np.ones(shape)
+    row, column = divmod(peak, shape[1])
     found[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = 0.0
     return found
 
 
-def _summit(before: float, top: float, after: float) -> float:
-    """Where a parabola through three values is highest, in steps from the middle one."""
-    bend = before - 2 * top + after
-    return 0.5 * (before - after) / bend if bend < 0 else 0.0
-
-
 @lru_cache(PEAKS)
-def _around(rows: int, columns: int, row: int, column: int, reach: int) -> tuple[NDArray[np.int64], Array]:
-    """The taxels around a peak that a fit looks at, row by row, and the table for them."""
+def _around(shape: tuple[int, int], peak: int, reach: int) -> tuple[int, int, float, float, NDArray[np.int64], Array]:
+    """A peak's row and column, the last of each, the taxels that a fit looks at, row by row, and the table for them."""
+    (row, column), (rows, columns) = divmod(peak, shape[1]), shape
     above, below = min(reach, row), min(reach, rows - 1 - row)
     left, right = min(reach, column), min(reach, columns - 1 - column)
-    taxels = np.arange(rows * columns).reshape(rows, columns)
+    taxels = np.arange(rows * columns).reshape(shape)
     around = taxels[row - above : row + below + 1, column - left : column + right + 1].ravel()
-    return around, _table(above, below, left, right)
+    return row, column, rows - 1.0, columns - 1.0, around, _table(above, below, left, right)
 
 
 @lru_cache(TABLES)

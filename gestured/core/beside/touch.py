@@ -8,6 +8,7 @@ with `learned`, and only what moves is followed from then on, beside an arm that
 import math
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,16 +91,13 @@ def _taxels(spot: Spot) -> tuple[slice, slice]:
     return slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2)
 
 
+@dataclass(slots=True, eq=False)
 class Finger:
     """One finger as it was seen last."""
 
-    __slots__ = ("number", "spot", "t", "told", "zone")
-
-    def __init__(self, spot: Spot, t: float) -> None:
-        self.number = -1  # among the contact's fingers; -1 before it was told of
-        self.spot, self.t = spot, t  # where and when it was seen last; s
-        self.told = (0.0, 0.0)  # x and y as they were told last
-        self.zone: str | None = None  # where it came down
+    spot: Spot
+    t: float  # s
+    told: Touch | None = None  # what was told of it last
 
 
 class Fingers:
@@ -120,7 +118,7 @@ class Fingers:
 
     def end(self, baseline: Array | None = None) -> list[Touch]:
         """The contact is over: `up` for each finger that was told of. The (N,) `baseline` shows which were learned."""
-        fingers, self._fingers = [one for one in self._fingers if one.number >= 0], []
+        fingers, self._fingers = [one for one in self._fingers if one.told], []
         if baseline is None or self._baseline is None or baseline is self._baseline:
             return [self._tell(one, "up") for one in fingers]
         learned = (baseline - self._baseline).reshape(self._shape)
@@ -132,28 +130,25 @@ class Fingers:
         look, segmenter = front_end.look, front_end.segmenter
         if look is None or look.shifted:
             return []
-        self._shape = front_end.rows, front_end.columns
-        given_up = not segmenter.phase.pending
+        phase, lying = segmenter.phase, self._lying
         if self._baseline is None:
-            self._baseline = front_end.baseline
-        quiet = segmenter.phase.let_go or (given_up and look.activity < segmenter.levels(look.t)[1])
-        if given_up and self._lying is None:
-            self._lying = Lying(look.t, self._shape)
+            self._baseline, self._shape = front_end.baseline, (front_end.rows, front_end.columns)
+        if lying is None and not phase.pending:
+            self._lying = lying = Lying(look.t, self._shape)
         if look.t - self._looked < EACH_S:
             return []
         self._looked = look.t
-        taxels = front_end.conditioner.taxels
+        taxels, noise = front_end.conditioner.taxels, front_end.noise
         frame = taxels.bridge(look.above[None])[0] if taxels.count else look.above.reshape(self._shape)
-        felt: Array | None = frame
-        if self._lying is not None:
-            least = segmenter.off if self._fingers else segmenter.on
-            felt = self._lying.moving(frame, look.t, least * front_end.noise)
-        told = self._follow([] if quiet or felt is None else spots(felt, front_end.noise), look.t)
-        if self._lying is not None:
-            lie = self._lying.learn([one.spot for one in self._fingers], frame, front_end.noise)
-            for one in [one for one in self._fingers if one.spot in lie]:
-                self._fingers.remove(one)
-                told += [self._tell(one, "up", "learned")] if one.number >= 0 else []
+        if lying is None:
+            return self._follow([] if phase.let_go else spots(frame, noise), look.t)
+        quiet = look.activity < segmenter.levels(look.t)[1]
+        felt = lying.moving(frame, look.t, (segmenter.off if self._fingers else segmenter.on) * noise)
+        told = self._follow([] if quiet or felt is None else spots(felt, noise), look.t)
+        lie = lying.learn([one.spot for one in self._fingers], frame, noise)
+        for one in [one for one in self._fingers if one.spot in lie]:
+            self._fingers.remove(one)
+            told += [self._tell(one, "up", "learned")] if one.told else []
         return told
 
     def _follow(self, found: list[Spot], t: float) -> list[Touch]:
@@ -161,37 +156,37 @@ class Fingers:
         if len(found) == 1 == len(self._fingers):  # nearly all frames
             one = self._fingers[0]
             one.spot, one.t = found[0], t
-            return [self._tell(one, "move" if one.number >= 0 else "down")]
+            return [self._tell(one)]
         told, left = [], list(self._fingers)
         for one, spot in _paired(left, found):
             left.remove(one)
             found.remove(spot)
             one.spot, one.t = spot, t
-            told.append(self._tell(one, "move" if one.number >= 0 else "down"))
+            told.append(self._tell(one))
         for one in left:
-            if one.number < 0 or t - one.t >= GONE_S:
+            if one.told is None or t - one.t >= GONE_S:
                 self._fingers.remove(one)
-                told += [self._tell(one, "up")] if one.number >= 0 else []
+                told += [self._tell(one, "up")] if one.told else []
         for spot in found:
             new = Finger(spot, t)
             self._fingers.append(new)
             if len(self._fingers) == 1:  # a second one may be a flaw of one frame
-                told.append(self._tell(new, "down"))
+                told.append(self._tell(new))
         return told
 
-    def _tell(self, one: Finger, phase: str, reason: str | None = None) -> Touch:
-        """What is told of a finger now."""
+    def _tell(self, one: Finger, phase: str = "move", reason: str | None = None) -> Touch:
+        """What is told of a finger now; at first that it is down."""
         row, column, peak, area = one.spot
-        rows, columns = self._shape
-        x, y = fractions(rows, columns, row, column)
-        if phase == "down":
-            one.number, one.told, one.zone = self._count, (x, y), zone_at(self.zones, Place(x, y))
+        x, y = fractions(*self._shape, row, column)
+        if (last := one.told) is None:
+            number, phase, dx, dy, zone = self._count, "down", 0.0, 0.0, zone_at(self.zones, Place(x, y))
             self._count += 1
-        (before_x, before_y), one.told = one.told, (x, y)
-        dx, dy = round(x - before_x, 4), round(y - before_y, 4)
-        return Touch(
-            self._sensor, self._id, one.number, phase, one.t, x, y, dx, dy, digits(peak), area, one.zone, reason
+        else:
+            number, dx, dy, zone = last.touch, round(x - last.x, 4), round(y - last.y, 4), last.zone
+        one.told = told = Touch(
+            self._sensor, self._id, number, phase, one.t, x, y, dx, dy, digits(peak), area, zone, reason
         )
+        return told
 
 
 def _paired(fingers: list[Finger], found: list[Spot]) -> list[tuple[Finger, Spot]]:
