@@ -3,14 +3,18 @@
 import json
 import math
 import os
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from gestured.client.pad.contacts import MOST, SILENT_S, Contacts
+from gestured.client.pad.invitation import invite
 from gestured.client.pad.pad import Pad
 from gestured.client.pad.server import MESSAGES, PadServer
 from gestured.client.web.server import BODY_BYTES
@@ -240,6 +244,22 @@ def test_where_nobody_listens_the_page_is_told() -> None:
 def test_it_never_binds_all_addresses(run, listen: str) -> None:
     status, out, err = run("pad", "--to", free_address(), "--listen", listen)
     assert (status, out) == (1, "") and "expected one address of this machine" in err
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "192.0.2.7"])
+def test_a_telephone_is_invited_by_a_picture_of_the_address_and_told_what_it_opens(
+    host: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def code(page: str, **_: Any) -> SimpleNamespace:
+        return SimpleNamespace(terminal=lambda out, **_: out.write(f"[{page}]\n"))
+
+    pad = SimpleNamespace(to="127.0.0.1:9000", name="armrest")
+    monkeypatch.setitem(sys.modules, "segno", SimpleNamespace(make=code))
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    invite(cast("PadServer", SimpleNamespace(address=Address(host, 9110), page="http://x/#secret", pad=pad)))
+    said = capsys.readouterr().err
+    assert ("[http://x/#secret]" in said) == ("--allow does not keep them out" in said) == (host != "127.0.0.1")
+    assert ("on this machine" in said) == (host == "127.0.0.1")
 
 
 # In a real browser, with the shipped model

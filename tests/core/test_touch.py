@@ -31,11 +31,11 @@ Fingers = Sequence[tuple[float, float]]
 Path = Callable[[float], Fingers]
 
 
-def sensor(*, asked: bool = True, zones: dict[str, Any] | None = None) -> Sensor:
+def sensor(*, asked: bool = True, zones: dict[str, Any] | None = None, grid: tuple[int, int] = (9, 9)) -> Sensor:
     """A sensor that answers `left` to everything."""
     classifier = Fake()
     setup = {"armrest": Setup(zones=zones_of(zones or {}))}
-    subject = Sensor("armrest", Scene(classifier.gestures, (9, 9), sensors=setup, touch=True), classifier)
+    subject = Sensor("armrest", Scene(classifier.gestures, grid, sensors=setup, touch=True), classifier)
     subject.follow([], asked=asked)
     return subject
 
@@ -45,6 +45,7 @@ class Hand:
 
     def __init__(self, subject: Sensor, rate_hz: float = 15.0) -> None:
         self.subject, self.rate_hz, self.t = subject, rate_hz, 0.0
+        self.grid, self.width = subject.front_end.sent, 0.8  # of a finger, in pitches
         self._random = np.random.default_rng(0)
         self.told: list[Event] = []
         self.rests(2.0)
@@ -54,7 +55,8 @@ class Hand:
         count, before = round(seconds * self.rate_hz), len(self.told)
         for k in range(count):
             self.t += 1 / self.rate_hz
-            values = 300 + self._random.normal(0, 2, (9, 9)) + drawn(*path(k / count), peak=peak)
+            values = 300 + self._random.normal(0, 2, self.grid)
+            values += drawn(*path(k / count), grid=self.grid, width=self.width, peak=peak)
             self.told += events_of(self.subject.push(Frame(self.t, values)))
         return [one for one in self.told[before:] if isinstance(one, Touch)]
 
@@ -103,28 +105,33 @@ def test_a_swipe_comes_down_moves_and_is_up_before_its_answer() -> None:
     assert all(abs(one.y - 0.5) < 0.05 and one.pressure > 300 and 1 <= one.area <= 9 for one in moves)
 
 
+DEEDS: dict[str, tuple[float, Path]] = {  # seconds, and where fingers are meanwhile
+    "tap": (0.15, line(4, 4)),
+    "swipe": (0.4, line(1, 7)),
+    "two": (0.4, lambda share: [(7 - 6 * share, 2), (7 - 6 * share, 6)]),
+    "hold": (6.5, line(3, 3)),
+    "palm": (0.5, lambda share: [(r, c) for r in range(2, 7) for c in range(2, 7)]),
+    "border": (0.4, lambda share: [(-0.5, 9 * share)]),
+    "corner": (0.4, line(0, 0, row=0)),
+    "quiet": (0.7, lambda share: []),
+}
+
+
 @settings(max_examples=30)
-@given(st.lists(st.sampled_from(["tap", "swipe", "two", "hold", "quiet", "silence", "restart", "palm"]), max_size=8))
-def test_each_finger_that_is_down_is_up_whatever_comes(deeds: list[str]) -> None:
-    hand = Hand(sensor())
+@given(
+    st.lists(st.sampled_from([*DEEDS, "silence", "restart"]), max_size=8),
+    st.sampled_from([(9, 9), (2, 2), (12, 5)]),
+    st.sampled_from([0.8, 0.1]),  # pitches: a fingertip, and a needle that presses one taxel alone
+)
+def test_each_finger_that_is_down_is_up_whatever_comes(deeds: list[str], grid: tuple[int, int], width: float) -> None:
+    hand = Hand(sensor(grid=grid))
+    hand.width = width
     for deed in deeds:
-        match deed:
-            case "tap":
-                hand.does(0.15, line(4, 4))
-            case "swipe":
-                hand.does(0.4, line(1, 7))
-            case "two":
-                hand.does(0.4, lambda share: [(7 - 6 * share, 2), (7 - 6 * share, 6)])
-            case "hold":
-                hand.does(6.5, line(3, 3))
-            case "palm":
-                hand.does(0.5, lambda share: [(r, c) for r in range(2, 7) for c in range(2, 7)])
-            case "quiet":
-                hand.rests(0.7)
-            case "silence":
-                hand.told += events_of(hand.subject.flush(hand.t))
-            case "restart":
-                hand.told += events_of(hand.subject.reset())
+        if deed in DEEDS:
+            hand.does(*DEEDS[deed])
+        else:
+            subject = hand.subject
+            hand.told += events_of(subject.flush(hand.t) if deed == "silence" else subject.reset())
     hand.told += events_of(hand.subject.flush(hand.t))
     checked(hand.told)
     downs = [one for one in hand.told if isinstance(one, Touch) and one.phase == "down"]

@@ -86,6 +86,11 @@ def test_a_line_is_as_long_as_it_is_and_a_finger_that_rests_goes_nowhere() -> No
     assert rest.way == 0.0
 
 
+def test_a_line_from_border_to_border_reaches_both() -> None:
+    line = where(segment(*[[(row, 4.0)] for row in np.linspace(8.3, -0.3, 9)]))  # a finger's middle may lie beyond
+    assert (line.start.y, line.end.y) == (0.0, 1.0)
+
+
 def test_two_fingers_begin_and_end_half_way_between_them() -> None:
     up = where(segment(*[[(row, 2.0), (row, 6.0)] for row in np.linspace(7, 1, 7)]))
     assert up.contacts == 2 and up.way == pytest.approx(0.75, abs=0.02)
@@ -153,12 +158,16 @@ def test_a_sensor_that_is_turned_or_mirrored_turns_and_mirrors_the_places(seed: 
 # --- what an answer says
 
 
-def told(*lines: str, mounting: Mounting | None = None, confidence: float = 0.9) -> Where:
-    """Where the one answer to these lines was."""
+def told(
+    *lines: str, dead: tuple[int, int] | None = None, mounting: Mounting | None = None, confidence: float = 0.9
+) -> Where:
+    """Where the one answer to these lines was, on a sensor of which one taxel may show nothing."""
     setup = {"armrest": Setup(mounting=mounting or Mounting())}
     classifier = Fake([says(0.05, confidence, 0.05)])
     subject = Sensor("armrest", Scene(classifier.gestures, (9, 9), sensors=setup), classifier)
     stream = frames("quiet for 1500ms", *lines, "quiet for 900ms")
+    for frame in stream if dead else ():
+        frame.values[dead] = 0.0
     found = events_of(one for frame in stream for one in subject.push(frame))
     (answer,) = (one for one in found if isinstance(one, Gesture | Unknown))
     assert answer.where is not None and isinstance(answer, Gesture) == (confidence > 0.5)
@@ -170,6 +179,12 @@ def test_gestures_and_unknown_say_where_they_were(confidence: float) -> None:
     found = told(SWIPE, confidence=confidence)  # row 4, from column 1 to 7
     assert found.start.x < 0.3 and found.end.x > 0.75 and found.way > 0.5
     assert found.start.y == pytest.approx(0.5, abs=0.05) and found.pressure > 300 and found.snr > 100
+
+
+def test_an_answer_says_that_its_way_led_over_a_bad_taxel_and_is_as_long_as_without() -> None:
+    over, beside = told(SWIPE, dead=(4, 4)), told(SWIPE, dead=(8, 4))
+    assert (over.bridged, beside.bridged) == (1, 0)
+    assert over.way == pytest.approx(beside.way, abs=0.05) and over.contacts == 1
 
 
 def test_a_tap_has_no_way() -> None:
