@@ -116,7 +116,12 @@ def middle(fingers: list[Spot]) -> tuple[float, float]:
 
 def fractions(rows: int, columns: int, row: float, column: float) -> tuple[float, float]:
     """A row and a column of a grid as fractions of it, to the right and upward."""
-    return round(column / (columns - 1), 4), round(1.0 - row / (rows - 1), 4)
+    return finely(column / (columns - 1)), finely(1.0 - row / (rows - 1))
+
+
+def finely(fraction: float) -> float:
+    """A fraction to four digits: what `round` with two arguments takes twice the time for."""
+    return round(fraction * 1e4) / 1e4
 
 
 def _way(places: Array, rests: float) -> float:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gestured.core.events import Place, Touch
 from gestured.core.front_end import FrontEnd
 from gestured.core.spots import Spot, spots
-from gestured.core.where import Zone, digits, fractions, zone_at
+from gestured.core.where import Zone, digits, finely, fractions, zone_at
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -182,7 +182,7 @@ class Fingers:
             number, phase, dx, dy, zone = self._count, "down", 0.0, 0.0, zone_at(self.zones, Place(x, y))
             self._count += 1
         else:
-            number, dx, dy, zone = last.touch, round(x - last.x, 4), round(y - last.y, 4), last.zone
+            number, dx, dy, zone = last.touch, finely(x - last.x), finely(y - last.y), last.zone
         one.told = told = Touch(
             self._sensor, self._id, number, phase, one.t, x, y, dx, dy, digits(peak), area, zone, reason
         )
