@@ -5,10 +5,11 @@ from dataclasses import MISSING, fields
 from typing import Any, get_args, get_type_hints
 
 from gestured.core.events import Event, Place, Where
-from gestured.core.messages import quoted
+from gestured.core.messages import STREAM_TIMES, quoted
 
-LARGEST = 1e300  # counts of a sensor may be nearly any
-LONGEST_S = 6e10  # the largest number in a line: Python's calendar knows no time further from 1970, some 1900 years
+LARGEST = 1e300  # of all numbers: counts of a sensor may be nearly any
+LONGEST_S = 6e10  # the largest time in a line: Python's calendar knows none further from 1970, some 1900 years
+TIMES = STREAM_TIMES | {"time"}
 
 
 def _is(*types: type) -> Callable[[Any], bool]:
@@ -16,7 +17,7 @@ def _is(*types: type) -> Callable[[Any], bool]:
 
 
 def _is_number(value: Any) -> bool:
-    return type(value) in (int, float) and abs(value) < LONGEST_S  # neither NaN nor infinite
+    return type(value) in (int, float) and abs(value) < LARGEST  # neither NaN nor infinite
 
 
 def _object(of: Callable[[Any], bool]) -> Callable[[Any], bool]:
@@ -32,17 +33,10 @@ def _is_place(value: Any) -> bool:
 
 
 def _is_where(value: Any) -> bool:
-    """Whether a value is an object with the fields of `Where`; counts of a sensor may be any that are finite."""
-    return isinstance(value, dict) and all(_WHERE[kind](value.get(name)) for name, kind in _WHERE_FIELDS.items())
+    return isinstance(value, dict) and all(_KINDS[kind][0](value.get(name)) for name, kind in _WHERE.items())
 
 
-_WHERE: dict[Any, Callable[[Any], bool]] = {
-    Place: _is_place,
-    float: lambda value: type(value) in (int, float) and abs(value) < LARGEST,  # neither NaN nor infinite
-    int: _is(int),
-    str | None: _is(str, type(None)),
-}
-_WHERE_FIELDS = get_type_hints(Where)
+_WHERE = get_type_hints(Where)
 GATES = Mapping[str, Mapping[str, Any]]
 # How a field is annotated -> whether a value is one, and what it is called.
 _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
@@ -53,6 +47,7 @@ _KINDS: dict[Any, tuple[Callable[[Any], bool], str]] = {
     str | None: (_is(str, type(None)), "a text or null"),
     bool | None: (_is(bool, type(None)), "true, false or null"),
     float | None: (lambda value: value is None or _is_number(value), "a number or null"),
+    Place: (_is_place, "an object with x and y"),
     Where | None: (_is_where, "an object with start, end, way, pressure, snr, contacts, bridged and zone"),
     list[str]: (_is_texts, "a list of texts"),
     tuple[str, ...]: (_is_texts, "a list of texts"),
@@ -88,6 +83,6 @@ def wrong_field(line: Mapping[str, Any]) -> str | None:
         if key not in line:
             if key == "type" or (key in known and key not in _ADDED.get(str(name), ())):
                 return f"{key} is missing: expected {words}"
-        elif not fits(line[key]):
+        elif not fits(line[key]) or (key in TIMES and abs(line[key] or 0.0) >= LONGEST_S):
             return f"{key} {quoted(line[key])}: expected {words}"
     return None

@@ -15,7 +15,7 @@ from gestured.core.events import Event, Gate, Gesture, Provisional, Status, Touc
 MAX_LINE = 4096  # bytes of a client's request
 LONGEST = 60  # characters of what a peer sent, in an answer to it
 EVENT_TYPES = tuple(cls.__name__.lower() for cls in get_args(Event))
-_STREAM_TIMES = frozenset(("onset", "offset", "decided", "until", "since", "t"))
+STREAM_TIMES = frozenset(("onset", "offset", "decided", "until", "since", "t"))
 # Fields that a line has only where they say something else than this.
 _UNSAID: dict[tuple[str, str], object] = {
     ("gesture", "own"): False, ("gesture", "where"): None, ("unknown", "where"): None, ("unknown", "gates"): (),
@@ -23,7 +23,7 @@ _UNSAID: dict[tuple[str, str], object] = {
 }  # fmt: skip
 # By type: of each field its name, whether it is a time, and the value that is left unsaid.
 _FIELDS = {
-    kind: tuple((one.name, one.name in _STREAM_TIMES, _UNSAID.get((kind, one.name), ...)) for one in fields(cls))
+    kind: tuple((one.name, one.name in STREAM_TIMES, _UNSAID.get((kind, one.name), ...)) for one in fields(cls))
     for kind, cls in zip(EVENT_TYPES, get_args(Event), strict=True)
 }
 
