@@ -1,8 +1,9 @@
 """The fingers of the contact that goes on: where each is, from frame to frame, for whoever asks to follow them.
 
 A touch event is no answer, and nothing that decides an answer reads what is written here. While a contact may become a
-gesture, all that presses is followed. Once it was given up (`held`), what stands still for a second is learned: it ends
-with `learned`, and only what moves is followed from then on, beside an arm that rests, or the same finger further on.
+gesture, all that presses is followed. Once it was given up (`held`), a finger that has stood still for a second is told
+to be up with the reason `learned`: from then on it is part of what lies there, and what moves beside it is followed. A
+finger that was learned and moves on comes down again.
 """
 
 import math
