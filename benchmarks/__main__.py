@@ -52,12 +52,15 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", metavar="PART", help="parts of the table")
     parser.add_argument("--scenes", action="store_true", help="the table of scenes instead")
     parser.add_argument("--json", action="store_true", help="print the rows as JSON")
-    parser.add_argument("--document", type=Path, metavar="PAGE", help="a page whose table `bench` is written anew")
+    parser.add_argument(
+        "--document", type=Path, metavar="PAGE", help="a page whose block `bench` or `scenes` is written"
+    )
     args = parser.parse_args()
     if args.scenes:
         from benchmarks import scenes
 
-        scenes.table(args.model)
+        _write("scenes", args.document, ["", text := scenes.table(args.model)])
+        print(text)
         return 0
     parts = _parts(args.model)
     unknown = set(args.only or ()) - set(parts)
@@ -80,10 +83,17 @@ def main() -> int:
                 print(told[-1], flush=True)
     if args.json:
         print(json.dumps({"machine": machine(), "rows": rows}, indent=2))
-    if args.document:
-        line = made_of(f'make bench ARGS="--document {args.document}"', shipped().values())
-        renew(args.document, "bench", [line, "", where, "", *told])
+    _write("bench", args.document, ["", where, "", *told])
     return 0
+
+
+def _write(block: str, document: Path | None, lines: list[str]) -> None:
+    """Into a page, where one is named; what is measured is the way of a frame through the daemon's core and a model."""
+    if document:
+        flags = "--scenes " if block == "scenes" else ""
+        code = ("gestured.core.hub", "gestured.model.model")
+        line = made_of(f'make bench ARGS="{flags}--document {document}"', shipped().values(), code)
+        renew(document, block, [line, *lines])
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import time
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
+from datetime import date
 from statistics import median
 
 from benchmarks import scenes_counted
@@ -19,8 +20,6 @@ from gestured.client.stream import Stream
 from gestured.core.address import Grid
 from gestured.core.frames import Frame, Touch
 from gestured.core.wire import Addresses, Decoder
-from gestured.lab.made_of import made_of
-from gestured.model.shipped import shipped
 from gestured.simulator import Participant, SimulatedSensor, generator, gesture_take
 
 OSC = "osc://127.0.0.1:{port}"  # where somebody listens
@@ -61,17 +60,16 @@ class Cost:
     descriptors: int
 
 
-def table(model: str) -> None:
-    """Print both tables of scenes, and what finger positions add to the decoding of a frame."""
+def table(model: str) -> str:
+    """Both tables of scenes, and what finger positions add to the decoding of a frame."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind(("127.0.0.1", 0))
         found = _scenes(model, listener.getsockname()[1])
-        print(made_of("make bench ARGS=--scenes", shipped().values()) + "\n")
         counts = {name: scenes_counted.counted(one.model, one.flags, one.stream) for name, one in found.items()}
-        print(scenes_counted.table(counts) + "\n", flush=True)
-        print(_beside([_round(found) for _ in range(ROUNDS + 1)][1:]))  # the first one warms up
+        beside = _beside([_round(found) for _ in range(ROUNDS + 1)][1:])  # the first one warms up
     passed, parsed = (_decoding(keep_touches) for keep_touches in (False, True))
-    print(f"\ndecode of a bundle, with three finger positions against without: {passed}; if they were kept: {parsed}")
+    cost = f"decode of a bundle, with three finger positions against without: {passed}; if they were kept: {parsed}"
+    return "\n\n".join((scenes_counted.table(counts), f"Measured on {date.today()}:", beside, cost))
 
 
 def _scenes(model: str, port: int) -> dict[str, Scene]:

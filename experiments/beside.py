@@ -70,7 +70,7 @@ def main() -> None:
     rows = [(f"{wait:g} s", *(f"{share:.2f}" for share in right[k :: len(WAITS_S)])) for k, wait in enumerate(WAITS_S)]
     notes = (f"Shares of {args.people} swipes each that are recognised at {USUAL}.",)
     table = Table("A swipe beside what was laid on so long before", ("laid on before", *LAID), rows, notes)
-    tell(table, [shipped()[MODEL]], "beside", "beside", args.document)
+    tell(table, [shipped()[MODEL]], "beside", args.document)
 
 
 if __name__ == "__main__":

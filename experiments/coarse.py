@@ -59,7 +59,7 @@ def main() -> None:
     add_document(parser, "few counts")
     args = parser.parse_args()
     table = coarse_table({name: open_model(name) for name in LADDER}, args.takes)
-    tell(table, shipped().values(), "coarse", "few counts", args.document)
+    tell(table, shipped().values(), "few counts", args.document)
 
 
 if __name__ == "__main__":

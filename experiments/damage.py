@@ -219,7 +219,7 @@ def main() -> int:
     else:
         rows = [tuple("-" if value is None else str(value) for value in row.values()) for row in found]
         table = Table("Gestures beside a fault", tuple(found[0]), rows)
-        tell(table, [shipped().get(args.model, Path(args.model))], "damage", "damage", args.document)
+        tell(table, [shipped().get(args.model, Path(args.model))], "damage", args.document)
     return int(any(figures["of nobody"] or figures["unended"] for figures in found))
 
 

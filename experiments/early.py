@@ -158,7 +158,7 @@ def main() -> None:
         print(json.dumps(figures, indent=2))
     else:
         made = table("Provisional events, simulated", {which: figures[which] for which in SETS})
-        tell(made, [shipped().get(args.model, Path(args.model))], "early", "early", args.document)
+        tell(made, [shipped().get(args.model, Path(args.model))], "early", args.document)
 
 
 HEAD = ("gestures", "right", "wrong", "moved", "early", "events", "confirmed", "moved_median_s", "tap_median_s",

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gestured.lab.digest import file_digest
-from gestured.lab.made_of import LINE, decides, digests, others
+from gestured.lab.made_of import LINE, OLDER, decides, digests, other_code, others
 from gestured.model.shipped import shipped
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -39,11 +39,14 @@ def made(root: Path) -> Iterator[Made]:
     docs = root / "docs"
     now = digests([*shipped().values(), root / "models" / "manifest.json", *docs.glob("*.json"), *docs.glob("*.svg")])
     for page in [*sorted(docs.glob("*.md")), *sorted((root / "models").glob("*.md"))]:
-        for number, line in enumerate(page.read_text().splitlines(), 1):
+        lines = page.read_text().splitlines()
+        for number, line in enumerate(lines, 1):
             if match := LINE.fullmatch(line.strip()):
                 why = [f"made of another {name}" for name in others(match, now)]
-                if match["code"] != decides():
+                if other_code(match):
                     why.append("made with other code" if match["code"] else "does not say with which code")
+                if not why and OLDER in lines[number : number + 2]:
+                    why.append("says itself that it is older")
                 yield Made(page, number, match[1], "; ".join(why))
 
 

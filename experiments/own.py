@@ -72,7 +72,7 @@ def main() -> None:
     seen = Seen.by(model, played(args.cache, args.people, judge=True))
     trials = (trial for trial in played_through(seen, model.space) if trial.kind in JUDGED)
     made = table(args.model.stem, figures(model.space, trials))
-    tell(made, [args.model], "own", "own", args.document)
+    tell(made, [args.model], "own", args.document)
 
 
 if __name__ == "__main__":

@@ -2,10 +2,10 @@
 
 import argparse
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from gestured.lab.made_of import command_of, made_of, renew
+from gestured.lab.made_of import DECIDES, command_of, made_of, renew
 from gestured.lab.table import Table
 
 
@@ -14,9 +14,19 @@ def add_document(parser: argparse.ArgumentParser, block: str) -> None:
     parser.add_argument("--document", type=Path, metavar="PAGE", help=f"a page whose block `{block}` is written anew")
 
 
-def tell(found: Table | str, files: Iterable[Path], module: str, block: str, document: Path | None) -> None:
-    """Print it; and where there is a document, put it between the marks of a block of that name."""
+def command() -> str:
+    """The command that runs now, `python -m experiments.NAME ...`, as a page names it."""
+    spec = sys.modules["__main__"].__spec__
+    return command_of(["python", "-m", spec.name if spec else "experiments", *sys.argv[1:]])
+
+
+def tell(
+    found: Table | str, files: Iterable[Path], block: str, document: Path | None, code: Sequence[str] = DECIDES
+) -> None:
+    """Print it; and where there is a document, put it between the marks of a block of that name.
+
+    `files` and `code`: the models, and the modules of gestured, that decide what it says.
+    """
     print(found)
     if document:
-        command = command_of(["python", "-m", f"experiments.{module}", *sys.argv[1:]])
-        renew(document, block, [made_of(command, files), "", str(found)])
+        renew(document, block, [made_of(command(), files, code), "", str(found)])

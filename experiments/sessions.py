@@ -84,7 +84,7 @@ def main() -> None:
     rows = [row(f"subject {n}", [one for one in heard if int(one.person) == n]) for n in subjects]
     head = ("", "minutes", "meant", "right", "wrong", "missed", "false", "95 % an hour", "deaf min an hour")
     table = Table("Real fingers, whole sessions as streams", head, [*rows, row("all", heard)])
-    tell(table, [args.models / f"{NET}.onnx"], "sessions", "sessions", args.document)
+    tell(table, [args.models / f"{NET}.onnx"], "sessions", args.document)
 
 
 if __name__ == "__main__":

@@ -105,7 +105,7 @@ def main() -> None:
         after = row["tap_answered_after_s"]
         cells = (f"{row['tap_gap_s']:.2f} s", *(f"{row[share]:.3f}" for share in shares))
         table.rows.append((*cells, "-" if after is None else f"{after:.2f} s"))
-    tell(table, [shipped().get(args.model, Path(args.model))], "taps", "taps", args.document)
+    tell(table, [shipped().get(args.model, Path(args.model))], "taps", args.document)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
 """Non-gestures of kinds that nobody taught: how many are rejected where heads alone, or whole networks, lack them.
 
-    python -m experiments.unseen --cache .cache/lab --document docs/figures.md
-    python -m experiments.unseen --cache .cache/lab --whole --document docs/figures.md
+    python -m experiments.unseen --real FOLDER --document docs/figures.md
+    python -m experiments.unseen --whole --real FOLDER --document docs/figures.md
 
-With --whole networks are trained without a group of kinds, which takes as long as a training. With --document its
-table and that of the network's card are written anew.
+With --whole a network and its second opinion are trained without a group of kinds, which goes on where it was
+interrupted. With --document its table and that of the network's card are written anew.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.heads import Heads
+from experiments.pages import command
 from experiments.trained import options, trained
 from gestured.lab.adapt.learning import opinions
 from gestured.lab.augment import symmetry_table
@@ -138,7 +139,7 @@ def whole_left_out(trained: Trained, data: TrainingData, plan: TrainingPlan, cac
     answers = {
         "known": [Said(test, model_answers(model, s), s, model.threshold, classes) for test, s in data.tests.items()],
         "heads": [Said(*given, classes) for given in Heads.of(trained, data, plan, NAME).without(classes, plan)],
-        "whole": _answers(learn(plan, less, cache), less, plan, classes),
+        "whole": _answers(learn(plan, less, cache, (NAME, "trajectory")), less, plan, classes),
     }
     found: dict[str, Any] = {"kinds": [CLASSES[k] for k in classes]}
     for how, said in answers.items():
@@ -205,8 +206,7 @@ def main() -> None:
     heads = held_out_kinds(found, data, plan)
     whole = whole_left_out(found, data, plan, args.cache, path) if args.whole else None
     if args.document:
-        command = "python -m experiments.unseen" + " --whole" * args.whole
-        lines = [made_of(command, [path]), ""]
+        lines = [made_of(command(), [path]), ""]
         for document in (args.document, path.with_suffix(".md")):
             renew(document, "unseen", [*lines, *lines_of(heads, whole)])
 

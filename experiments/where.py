@@ -1,11 +1,10 @@
 """How accurately a contact's place is told, against the true places of two generators, and on real frames.
 
-    python -m experiments.where
-    python -m experiments.where --document docs/where.md
+    python -m experiments.where --real FOLDER --document docs/where.md
 
 Each take is another person on another sensor; its frames pass through the front end as in the daemon. Errors are in
 taxel pitches. Real frames (CapFingerId, 27 x 15) have no truth: there the place in a frame is compared with that in the
-same frame averaged to 9 x 9. With --document the tables are written into a page.
+same frame averaged to 9 x 9.
 """
 
 import argparse
@@ -22,14 +21,15 @@ from experiments.foreign.hands import draw_person
 from experiments.foreign.hands import perform as perform_foreign
 from experiments.foreign.sensors import draw_sensor
 from experiments.foreign.sensors import record as record_foreign
+from experiments.pages import add_document, tell
 from gestured.core.events import Where
 from gestured.core.frames import Frame, Segment
 from gestured.core.front_end import Cut, FrontEnd
 from gestured.core.spots import spots
 from gestured.core.where import where
-from gestured.lab.made_of import renew
 from gestured.lab.progress import progress
 from gestured.lab.table import Table, Value
+from gestured.lab.train import REAL_FILES
 from gestured.record.arrays import read
 from gestured.simulator import Participant, SimulatedSensor, any_sensor, generator, perform
 
@@ -45,6 +45,7 @@ DOWN, FIRM = (
     0.3,
 )  # of a usual press: from there on a finger is on the sensor, and presses so that a frame shows it
 APART = (1.5, 2.0, 2.5, 3.0, 4.0, math.inf)  # pitches between two fingers: edges of the table's rows
+TELLS = ("gestured.core.front_end", "gestured.core.where")  # the code that decides what is said of a place
 TOUCHED = 60  # counts of a real frame that shows a finger
 
 
@@ -210,11 +211,9 @@ def several(count: int) -> Table:
     )
 
 
-def real(path: Path | None, count: int) -> Table | str:
-    """Real frames against themselves on a coarser grid; or why there are none."""
-    if path is None:
-        return "Real frames were not compared: --real names none."
-    frames = read(path).frames
+def real(folder: Path, count: int) -> Table:
+    """Real frames against themselves on a coarser grid."""
+    frames = read(folder / REAL_FILES[1]).frames
     rng = np.random.default_rng(0)
     touched = np.flatnonzero(frames.max(axis=(1, 2)) >= TOUCHED)
     edges = np.linspace(0, 15, 10)
@@ -255,15 +254,12 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--takes", type=int, default=300, help="takes for each row (%(default)s)")
-    parser.add_argument(
-        "--real", type=Path, metavar="FILE", help="sessions of CapFingerId, capfingerid_sessions_dev.npz"
-    )
-    parser.add_argument("--document", type=Path, metavar="PAGE", help="a page with the marks `places: begin` and `end`")
+    parser.add_argument("--real", type=Path, required=True, metavar="FOLDER", help="of real recordings, CapFingerId's")
+    add_document(parser, "places")
     args = parser.parse_args()
-    lines = [str(table) for table in (accuracy(args.takes), several(args.takes), real(args.real, 10 * args.takes))]
-    print("\n".join(lines))
-    if args.document:
-        renew(args.document, "places", ["", *"\n".join(lines).splitlines()])
+    found = real(args.real, 10 * args.takes)  # first, so that missing recordings are told of now
+    tables = (accuracy(args.takes), several(args.takes), found)
+    tell("\n".join(map(str, tables)), [], "places", args.document, TELLS)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,6 @@ than one segment or event), or its one segment's label. Takes that nobody can re
 import argparse
 import json
 import math
-import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -25,7 +24,7 @@ from typing import Any
 
 from experiments.early import Ahead, heard, table
 from experiments.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
-from experiments.pages import tell
+from experiments.pages import command, tell
 from gestured.core.events import Cancelled, Gesture, Onset, Unknown
 from gestured.core.facts import events_of
 from gestured.core.frames import Frame, Segment
@@ -33,7 +32,7 @@ from gestured.core.front_end import Cut, FrontEnd, Void
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.lab.dataset import Truth
-from gestured.lab.made_of import command_of, made_of, renew
+from gestured.lab.made_of import made_of, renew
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.record.judge import Performed, Tally
@@ -243,8 +242,7 @@ def show_shipped(args: argparse.Namespace) -> None:
     """Print the table of all shipped models; put it where --document wants it."""
     results = {name: judged(name, args)[0] for name in shipped()}
     rows = {name: [row(name, level, found) for level, found in result.items()] for name, result in results.items()}
-    command = command_of(["python", "-m", "experiments.foreign.judge", *sys.argv[1:]])
-    above = [made_of(command, shipped().values()), "", *HEAD]
+    above = [made_of(command(), shipped().values()), "", *HEAD]
     table = [*above, *(line for lines in rows.values() for line in lines)]
     print(json.dumps(results, indent=1) if args.json else "\n".join(table))
     if args.document:
@@ -356,7 +354,7 @@ def show_provisional(args: argparse.Namespace) -> None:
         print(json.dumps(rows, indent=1))
         return
     made = table("Provisional events, by another generator", rows)
-    tell(made, [shipped().get(args.model, Path(args.model))], "foreign.judge", "early elsewhere", args.document)
+    tell(made, [shipped().get(args.model, Path(args.model))], "early elsewhere", args.document)
 
 
 def main() -> None:
@@ -396,8 +394,6 @@ def main() -> None:
     if args.json:
         print(json.dumps({"takes": result, "sessions": long}, indent=1))
         return
-    if args.model in shipped():
-        print(made_of("python -m experiments.foreign.judge", [shipped()[args.model]]))
     _show(result, args.front_end)
     for found in long:
         print(f"\n== sessions, {found['level']}: {found['gestures']} gestures", end="")

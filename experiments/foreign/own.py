@@ -122,7 +122,7 @@ def main() -> None:
     add_document(parser, "other hands")
     args = parser.parse_args()
     table = judge(open_model(args.model), args.people, args.level)
-    tell(table, [shipped()[args.model]], "foreign.own", "other hands", args.document)
+    tell(table, [shipped()[args.model]], "other hands", args.document)
 
 
 if __name__ == "__main__":

@@ -9,16 +9,15 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-import gestured
-
-PACKAGE = Path(gestured.__file__).parent
+PACKAGE = Path(__file__).resolve().parents[1]  # not by importing it: all that it imports would be used, too
 
 
 @cache
-def code_digest(module: str) -> str:
+def code_digest(module: str, aside: frozenset[str] = frozenset()) -> str:
     """SHA-256 of a module of gestured, such as `gestured.lab.fit`, and of all of gestured's that it uses.
 
-    A module is used that an import or a text names, anywhere in the code: programs are started by their name.
+    A module is used that an import or a text names, anywhere in the code: programs are started by their name. Those
+    that are set `aside` do not count, nor what they alone use.
     """
     found: dict[Path, ast.Module] = {}
     todo = list(_files(module))
@@ -26,7 +25,7 @@ def code_digest(module: str) -> str:
         path = todo.pop()
         if path not in found:
             found[path] = tree = _WithoutTexts().visit(ast.parse(path.read_bytes()))
-            todo += [other for name in _named(tree, path) for other in _files(name)]
+            todo += [other for name in _named(tree, path) if name not in aside for other in _files(name)]
     total = hashlib.sha256()
     for path in sorted(found):
         total.update(f"{path.relative_to(PACKAGE)}\n{ast.dump(found[path])}\n".encode())

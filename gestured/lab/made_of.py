@@ -1,14 +1,15 @@
 """What a generated table was made of: one line above it with its command and digests.
 
-The digests are of models and files, and of the code that decides. A test compares the line with the files of the
-checkout, so that no table outlives the models that it speaks of. Where the table stands between marks of its own, the
-line also holds its digest, which finds figures edited by hand.
+The digests are of models and files, and of the code that decides what the table says. A test compares the line with
+the files of the checkout, so that no table outlives the models that it speaks of. Where the table stands between marks
+of its own, the line also holds its digest, which finds figures edited by hand.
 """
 
 import hashlib
 import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 from gestured.core.errors import GesturedError
@@ -16,17 +17,26 @@ from gestured.lab.digest import code_digest, file_digest
 
 SHOWN = 12  # digits of a SHA-256 that are written: no two files of a project share them
 LINE = re.compile(
-    r"<!-- made by `([^`]+)` of ((?:\S+ [0-9a-f]{12}(?:, )?)+)(?:; code (?P<code>[0-9a-f]{12}))?"
-    r"(?:; block [0-9a-f]{12})? -->"
+    r"<!-- made by `([^`]+)`(?: of ((?:\S+ [0-9a-f]{12}(?:, )?)+))?"
+    r"(?:; code (?P<code>[0-9a-f]{12})(?: of (?P<modules>[\w. ]+))?)?(?:; block [0-9a-f]{12})? -->"
 )
+# What decides which gesture a sensor's frames become. What carries frames, opens files and describes answers is set
+# aside: it changes no decision, and changes often.
+DECIDES = ("gestured.core.sensor", "gestured.model.model")
+CARRIES = frozenset((
+    "gestured.core.address", "gestured.core.osc", "gestured.core.owner", "gestured.core.wire", "gestured.core.where",
+    "gestured.core.beside.habits", "gestured.core.beside.reading", "gestured.core.beside.touch",
+    "gestured.model.file", "gestured.model.limit",
+))  # fmt: skip
 BLOCK = re.compile(r"^<!-- ([^:\n]+): begin -->\n(.*?)^<!-- \1: end -->$", re.MULTILINE | re.DOTALL)
 OLDER = "**Made with models that no longer ship, or with older code; to be made again.**"  # stands below such a line
 
 
-def made_of(command: str, files: Iterable[Path]) -> str:
-    """The line, for a table that `command` prints of these files."""
+def made_of(command: str, files: Iterable[Path], code: Sequence[str] = DECIDES) -> str:
+    """The line, for a table that `command` prints of these files; `code`: the modules that decide what it says."""
     of = ", ".join(f"{name} {digest}" for name, digest in digests(files).items())
-    return f"<!-- made by `{command}` of {of}; code {decides()} -->"
+    modules = "" if code == DECIDES else f" of {' '.join(code)}"
+    return f"<!-- made by `{command}`{of and f' of {of}'}; code {decides(tuple(code))}{modules} -->"
 
 
 def command_of(words: Sequence[str]) -> str:
@@ -41,9 +51,17 @@ def command_of(words: Sequence[str]) -> str:
     return shlex.join(found)
 
 
-def decides() -> str:
-    """The digest of the code that decides, from frames to events, as a line holds it."""
-    return code_digest("gestured.core.sensor")[:SHOWN]
+@cache
+def decides(code: tuple[str, ...] = DECIDES) -> str:
+    """The digest of the code that decides, by default from frames to gestures, as a line holds it."""
+    aside = CARRIES if code == DECIDES else frozenset[str]()
+    return hashlib.sha256("".join(code_digest(module, aside) for module in code).encode()).hexdigest()[:SHOWN]
+
+
+def other_code(line: re.Match[str]) -> bool:
+    """Whether the code that decides a table is another one now than a `LINE` says."""
+    modules = line["modules"]
+    return bool(line["code"] != (decides(tuple(modules.split())) if modules else decides()))
 
 
 def renew(document: Path, name: str, lines: Iterable[str]) -> None:
@@ -112,5 +130,5 @@ def digests(files: Iterable[Path]) -> dict[str, str]:
 
 def others(line: re.Match[str], now: Mapping[str, str]) -> list[str]:
     """The names of the files of a `LINE` whose digests are not what they are `now`."""
-    named = (part.split() for part in line[2].split(", "))
+    named = (part.split() for part in (line[2] or "").split(", ") if part)
     return [name for name, digest in named if now.get(name) != digest]

@@ -24,6 +24,7 @@ GENERATED = {
     "docs/numerics.md": ("gestured-lab stability",),
     "docs/reliability.md": ("python -m experiments.damage", "python -m experiments.deaf"),
     "docs/study.md": ("gestured-lab study",),
+    "docs/where.md": ("python -m experiments.where",),
 }
 
 
@@ -107,12 +108,16 @@ def test_a_table_of_other_models_or_of_other_code_is_listed(tmp_path: Path) -> N
     (tmp_path / "models").mkdir()
     (tmp_path / "models" / "manifest.json").write_text("{}")
     line, page = made_of("make it", shipped().values()), tmp_path / "docs" / "page.md"
-    page.write_text(f"{line}\n{OLDER}\n")
-    assert [one.why for one in made(tmp_path)] == [""]
+    page.write_text(f"{line}\n\n{line}\n{OLDER}\n")
+    assert [one.why for one in made(tmp_path)] == ["", "says itself that it is older"]
     page.write_text(re.sub("(?<=code )[0-9a-f]{12}", "0" * 12, line) + "\n\n" + re.sub("; code .{12}", "", line))
     assert [one.why for one in made(tmp_path)] == ["made with other code", "does not say with which code"]
     page.write_text(f"\n{re.sub('(?<=cnn_lstm.onnx )[0-9a-f]{12}', '0' * 12, line)}\n{OLDER}\n")
     assert [(one.number, one.why) for one in made(tmp_path)] == [(2, "made of another cnn_lstm.onnx")]
+    line = made_of("make it", [], ("gestured.core.where",))
+    assert " of gestured.core.where" in line and "onnx" not in line
+    page.write_text(line + "\n\n" + line.replace("core.where", "core.spots"))
+    assert [one.why for one in made(tmp_path)] == ["", "made with other code"]
 
 
 def test_a_figure_without_its_data_says_what_is_missing(tmp_path: Path) -> None:

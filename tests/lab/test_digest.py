@@ -51,7 +51,27 @@ def test_every_change_of_code_that_is_used_changes_it(copy: Path, module: str, r
     assert digest(copy, module) != before
 
 
-def test_code_that_is_not_used_does_not_count(copy: Path) -> None:
+@pytest.mark.parametrize("room", ["control/cli.py", "core/osc.py", "core/sensor.py", "client/stream.py"])
+def test_code_that_is_not_used_does_not_count(copy: Path, room: str) -> None:
     before = digest(copy, "gestured.lab.dataset")
-    (copy / "control" / "cli.py").write_text("")
+    (copy / room).write_text("")
     assert digest(copy, "gestured.lab.dataset") == before
+
+
+def test_a_table_names_the_code_that_decides_it_and_no_more(copy: Path) -> None:
+    code = "from gestured.lab.made_of import decides; print(decides(), decides(('gestured.core.where',)))"
+
+    def told() -> list[str]:
+        environ = {**os.environ, "PYTHONPATH": str(copy.parent)}
+        command = [sys.executable, "-P", "-c", code]
+        return subprocess.run(command, env=environ, capture_output=True, text=True, check=True).stdout.split()
+
+    begun = told()
+    for room, changed in (
+        ("daemon/service.py", []), ("core/osc.py", []), ("lab/everyday/hours.py", []), ("core/spots.py", [1]),
+        ("core/decision.py", [0]), ("model/context.py", [0]), ("core/contact.py", [0, 1]),
+    ):  # fmt: skip
+        before = (copy / room).read_text()
+        (copy / room).write_text(f"{before}\nOTHER_CODE = 1\n")
+        assert [n for n, (one, other) in enumerate(zip(begun, told(), strict=True)) if one != other] == changed, room
+        (copy / room).write_text(before)
