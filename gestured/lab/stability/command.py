@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 
 from gestured.lab.made_of import made_of, renew
+from gestured.lab.stability.day import day_table
 from gestured.lab.stability.decisions import decisions_table
 from gestured.lab.stability.extremes import whole_path_table
 from gestured.lab.stability.relaxation import filters_table
@@ -18,8 +19,12 @@ TABLES: Mapping[str, Callable[[bool], Table]] = {  # by their marks in a page; e
     "filters": filters_table,
     "extremes": lambda quick: whole_path_table(open_model(LADDER[0]), quick),
     "stiff": lambda quick: stiff_table(open_model(LADDER[0]), quick),
+    "day": day_table,
     "models": lambda quick: decisions_table(LADDER, quick),
 }
+
+# Tables that no model has a part in, and the code that they measure.
+WITHOUT_MODELS = {"filters": ("gestured.lab.stability.filters",), "day": ("gestured.core.front_end",)}
 
 
 def run(args: argparse.Namespace) -> int:
@@ -31,7 +36,9 @@ def run(args: argparse.Namespace) -> int:
         if not args.json:
             print(table, flush=True)
         if args.document:
-            renew(args.document, name, [made_of(args.words, shipped().values()), "", str(table)])
+            code = WITHOUT_MODELS.get(name)
+            made = made_of(args.words, [], code) if code else made_of(args.words, shipped().values())
+            renew(args.document, name, [made, "", str(table)])
     if args.json:
         print(json.dumps(done, indent=2))
     return 0

@@ -18,17 +18,16 @@ from gestured.core.wire import Arrival
 from gestured.lab.everyday.heard import hear
 from gestured.lab.everyday.hours import Hours, points_of
 from gestured.lab.everyday.stretches import Stretch
+from gestured.lab.stability.day import FIRST, day
 from gestured.lab.stability.path import Array
 from gestured.lab.table import Table, Value
 from gestured.model.model import Model
 from gestured.record.judge import NONE, Performed
-from gestured.simulator import GESTURES, Participant, SimulatedSensor, Take, gesture_take, session
+from gestured.simulator import Participant, SimulatedSensor, Take, session
 from gestured.simulator.people import generator
 
 SESSION_S, PEOPLE = 120.0, 10
 OTHERS = 0.25  # share of non-gestures in what is performed
-DAY_S = 86_400.0
-FIRST = 8_000_000  # of the people; no model learned from them
 EPOCH_S = 1.7e9  # of the sensors' clocks at a session's start
 Bend = Callable[[Take, float], Take]  # a session and its noise in counts -> what becomes of it
 Clock = Callable[[Array], Array]  # true times -> what the sensor's clock shows, in s
@@ -123,7 +122,7 @@ def stiff_table(model: Model, quick: bool) -> Table:
     """Each case over the same sessions, and a day."""
     people = range(FIRST, FIRST + (1 if quick else PEOPLE))
     rows = [_row(case.title, model, (_stretch(case, person) for person in people)) for case in cases()]
-    rows.append(_row("24 hours whose temperature swings by 50 noise units", model, [_day(quick)]))
+    rows.append(_row("24 hours whose temperature swings by 50 noise units", model, [day(quick)]))
     return Table(
         "Stiff and extreme sessions, by decisions",
         ("session", "minutes", "gestures", "right", "wrong", "missed", "false", "deaf min an hour"),
@@ -166,26 +165,3 @@ def _stamped(case: Case, take: Take) -> Iterator[Frame]:
         counter = (case.counter + n + 2**31) % 2**32 - 2**31
         stamp = stamper.stamp([Arrival("stiff", values, counter, float(tags[n]), ())], arrived)[0]
         yield Frame(stamp.t, values, (), stamp.lost)
-
-
-def _day(quick: bool) -> Stretch:
-    """A day at 15 Hz whose temperature swings by fifty noise units, with a gesture every ten minutes."""
-    sensor, rng = SimulatedSensor.nominal(day=FIRST), generator(FIRST, 0xDA4)
-    noise, hours = sensor.gain * sensor.noise, 1 if quick else 24
-    takes = [gesture_take(name, Participant(FIRST + k), sensor, rng) for k, name in enumerate(GESTURES)]
-    touched = [frames - np.median(frames, axis=0) for frames in map(_counts, takes)]
-    meant: list[Performed] = []
-    for k in range(6 * hours):
-        act, at = takes[k % len(takes)].events[0], 600.0 * k + 300.0
-        meant.append(Performed(act.label, act.kind, at + act.onset_s, at + act.offset_s))
-
-    def frames() -> Iterator[Frame]:
-        for k in range(6 * hours):
-            t = 600.0 * k + np.arange(9000) / sensor.rate_hz
-            block = noise * rng.standard_normal((9000, sensor.rows, sensor.columns))
-            block += 300.0 + 50.0 * noise * np.sin(2 * math.pi * t / DAY_S)[:, None, None]
-            one = touched[k % len(touched)]
-            block[4500 : 4500 + len(one)] += one
-            yield from map(Frame, t.tolist(), np.rint(block))
-
-    return Stretch("day", "one", frames(), Setup(grid=(sensor.rows, sensor.columns)), meant, [])
