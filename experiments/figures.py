@@ -38,7 +38,7 @@ def made(root: Path) -> Iterator[Made]:
     """All lines of a checkout that say what a table was made of, in the order in which their commands are run."""
     docs = root / "docs"
     now = digests([*shipped().values(), root / "models" / "manifest.json", *docs.glob("*.json"), *docs.glob("*.svg")])
-    for page in [*sorted(docs.glob("*.md")), *sorted((root / "models").glob("*.md"))]:
+    for page in [*root.glob("README.md"), *sorted(docs.glob("*.md")), *sorted((root / "models").glob("*.md"))]:
         lines = page.read_text().splitlines()
         for number, line in enumerate(lines, 1):
             if match := LINE.fullmatch(line.strip()):

@@ -1,6 +1,6 @@
 """Model cards: what a shipped model is, what it learned from, what it is worth and where it ends."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from textwrap import fill
@@ -12,7 +12,7 @@ from gestured.lab.fit import REAL_KINDS
 from gestured.lab.made_of import kept, made_of, renew
 from gestured.lab.manifest import NAME
 from gestured.lab.recordings.origin import said
-from gestured.lab.train import TrainingPlan
+from gestured.lab.train import REAL_SETS, TrainingPlan
 from gestured.model.opening import open_model
 from gestured.simulator import NON_GESTURES
 
@@ -23,14 +23,32 @@ def write_cards(folder: Path, figures: Mapping[str, Mapping[str, Any]], plan: Tr
         (folder / f"{name}.md").write_text(_card(folder / f"{name}.onnx", name, found, plan))
 
 
-def write_block(document: Path, folder: Path, figures: Mapping[str, Mapping[str, Any]]) -> None:
-    """Renew the table of a folder's models in a document; GesturedError where its marks are missing."""
+def write_blocks(
+    documents: Sequence[Path], folder: Path, figures: Mapping[str, Mapping[str, Any]], command: str
+) -> None:
+    """Renew the tables of a folder's models: `figures` in the first document, `worst` of one model in the others.
+
+    GesturedError where their marks are missing.
+    """
     files = [*(folder / f"{name}.onnx" for name in figures), folder / NAME]
     rows = [row for name, found in figures.items() for row in _rows(found, f"`{name}.onnx`, ")]
-    real = " --real FOLDER" if any("real" in found for found in figures.values()) else ""
-    command = f"gestured-lab evaluate{real} --document docs/figures.md"
     name, found = next(iter(figures.items()))
-    renew(document, "figures", [made_of(command, files), "", *HEAD, *rows, "", *_by_kind(name, found)])
+    tables = [*HEAD, *rows, "", *_worst(figures), "", *_by_kind(name, found)]
+    renew(documents[0], "figures", [made_of(command, files), "", *tables])
+    for document in documents[1:]:
+        renew(document, "worst", [made_of(command, files[:1]), "", *_worst({name: found})])
+
+
+def _worst(figures: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Of each model and set the gesture, the person and the kind of non-gesture that fare worst."""
+    lines = [f"| the worst | {' | '.join(SETS)} |", f"|---{'|---' * len(SETS)}|"]
+    for name, found in figures.items():
+        sets = [*(found["simulated"].get(test, {}) for test in ("nominal", "wide")), found.get("real", {}).get(MIXED)]
+        for title, words in WORST_OF.items():
+            cells = [(of or {}).get("worst", {}).get(title) for of in sets]
+            told = " | ".join(f"{one[0]} {one[1]:.3f} of {one[2]}" if one else "-" for one in cells)
+            lines.append(f"| {f'`{name}`: ' if len(figures) > 1 else ''}{words} | {told} |")
+    return lines
 
 
 def _by_kind(name: str, found: Mapping[str, Any]) -> list[str]:
@@ -53,6 +71,13 @@ def _by_kind(name: str, found: Mapping[str, Any]) -> list[str]:
     ]
 
 
+SETS = ("simulated, nominal", "simulated, wide", "real")
+MIXED = REAL_SETS[1]  # the set of real recordings that has non-gestures, too
+WORST_OF = {
+    "gesture": "gesture, named rightly",
+    "person": "person, named rightly",
+    "non-gesture": "non-gesture, rejected",
+}
 WORST = 12  # kinds of non-gestures that have a row; always as many, since a table may not lose rows
 MEASURED_APART = ("unseen", "judged")  # parts of a card between marks, which experiments write
 HEAD = (

@@ -92,8 +92,8 @@ def parser() -> argparse.ArgumentParser:
                    "writes cards and manifest",
                    "gestured-lab evaluate --models models")  # fmt: skip
     evaluate.add_argument("--models", type=Path, default=MODELS, help=f"folder of the models (default: {MODELS})")
-    evaluate.add_argument("--document", type=Path, metavar="FILE", help="a page whose tables of figures are "
-                          "written anew, such as docs/figures.md")  # fmt: skip
+    evaluate.add_argument("--document", type=Path, nargs="+", metavar="PAGE", help="a page whose block `figures` is "
+                          "written anew, such as docs/figures.md, and others whose block `worst` is")  # fmt: skip
     evaluate.add_argument("--recordings", **mine, help="the recordings with which the models were trained")
     add_data(evaluate)
     everyday = add("everyday", "count false gestures in hours of everyday contact, simulated or of your own, and what "

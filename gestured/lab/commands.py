@@ -7,7 +7,7 @@ from typing import Any
 
 import torch
 
-from gestured.lab.cards import write_block, write_cards
+from gestured.lab.cards import write_blocks, write_cards
 from gestured.lab.evaluate import Evaluation, real_figures, simulated_figures
 from gestured.lab.manifest import write_manifest
 from gestured.lab.own import command as own
@@ -56,6 +56,6 @@ def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     write_manifest(args.models, figures)
     write_cards(args.models, figures, plan)
     if args.document:
-        write_block(args.document, args.models, figures)
+        write_blocks(args.document, args.models, figures, args.words)
     if args.json:
         print(json.dumps(figures, indent=2))

@@ -23,6 +23,7 @@ from gestured.model.model import Model
 from gestured.model.opening import open_model
 from gestured.simulator import GESTURES, NONE
 
+FEWEST = 20  # samples of a gesture, a person or a kind of which a share says something
 SHARES = ("right", "wrong", "lost", "rejected")  # of an evaluation, those that have intervals
 
 
@@ -133,16 +134,41 @@ def simulated_figures(models: Mapping[str, Path], data: TrainingData) -> dict[st
         for test, samples in data.tests.items():
             given = model_answers(model, samples)
             result = outcome(given, targets(samples), model.threshold, data.performed[test], samples.people)
-            found[name][test] = asdict(result) | {"kinds": by_kind(given, samples, model.threshold)}
+            more = {"kinds": by_kind(given, samples, model.threshold), "worst": worst(given, samples, model.threshold)}
+            found[name][test] = asdict(result) | more
             print(result.rows(f"{name}, simulated, {test}"), flush=True)
     return found
 
 
 def by_kind(given: Answers, samples: Samples, least: float) -> dict[str, float]:
     """Share of each gesture's samples named rightly, and of each non-gesture's rejected."""
-    published = confidence(given) >= least
-    good = np.where(samples.labels == NONE, ~published, published & (given[0].argmax(axis=1) == targets(samples)))
+    good = _good(given, samples, least)
     return {str(kind): round(float(good[samples.kinds == kind].mean()), 3) for kind in np.unique(samples.kinds)}
+
+
+def _good(given: Answers, samples: Samples, least: float) -> NDArray[np.bool_]:
+    """(N,) whether a gesture was named rightly, or a non-gesture rejected."""
+    published = confidence(given) >= least
+    return np.where(samples.labels == NONE, ~published, published & (given[0].argmax(axis=1) == targets(samples)))
+
+
+def worst(given: Answers, samples: Samples, least: float) -> dict[str, tuple[str, float, int]]:
+    """The gesture and the person that were named rightly least often, and the kind of non-gesture rejected least often.
+
+    Of each the share, and of how many samples it is; those with fewer than `FEWEST` samples are left out.
+    """
+    good, known, other = _good(given, samples, least), targets(samples) >= 0, samples.labels == NONE
+    groups = {
+        "gesture": (samples.kinds, known & ~other), "person": (samples.people, known & ~other),
+        "non-gesture": (samples.kinds, known & other),
+    }  # fmt: skip
+    found: dict[str, tuple[str, float, int]] = {}
+    for title, (names, chosen) in groups.items():
+        counted = zip(*np.unique(names[chosen], return_counts=True), strict=True)
+        rows = [(float(good[chosen & (names == name)].mean()), str(name), int(n)) for name, n in counted if n >= FEWEST]
+        for share, name, count in sorted(rows)[:1]:
+            found[title] = name, round(share, 3), count
+    return found
 
 
 def without(calibrated: Calibrated, real: Samples, held: NDArray[np.bool_]) -> Calibrated:
@@ -176,7 +202,7 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
             chosen = is_of(real.labels, title) & judged_once
             answers = scores[chosen], unknown[chosen]
             result = outcome(answers, labels[chosen], least, data.performed.get(title), real.people[chosen])
-            found.setdefault(name, {})[title] = asdict(result)
+            found.setdefault(name, {})[title] = asdict(result) | {"worst": worst(answers, real.take(chosen), least)}
             print(result.rows(f"{name}, real, {title}"), flush=True)
         found[name]["kinds"] = by_kind((scores, unknown), real, least)
     return found

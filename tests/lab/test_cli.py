@@ -180,11 +180,18 @@ def test_train_makes_three_models_and_evaluate_their_figures(
     capsys.readouterr()
     page = tmp_path / "figures.md"
     page.write_text("<!-- figures: begin -->\n<!-- figures: end -->\n")
-    assert main(["evaluate", "--models", str(out), *arguments, "--document", str(page), "--json"]) == 0
+    monkeypatch.setattr("gestured.lab.evaluate.FEWEST", 1)
+    front = tmp_path / "README.md"
+    front.write_text("<!-- worst: begin -->\n<!-- worst: end -->\n")
+    assert main(["evaluate", "--models", str(out), *arguments, "--document", str(page), str(front), "--json"]) == 0
     text = capsys.readouterr().out
     figures = json.loads(text[text.index("\n{\n") :])
     assert figures.keys() == set(LADDER)
     assert set(figures["cnn_lstm"]["real"]) >= {"taps and swipes", "with non-gestures"}
     asked = set(figures["cnn_lstm"]["simulated"]["wide"]["kinds"]) & set(NON_GESTURES)
     assert asked and asked <= set(re.findall(r"\w+", page.read_text()))  # the page names what each kind comes to
+    told = figures["cnn_lstm"]["simulated"]["wide"]["worst"]
+    assert told.keys() == {"gesture", "person", "non-gesture"}
+    for name, share, count in told.values():
+        assert all(f"{name} {share:.3f} of {count}" in one.read_text() for one in (page, front))
     assert {path.name: path.read_bytes() for path in sorted(out.glob("*.onnx"))} == before

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from gestured.lab.evaluate import Evaluation, outcome
+from gestured.lab.evaluate import Evaluation, outcome, worst
+from gestured.lab.fit import CLASSES
+from gestured.lab.samples import Samples
 
 THREE = np.eye(3, dtype=np.float32)
 
@@ -77,3 +79,24 @@ def test_intervals_hold_the_shares_that_they_are_of(performed: int | None) -> No
     assert found.intervals["lost"]["low"] >= never / found.gestures  # what was never cut out is lost whoever is drawn
     assert found.rows("a set").splitlines()[0] == found.row("a set")
     assert {len(line) for line in found.rows("a set").splitlines()} == {len(Evaluation.HEAD)}
+
+
+def test_the_worst_is_found_among_those_that_are_there_often_enough() -> None:
+    """Taps fare worst, but for a kind that is there once; of two people the second; spikes are taken for gestures."""
+    rows = (
+        [("one_tap", 0)] * 30 + [("swipe_up", 1)] * 30 + [("swipe_down", 0)] + [("spike", 1)] * 20 + [("wave", 0)] * 20
+    )
+    right = [n % 3 > 0 for n in range(30)] + [n % 10 > 0 for n in range(30)] + [False] + [False] * 5 + [True] * 35
+    kinds = np.array([kind for kind, _ in rows])
+    labels = np.where(np.isin(kinds, ["spike", "wave"]), "none", kinds)
+    people = np.array([person for _, person in rows])
+    nothing = np.zeros(len(rows))
+    samples = Samples(nothing, nothing, labels, kinds, people, nothing, nothing, nothing, nothing)  # type: ignore[arg-type]
+    scores, unknown = np.zeros((len(rows), 10)), np.zeros(len(rows))
+    for n, (kind, good) in enumerate(zip(kinds, right, strict=True)):
+        gesture = labels[n] != "none"
+        scores[n, CLASSES.index(kind) if gesture and good else 3] = 1.0
+        unknown[n] = 1.0 if good and not gesture else 0.0
+    assert worst((scores, unknown), samples, 0.5) == {
+        "gesture": ("one_tap", 0.667, 30), "person": ("0", 0.645, 31), "non-gesture": ("spike", 0.75, 20),
+    }  # fmt: skip
