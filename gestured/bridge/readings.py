@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 MOST_TAXELS = 64 * 64  # of the largest grid
 LINE_BYTES = 32 * MOST_TAXELS  # of the longest packet or line; numbers in text have up to some 25 characters
-COUNTER = 0x7FFFFFFF  # a frame counter is an `i` of OSC
+WIDTHS = (8, 16)  # bits of a counter in firmware; one of 32 bits wraps as OSC's does
+NEAR = 16  # frames that may be lost where a counter wraps; one that falls further began anew
 FEWEST = 3  # frames of another protocol that are no accident
 
 
@@ -20,6 +21,26 @@ class Reading(NamedTuple):
     values: NDArray[np.generic]
     counter: int | None = None
     moment: float | None = None
+
+
+class Unwrapped:
+    """A sensor's own frame counter: one of 8 or 16 bits that overflows goes on, as one of 32 bits does."""
+
+    def __init__(self) -> None:
+        self._last, self._beyond = 0, 0
+
+    def of(self, counter: int) -> int:
+        """The counter that goes on, for each of the sensor's frames in turn."""
+        for bits in WIDTHS:
+            if counter < self._last < 2**bits and counter + 2**bits - self._last <= NEAR:
+                self._beyond += 2**bits
+        self._last = counter
+        return counter + self._beyond
+
+
+def signed(counter: int) -> int:
+    """A frame counter as an `i` of OSC: an int32, which overflows."""
+    return (counter + 2**31) % 2**32 - 2**31
 
 
 class Protocol(ABC):
@@ -68,4 +89,4 @@ def reading_of(found: Sequence[object], shape: tuple[int, int], dtype: np.dtype[
     first = found[0]
     if not isinstance(first, int | float) or not math.isfinite(first) or first != int(first):
         return None
-    return Reading(values, int(first) & COUNTER)
+    return Reading(values, int(first))

@@ -16,7 +16,7 @@ from typing import Any
 from gestured.bridge.counts import Counts
 from gestured.bridge.options import BridgeError, add_destination, add_metrics, destination, need, on_stop
 from gestured.bridge.protocols import PROTOCOLS, looks_like
-from gestured.bridge.readings import COUNTER, MOST_TAXELS, Reading
+from gestured.bridge.readings import MOST_TAXELS, Reading, Unwrapped, signed
 from gestured.client.program import Commands
 from gestured.client.sensor import Form, sent_after_refusal
 from gestured.client.values import rows_by_columns
@@ -83,7 +83,7 @@ class Serial:
         self._to = args.to
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.connect(address)
-        self._counter = 0
+        self._counter, self._own = 0, Unwrapped()  # ours where the sensor has none, and the sensor's
         self._stopped = False
         self._opened = False  # ever
         counts.serve(args.metrics)
@@ -163,13 +163,13 @@ class Serial:
         """The newest of them to the daemon."""
         first = max(len(readings) - KEPT, 0)
         for n, reading in enumerate(readings):
-            self._counter = (self._counter + 1) & COUNTER
+            self._counter += 1
+            counter = self._counter if reading.counter is None else self._own.of(reading.counter)
             if n < first:
                 self._counts.add("frames", "overtaken")
                 continue
-            counter = self._counter if reading.counter is None else reading.counter
             moment = time.time() if reading.moment is None else reading.moment
-            packet = self._forms[form_of(reading)].packet(Frame(0.0, reading.values), counter, moment)
+            packet = self._forms[form_of(reading)].packet(Frame(0.0, reading.values), signed(counter), moment)
             try:
                 heard = not sent_after_refusal(self._socket, packet)
             except OSError:  # the network is down: as good as nobody who listens

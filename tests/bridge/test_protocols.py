@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 from pythonosc.osc_message_builder import OscMessageBuilder
 
 from gestured.bridge.protocols import PROTOCOLS, looks_like
-from gestured.bridge.readings import Protocol
+from gestured.bridge.readings import Protocol, Unwrapped, signed
+from gestured.core.stamping import Stamper
+from gestured.core.wire import Arrival
 
 ROWS, COLUMNS = 4, 5
 SIZE = ROWS * COLUMNS
@@ -189,3 +191,22 @@ def test_noise_looks_like_nothing():
     noise = np.random.default_rng(1).integers(0, 256, 20_000).astype(np.uint8).tobytes()
     assert looks_like(noise) is None
     assert looks_like(bytes(20_000)) is None
+
+
+@pytest.mark.parametrize("bits", [8, 16, 32])
+@given(lost=st.sets(st.integers(0, 80)), first=st.integers(-40, 0))
+def test_a_counter_that_overflows_is_no_sensor_that_began_anew(bits: int, lost: set[int], first: int):
+    """At most some of the frames around the overflow are lost; the daemon's own stamper says how many."""
+    own, stamper, before = Unwrapped(), Stamper(), None
+    kept = [n for n in range(81) if n not in lost or n % 8 == 0]
+    for n in kept:
+        counter = signed(own.of((first + n) % 2**bits))
+        (stamp,) = stamper.stamp([Arrival("pad", np.zeros((2, 2)), counter, None, ())], n / 15)
+        assert not stamp.restarted and not stamp.dropped and stamp.lost == (0 if before is None else n - before - 1)
+        before = n
+
+
+@pytest.mark.parametrize(("last", "then"), [(100, 0), (200, 3), (300, 0), (40_000, 1), (70_000, 2)])
+def test_a_counter_that_falls_elsewhere_began_anew(last: int, then: int):
+    own = Unwrapped()
+    assert own.of(last) - own.of(then) == last - then
