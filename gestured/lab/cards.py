@@ -79,7 +79,7 @@ WORST_OF = {
     "non-gesture": "non-gesture, rejected",
 }
 WORST = 12  # kinds of non-gestures that have a row; always as many, since a table may not lose rows
-MEASURED_APART = ("unseen", "judged")  # parts of a card between marks, which experiments write
+MEASURED_APART = ("unseen", "seeds", "judged")  # parts of a card between marks, which experiments write
 HEAD = (
     "| set | gestures | right\\* | right | wrong | lost | non-gestures | rejected |",
     "|---|---|---|---|---|---|---|---|",
@@ -88,10 +88,11 @@ HEAD = (
 
 def _card(path: Path, name: str, found: Mapping[str, Any], plan: TrainingPlan) -> str:
     templates = Environment(loader=PackageLoader("gestured.lab", "."), keep_trailing_newline=True)
-    apart = (kept(path.with_suffix(".md"), part) for part in MEASURED_APART)
+    blank = "<!-- {0}: begin -->\n<!-- {0}: end -->"
+    apart = [kept(path.with_suffix(".md"), part) or blank.format(part) for part in MEASURED_APART]
     return templates.get_template("card.md").render(
         name=name, model=open_model(path), plan=plan, settings=asdict(plan.fit), real=bool(said(path)),
-        table=[*HEAD, *_rows(found)], others=list(filter(None, apart)),
+        table=[*HEAD, *_rows(found)], others=apart,
     )  # fmt: skip
 
 

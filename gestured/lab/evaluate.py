@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 
 from gestured.lab.decide import Answers, confidence
-from gestured.lab.fit import RECURRENT, padded, targets
+from gestured.lab.fit import CLASSES, RECURRENT, padded, targets
 from gestured.lab.intervals import interval
 from gestured.lab.samples import Samples
 from gestured.lab.train import REAL_SETS, Calibrated, Trained, TrainingData, folds, is_of, judged
@@ -157,15 +157,14 @@ def worst(given: Answers, samples: Samples, least: float) -> dict[str, tuple[str
 
     Of each the share, and of how many samples it is; those with fewer than `FEWEST` samples are left out.
     """
-    good, known, other = _good(given, samples, least), targets(samples) >= 0, samples.labels == NONE
-    groups = {
-        "gesture": (samples.kinds, known & ~other), "person": (samples.people, known & ~other),
-        "non-gesture": (samples.kinds, known & other),
-    }  # fmt: skip
+    good, classes = _good(given, samples, least), targets(samples)
+    meant, names = (classes >= 0) & (classes < len(GESTURES)), np.array(CLASSES)[classes]
+    people = np.char.add("no. ", samples.people.astype(str))
+    groups = {"gesture": (names, meant), "person": (people, meant), "non-gesture": (names, classes >= len(GESTURES))}
     found: dict[str, tuple[str, float, int]] = {}
-    for title, (names, chosen) in groups.items():
-        counted = zip(*np.unique(names[chosen], return_counts=True), strict=True)
-        rows = [(float(good[chosen & (names == name)].mean()), str(name), int(n)) for name, n in counted if n >= FEWEST]
+    for title, (of, chosen) in groups.items():
+        counted = zip(*np.unique(of[chosen], return_counts=True), strict=True)
+        rows = [(float(good[chosen & (of == name)].mean()), str(name), int(n)) for name, n in counted if n >= FEWEST]
         for share, name, count in sorted(rows)[:1]:
             found[title] = name, round(share, 3), count
     return found

@@ -98,5 +98,5 @@ def test_the_worst_is_found_among_those_that_are_there_often_enough() -> None:
         scores[n, CLASSES.index(kind) if gesture and good else 3] = 1.0
         unknown[n] = 1.0 if good and not gesture else 0.0
     assert worst((scores, unknown), samples, 0.5) == {
-        "gesture": ("one_tap", 0.667, 30), "person": ("0", 0.645, 31), "non-gesture": ("spike", 0.75, 20),
+        "gesture": ("one_tap", 0.667, 30), "person": ("no. 0", 0.645, 31), "non-gesture": ("spike", 0.75, 20),
     }  # fmt: skip
