@@ -129,8 +129,9 @@ def parser() -> argparse.ArgumentParser:
     study.add_argument("--seeds", type=int, default=3, help="seeds of each figure of the main tables (default: 3)")
     study.add_argument("--draw", type=Path, metavar="FILE", help="compute nothing: draw the picture of error against "
                        "run time again, from the study.json or operating-points.json of an earlier run")  # fmt: skip
-    study.add_argument("--document", type=Path, metavar="FILE", help="with --draw: a page whose table of choices "
-                       "is written anew, such as docs/figures.md")  # fmt: skip
+    study.add_argument("--document", type=Path, metavar="PAGE", help="a page whose block `study` is written anew, such "
+                       "as docs/study.md, and the picture beside it; with --draw one whose block `choice` is, such as "
+                       "docs/figures.md")  # fmt: skip
     study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: of "
                        "another generator (python -m experiments.foreign.recordings) or another sensor")  # fmt: skip
     study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")

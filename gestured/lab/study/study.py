@@ -63,6 +63,11 @@ def run(args: argparse.Namespace) -> int:
     args.out.mkdir(parents=True, exist_ok=True)
     write(study, args.out)
     tables_path = write_report(study, args.out)
+    if args.document:
+        lines = tables_path.read_text("utf-8").splitlines()[1:]  # the first says what they were made of, as `made` does
+        made = made_of(args.words, shipped().values())
+        renew(args.document, "study", [made, "", *(line for line in lines if not line.startswith("!["))])
+        write_picture(study, args.document.parent)
     print(json.dumps(study, indent=2) if args.json else f"{tables_path}: {study['machine']['minutes']} minutes")
     return 0
 
