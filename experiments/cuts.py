@@ -1,11 +1,10 @@
-"""How the front end's cuts compare with cuts at the true marks: `python -m experiments.cuts`.
+"""What the front end cuts of sessions whose truth is known: `python -m experiments.cuts`.
 
     python -m experiments.cuts --level nominal hard faint --sessions 100
     python -m experiments.cuts --foreign --level nominal hard --sessions 100
 
 Short sessions of one person each on one sensor each, of this project's simulator or of the independent one (which
-judges: nothing is tuned on it). Each gesture is named twice: as the front end cuts it, and as it would be cut by
-somebody who knows when the finger came and left. A gesture is `one` if exactly one segment lies in it, and that
+judges: nothing is tuned on it). A gesture is `one` if exactly one segment lies in it, and that
 segment in no other gesture; `split` if several do, `joined` if its segment holds another gesture too, `missed` if none
 does. Onsets and offsets are seconds after the true ones, of gestures that are one segment, at the quantiles 0.1, 0.5
 and 0.9. `false` are segments of nobody, an hour.
@@ -14,8 +13,6 @@ and 0.9. `false` are segments of nobody, an hour.
 import argparse
 import json
 from collections import Counter
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -24,7 +21,7 @@ from numpy.typing import NDArray
 
 from experiments import foreign
 from gestured.core.facts import Decided
-from gestured.core.frames import Frame, Segment
+from gestured.core.frames import Frame
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.lab.dataset import Truth, truths
@@ -89,8 +86,7 @@ class Sheet:
     gestures: int = 0
     cuts: Counter[str] = field(default_factory=Counter)  # one, split, joined, missed
     cut: Counter[str] = field(default_factory=Counter)  # right, wrong, lost: named as the front end cuts
-    marked: Counter[str] = field(default_factory=Counter)  # the same at the true marks
-    best: Counter[str] = field(default_factory=Counter)  # the best score is right: "cut", "marked"
+    best: int = 0  # the best score is right
     onsets: list[float] = field(default_factory=list)
     offsets: list[float] = field(default_factory=list)
     others: int = 0  # non-gestures
@@ -117,8 +113,7 @@ class Sheet:
             "gestures": self.gestures,
             **share(self.cuts, "one", "split", "joined", "missed"),
             "onset_s": quantiles(self.onsets), "offset_s": quantiles(self.offsets),
-            "cut": {**share(self.cut, "right", "wrong", "lost"), "best": round(self.best["cut"] / n, 4)},
-            "marked": {**share(self.marked, "right", "wrong", "lost"), "best": round(self.best["marked"] / n, 4)},
+            "cut": {**share(self.cut, "right", "wrong", "lost"), "best": round(self.best / n, 4)},
             "others": self.others, "accepted": round(self.accepted / max(self.others, 1), 4),
             "false an hour": round(self.false / max(self.hours, 1e-9), 2),
         }  # fmt: skip
@@ -129,11 +124,8 @@ def measure(recording: Recording, model: Any) -> Sheet:
     frames, times, performed = recording
     sheet = Sheet(hours=float(times[-1]) / 3600)
     machine = Sensor("cuts", Scene(model.gestures, frames.shape[1:]), model)
-    front = machine.front_end
-    looks: list[tuple[NDArray[np.float64], float]] = []  # baseline and noise, as known at each frame
     decided: list[Decided] = []
     for t, values in zip(times, frames, strict=True):
-        looks.append((front.baseline, front.noise))
         decided += [x for x in machine.push(Frame(float(t), values)) if isinstance(x, Decided)]
     decided += [x for x in machine.flush(float(times[-1]) + 5.0) if isinstance(x, Decided)]
     within = [
@@ -154,46 +146,11 @@ def measure(recording: Recording, model: Any) -> Sheet:
         sheet.cut["right" if named == [act.label] else "wrong" if set(named) - {act.label} else "lost"] += 1
         if len(found) == 1:
             (one,) = found
-            sheet.best["cut"] += model.gestures[int(one.scores.values.argmax())] == act.label
+            sheet.best += model.gestures[int(one.scores.values.argmax())] == act.label
             if not joined:
                 sheet.onsets.append(one.segment.onset - act.onset)
                 sheet.offsets.append(one.segment.offset - act.offset)
-        first = int(np.searchsorted(times, act.onset))
-        if looks[first][1] > 0:
-            scores = model.classify(at_marks(front, recording, act, *looks[first]))
-            best = model.gestures[int(scores.values.argmax())]
-            sheet.best["marked"] += best == act.label
-            sure = scores.confidence >= scores.threshold
-            sheet.marked["lost" if not sure else "right" if best == act.label else "wrong"] += 1
-        else:
-            sheet.marked["lost"] += 1
     return sheet
-
-
-def at_marks(front: Any, recording: Recording, act: Truth, baseline: NDArray[np.float64], noise: float) -> Segment:
-    """The segment of somebody who knows when the finger came and left."""
-    times = recording.times
-    first = int(np.searchsorted(times, act.onset))
-    last = max(int(np.searchsorted(times, act.offset, side="right")) - 1, first)
-    low, high = max(first - 3, 0), min(last + 4, len(times))
-    raw = recording.frames[low:high].astype(np.float64).reshape(high - low, -1)
-    frames = front.conditioner.taxels.bridge(raw - baseline).astype(np.float32)
-    return Segment(frames.reshape(-1, front.rows, front.columns), times[low:high], first - low, last - low, noise)
-
-
-def _batch(task: tuple[str, bool, int, int, int, str]) -> Sheet:
-    level, is_foreign, burst, first, count, source = task
-    model, sheet = open_model(source), Sheet()
-    for seed in range(first, first + count):
-        recording = (others if is_foreign else ours)(level, seed)
-        sheet += measure(lossy(recording, burst, seed) if burst else recording, model)
-    return sheet
-
-
-def _tasks(args: argparse.Namespace, level: str) -> Iterator[tuple[str, bool, int, int, int, str]]:
-    step = 10
-    for first in range(args.first, args.first + args.sessions, step):
-        yield level, args.foreign, args.burst, first, min(step, args.first + args.sessions - first), args.model
 
 
 def main() -> None:
@@ -204,16 +161,16 @@ def main() -> None:
     parser.add_argument("--burst", type=int, default=0, help="frames lost in a row in each performance (%(default)s)")
     parser.add_argument("--first", type=int, default=0, help="first seed (%(default)s)")
     parser.add_argument("--model", default="cnn_lstm", help="a shipped model's name or a path (%(default)s)")
-    parser.add_argument("--jobs", type=int, default=1, help="processes (%(default)s)")
     args = parser.parse_args()
     if args.foreign and "faint" in args.level:
         parser.error("--foreign: its levels are nominal and hard")
-    with ProcessPoolExecutor(args.jobs) as pool:
-        for level in args.level:
-            sheet = Sheet()
-            for part in pool.map(_batch, _tasks(args, level)):
-                sheet += part
-            print(json.dumps({"level": level, "burst": args.burst, **sheet.figures()}), flush=True)
+    model = open_model(args.model)
+    for level in args.level:
+        sheet = Sheet()
+        for seed in range(args.first, args.first + args.sessions):
+            recording = (others if args.foreign else ours)(level, seed)
+            sheet += measure(lossy(recording, args.burst, seed) if args.burst else recording, model)
+        print(json.dumps({"level": level, "burst": args.burst, **sheet.figures()}), flush=True)
 
 
 if __name__ == "__main__":

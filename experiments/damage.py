@@ -205,7 +205,6 @@ def main() -> int:
     parser.add_argument("--model", default="cnn_lstm", help="path or name (default: cnn_lstm)")
     parser.add_argument("--people", type=int, default=10, help="two minutes each, touched and untouched (default: 10)")
     parser.add_argument("--fault", action="append", choices=tuple(FAULTS), help="only this one; may be repeated")
-    parser.add_argument("--json", action="store_true")
     add_document(parser, "damage")
     args = parser.parse_args()
     log.configure("error")
@@ -214,12 +213,9 @@ def main() -> int:
     takes, idle = [take(person) for person in people], [take(person, touched=False) for person in people]
     faults = args.fault or list(FAULTS)
     found = [measure(name, takes, idle, bench).figures() for name in progress(faults, len(faults), "faults")]
-    if args.json:
-        print(json.dumps(found, indent=2))
-    else:
-        rows = [tuple("-" if value is None else str(value) for value in row.values()) for row in found]
-        table = Table("Gestures beside a fault", tuple(found[0]), rows)
-        tell(table, [shipped().get(args.model, Path(args.model))], "damage", args.document)
+    rows = [tuple("-" if value is None else str(value) for value in row.values()) for row in found]
+    table = Table("Gestures beside a fault", tuple(found[0]), rows)
+    tell(table, [shipped().get(args.model, Path(args.model))], "damage", args.document)
     return int(any(figures["of nobody"] or figures["unended"] for figures in found))
 
 

@@ -4,12 +4,10 @@ python -m experiments.taps --people 20
 """
 
 import argparse
-import json
 from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 from experiments.pages import add_document, tell
 from gestured.core.classifier import Classifier
@@ -19,7 +17,7 @@ from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
 from gestured.core.sensor import Sensor
 from gestured.lab.online import tallied
 from gestured.lab.progress import progress
-from gestured.lab.table import Table
+from gestured.lab.table import Table, Value
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
@@ -58,10 +56,10 @@ def read(model: Classifier, take: Take, wait_s: float) -> tuple[Counter[str], li
     return counts, waited
 
 
-def figures(model: str, people: int, seed: int) -> list[dict[str, Any]]:
-    """A row for each wait: shares of what was done, and the median single tap's wait in seconds."""
+def figures(model: str, people: int, seed: int) -> list[tuple[Value, ...]]:
+    """A row for each wait: shares of what was done, and the median single tap's wait."""
     sessions, opened = takes(people, seed), open_model(model)
-    rows = []
+    rows: list[tuple[Value, ...]] = []
     for wait_s in progress(WAITS_S, len(WAITS_S), "waits"):
         counts: Counter[str] = Counter()
         waited: list[float] = []
@@ -69,17 +67,9 @@ def figures(model: str, people: int, seed: int) -> list[dict[str, Any]]:
             more, also = read(opened, take, wait_s)
             counts, waited = counts + more, waited + also
         single, double = max(counts[ONE_TAP], 1), max(counts[DOUBLE_TAP], 1)
-        rows.append(
-            {
-                "tap_gap_s": wait_s,
-                "double_taps": counts[DOUBLE_TAP],
-                "double_taps_right": round(counts[f"{DOUBLE_TAP} {DOUBLE_TAP}"] / double, 3),
-                "double_taps_read_as_taps": round(counts[f"{DOUBLE_TAP} {ONE_TAP}"] / double, 3),
-                "taps": counts[ONE_TAP],
-                "taps_right": round(counts[f"{ONE_TAP} {ONE_TAP}"] / single, 3),
-                "tap_answered_after_s": round(median(waited), 3) if waited else None,
-            }
-        )
+        taken = ((DOUBLE_TAP, DOUBLE_TAP, double), (DOUBLE_TAP, ONE_TAP, double), (ONE_TAP, ONE_TAP, single))
+        shares = (f"{counts[f'{done} {said}'] / of:.3f}" for done, said, of in taken)
+        rows.append((f"{wait_s:.2f} s", *shares, f"{median(waited):.2f} s" if waited else "-"))
     return rows
 
 
@@ -92,19 +82,9 @@ def main() -> None:
     parser.add_argument("--model", default="cnn_lstm", help="a path, or a shipped model's name (%(default)s)")
     parser.add_argument("--people", type=int, default=20, help="participants, two minutes of taps each (%(default)s)")
     parser.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (%(default)s)")
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     add_document(parser, "taps")
     args = parser.parse_args()
-    rows = figures(args.model, args.people, args.seed)
-    if args.json:
-        print(json.dumps(rows, indent=2))
-        return
-    shares = ("double_taps_right", "double_taps_read_as_taps", "taps_right")
-    table = Table("Taps by the time in which a second one counts", HEAD)
-    for row in rows:
-        after = row["tap_answered_after_s"]
-        cells = (f"{row['tap_gap_s']:.2f} s", *(f"{row[share]:.3f}" for share in shares))
-        table.rows.append((*cells, "-" if after is None else f"{after:.2f} s"))
+    table = Table("Taps by the time in which a second one counts", HEAD, figures(args.model, args.people, args.seed))
     tell(table, [shipped().get(args.model, Path(args.model))], "taps", args.document)
 
 

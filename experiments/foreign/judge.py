@@ -1,41 +1,38 @@
-"""Judge models, or the front end alone, on the independent generator.
+"""Judge models on the independent generator.
 
     python -m experiments.foreign.judge --n 20 --level nominal hard --document docs/figures.md
     python -m experiments.foreign.judge --model cnn_lstm --n 40 --level nominal hard
-    python -m experiments.foreign.judge --front-end --n 40
-    python -m experiments.foreign.judge --model cnn_lstm --grids --sessions 5 --json
+    python -m experiments.foreign.judge --model cnn_lstm --grids
     python -m experiments.foreign.judge --model cnn_lstm --provisional --sessions 10
 
-Without --model or --front-end all shipped models are judged, a row for each; --document puts the table into a page, and
+Without --model all shipped models are judged, a row for each; --document puts the table into a page, and
 each model's rows into its card. A take's outcome is one of: `missed` (no segment), `cancelled:REASON`, `split` (more
 than one segment or event), or its one segment's label. Takes that nobody can recognise (see `visible`) are counted as
 `unseen` and left out.
 """
 
 import argparse
-import json
-import math
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from experiments.early import Ahead, heard, table
 from experiments.foreign import GESTURES, GRIDS, LEVELS, NON_GESTURES, other_grids, session, take
 from experiments.pages import command, tell
+from gestured.core.classifier import Classifier
 from gestured.core.events import Cancelled, Gesture, Onset, Unknown
 from gestured.core.facts import events_of
-from gestured.core.frames import Frame, Segment
-from gestured.core.front_end import Cut, FrontEnd, Void
+from gestured.core.frames import Frame
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
 from gestured.lab.dataset import Truth
 from gestured.lab.made_of import made_of, renew
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
-from gestured.record.judge import Performed, Tally
 
 SEEN = 4.0  # times the noise
 SESSION_S = 120.0
@@ -62,15 +59,7 @@ class Outcome:
     before: str = ""  # best label before rejection, where there is one segment
     extra: int = 0  # segments that lie wholly outside the gesture
     late: float = 0.0  # s, decision after the true release
-    start: float = 0.0  # s, segment's onset after the true one
-    end: float = 0.0  # s, segment's offset after the true release
-    segments: list[tuple[float, float]] = field(default_factory=list)  # (s, s) relative to the true onset
     ready: bool = True
-    confidence: float = 0.0
-    strongest: float = 0.0  # true signal over noise, at best
-    frames: int = 0  # in which the touch is to be seen
-    lasted: float = 0.0  # s, true
-    pieces: int = 0  # stretches of frames above a fifth of the segment's peak
 
 
 def _frames(recording: Take) -> Iterator[Frame]:
@@ -79,15 +68,8 @@ def _frames(recording: Take) -> Iterator[Frame]:
 
 
 def _decided(events: list[Any]) -> tuple[list[Any], list[Any]]:
-    """What was answered (Cut, Gesture or Unknown), and what was cancelled."""
-    return [e for e in events if isinstance(e, Cut | Gesture | Unknown)], [
-        e for e in events if isinstance(e, Void | Cancelled)
-    ]
-
-
-def _span(event: Any) -> tuple[float, float]:
-    thing: Segment | Any = event.segment if isinstance(event, Cut) else event
-    return thing.onset, thing.offset
+    """What was answered, and what was cancelled."""
+    return [e for e in events if isinstance(e, Gesture | Unknown)], [e for e in events if isinstance(e, Cancelled)]
 
 
 def visible(recording: Take) -> bool:
@@ -106,57 +88,33 @@ def visible(recording: Take) -> bool:
     return bool(weaker >= SEEN and seen[first:second].min() < 0.6 * weaker)
 
 
-def _pieces(segment: Segment) -> int:
-    """How many separate stretches of frames reach a fifth of the segment's strongest taxel."""
-    strength = segment.frames.max(axis=(1, 2))
-    strong = strength >= 0.2 * strength.max()
-    return int(strong[0]) + int((strong[1:] & ~strong[:-1]).sum())
-
-
-def _machine(grid: tuple[int, int], classifier: Any | None) -> tuple[Any, FrontEnd]:
-    """What takes the frames, and its front end, which is all of it where there is no classifier."""
-    if classifier is None:
-        front = FrontEnd(*grid)
-        return front, front
-    sensor = Sensor("foreign", Scene(classifier.gestures, grid), classifier)
-    return sensor, sensor.front_end
-
-
-def judge(recording: Take, seed: int, level: str, classifier: Any | None) -> Outcome:
-    """Run one take through a fresh front end or, where a classifier is given, through a fresh sensor."""
-    machine, front = _machine(recording["frames"].shape[1:], classifier)
+def judge(recording: Take, seed: int, level: str, classifier: Classifier) -> Outcome:
+    """Run one take through a fresh sensor."""
+    machine = Sensor("foreign", Scene(classifier.gestures, recording["frames"].shape[1:]), classifier)
     onset, release = recording["onset"], recording["release"]
     events: list[Any] = []
     ready = False
     for frame in _frames(recording):
         if frame.t < onset:
-            ready = front.ready
+            ready = machine.front_end.ready
         events += events_of(machine.push(frame))
     events += events_of(machine.flush(float(recording["times"][-1]) + 5.0))
     decided, cancelled = _decided(events)
     slack = 2.0 / max(float(len(recording["times"]) / recording["times"][-1]), 1.0)
-    inside = [e for e in decided if _span(e)[0] <= release + slack + 0.2 and _span(e)[1] >= onset - slack]
+    inside = [e for e in decided if e.onset <= release + slack + 0.2 and e.offset >= onset - slack]
     result = Outcome(recording["kind"], level, seed, "missed", ready=ready, extra=len(decided) - len(inside))
-    result.strongest, result.frames = float(recording["seen"].max()), int((recording["seen"] > SEEN).sum())
-    result.lasted = release - onset
-    result.segments = [(round(_span(e)[0] - onset, 2), round(_span(e)[1] - onset, 2)) for e in inside]
     if len(inside) + len(cancelled) > 1:
         result.answer = "split"
         named = [e for e in inside if isinstance(e, Gesture)]
         if named and recording["label"] == "none":
             result.answer = named[0].gesture  # a non-gesture in pieces, one of which was taken for a gesture
-        elif classifier is not None and recording["label"] == "none":
+        elif recording["label"] == "none":
             result.answer = "unknown"
     elif inside:
         event = inside[0]
-        first, last = _span(event)
-        result.late, result.start, result.end = event.decided - release, first - onset, last - release
-        if isinstance(event, Cut):
-            result.answer, result.pieces = "segment", _pieces(event.segment)
-        else:
-            result.before = max(event.scores, key=lambda name: event.scores[name])
-            result.answer = event.gesture if isinstance(event, Gesture) else "unknown"
-            result.confidence = event.confidence
+        result.late = event.decided - release
+        result.before = max(event.scores, key=lambda name: event.scores[name])
+        result.answer = event.gesture if isinstance(event, Gesture) else "unknown"
     elif cancelled:
         result.answer = f"cancelled:{cancelled[0].reason}"
     elif any(isinstance(e, Onset) for e in events):
@@ -164,9 +122,9 @@ def judge(recording: Take, seed: int, level: str, classifier: Any | None) -> Out
     return result
 
 
-def _batch(task: tuple[str | None, str, str, int, bool, int, bool]) -> tuple[list[Outcome], int]:
+def _batch(task: tuple[str, str, str, int, bool, int, bool]) -> tuple[list[Outcome], int]:
     source, kind, level, count, grids, first, whole = task
-    classifier = source and open_model(source)
+    classifier = open_model(source)
     outcomes: list[Outcome] = []
     unseen = 0
     for seed in range(first, first + count):
@@ -203,15 +161,12 @@ def summary(outcomes: list[Outcome], unseen: dict[str, int]) -> dict[str, Any]:
                 "before": sum(o.before == kind for o in mine) / len(mine),
                 "answers": dict(answers.most_common()),
                 "extra": sum(o.extra for o in mine),
-                "partial": sum(bool(o.segments) and (o.start > 0.2 or o.end < -0.2) for o in mine),
-                "pieces": dict(Counter(o.pieces for o in mine if o.answer == "segment").most_common()),
                 "late_s": sorted(o.late for o in mine)[len(mine) // 2],
             }
         result[level] = {
             "gestures": len(gestures),
             "unseen": unseen.get(level, 0),
             "not_ready": sum(not o.ready for o in own),
-            "one_segment": sum(bool(o.before) or o.answer == "segment" for o in gestures) / n,
             "before_rejection": sum(o.before == o.kind for o in gestures) / n,
             "right": sum(o.answer == o.kind for o in gestures) / n,
             "wrong": sum(o.answer in GESTURES and o.answer != o.kind for o in gestures) / n,
@@ -238,83 +193,50 @@ def row(model: str, level: str, found: dict[str, Any]) -> str:
     return f"| `{model}.onnx`, another generator, {level} | {' | '.join(map(str, cells))} |"
 
 
+def left_out(results: dict[str, dict[str, Any]], args: argparse.Namespace) -> list[str]:
+    """How many gestures nobody could see, and what the shares were if each of them were lost."""
+    asked, first = args.n * len(set(args.kinds) & set(GESTURES)), next(iter(results.values()))
+    dark = ", ".join(f"{asked - found['gestures']} on {level} sensors" for level, found in first.items())
+    shares = {
+        name: ", ".join(f"{found['right'] * found['gestures'] / max(asked, 1):.3f}" for found in result.values())
+        for name, result in results.items()
+    }
+    right = "; ".join(f"`{name}` {said}" for name, said in shares.items())
+    text = (
+        f"Left out of {asked} gestures is what no frame shows clearly enough for anybody to name it: {dark}. If all of "
+        f"these were lost, right would be {right}."
+    )
+    return fill(text, 118).splitlines()
+
+
 def show_shipped(args: argparse.Namespace) -> None:
     """Print the table of all shipped models; put it where --document wants it."""
-    results = {name: judged(name, args)[0] for name in shipped()}
+    results = {name: judged(name, args) for name in shipped()}
     rows = {name: [row(name, level, found) for level, found in result.items()] for name, result in results.items()}
     above = [made_of(command(), shipped().values()), "", *HEAD]
-    table = [*above, *(line for lines in rows.values() for line in lines)]
-    print(json.dumps(results, indent=1) if args.json else "\n".join(table))
+    table = [*above, *(line for lines in rows.values() for line in lines), "", *left_out(results, args)]
+    print("\n".join(table))
     if args.document:
         renew(args.document, "judged", table)
         for name, path in shipped().items():
             renew(path.with_suffix(".md"), "judged", [*OF_A_CARD, "", *above, *rows[name]])
 
 
-def _show(result: dict[str, Any], front_end: bool) -> None:
+def _show(result: dict[str, Any]) -> None:
     for level, row in result.items():
         print(f"\n== {level}: {row['gestures']} gestures, {row['non_gestures']} non-gestures", end="")
         print(f" ({row['unseen']} unseen left out, {row['not_ready']} not ready at onset)")
-        names = ["one_segment", "split", "missed", "cancelled"]
-        if not front_end:
-            names = [
-                "before_rejection",
-                "right",
-                "wrong",
-                "unknown",
-                "missed",
-                "cancelled",
-                "split",
-                "rejected",
-            ]
+        names = ("before_rejection", "right", "wrong", "unknown", "missed", "cancelled", "split", "rejected")
         print("   " + "  ".join(f"{name} {100 * row[name]:.1f} %" for name in names))
         for kind, k in row["kinds"].items():
             answers = ", ".join(f"{a} {c}" for a, c in k["answers"].items() if a != kind)
             rejected = sum(c for a, c in k["answers"].items() if a not in GESTURES)
-            if front_end:
-                share = "one " + _percent(k["answers"].get("segment", 0), k["n"]) + f"  partial {k['partial']}"
-                if kind == "double_tap":
-                    answers += f"; contacts in it {k['pieces']}"
-            elif kind in GESTURES:
+            share = f"rejected {_percent(rejected, k['n'])}"
+            if kind in GESTURES:
                 share = f"before {100 * k['before']:5.1f}  right {_percent(k['answers'].get(kind, 0), k['n'])}"
-            else:
-                share = f"rejected {_percent(rejected, k['n'])}"
-            print(
-                f"   {kind:25s} n {k['n']:3d}  {share}  late {k['late_s']:+.2f} s  extra {k['extra']}",
-                f" {answers}",
-            )
-        if not front_end:
-            for title in ("confusions", "taken_for"):
-                print(f"   {title}: " + "; ".join(f"{a} {c}" for a, c in row[title]))
-
-
-def sessions(source: str, level: str, count: int, first: int) -> dict[str, Any]:
-    """Continuous sessions: gestures right and wrong, and events that answer to no gesture."""
-    classifier = open_model(source)
-    counts: Counter[str] = Counter()
-    errors: Counter[str] = Counter()
-    for seed in range(first, first + count):
-        recording = session(seed, level, SESSION_S)
-        performed = [Performed(e["label"], e["kind"], e["onset"], e["release"]) for e in recording["events"]]
-        tally = Tally(performed)
-        events = heard(recording["times"], recording["frames"], classifier)
-        said = [event for event in events if isinstance(event, Gesture)]
-        outcomes = [tally.hear({"type": "gesture", **asdict(event)}, event.decided) for event in said]
-        for outcome in [*outcomes, *tally.settle(math.inf)]:
-            if outcome is not None and outcome.verdict not in ("right", "rejected"):
-                done = outcome.performed.kind if outcome.performed else "nothing"
-                errors[f"{done} -> {outcome.event['gesture'] if outcome.event else 'missed'}"] += 1
-        counts.update(tally.counts)
-    total = counts["right"] + counts["wrong"] + counts["missed"]
-    return {
-        "level": level,
-        "gestures": total,
-        "right": counts["right"] / max(total, 1),
-        "wrong": counts["wrong"] / max(total, 1),
-        "lost": counts["missed"] / max(total, 1),
-        "false_a_minute": counts["false"] / (count * SESSION_S / 60.0),
-        "errors": errors.most_common(12),
-    }
+            print(f"   {kind:25s} n {k['n']:3d}  {share}  late {k['late_s']:+.2f} s  extra {k['extra']}  {answers}")
+        for title in ("confusions", "taken_for"):
+            print(f"   {title}: " + "; ".join(f"{a} {c}" for a, c in row[title]))
 
 
 def provisional(source: str, level: str, share: float, seeds: range) -> Ahead:
@@ -330,8 +252,8 @@ def provisional(source: str, level: str, share: float, seeds: range) -> Ahead:
     return found
 
 
-def judged(source: str | None, args: argparse.Namespace) -> tuple[dict[str, Any], list[Outcome]]:
-    """What a model, or without one the front end, makes of the takes that are asked for; and each outcome."""
+def judged(source: str, args: argparse.Namespace) -> dict[str, Any]:
+    """What a model makes of the takes that are asked for."""
     levels = ["grids"] if args.grids else args.level
     tasks = [(source, k, lv, args.n, args.grids, args.first, args.whole) for lv in levels for k in args.kinds]
     outcomes: list[Outcome] = []
@@ -340,7 +262,7 @@ def judged(source: str | None, args: argparse.Namespace) -> tuple[dict[str, Any]
         for task, (some, dark) in zip(tasks, pool.map(_batch, tasks), strict=True):
             outcomes += some
             unseen[task[2]] += dark
-    return summary(outcomes, unseen), outcomes
+    return summary(outcomes, unseen)
 
 
 def show_provisional(args: argparse.Namespace) -> None:
@@ -350,9 +272,6 @@ def show_provisional(args: argparse.Namespace) -> None:
         name: provisional(args.model, level, share, range(args.first, args.first + (args.sessions or 10))).figures()
         for name, (level, share) in sets.items()
     }
-    if args.json:
-        print(json.dumps(rows, indent=1))
-        return
     made = table("Provisional events, by another generator", rows)
     tell(made, [shipped().get(args.model, Path(args.model))], "early elsewhere", args.document)
 
@@ -360,9 +279,7 @@ def show_provisional(args: argparse.Namespace) -> None:
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    what = parser.add_mutually_exclusive_group()
-    what.add_argument("--model", help="a shipped model's name or a path; its figures kind by kind")
-    what.add_argument("--front-end", action="store_true", help="segmentation alone; needs no model")
+    parser.add_argument("--model", help="a shipped model's name or a path; its figures kind by kind")
     parser.add_argument(
         "--document", type=Path, metavar="PAGE", help="a page to write; with all models' table, their cards"
     )
@@ -371,47 +288,21 @@ def main() -> None:
     parser.add_argument("--level", nargs="+", choices=LEVELS, default=list(LEVELS))
     parser.add_argument("--kinds", nargs="+", default=[*GESTURES, *NON_GESTURES])
     parser.add_argument("--grids", action="store_true", help=f"other grids instead of levels: {GRIDS}")
-    parser.add_argument("--sessions", type=int, default=0, help="also this many sessions of two minutes a level")
+    parser.add_argument("--sessions", type=int, default=0, help="of two minutes a level, with --provisional")
     parser.add_argument("--provisional", action="store_true", help="only: provisional events in those sessions")
-    parser.add_argument("--list", action="store_true", help="print each gesture that went wrong, with its seed")
     parser.add_argument("--whole", action="store_true", help="keep takes that nobody can recognise")
     parser.add_argument("--jobs", type=int, default=1, help="processes (%(default)s)")
-    parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
     if args.provisional and args.model is None:
         parser.error("--provisional: expected a --model")
-    if args.provisional or not (args.model or args.front_end):
-        (show_provisional if args.provisional else show_shipped)(args)
-        return
-    if args.document:
-        parser.error("--document: expected neither --model nor --front-end, the page has all models")
-    result, outcomes = judged(args.model, args)
-    long = (
-        [sessions(args.model, lv, args.sessions, args.first) for lv in args.level]
-        if args.model and args.sessions
-        else []
-    )
-    if args.json:
-        print(json.dumps({"takes": result, "sessions": long}, indent=1))
-        return
-    _show(result, args.front_end)
-    for found in long:
-        print(f"\n== sessions, {found['level']}: {found['gestures']} gestures", end="")
-        print(
-            f"  right {100 * found['right']:.1f} %  wrong {100 * found['wrong']:.1f} %",
-            f" lost {100 * found['lost']:.1f} %",
-            end="",
-        )
-        print(f"  false events a minute {found['false_a_minute']:.2f}")
-        print("   " + "; ".join(f"{a} {c}" for a, c in found["errors"]))
-    if args.list:
-        for o in outcomes:
-            if o.kind in GESTURES and o.answer not in (o.kind, "segment"):
-                print(
-                    f"{o.level:8s} {o.kind:25s} seed {o.seed:3d}  {o.answer:15s} before {o.before:15s}",
-                    o.segments,
-                    f"lasted {o.lasted:.2f} s, seen {o.strongest:.1f}, frames {o.frames}",
-                )
+    if args.provisional:
+        show_provisional(args)
+    elif args.model is None:
+        show_shipped(args)
+    elif args.document:
+        parser.error("--document: expected no --model, the page has all models")
+    else:
+        _show(judged(args.model, args))
 
 
 if __name__ == "__main__":
