@@ -7,10 +7,9 @@ become a double tap, and a scribble begins as a swipe.
 """
 
 import argparse
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +21,19 @@ from gestured.core.facts import events_of
 from gestured.core.frames import Frame
 from gestured.core.scene import DOUBLE_TAP, ONE_TAP, Scene
 from gestured.core.sensor import Sensor
+from gestured.lab.cards import with_interval
 from gestured.lab.dataset import Truth, truths
+from gestured.lab.intervals import interval
 from gestured.lab.online import NON_GESTURE_SHARE, SESSION_S
 from gestured.lab.progress import progress
-from gestured.lab.table import Table
+from gestured.lab.table import Table, Value
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 from gestured.record.judge import owners, verdict
 from gestured.simulator import NONE, Participant, SimulatedSensor, Take, any_sensor, generator, session
 
 HARD = 0.9  # hardness of the simulator's hard sensors
+SHARES = ("right", "wrong", "early", "confirmed", "taps")
 SETS = ("nominal", "hard", "non-gestures")
 
 
@@ -48,25 +50,21 @@ class Ahead:
     """What became of provisional events in some sessions."""
 
     minutes: float = 0.0
-    moved: int = 0  # gestures that were performed and are no taps
-    early: int = 0  # of them with a right provisional event at or before the last touched frame
+    people: int = 0  # sessions: each is another person's
     moved_s: list[float] = field(default_factory=list)  # first right word about each, after its last touched frame
     tap_s: list[float] = field(default_factory=list)  # the same of single taps
-    confirmed: dict[bool, int] = field(default_factory=lambda: {True: 0, False: 0})  # events, but for taps
-    taps: dict[bool, int] = field(default_factory=lambda: {True: 0, False: 0})  # events of a tap at its release
-    right: int = 0  # answers to gestures
-    wrong: int = 0
-    gestures: int = 0
+    # Of each share what was counted, whether it is so, and whose it was: answers to gestures; of those that are no taps
+    # which had a right provisional event in time; of provisional events, those of a tap apart, which were confirmed.
+    counted: dict[str, list[tuple[bool, int]]] = field(default_factory=lambda: {name: [] for name in SHARES})
 
     def add(self, events: Sequence[Event], acts: Iterable[Truth], minutes: float) -> None:
         """Count what was said in one session."""
-        self.minutes += minutes
+        self.minutes, self.people = self.minutes + minutes, self.people + 1
         said = {event.id: event for event in events if isinstance(event, Provisional)}
         answers = [event for event in events if isinstance(event, Gesture | Unknown)]
         ends = {event.id: event.provisional for event in events if isinstance(event, Gesture | Unknown | Cancelled)}
         for number, event in said.items():
-            counts = self.taps if event.gesture == ONE_TAP else self.confirmed
-            counts[ends.get(number) == "confirmed"] += 1
+            self._count("taps" if event.gesture == ONE_TAP else "confirmed", ends.get(number) == "confirmed")
         performed = list(acts)
         belongs = owners([(answer.onset, answer.offset) for answer in answers], performed)
         for act in performed:
@@ -75,13 +73,11 @@ class Ahead:
 
     def _gesture(self, act: Truth, near: Sequence[Gesture | Unknown], said: dict[int, Provisional]) -> None:
         """Count one gesture that was performed, by the answers at its time."""
-        self.gestures += 1
         named = [answer.gesture for answer in near if isinstance(answer, Gesture)]
         found = verdict(named[0], act, answered=False) if named else "missed"
-        self.right += found == "right"
-        self.wrong += found == "wrong"
+        self._count("right", found == "right")
+        self._count("wrong", found == "wrong")
         moved = act.label not in (ONE_TAP, DOUBLE_TAP)
-        self.moved += moved
         after = []
         for answer in near:
             first = said.get(answer.id)
@@ -90,38 +86,34 @@ class Ahead:
             elif isinstance(answer, Gesture) and answer.gesture == act.label:
                 after.append(answer.decided - answer.offset)
         if moved:
-            self.early += any(
+            self._count("early", any(
                 answer.id in said and said[answer.id].gesture == act.label
                 and said[answer.id].decided <= answer.offset + 1e-6 for answer in near
-            )  # fmt: skip
+            ))  # fmt: skip
         if after and (moved or act.label == ONE_TAP):
             (self.moved_s if moved else self.tap_s).append(after[0])
 
-    def figures(self) -> dict[str, Any]:
-        """Everything as plain data; None where there is nothing to divide by."""
-        return {
-            "gestures": self.gestures,
-            "right": _share(self.right, self.gestures),
-            "wrong": _share(self.wrong, self.gestures),
-            "moved": self.moved,
-            "early": _share(self.early, self.moved),
-            "events": sum(self.confirmed.values()),
-            "confirmed": _share(self.confirmed[True], sum(self.confirmed.values())),
-            "moved_median_s": _median(self.moved_s),
-            "tap_median_s": _median(self.tap_s),
-            "taps_confirmed": _share(self.taps[True], sum(self.taps.values())),
-            "events_per_minute": round((sum(self.confirmed.values()) + sum(self.taps.values())) / self.minutes, 2)
-            if self.minutes
-            else None,
-        }
+    def _count(self, name: str, so: bool) -> None:
+        self.counted[name].append((so, self.people))
+
+    def cells(self) -> tuple[Value, ...]:
+        """A row of `HEAD`; a dash where there is nothing to divide by."""
+        some = {name: _share(counted) for name, counted in self.counted.items()}
+        count = {name: len(counted) for name, counted in self.counted.items()}
+        rate = (count["confirmed"] + count["taps"]) / self.minutes
+        return (
+            count["right"], some["right"], some["wrong"], count["early"], some["early"], count["confirmed"],
+            some["confirmed"], _median(self.moved_s), _median(self.tap_s), some["taps"], f"{rate:.2f}",
+        )  # fmt: skip
 
 
-def _share(part: int, whole: int) -> float | None:
-    return round(part / whole, 4) if whole else None
+def _share(counted: Sequence[tuple[bool, int]]) -> str:
+    share, low, high = interval([so for so, _ in counted], [of for _, of in counted])
+    return with_interval(share, {"low": low, "high": high}) if counted else "-"
 
 
-def _median(values: Sequence[float]) -> float | None:
-    return round(float(np.median(values)), 3) if values else None
+def _median(values: Sequence[float]) -> str:
+    return f"{np.median(values):.3f}" if values else "-"
 
 
 def takes(which: str, count: int, seed: int) -> Iterator[Take]:
@@ -144,25 +136,21 @@ def main() -> None:
     args = parser.parse_args()
     model = open_model(args.model)
     count = max(round(args.minutes * 60 / SESSION_S), 1)
-    figures: dict[str, dict[str, Any]] = {}
-    for which in SETS:
-        ahead = Ahead()
+    found = {which: Ahead() for which in SETS}
+    for which, ahead in found.items():
         for take in progress(takes(which, count, args.seed), count, which):
             ahead.add(heard(take.times, take.frames, model), truths(take), SESSION_S / 60)
-        figures[which] = ahead.figures()
-    made = table("Provisional events, simulated", figures)
+    made = table("Provisional events, simulated", found)
     tell(made, [shipped().get(args.model, Path(args.model))], "early", args.document)
 
 
-HEAD = ("gestures", "right", "wrong", "moved", "early", "events", "confirmed", "moved_median_s", "tap_median_s",
-        "taps_confirmed", "events_per_minute")  # fmt: skip
-SHOWN = ("moved, median s", "one tap, median s", "taps confirmed", "events a minute")  # as a page calls the last ones
+HEAD = ("sessions", "gestures", "right", "wrong", "moved", "early", "events", "confirmed", "moved, median s",
+        "one tap, median s", "taps confirmed", "events a minute")  # fmt: skip
 
 
-def table(title: str, sets: dict[str, dict[str, Any]]) -> Table:
+def table(title: str, sets: Mapping[str, Ahead]) -> Table:
     """One row for each set."""
-    rows = [(name, *("-" if found[key] is None else str(found[key]) for key in HEAD)) for name, found in sets.items()]
-    return Table(title, ("sessions", *HEAD[: -len(SHOWN)], *SHOWN), rows)
+    return Table(title, HEAD, [(name, *found.cells()) for name, found in sets.items()])
 
 
 if __name__ == "__main__":

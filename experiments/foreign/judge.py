@@ -13,7 +13,7 @@ than one segment or event), or its one segment's label. Takes that nobody can re
 
 import argparse
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +29,9 @@ from gestured.core.facts import events_of
 from gestured.core.frames import Frame
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
+from gestured.lab.cards import with_interval
 from gestured.lab.dataset import Truth
+from gestured.lab.intervals import interval
 from gestured.lab.made_of import made_of, renew
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
@@ -57,7 +59,6 @@ class Outcome:
     seed: int
     answer: str  # label | "unknown" | "missed" | "split" | "cancelled:REASON"
     before: str = ""  # best label before rejection, where there is one segment
-    extra: int = 0  # segments that lie wholly outside the gesture
     late: float = 0.0  # s, decision after the true release
     ready: bool = True
 
@@ -65,11 +66,6 @@ class Outcome:
 def _frames(recording: Take) -> Iterator[Frame]:
     for t, values in zip(recording["times"], recording["frames"], strict=True):
         yield Frame(float(t), values)
-
-
-def _decided(events: list[Any]) -> tuple[list[Any], list[Any]]:
-    """What was answered, and what was cancelled."""
-    return [e for e in events if isinstance(e, Gesture | Unknown)], [e for e in events if isinstance(e, Cancelled)]
 
 
 def visible(recording: Take) -> bool:
@@ -99,10 +95,11 @@ def judge(recording: Take, seed: int, level: str, classifier: Classifier) -> Out
             ready = machine.front_end.ready
         events += events_of(machine.push(frame))
     events += events_of(machine.flush(float(recording["times"][-1]) + 5.0))
-    decided, cancelled = _decided(events)
+    decided = [e for e in events if isinstance(e, Gesture | Unknown)]
+    cancelled = [e for e in events if isinstance(e, Cancelled)]
     slack = 2.0 / max(float(len(recording["times"]) / recording["times"][-1]), 1.0)
     inside = [e for e in decided if e.onset <= release + slack + 0.2 and e.offset >= onset - slack]
-    result = Outcome(recording["kind"], level, seed, "missed", ready=ready, extra=len(decided) - len(inside))
+    result = Outcome(recording["kind"], level, seed, "missed", ready=ready)
     if len(inside) + len(cancelled) > 1:
         result.answer = "split"
         named = [e for e in inside if isinstance(e, Gesture)]
@@ -160,7 +157,6 @@ def summary(outcomes: list[Outcome], unseen: dict[str, int]) -> dict[str, Any]:
                 "n": len(mine),
                 "before": sum(o.before == kind for o in mine) / len(mine),
                 "answers": dict(answers.most_common()),
-                "extra": sum(o.extra for o in mine),
                 "late_s": sorted(o.late for o in mine)[len(mine) // 2],
             }
         result[level] = {
@@ -176,20 +172,38 @@ def summary(outcomes: list[Outcome], unseen: dict[str, int]) -> dict[str, Any]:
             "split": sum(o.answer == "split" for o in gestures) / n,
             "non_gestures": len(others),
             "rejected": sum(o.answer not in GESTURES for o in others) / max(len(others), 1),
-            "confusions": Counter(
-                f"{o.kind} -> {o.before}" for o in gestures if o.before and o.before != o.kind
-            ).most_common(10),
-            "taken_for": Counter(f"{o.kind} -> {o.answer}" for o in others if o.answer in GESTURES).most_common(12),
+            "ends": {
+                "right": _ends(o.answer == o.kind for o in gestures),
+                "wrong": _ends(o.answer in GESTURES and o.answer != o.kind for o in gestures),
+                "lost": _ends(o.answer not in GESTURES for o in gestures),
+                "rejected": _ends(o.answer not in GESTURES for o in others),
+            },
             "kinds": kinds,
         }
     return result
 
 
+def _ends(hits: Iterable[bool]) -> dict[str, float]:
+    """Where a share's 95 % interval begins and ends; each take is another person."""
+    counted = list(hits)
+    _, low, high = interval(counted, range(len(counted)))
+    return {"low": low, "high": high}
+
+
 def row(model: str, level: str, found: dict[str, Any]) -> str:
     """A line of the table; what is unknown, missed, cancelled or split is lost."""
     lost = sum(found[name] for name in ("unknown", "missed", "cancelled", "split"))
-    shares = [f"{share:.3f}" for share in (found["before_rejection"], found["right"], found["wrong"], lost)]
-    cells = (found["gestures"], *shares, found["non_gestures"], f"{found['rejected']:.3f}")
+    right, wrong, gone, rejected = (
+        with_interval(share, found["ends"][name])
+        for name, share in (
+            ("right", found["right"]),
+            ("wrong", found["wrong"]),
+            ("lost", lost),
+            ("rejected", found["rejected"]),
+        )
+    )
+    before = f"{found['before_rejection']:.3f}"
+    cells = (found["gestures"], before, right, wrong, gone, found["non_gestures"], rejected)
     return f"| `{model}.onnx`, another generator, {level} | {' | '.join(map(str, cells))} |"
 
 
@@ -234,9 +248,7 @@ def _show(result: dict[str, Any]) -> None:
             share = f"rejected {_percent(rejected, k['n'])}"
             if kind in GESTURES:
                 share = f"before {100 * k['before']:5.1f}  right {_percent(k['answers'].get(kind, 0), k['n'])}"
-            print(f"   {kind:25s} n {k['n']:3d}  {share}  late {k['late_s']:+.2f} s  extra {k['extra']}  {answers}")
-        for title in ("confusions", "taken_for"):
-            print(f"   {title}: " + "; ".join(f"{a} {c}" for a, c in row[title]))
+            print(f"   {kind:25s} n {k['n']:3d}  {share}  late {k['late_s']:+.2f} s  {answers}")
 
 
 def provisional(source: str, level: str, share: float, seeds: range) -> Ahead:
@@ -269,7 +281,7 @@ def show_provisional(args: argparse.Namespace) -> None:
     """Print provisional events in sessions of the levels, and of non-gestures."""
     sets = {level: (level, 0.25) for level in args.level} | {"non-gestures": ("nominal", 1.0)}
     rows = {
-        name: provisional(args.model, level, share, range(args.first, args.first + (args.sessions or 10))).figures()
+        name: provisional(args.model, level, share, range(args.first, args.first + (args.sessions or 10)))
         for name, (level, share) in sets.items()
     }
     made = table("Provisional events, by another generator", rows)
