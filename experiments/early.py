@@ -32,6 +32,7 @@ from gestured.model.shipped import shipped
 from gestured.record.judge import owners, verdict
 from gestured.simulator import NONE, Participant, SimulatedSensor, Take, any_sensor, generator, session
 
+FIRST = 900  # participant; training used 0 to 33
 HARD = 0.9  # hardness of the simulator's hard sensors
 SHARES = ("right", "wrong", "early", "confirmed", "taps")
 SETS = ("nominal", "hard", "non-gestures")
@@ -116,10 +117,10 @@ def _median(values: Sequence[float]) -> str:
     return f"{np.median(values):.3f}" if values else "-"
 
 
-def takes(which: str, count: int, seed: int) -> Iterator[Take]:
+def takes(which: str, count: int) -> Iterator[Take]:
     """Sessions of one new participant each."""
     for n in range(count):
-        person = seed + n
+        person = FIRST + n
         rng = generator(person, 0xEA)
         sensor = any_sensor(rng, HARD) if which == "hard" else SimulatedSensor.nominal(day=person)
         share = 1.0 if which == "non-gestures" else NON_GESTURE_SHARE
@@ -131,14 +132,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", default="cnn_lstm", help="a shipped model's name, or a path (%(default)s)")
     parser.add_argument("--minutes", type=float, default=20, help="minutes of sessions of each kind (%(default)s)")
-    parser.add_argument("--seed", type=int, default=900, help="first participant; training used 0 to 33 (%(default)s)")
     add_document(parser, "early")
     args = parser.parse_args()
     model = open_model(args.model)
     count = max(round(args.minutes * 60 / SESSION_S), 1)
     found = {which: Ahead() for which in SETS}
     for which, ahead in found.items():
-        for take in progress(takes(which, count, args.seed), count, which):
+        for take in progress(takes(which, count), count, which):
             ahead.add(heard(take.times, take.frames, model), truths(take), SESSION_S / 60)
     made = table("Provisional events, simulated", found)
     tell(made, [shipped().get(args.model, Path(args.model))], "early", args.document)

@@ -16,6 +16,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -32,12 +33,13 @@ from gestured.core.sensor import Sensor
 from gestured.lab.cards import with_interval
 from gestured.lab.dataset import Truth
 from gestured.lab.intervals import interval
-from gestured.lab.made_of import made_of, renew
+from gestured.lab.made_of import digests, made_of, renew
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
 
 SEEN = 4.0  # times the noise
 SESSION_S = 120.0
+OPENED = Path("experiments/foreign/opened.txt")  # in a checkout: when it judged for a page, and which models
 Take = dict[str, Any]
 HEAD = (
     "| model and sensors | gestures | right\\* | right | wrong | lost | non-gestures | rejected |",
@@ -138,10 +140,6 @@ def _batch(task: tuple[str, str, str, int, bool, int, bool]) -> tuple[list[Outco
     return outcomes, unseen
 
 
-def _percent(part: float, whole: float) -> str:
-    return f"{100 * part / whole:5.1f}" if whole else "    -"
-
-
 def summary(outcomes: list[Outcome], unseen: dict[str, int]) -> dict[str, Any]:
     """Everything that the tables show, as plain data; shares are 0..1."""
     result: dict[str, Any] = {}
@@ -232,6 +230,9 @@ def show_shipped(args: argparse.Namespace) -> None:
     print("\n".join(table))
     if args.document:
         renew(args.document, "judged", table)
+        if OPENED.exists():
+            with OPENED.open("a") as file:
+                file.write(f"{date.today()} {' '.join(f'{a} {b}' for a, b in digests(shipped().values()).items())}\n")
         for name, path in shipped().items():
             renew(path.with_suffix(".md"), "judged", [*OF_A_CARD, "", *above, *rows[name]])
 
@@ -245,9 +246,9 @@ def _show(result: dict[str, Any]) -> None:
         for kind, k in row["kinds"].items():
             answers = ", ".join(f"{a} {c}" for a, c in k["answers"].items() if a != kind)
             rejected = sum(c for a, c in k["answers"].items() if a not in GESTURES)
-            share = f"rejected {_percent(rejected, k['n'])}"
+            share = f"rejected {100 * rejected / k['n']:5.1f}"
             if kind in GESTURES:
-                share = f"before {100 * k['before']:5.1f}  right {_percent(k['answers'].get(kind, 0), k['n'])}"
+                share = f"before {100 * k['before']:5.1f}  right {100 * k['answers'].get(kind, 0) / k['n']:5.1f}"
             print(f"   {kind:25s} n {k['n']:3d}  {share}  late {k['late_s']:+.2f} s  {answers}")
 
 
