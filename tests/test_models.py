@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from hypothesis import strategies as st
 
 from benchmarks import inside
 from gestured.core.errors import ModelError
+from gestured.core.frames import Before
 from gestured.core.own import EXAMPLES
 from gestured.model import file as model_file
 from gestured.model import points
@@ -82,6 +84,15 @@ def test_values_that_are_not_finite_are_unknown(tmp_path: Path, takes: str, leve
     scores = model.classify(segment(level=level))
     assert scores.unknown == 1.0
     np.testing.assert_allclose(scores.values, [0.5, 0.5])
+
+
+@pytest.mark.parametrize("name", LADDER)
+@pytest.mark.parametrize("rest", [-1e6, -1.0, 0.0, 1e6])
+def test_a_segment_is_answered_whatever_went_on_before_it(name: str, rest: float) -> None:
+    """What has rested may by now weigh less than nothing: a sensor that cools sinks below what it showed when bare."""
+    before = Before(quiet_s=0.0, recent=400, length_s=1e6, covered=1.0, rest=rest)
+    scores = open_model(name).classify(replace(segment(), before=before))
+    assert np.isfinite(scores.values).all() and 0.0 <= scores.unknown <= 1.0
 
 
 def test_report_is_json_and_says_what_the_file_is(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ def past(before: Before) -> tuple[float, ...]:
         math.log1p(before.recent),
         math.log1p(min(before.length_s, LONGEST_S)),
         before.covered,
-        math.log1p(min(before.rest, STRONGEST)),
+        math.log1p(min(max(before.rest, 0.0), STRONGEST)),
     )
 
 
