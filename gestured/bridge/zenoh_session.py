@@ -15,7 +15,7 @@ from gestured.bridge.options import BridgeError, host_name
 from gestured.core.address import is_sensor
 
 ROUTER = "tcp/127.0.0.1:7447"  # where a router of this machine listens unless told otherwise
-AGAIN_S = 0.5  # from one attempt to reach the router to the next
+FIRST_S, LONGEST_S = 0.25, 2.0  # from one attempt to the next: doubled each time, a router that is back is found soon
 HEARD = frozenset(("ok", "degraded", "starting", "faulty"))  # states of a sensor whose frames come
 
 
@@ -67,13 +67,15 @@ class Zenoh:
         import zenoh
         from zenoh.handlers import Callback
 
+        pause = FIRST_S
         while not self._closed.is_set():
             try:
                 session = zenoh.open(self._config)
             except zenoh.ZError as error:
                 words = f"Zenoh cannot be reached: {_first_words(error)}; trying again"
                 self._counts.connected("zenoh", False, words)
-                self._closed.wait(AGAIN_S)
+                self._closed.wait(pause)
+                pause = min(2 * pause, LONGEST_S)
                 continue
             # Called by Zenoh's own threads: one of Python's that waits for Zenoh would abort the process at its end.
             self._answers = session.declare_queryable(self._key("**"), Callback(self._answer, indirect=False))

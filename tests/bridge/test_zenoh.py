@@ -1,5 +1,6 @@
 """Events and frames through a real router: Zenoh's own, from its wheel."""
 
+import argparse
 import json
 import queue
 import select
@@ -13,7 +14,9 @@ import numpy as np
 import pytest
 
 from gestured.bridge import forward
+from gestured.bridge import zenoh as zenoh_command
 from gestured.bridge.counts import Counts
+from gestured.bridge.zenoh_session import Zenoh
 from gestured.core.address import Address
 from tests.bridge.conftest import Process, emit, page, wait
 from tests.bridge.test_mqtt import STATUS, gesture
@@ -285,6 +288,19 @@ def test_who_is_silent_gives_its_place_to_another(udp, monkeypatch):
     assert [became(name) for name in ("a", "c")] == ["sent", "overflow"]
     now += 2.0
     assert [became(name) for name in ("c", "a", "b")] == ["sent", "sent", "overflow"]
+
+
+def test_a_router_that_is_not_there_is_asked_for_ever_more_seldom(monkeypatch):
+    """Said once, and tried again with growing pauses, two seconds at most: a router that comes is found soon."""
+    parser = argparse.ArgumentParser()
+    zenoh_command.add(parser.add_subparsers())
+    session = Zenoh(parser.parse_args(["zenoh", "--site", "car", "--connect", "tcp/127.0.0.1:1"]), Counts("zenoh"))
+    pauses: list[float] = []
+    closed = SimpleNamespace(is_set=lambda: len(pauses) == 8, wait=pauses.append)
+    monkeypatch.setattr(session, "_closed", closed)
+    session._open()
+    assert pauses == sorted(pauses) and len(set(pauses)) > 2
+    assert pauses[0] < 0.5 and pauses[-2:] == [2.0, 2.0]
 
 
 @pytest.mark.parametrize(
