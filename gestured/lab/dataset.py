@@ -126,7 +126,7 @@ def from_day(life: Day) -> list[Sample]:
 
 def _day(places: Mapping[str, Place], seed: int, index: int) -> list[Sample]:
     """Some minutes of somebody's everyday life, on the nominal sensor or on any other."""
-    rng = generator(seed, 0xDA7A if places is PLACES else 0xDA7B, index)
+    rng = generator(seed, 0xDA7B, index)
     if rng.random() >= ANY_SENSOR:
         return _nominal_day(seed, index, places)
     sensor = any_sensor(rng, float(rng.random()))

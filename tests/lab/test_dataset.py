@@ -147,6 +147,11 @@ def test_what_is_simulated_once_is_not_simulated_again(tmp_path: Path, monkeypat
             simulated(tmp_path / "cache", stream, seed, count)
 
 
+def test_a_day_is_the_same_in_another_process(tmp_path: Path) -> None:
+    """Also one on any sensor, which is drawn apart from the day."""
+    same(simulated(tmp_path, "days", 4, 1, jobs=1), collect(STREAMS["days"](4, 0)))
+
+
 class Broken:
     """A pool whose work is interrupted half-way."""
 
