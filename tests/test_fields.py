@@ -1,6 +1,7 @@
 """Lines of a daemon that is mad: each fault of a field is found, and nothing that a daemon says is called one."""
 
 import json
+from dataclasses import FrozenInstanceError, fields
 
 import pytest
 from hypothesis import given
@@ -70,6 +71,13 @@ def test_a_place_that_is_none_is_named():
     for wrong in ({"start": {"x": 0.5}}, {"end": 0.5}, {"snr": float("nan")}, {"zone": 3}, {"contacts": None}):
         words = wrong_field(gesture | {"where": gesture["where"] | wrong})
         assert words is not None and words.startswith("where {") and "expected an object with start" in words
+
+
+@pytest.mark.parametrize("event", EVENTS, ids=lambda event: type(event).__name__)
+def test_an_event_belongs_to_all_that_it_is_told_and_none_of_them_can_change_it(event):
+    for one in fields(event):
+        with pytest.raises(FrozenInstanceError):
+            setattr(event, one.name, None)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400, 1e60, -1e11, True])

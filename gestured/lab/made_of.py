@@ -24,7 +24,8 @@ LINE = re.compile(
 # aside: it changes no decision, and changes often.
 DECIDES = ("gestured.core.sensor", "gestured.model.model")
 CARRIES = frozenset((
-    "gestured.core.address", "gestured.core.osc", "gestured.core.owner", "gestured.core.wire", "gestured.core.where",
+    "gestured.core.address", "gestured.core.events", "gestured.core.osc", "gestured.core.owner", "gestured.core.wire",
+    "gestured.core.where",
     "gestured.core.beside.habits", "gestured.core.beside.reading", "gestured.core.beside.touch",
     "gestured.model.file", "gestured.model.limit",
 ))  # fmt: skip
