@@ -16,7 +16,7 @@ import pytest
 from gestured.client.control import Control
 from gestured.control.cli import main
 from tests.daemon import tiny_model
-from tests.daemon.harness import Daemon, Sensor
+from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
 from tests.sockets import free_address
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -49,8 +49,13 @@ def start() -> Iterator[Start]:
 
     yield begin
     for process in running:
-        process.kill()
-        process.communicate()
+        process.terminate()  # what it has started itself, it ends itself
+    for process in running:
+        try:
+            process.communicate(timeout=DEADLINE_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
 
 
 @pytest.fixture
