@@ -14,13 +14,12 @@ from gestured.bridge.broker import Broker, properties, topic_of
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import GONE, OLD_S, Daemon, Line
 from gestured.bridge.gates import OFF, ON, Gate
-from gestured.bridge.options import STATUS, host_name
+from gestured.bridge.options import FIRST_S, LONGEST_S, STATUS, host_name
 from gestured.bridge.retained import OPEN, Retained
 from gestured.core.errors import GesturedError
 
 COMMAND = ("gate", "set")  # below a sensor, in a topic
 EXPIRY_S = 1  # how long a broker keeps an event for a subscriber: as OLD_S says, which MQTT counts in whole seconds
-FIRST_S, LONGEST_S = 0.25, 2.0  # from one attempt to the next: doubled each time, a broker that is back is found soon
 LAST_S = 1.0  # for the broker's answer to our good-bye; without it, it publishes our last will
 WAITING_EVENTS = 1000  # events that are kept for the broker; more than a second of the busiest daemon
 IN_FLIGHT = 18  # events whose acknowledgement is awaited at a time; mosquitto takes 20 messages

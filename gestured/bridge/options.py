@@ -17,6 +17,8 @@ from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.core.messages import EVENT_TYPES
 
+# s, from one attempt to reach a bus to the next: twice as long each time, so that one that is back is found soon.
+FIRST_S, LONGEST_S = 0.25, 2.0
 STATUS = "status"  # the type of the line that says how each sensor is, once a second
 
 

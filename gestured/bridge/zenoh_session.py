@@ -11,11 +11,10 @@ from typing import Any
 from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import MOST_SENSORS, OLD_S, Daemon, Line
 from gestured.bridge.forward import Forward
-from gestured.bridge.options import BridgeError, host_name
+from gestured.bridge.options import FIRST_S, LONGEST_S, BridgeError, host_name
 from gestured.core.address import is_sensor
 
 ROUTER = "tcp/127.0.0.1:7447"  # where a router of this machine listens unless told otherwise
-FIRST_S, LONGEST_S = 0.25, 2.0  # from one attempt to the next: doubled each time, a router that is back is found soon
 HEARD = frozenset(("ok", "degraded", "starting", "faulty"))  # states of a sensor whose frames come
 
 
