@@ -88,7 +88,7 @@ def main() -> int:
 
 
 def _write(block: str, document: Path | None, lines: list[str]) -> None:
-    """Into a page, where one is named; what is measured is the way of a frame through the daemon's core and a model."""
+    """Write a block into a page, where one is named; its line names the code of the hub and of a model's answer."""
     if document:
         flags = "--scenes " if block == "scenes" else ""
         code = ("gestured.core.hub", "gestured.model.model")

@@ -2,10 +2,10 @@
 
     python -m experiments.seeds --document models/cnn_lstm.md
 
-A further seed takes some 25 minutes of one core, and goes on where it was interrupted: its network is learned alone,
-while the one that ships is what its training has left in the cache, where two others were learned beside it. All are
-judged before calibration, second opinion and real fingers: a gesture by the best score among gestures, a non-gesture as
-rejected where the best of all classes is no gesture.
+A further seed takes some 25 minutes of one core, and goes on where it was interrupted. The first seed is the one that
+ships: its network is taken from the cache of its training, in which two other networks were learned beside it. A
+further seed's network is learned alone. All are judged before calibration, second opinion and real fingers: a gesture
+is right where its score is the best among gestures; a non-gesture is rejected where the best of all scores is of none.
 """
 
 from collections.abc import Sequence

@@ -30,7 +30,7 @@ class Unwrapped:
         self._last, self._beyond = 0, 0
 
     def of(self, counter: int) -> int:
-        """The counter that goes on, for each of the sensor's frames in turn."""
+        """The counter as if it had never overflowed; to be asked with each of the sensor's frames, in their order."""
         for bits in WIDTHS:
             if counter < self._last < 2**bits and counter + 2**bits - self._last <= NEAR:
                 self._beyond += 2**bits

@@ -73,7 +73,7 @@ def _run(life: Stretch) -> tuple[Value, ...]:
 
 
 def held(state: object, seen: set[int] | None = None) -> Iterator[tuple[int, bytes]]:
-    """All that an object holds, piece by piece: how many numbers, and the bytes that say which; a cycle once."""
+    """All that an object holds, piece by piece: how many numbers a piece has, and its bytes; no object counts twice."""
     seen = set() if seen is None else seen
     parts: list[tuple[object, object]]
     if isinstance(state, np.ndarray):
