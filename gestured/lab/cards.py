@@ -14,6 +14,7 @@ from gestured.lab.manifest import NAME
 from gestured.lab.recordings.origin import said
 from gestured.lab.train import REAL_SETS, TrainingPlan
 from gestured.model.opening import open_model
+from gestured.model.shipped import LADDER
 from gestured.simulator import NON_GESTURES
 
 
@@ -79,7 +80,8 @@ WORST_OF = {
     "non-gesture": "non-gesture, rejected",
 }
 WORST = 12  # kinds of non-gestures that have a row; always as many, since a table may not lose rows
-MEASURED_APART = ("unseen", "seeds", "judged")  # parts of a card between marks, which experiments write
+# Parts of a card between marks, which experiments write: of every model, and of the first one.
+OF_ALL, OF_THE_FIRST = ("judged",), ("unseen", "seeds", "judged")
 HEAD = (
     "| set | gestures | right\\* | right | wrong | lost | non-gestures | rejected |",
     "|---|---|---|---|---|---|---|---|",
@@ -89,7 +91,8 @@ HEAD = (
 def _card(path: Path, name: str, found: Mapping[str, Any], plan: TrainingPlan) -> str:
     templates = Environment(loader=PackageLoader("gestured.lab", "."), keep_trailing_newline=True)
     blank = "<!-- {0}: begin -->\n<!-- {0}: end -->"
-    apart = [kept(path.with_suffix(".md"), part) or blank.format(part) for part in MEASURED_APART]
+    parts = OF_THE_FIRST if name == LADDER[0] else OF_ALL
+    apart = [kept(path.with_suffix(".md"), part) or blank.format(part) for part in parts]
     return templates.get_template("card.md").render(
         name=name, model=open_model(path), plan=plan, settings=asdict(plan.fit), real=bool(said(path)),
         table=[*HEAD, *_rows(found)], others=apart,
