@@ -18,6 +18,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
+from benchmarks.viewers import viewer
 from gestured.client.control import Control
 from gestured.client.web.door import HEADER, at_home
 from gestured.client.web.server import BODY_BYTES, SHARED, STRANGERS
@@ -127,6 +128,13 @@ def test_the_address_works_once_and_becomes_a_secret_of_the_tab(view: Page) -> N
     status, _, body = view.ask("/open", "POST", {}, X_Gestured_Token=view.token)
     assert status == 403 and b"Start gesturectl view again" in body
     assert view.ask("/stream", X_Gestured_Token=view.token)[0] == 403
+
+
+def test_the_browser_of_the_bench_sees_what_a_page_would(real: Daemon) -> None:
+    sensor = Sensor(real, "arm").begin()
+    sensor.send([sensor.hand.frame()])
+    with viewer(real.ready["control"], "arm"):  # raises unless the browser says that it sees the sensor
+        pass
 
 
 def test_what_a_browser_is_told_to_allow(view: Page) -> None:
