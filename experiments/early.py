@@ -54,9 +54,8 @@ class Ahead:
     people: int = 0  # sessions: each is another person's
     moved_s: list[float] = field(default_factory=list)  # first right word about each, after its last touched frame
     tap_s: list[float] = field(default_factory=list)  # the same of single taps
-    # For each name in SHARES one pair for each thing that was counted: whether it was so, and whose session it was in.
-    # `right` and `wrong` count gestures; `early` gestures that are no taps; `confirmed` provisional events that say no
-    # single tap; `taps` those that do, and whether they were confirmed.
+    # By name of a share one pair for each thing counted: whether it was so, and whose session it was in. `right` and
+    # `wrong` count gestures, `early` those that are no taps, `confirmed` provisional events of these, `taps` of taps.
     counted: dict[str, list[tuple[bool, int]]] = field(default_factory=lambda: {name: [] for name in SHARES})
 
     def add(self, events: Sequence[Event], acts: Iterable[Truth], minutes: float) -> None:
