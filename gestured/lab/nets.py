@@ -29,8 +29,8 @@ def last_active(x: Tensor) -> Tensor:
 
 def read_at(x: Tensor, lengths: Tensor | None = None) -> Tensor:
     """(B, T, R, C) -> (B,) int64 index of the frame after the last active one, or of the last frame."""
-    end = torch.full_like(last_active(x), x.shape[1]) if lengths is None else lengths
-    return torch.minimum(last_active(x) + 1, end - 1)
+    end = x.shape[1] if lengths is None else lengths
+    return (last_active(x) + 1).clamp(max=end - 1)
 
 
 class Opinion(nn.Module):

@@ -6,11 +6,14 @@ fingers there were (local maxima) and how many contacts. They see what a recurre
 things: a second opinion.
 """
 
+from collections.abc import Sequence
+
 import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from gestured.lab.nets import Opinion, Perceptron, active_frames, last_active, read_at
+from gestured.lab.nets import Opinion, Perceptron, read_at
+from gestured.model.features import ACTIVE
 
 PATH_POINTS = 8  # of the path
 PATCH = 7  # taxels across the mean contact
@@ -19,175 +22,169 @@ EPS = 1e-6
 MAXIMUM = 0.2  # of the peak: lower local maxima are no fingers
 
 
-def _mean(values: Tensor, weight: Tensor) -> Tensor:
-    return (values * weight).sum(1) / (weight.sum(1) + EPS)
+# The series of a frame, and what is found from frame to frame, in the order in which they stand in a tensor.
+X, Y, TOTAL, AREA, MAXIMA, PEAK, XX, YY, XY, MAJOR, MINOR, STEP, SLOW, SEVERAL, ONES = range(15)
+# Weights of frames: how hard, at both ends and in each half; all, of the first contact, of later ones; by quarters.
+HARD, BEGIN, END, EARLY_HARD, LATE_HARD, ALL, FIRST, LATER, QUARTERS, EARLY, LATE = (*range(9), 12, 13)
+SPREAD = ((HARD, X), (HARD, Y), (HARD, MAJOR), (ALL, AREA), (ALL, PEAK), (ALL, TOTAL))
+MEANS = (
+    (HARD, X), (HARD, Y), (HARD, XX), (HARD, YY), (HARD, XY), (HARD, MAJOR), (HARD, MINOR),
+    (ALL, AREA), (ALL, PEAK), (ALL, SLOW), (ALL, MAXIMA), (ALL, SEVERAL), (EARLY, SEVERAL), (LATE, SEVERAL),
+)  # fmt: skip
+# Where each single feature is found, in the order that weights of all model files since version 0.2 expect.
+ORDER = [
+    0, 1, 5, 2, 3, 4, 6, 7, 8, 9, 10, 11, 12, 13, 14, 38, 39, 15, 16, 32, 23, 24, 17, 19, 21, 22, 18, 20, 33, 47, 34,
+    35, 36, 28, 29, 25, 26, 27, 40, 44, 48, 30, 45, 41, 31, 42, 37, 43, 46, 49, 50, 51, 52, 53,
+]  # fmt: skip
+BY_QUARTER = tuple((QUARTERS + k, value) for value in (PEAK, X, Y, STEP) for k in range(4))
 
 
-def _spread(values: Tensor, weight: Tensor) -> Tensor:
-    mean = _mean(values, weight)
-    return (_mean((values - mean[:, None]) ** 2, weight) + EPS).sqrt()
+def _basis(rows: int, columns: int, dtype: torch.dtype) -> Tensor:
+    """(R * C, 6) by which taxels are weighed for total, x, y, xx, yy and xy; x to the right, y upward, -1 to 1."""
+    at_y, at_x = torch.linspace(1.0, -1.0, rows, dtype=dtype), torch.linspace(-1.0, 1.0, columns, dtype=dtype)
+    y, x = torch.meshgrid(at_y, at_x, indexing="ij")
+    return torch.stack([torch.ones_like(x), x, y, x * x, y * y, x * y], 2).flatten(0, 1)
 
 
-def _top(values: Tensor, weight: Tensor) -> Tensor:
-    return (values * weight).amax(1)
+def per_frame(x: Tensor) -> Tensor:
+    """(B, T, R, C) -> (B, 9, T): the series from `X` to `XY`, which are centroid, what is pressed, second moments."""
+    rows, columns = int(x.shape[2]), int(x.shape[3])
+    flat = x.flatten(2)
+    moments = F.relu(flat - FLOOR) @ _basis(rows, columns, x.dtype)
+    total, about = torch.split(moments, [1, 5], 2)
+    place, squares, product = torch.split(about / (total + EPS), [2, 2, 1], 2)
+    peak = flat.amax(2, keepdim=True)
+    each = x.reshape(-1, 1, rows, columns)
+    ridge = (each >= F.max_pool2d(each, 3, 1, 1)).reshape(flat.shape)
+    high = flat >= (0.35 * peak).clamp(min=MAXIMUM)
+    area, maxima = (flat >= 0.3).to(x.dtype).mean(2, keepdim=True), (ridge & high).to(x.dtype).sum(2, keepdim=True)
+    second = [(squares - place**2).clamp(min=0), product - place.prod(2, keepdim=True)]
+    return torch.cat([place, total, area, maxima, peak, *second], 2).transpose(1, 2)
 
 
-def per_frame(x: Tensor) -> dict[str, Tensor]:
-    """(B, T, R, C) -> (B, T) series: total, centroid, second moments, area, number of local maxima, peak."""
-    rows, columns = x.shape[2], x.shape[3]
-    w = F.relu(x - FLOOR)
-    total = w.sum((2, 3))
-    norm = total + EPS
-    at_y = torch.linspace(1.0, -1.0, rows, dtype=x.dtype)  # y upward
-    at_x = torch.linspace(-1.0, 1.0, columns, dtype=x.dtype)
-    by_row, by_column = w.sum(3), w.sum(2)  # (B, T, R), (B, T, C)
-    cy, cx = (by_row * at_y).sum(2) / norm, (by_column * at_x).sum(2) / norm
-    vyy = (by_row * at_y**2).sum(2) / norm - cy**2
-    vxx = (by_column * at_x**2).sum(2) / norm - cx**2
-    vxy = ((w * at_x).sum(3) * at_y).sum(2) / norm - cx * cy
-    flat = x.reshape(-1, 1, rows, columns)
-    peak = x.flatten(2).amax(2)
-    ridge = (flat >= F.max_pool2d(flat, 3, 1, 1)).to(x.dtype).reshape(x.shape)
-    high = (x >= 0.35 * peak[:, :, None, None]).to(x.dtype) * (x >= MAXIMUM).to(x.dtype)
-    return {
-        "total": total,
-        "x": cx,
-        "y": cy,
-        "vxx": vxx.clamp(min=0),
-        "vyy": vyy.clamp(min=0),
-        "vxy": vxy,
-        "area": (x >= 0.3).to(x.dtype).mean((2, 3)),
-        "maxima": (ridge * high).sum((2, 3)),
-        "peak": peak,
-    }
+def mean_blob(x: Tensor, place: Tensor, weight: Tensor) -> Tensor:
+    """(B, T, R, C) -> (B, PATCH * PATCH): the contact, its frames centred and averaged: finger, two, palm.
 
-
-def mean_blob(x: Tensor, s: dict[str, Tensor], weight: Tensor) -> Tensor:
-    """(B, T, R, C) -> (B, PATCH * PATCH): the contact, its frames centred and averaged: finger, two, palm."""
-    rows, columns = x.shape[2], x.shape[3]
-    offset = torch.arange(PATCH, dtype=x.dtype) - PATCH // 2
-    row = (1 - s["y"]) / 2 * (rows - 1)
-    column = (s["x"] + 1) / 2 * (columns - 1)
-    at_row = row[:, :, None, None] + offset[:, None] - torch.arange(rows, dtype=x.dtype)  # (B, T, PATCH, R)
-    at_column = column[:, :, None, None] + offset[:, None] - torch.arange(columns, dtype=x.dtype)
-    moved = F.relu(1 - at_row.abs()) @ x @ F.relu(1 - at_column.abs()).transpose(2, 3)
-    blob = (moved * weight[:, :, None, None]).sum(1) / (weight.sum(1)[:, None, None] + EPS)
-    return (blob / (blob.amax((1, 2), keepdim=True) + 0.05)).flatten(1)
+    `place` (B, 2, T) is each frame's centroid, `weight` (B, 1, T) what the frame counts.
+    """
+    rows, columns = int(x.shape[2]), int(x.shape[3])
+    offset = torch.arange(PATCH, dtype=x.dtype)[:, None] - PATCH // 2
+    across, up = place[..., None, None].unbind(1)  # (B, T, 1, 1)
+    row, column = (1 - up) * ((rows - 1) / 2), (across + 1) * ((columns - 1) / 2)
+    at_row = F.relu(1 - (row + (offset - torch.arange(rows, dtype=x.dtype))).abs())  # (B, T, PATCH, R)
+    at_column = F.relu(1 - (column + (offset - torch.arange(columns, dtype=x.dtype))).abs())
+    moved = (at_row @ x @ at_column.transpose(2, 3)).flatten(2)
+    blob = (weight @ moved)[:, 0] / (weight.sum(2) + EPS)
+    return blob / (blob.amax(1, keepdim=True) + 0.05)
 
 
 def trajectory_features(x: Tensor, lengths: Tensor | None = None) -> Tensor:
     """(B, T, R, C) windows -> (B, F) features; of the idle frames at the end only the first counts.
 
-    `lengths` (B,) as in `nets`.
+    `lengths` (B,) as in `nets`. A graph of hundreds of small nodes takes most of its time for what is around them. So
+    series (B, n, T) stand together wherever they are treated alike, and no dimension is dropped before the end.
     """
     time = x.shape[1]
     index = torch.arange(time, dtype=x.dtype)
-    active = active_frames(x)
-    last = last_active(x).to(x.dtype)[:, None]
-    span = (index[None, :] <= last).to(x.dtype)
-    s = per_frame(x)
-    end = read_at(x, lengths)
-    after = s["peak"].gather(1, end[:, None])[:, 0]  # what is still pressed there: little where the gesture is over
-    over = (end.to(x.dtype) > last[:, 0]).to(x.dtype)
-    blob = mean_blob(x, s, active * s["peak"])
-    n = active.sum(1) + EPS
-    first = (active * (time - index)).amax(1)
-    first = time - first  # index of the first active frame
-    duration = (last[:, 0] - first + 1).clamp(min=0)
-
-    # Contacts: rising edges of activity, their gaps and lengths.
-    rise = active * (1 - _before(active))
-    rises = rise.sum(1)
-    pauses = (span * (1 - active) * (index[None, :] >= first[:, None]).to(x.dtype)).sum(1)
-    ordinal = rise.cumsum(1)
+    series = per_frame(x)
+    place, peak = series[:, :TOTAL], series[:, PEAK : PEAK + 1]
+    active = (peak >= ACTIVE).to(x.dtype)
+    last, first = (active * index).amax(2), time - (active * (time - index)).amax(2)  # (B, 1)
+    end = read_at(x, lengths)[:, None]
+    over = (end.to(x.dtype) > last).to(x.dtype)
+    after = peak.gather(2, end[:, None])[:, 0]  # what is still pressed there: little where the gesture is over
+    blob = mean_blob(x, place, active * peak)
+    duration, n = (last - first + 1).clamp(min=0), active.sum(2)
+    rise = active * (1 - _before(active))  # a contact begins
 
     # From here on active frames alone, moved to the front in their order: a pause is bridged by the last known place.
-    order = torch.sort(index + (1 - active) * 1e6, 1).indices
-    s = {name: series.gather(1, order) for name, series in s.items()}
-    active, ordinal = active.gather(1, order), ordinal.gather(1, order)
+    order = torch.sort(index + (1 - active) * 1e6, 2).indices
+    series = torch.cat([series, active, rise.cumsum(2)], 1)
+    series = series.gather(2, order.expand(-1, series.shape[1], -1))
+    kept, active, ordinal = torch.split(series, [XY + 1, 1, 1], 1)
+    place, _, maxima, peak, squares, product = torch.split(kept, [2, 2, 1, 1, 2, 1], 1)
     index = order.to(x.dtype)
-    one = active * (ordinal <= 1).to(x.dtype)
-    two = active * (ordinal >= 2).to(x.dtype)
     both = active * _before(active)  # a step leads here from an active frame
-    weight = active * s["peak"]
-    dx, dy = (s["x"] - _before(s["x"])) * both, (s["y"] - _before(s["y"])) * both
-    step = (dx**2 + dy**2 + EPS**2).sqrt() * both
-    length = step.sum(1)
-    mx, my = _mean(s["x"], weight), _mean(s["y"], weight)
-    x0, y0 = _ends(s["x"], weight, index, first), _ends(s["y"], weight, index, first)
-    x1, y1 = _ends(s["x"], weight, index, last[:, 0]), _ends(s["y"], weight, index, last[:, 0])
-    ex, ey = x1 - x0, y1 - y0
-    reach = (ex**2 + ey**2 + EPS**2).sqrt()
-    high_x, low_x = _top(s["x"] + 2, active) - 2, 2 - _top(2 - s["x"], active)
-    high_y, low_y = _top(s["y"] + 2, active) - 2, 2 - _top(2 - s["y"], active)
-    width, height = (high_x - low_x).clamp(min=0), (high_y - low_y).clamp(min=0)
+    way = (place - _before(place)) * both
+    step = (way.square().sum(1, keepdim=True) + EPS**2).sqrt() * both
+
+    # What frames count for.
+    one = active * (ordinal <= 1).to(x.dtype)
+    near = F.relu(2.0 - (index - torch.stack([first, last], 1)).abs())  # two frames from an end
+    progress = (index - first[:, None]) / (duration[:, None] + EPS)
+    quarter = torch.arange(4, dtype=x.dtype)[:, None] / 4
+    parts = ((progress >= quarter) & (progress < quarter + 0.25)).to(x.dtype) * active
+    halves = torch.cat([parts[:, :2].sum(1, keepdim=True), parts[:, 2:].sum(1, keepdim=True)], 1)
+    frames = torch.cat([one, active - one], 1)
+    weights = torch.cat([torch.cat([active, near * active, halves], 1) * peak, active, frames, parts, halves], 1)
+
+    # Means, and how far values lie from them. How wide a contact is, and whether that changes, tells fingers and palms.
+    middle = squares.sum(1, keepdim=True) / 2
+    half = ((middle - squares[:, :1]).square() + product.square() + EPS**2).sqrt()
+    radii = torch.cat([middle + half, middle - half + EPS], 1).clamp(min=EPS).sqrt()
+    flags = torch.cat([step < 0.04, maxima >= 1.5, step >= 0], 1).to(x.dtype)
+    values = torch.cat([kept, radii, step, flags], 1)  # (B, 15, T), from `X` to `ONES`
+    sums = weights @ values.transpose(1, 2)  # (B, 14, 15), weights from `HARD` to `LATE`
+    counts = sums[:, :, ONES:]
+    means = sums / (counts + EPS)
+    some, other = [value for _, value in SPREAD], [weight for weight, _ in SPREAD]
+    apart = (values[:, some] - _picked(means, SPREAD)[:, :, None]).square() * weights[:, other]
+    spread = (apart.sum(2) / (counts[:, other, 0] + EPS) + EPS).sqrt()
+    lifted = torch.cat([place + 2, 2 - place, values[:, [MAJOR, AREA, TOTAL, MAXIMA, STEP]]], 1) * active
+    top = torch.cat([lifted, frames * peak], 1).amax(2)
+    high, low, widest, largest, heaviest, most, longest, harder = torch.split(top, [2, 2, 1, 1, 1, 1, 1, 2], 1)
+    high, low = high - 2, 2 - low
+    box = (high - low).clamp(min=0)  # width and height
+    begun, ended = torch.split(_picked(means, ((BEGIN, X), (BEGIN, Y), (END, X), (END, Y))), [2, 2], 1)
+    moved = ended - begun
+    length, reach = sums[:, ALL, STEP : STEP + 1], (moved.square().sum(1, keepdim=True) + EPS**2).sqrt()
 
     # Turning: winding about the path's middle, signed area, and turning of successive steps (small steps count little).
-    rx, ry = s["x"] - ((high_x + low_x) / 2)[:, None], s["y"] - ((high_y + low_y) / 2)[:, None]
-    px, py = rx - dx, ry - dy
-    cross, dot = px * ry - py * rx, px * rx + py * ry
-    moved = (step > 0.02).to(x.dtype) * active
-    moved = moved * ((dot > 0) | (cross.abs() > 1e-3 * dot.abs())).to(x.dtype)  # half a turn has no sense
-    angle = _angle(cross, dot) * moved
-    area = (cross * moved).sum(1) / 2
-    qx, qy = _before(dx), _before(dy)
-    turn = _angle(qx * dy - qy * dx, qx * dx + qy * dy)
-    turn = turn * (step > 0.04).to(x.dtype) * ((qx**2 + qy**2) > 0.0016).to(x.dtype)
+    towards, before = place - ((high + low) / 2)[:, :, None], _before(way)
+    a, b = torch.stack([towards - way, before], 2), torch.stack([towards, way], 2)  # (B, 2, 2, T): x and y first
+    crossed, dot = a * b.flip(1), (a * b).sum(1)
+    cross = crossed[:, 0] - crossed[:, 1]
+    sense = (dot > 0) | (cross.abs() > 1e-3 * dot.abs())  # half a turn has none
+    winds = (step > 0.02) & (active > 0) & sense[:, :1]
+    turns = (step > 0.04) & (before.square().sum(1, keepdim=True) > 0.0016)
+    counted = torch.cat([winds, turns], 1).to(x.dtype)
+    angle = _angle(cross, dot) * counted
+    area = (cross * counted).sum(2)[:, :1] / 2
 
-    # The path at equal distances, from its middle, and how its parts lie in time.
+    # The path at equal distances, from its middle.
     share = step / (length[:, None] + EPS)
-    reached = share.cumsum(1)
+    share = share.transpose(1, 2)
     marks = torch.arange(PATH_POINTS, dtype=x.dtype) / (PATH_POINTS - 1)
-    done = ((marks - (reached - share)[:, :, None]) / (share[:, :, None] + 1e-4)).clamp(0, 1)
-    path_x = torch.einsum("btk,bt->bk", done, dx) + (s["x"][:, :1] - mx[:, None])
-    path_y = torch.einsum("btk,bt->bk", done, dy) + (s["y"][:, :1] - my[:, None])
-    size = (width**2 + height**2).sqrt()[:, None] + 0.1
-    progress = (index - first[:, None]) / (duration[:, None] + EPS)
-    slots = [active * ((progress >= k / 4) & (progress < (k + 1) / 4)).to(x.dtype) for k in range(4)]
-    by_slot = [torch.stack([_mean(v, slot) for slot in slots], 1) for v in (s["peak"], s["x"], s["y"], step)]
+    done = ((marks - (share.cumsum(1) - share)) / (share + 1e-4)).clamp(0, 1)  # (B, T, PATH_POINTS)
+    path = way @ done + place[:, :, :1] - means[:, HARD, :TOTAL, None]
+    path = path.flatten(1)
+    size = box.square().sum(1, keepdim=True).sqrt() + 0.1
 
-    # Width of the contact, and how it changes: two fingers, palms, pinches.
-    half = ((s["vxx"] - s["vyy"]) ** 2 / 4 + s["vxy"] ** 2 + EPS**2).sqrt()
-    middle = (s["vxx"] + s["vyy"]) / 2
-    major, minor = (middle + half).clamp(min=0).sqrt(), (middle - half + EPS).clamp(min=EPS).sqrt()
-    early, late = slots[0] + slots[1], slots[2] + slots[3]
-    several = (s["maxima"] >= 1.5).to(x.dtype)
+    single = torch.cat([
+        torch.cat([duration, n, duration - n, counts[:, [FIRST, LATER], 0]], 1) / 15, rise.sum(2),
+        length, reach, reach / (length + 0.1), moved, moved / (reach + 0.1), box, longest, longest / (length + 0.1),
+        angle.sum(2), angle.abs().sum(2), area, area / (box.prod(1, keepdim=True) + 0.05),
+        _picked(means, MEANS), _picked(means, ((ALL, TOTAL),)) / 10, spread[:, :5], spread[:, 5:] / 10,
+        widest, largest, heaviest / 10, most, means[:, LATE_HARD, MAJOR:MINOR] - means[:, EARLY_HARD, MAJOR:MINOR],
+        means[:, LATER, :TOTAL] - means[:, FIRST, :TOTAL], harder[:, :1] - harder[:, 1:], over, after,
+    ], 1)  # fmt: skip
+    return torch.cat([single[:, ORDER], path / size, path, _picked(means, BY_QUARTER), blob], 1)
 
-    single = [
-        duration / 15, n / 15, rises, pauses / 15, one.sum(1) / 15, two.sum(1) / 15,
-        length, reach, reach / (length + 0.1), ex, ey, ex / (reach + 0.1), ey / (reach + 0.1), width, height,
-        _spread(s["x"], weight), _spread(s["y"], weight), step.amax(1), step.amax(1) / (length + 0.1),
-        _mean((step < 0.04).to(x.dtype), active), mx, my,
-        angle.sum(1), angle.abs().sum(1), area, area / (width * height + 0.05), turn.sum(1), turn.abs().sum(1),
-        _mean(s["maxima"], active), s["maxima"].amax(1), _mean(several, active), _mean(several, early),
-        _mean(several, late),
-        _mean(major, weight), _mean(minor, weight), _mean(s["vxx"], weight), _mean(s["vyy"], weight),
-        _mean(s["vxy"], weight), _spread(major, weight), _top(major, active),
-        _mean(major, late * weight) - _mean(major, early * weight),
-        _mean(s["area"], active), _top(s["area"], active), _spread(s["area"], active),
-        _mean(s["peak"], active), _spread(s["peak"], active), _mean(s["total"], active) / 10,
-        _spread(s["total"], active) / 10, _top(s["total"], active) / 10,
-        _mean(s["x"], two) - _mean(s["x"], one), _mean(s["y"], two) - _mean(s["y"], one),
-        _top(s["peak"], one) - _top(s["peak"], two), over, after,
-    ]  # fmt: skip
-    return torch.cat([torch.stack(single, 1), path_x / size, path_y / size, path_x, path_y, *by_slot, blob], 1)
+
+def _picked(means: Tensor, pairs: Sequence[tuple[int, int]]) -> Tensor:
+    """(B, 14, 15) -> (B, n): those by these weights of these values."""
+    return means.flatten(1)[:, [weight * (ONES + 1) + value for weight, value in pairs]]
 
 
 def _before(v: Tensor) -> Tensor:
-    """(B, T) -> the same one frame later, 0 first."""
-    return F.pad(v, (1, 0))[:, :-1]
+    """(..., T) -> the same one frame later, 0 first."""
+    return F.pad(v, (1, -1))
 
 
 def _angle(y: Tensor, x: Tensor) -> Tensor:
     """atan2, kept away from the places where ONNX has no answer or another one: y = 0 and the origin."""
     still = x * x + y * y < 1e-12
     return torch.atan2(torch.where(still | (y == 0), 1e-9, y), torch.where(still, 1.0, x))
-
-
-def _ends(v: Tensor, weight: Tensor, index: Tensor, at: Tensor) -> Tensor:
-    """(B,) weighted mean within two frames of `at`."""
-    near = weight * F.relu(2.0 - (index - at[:, None]).abs())
-    return _mean(v, near)
 
 
 class TrajectoryNet(Opinion):
