@@ -40,35 +40,46 @@ class Spot(NamedTuple):
 
 def spots(frame: Array, noise: float) -> list[Spot]:
     """The fingers in (R, C) counts above the baseline, the strongest first: one, or two that can be told apart."""
-    shape, first = frame.shape, int(frame.argmax())
-    top = frame.item(first)
-    second = int((frame * _elsewhere(shape, first)).argmax())
-    peak = frame.item(second)
-    if peak < SECOND * top or peak < NOISE * noise or not _parted(frame, first, second):
-        return [_spot(frame, first, REACH, (frame > top / 2).tobytes().count(1))]  # np.count_nonzero takes longer
-    (row, column), (down, across) = divmod(first, shape[1]), divmod(second, shape[1])
-    near = max(abs(down - row), abs(across - column)) <= APART
-    rows, columns = np.indices(shape)  # below: less far from the first peak than half-way
+    peaks = _peaks(frame, noise)
+    if len(peaks) == 1:
+        (first, reach), level = peaks[0], frame.item(peaks[0][0]) / 2
+        return [_new(Spot, (*_place(frame, first, reach), 2 * level, (frame > level).tobytes().count(1)))]
+    (row, column), (down, across) = (divmod(peak, frame.shape[1]) for peak, _ in peaks)
+    rows, columns = np.indices(frame.shape)  # below: less far from the first peak than half-way
     nearer = rows * (down - row) + columns * (across - column) < (down**2 + across**2 - row**2 - column**2) / 2
-    return [
-        _spot(frame, at, 1 if near else REACH, int(np.count_nonzero((frame > frame.item(at) / 2) & own)))
-        for at, own in ((first, nearer), (second, ~nearer))
-    ]
+    found: list[Spot] = []
+    for (peak, reach), own in zip(peaks, (nearer, ~nearer), strict=True):
+        level = frame.item(peak)
+        area = int(np.count_nonzero((frame > level / 2) & own))
+        found.append(_new(Spot, (*_place(frame, peak, reach), level, area)))
+    return found
+
+
+def places(frame: Array, noise: float) -> list[tuple[float, float]]:
+    """The row and the column of each of the `spots` of a frame."""
+    return [_place(frame, peak, reach) for peak, reach in _peaks(frame, noise)]
+
+
+def _peaks(frame: Array, noise: float) -> tuple[tuple[int, int], ...]:
+    """The strongest taxel of each finger, and how far a fit looks around it."""
+    first = int(frame.argmax())
+    second = int((frame * _elsewhere(frame.shape, first)).argmax())
+    peak = frame.item(second)
+    if peak < SECOND * frame.item(first) or peak < NOISE * noise or not _parted(frame, first, second):
+        return ((first, REACH),)
+    (row, column), (down, across) = divmod(first, frame.shape[1]), divmod(second, frame.shape[1])
+    reach = 1 if max(abs(down - row), abs(across - column)) <= APART else REACH
+    return (first, reach), (second, reach)
 
 
 def _parted(frame: Array, first: int, second: int) -> bool:
     """Whether the second taxel is a peak, and a valley lies between it and the first."""
-    columns, peak = frame.shape[1], frame.item(second)
-    (row, column), (down, across) = divmod(first, columns), divmod(second, columns)
-    if peak < frame[max(down - 1, 0) : down + 2, max(across - 1, 0) : across + 2].max():
-        return False
-    steps = 2 * max(abs(down - row), abs(across - column))
-    between = (k * (1.0 / steps) for k in range(1, steps))  # along the line between both
-    places = ((round(row + share * (down - row)), round(column + share * (across - column))) for share in between)
-    return any(frame.item(place) <= VALLEY * peak for place in places)
+    peak, (beside, between) = frame.item(second), _ways(frame.shape, first, second)
+    return peak >= frame.take(beside).max() and bool((frame.take(between) <= VALLEY * peak).any())
 
 
-def _spot(frame: Array, peak: int, reach: int, area: int) -> Spot:
+def _place(frame: Array, peak: int, reach: int) -> tuple[float, float]:
+    """The row and the column of the finger whose strongest taxel is `peak`."""
     row, column, last_row, last_column, around, table = _around(frame.shape, peak, reach)
     fits = table.dot(frame.take(around))
     best, at = int(fits.argmax()), fits.item
@@ -81,7 +92,7 @@ def _spot(frame: Array, peak: int, reach: int, area: int) -> Spot:
     across_to = column + (across + (0.5 * (left - right) / turn if turn < 0 else 0.0)) * STEP
     if not (0.0 <= down_to <= last_row and 0.0 <= across_to <= last_column):  # beyond the outermost taxels
         down_to, across_to = min(max(down_to, 0.0), last_row), min(max(across_to, 0.0), last_column)
-    return _new(Spot, (down_to, across_to, frame.item(peak), area))
+    return down_to, across_to
 
 
 def _offset(best: int) -> tuple[int, int, int, int]:
@@ -103,14 +114,28 @@ def _elsewhere(shape: tuple[int, int], peak: int) -> Array:
 
 
 @lru_cache(PEAKS)
+def _ways(shape: tuple[int, int], first: int, second: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The taxels beside the second of two, and those along the line between both."""
+    taxels, (row, column), (down, across) = _taxels(shape), divmod(first, shape[1]), divmod(second, shape[1])
+    steps = 2 * max(abs(down - row), abs(across - column))
+    shares = [k * (1.0 / steps) for k in range(1, steps)]
+    between = [taxels[round(row + s * (down - row)), round(column + s * (across - column))] for s in shares]
+    return taxels[max(down - 1, 0) : down + 2, max(across - 1, 0) : across + 2].ravel(), np.array(between, np.int64)
+
+
+@lru_cache(PEAKS)
 def _around(shape: tuple[int, int], peak: int, reach: int) -> tuple[int, int, float, float, NDArray[np.int64], Array]:
     """A peak's row and column, the last of each, the taxels that a fit looks at, row by row, and the table for them."""
     (row, column), (rows, columns) = divmod(peak, shape[1]), shape
     above, below = min(reach, row), min(reach, rows - 1 - row)
     left, right = min(reach, column), min(reach, columns - 1 - column)
-    taxels = np.arange(rows * columns).reshape(shape)
-    around = taxels[row - above : row + below + 1, column - left : column + right + 1].ravel()
+    around = _taxels(shape)[row - above : row + below + 1, column - left : column + right + 1].ravel()
     return row, column, rows - 1.0, columns - 1.0, around, _table(above, below, left, right)
+
+
+def _taxels(shape: tuple[int, int]) -> NDArray[np.int64]:
+    """(R, C) the number of each taxel, row by row."""
+    return np.arange(shape[0] * shape[1]).reshape(shape)
 
 
 @lru_cache(TABLES)

@@ -4,7 +4,7 @@ A sensor's zones are rectangles that share no place. The one in which a contact 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ from gestured.core.address import is_sensor
 from gestured.core.contact import RESTS
 from gestured.core.events import Place, Where
 from gestured.core.frames import SMALLEST, Segment
-from gestured.core.spots import Spot, spots
+from gestured.core.spots import places
 
 Array = NDArray[np.float64]
 
@@ -89,14 +89,14 @@ def where(segment: Segment, zones: Mapping[str, Zone]) -> Where:
     seen = np.flatnonzero(peaks >= SEEN * top) if top > 0 else np.arange(len(touched))
     if len(seen) > MOST:
         seen = seen[np.rint(np.linspace(0, len(seen) - 1, MOST)).astype(int)]
-    found = [(peaks[k], spots(touched[k].astype(np.float64), segment.noise)) for k in seen]
-    two = [len(fingers) == 2 for peak, fingers in found if peak >= BOTH * top] or [False]
+    found = [places(frame, segment.noise) for frame in touched[seen].astype(np.float64)]
+    two = [len(fingers) == 2 for fingers, peak in zip(found, peaks[seen].tolist(), strict=True) if peak >= BOTH * top]
     contacts = 2 if 2 * sum(two) > len(two) else 1
-    places = np.array([middle(fingers[:contacts]) for _, fingers in found if len(fingers) >= contacts])
+    path = [middle(fingers[:contacts]) for fingers in found if len(fingers) >= contacts]
     rows, columns = touched.shape[1:]
     snr = top / max(segment.noise, SMALLEST)
-    way = _way(places, RESTS + SHAKE / max(snr, 1.0))
-    start, end = (Place(*fractions(rows, columns, row, column)) for row, column in places[[0, -1]].tolist())
+    way = _way(path, RESTS + SHAKE / max(snr, 1.0))
+    start, end = (Place(*fractions(rows, columns, row, column)) for row, column in (path[0], path[-1]))
     return Where(
         start,
         end,
@@ -104,14 +104,15 @@ def where(segment: Segment, zones: Mapping[str, Zone]) -> Where:
         digits(top),
         digits(snr),
         contacts,
-        0 if segment.bad is None else _under(segment.bad, places),
+        0 if segment.bad is None or not segment.bad.any() else _under(segment.bad, np.array(path)),
         zone_at(zones, start),
     )
 
 
-def middle(fingers: list[Spot]) -> tuple[float, float]:
-    """The row and column half-way between fingers."""
-    return sum(one.row for one in fingers) / len(fingers), sum(one.column for one in fingers) / len(fingers)
+def middle(fingers: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """The row and column half-way between one or two fingers'."""
+    (row, column), (down, across) = fingers[0], fingers[-1]
+    return (row + down) / 2, (column + across) / 2
 
 
 def fractions(rows: int, columns: int, row: float, column: float) -> tuple[float, float]:
@@ -124,20 +125,20 @@ def finely(fraction: float) -> float:
     return round(fraction * 1e4) / 1e4
 
 
-def _way(places: Array, rests: float) -> float:
-    """The length of a path (n, 2), 0 where it never goes as far as `rests` from where it was; in pitches."""
-    length, (last, *rest) = 0.0, places.tolist()
-    for each in rest:
+def _way(path: Sequence[tuple[float, float]], rests: float) -> float:
+    """The length of a path, 0 where it never goes as far as `rests` from where it was; in pitches."""
+    length, last = 0.0, path[0]
+    for each in path:
         step = math.dist(last, each)
         if step >= rests:
             length, last = length + step, each
-    return length + math.dist(last, places[-1]) if length else 0.0
+    return length + math.dist(last, path[-1]) if length else 0.0
 
 
-def _under(bad: NDArray[np.bool_], places: Array) -> int:
+def _under(bad: NDArray[np.bool_], path: Array) -> int:
     """How many of (R, C) bad taxels lie within `UNDER` of a path (n, 2)."""
     taxels = np.argwhere(bad)[:, None].astype(np.float64)  # (B, 1, 2)
-    begin, step = places, np.diff(places, axis=0, append=places[-1:])
+    begin, step = path, np.diff(path, axis=0, append=path[-1:])
     along = ((taxels - begin) * step).sum(axis=2) / np.maximum((step**2).sum(axis=1), 1e-12)
     nearest = begin + np.clip(along, 0.0, 1.0)[..., None] * step
     return int(np.count_nonzero((np.hypot(*(taxels - nearest).transpose(2, 0, 1)) <= UNDER).any(axis=1)))
