@@ -13,6 +13,16 @@ from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
 STOP_S = 5.0  # that the daemon may take to end
+# Who is killed can end nothing any more, so the kernel is asked to (where it can: Linux). PR_SET_PDEATHSIG, SIGTERM.
+DIE = "import ctypes; ctypes.CDLL(None).prctl(1, 15); " if sys.platform == "linux" else ""
+
+
+def child_of_ours(module: str) -> list[str]:
+    """The beginning of a command line that runs a module of gestured's, and ends when we do, however we end."""
+    root = Path(gestured.__file__).parent.parent
+    safe = [] if root == Path.cwd() else ["-P"]  # a folder named gestured in the current one is not the package
+    run = f"{DIE}import runpy; runpy.run_module('{module}', run_name='__main__', alter_sys=True)"
+    return [sys.executable, *safe, "-c", run]
 
 
 class Engine:
@@ -23,9 +33,7 @@ class Engine:
         self._folder = tempfile.TemporaryDirectory(prefix="gestured-demo-")
         folder = Path(self._folder.name)
         self._log = folder / "log"
-        root = Path(gestured.__file__).parent.parent
-        safe = [] if root == Path.cwd() else ["-P"]  # a folder named gestured in the current one is not the package
-        command = [sys.executable, *safe, "-m", "gestured.daemon", "--model", model, "--listen", "127.0.0.1:0"]
+        command = [*child_of_ours("gestured.daemon"), "--model", model, "--listen", "127.0.0.1:0"]
         command += ["--socket", str(folder / "events.sock"), "--grid", f"{rows}x{columns}"]
         command += ["--own-gestures", str(folder / "own-gestures.json"), *more]  # the user's would change answers
         environment = {name: value for name, value in os.environ.items() if not name.startswith("GESTURED_")}

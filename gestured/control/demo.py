@@ -13,7 +13,7 @@ from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen
 
 from gestured.client.control import Control
-from gestured.client.engine import Engine
+from gestured.client.engine import Engine, child_of_ours
 from gestured.client.lines import Refused, read_ahead
 from gestured.client.pad.pad import Pad
 from gestured.client.pad.server import PadServer
@@ -32,7 +32,6 @@ from gestured.simulator import Take
 
 DEMO_SENSOR = "demo"
 SLACK_S = 0.3  # idle frames shown before what was performed, and waited for at the end
-VIEW = (sys.executable, "-m", "gestured.control", "view", "--listen", "127.0.0.1:0")
 DRAWN_AFTER_S = 0.1
 POLL_S = 0.05
 GONE_S = 3.0  # without a page a pad counts as closed: a page that is loaded again comes back within that time
@@ -95,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
 @contextmanager
 def page(control: Path) -> Iterator[str]:
     """`gesturectl view` in a process of its own; the address of its page, which is shown and never opened."""
-    command = [*VIEW, "--control", str(control)]
+    command = [*child_of_ours("gestured.control"), "view", "--listen", "127.0.0.1:0", "--control", str(control)]
     with Popen(command, stdin=DEVNULL, stdout=PIPE, stderr=DEVNULL, text=True) as process:
         try:
             yield process.stdout.readline().strip() if process.stdout is not None else ""

@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ import gestured
 from gestured.client.engine import Engine
 from gestured.model.shipped import shipped
 from tests.control.test_view import Page
+from tests.sockets import PATIENCE_S
 
 pytestmark = [
     pytest.mark.e2e,
@@ -75,6 +77,17 @@ def test_ended_early_it_still_sums_up_and_leaves_nothing_behind(start, shallow, 
     assert process.returncode == 0
     assert b"Summary" in out and err == b""
     assert daemons(shallow) == [] and os.listdir(shallow) == []
+
+
+def test_killed_outright_it_leaves_no_daemon_running(start, shallow):
+    process = start("demo", "--seconds", 60, env={"TMPDIR": str(shallow)})
+    assert b"listens on" in process.stdout.readline()
+    process.kill()
+    process.communicate(timeout=30)
+    patience = time.monotonic() + PATIENCE_S
+    while daemons(shallow) and time.monotonic() < patience:
+        time.sleep(0.05)
+    assert daemons(shallow) == []
 
 
 def test_without_a_terminal_it_says_words_and_goes_on_while_its_pad_is_open(start, shallow):
