@@ -36,7 +36,8 @@ class Hub:
     def __init__(self, scene: Scene, classifier: Classifier, *, later: bool = False) -> None:
         """`classifier` must know the scene's gestures (ValueError).
 
-        Provisional events are given at once, or `later`: by `look`, for whoever must not have answers wait for them.
+        The model is run at once, or `later`: by `ask` and `look`, for whoever must not have answers of other sensors
+        wait for that. What has not been asked when its answer is due is asked then, so answers are the same.
         """
         self._sensors: dict[str, Sensor] = {}
         self._numbers: dict[str, tuple[int, int]] = {}  # sequence and id that sensors which are not there have used
@@ -50,7 +51,8 @@ class Hub:
         self._later = later
         self._armed: dict[str, float] = {}  # sensors that come armed, until so many s on this clock
         self.gates = Gates(scene.gates)  # which a change of the scene leaves as they are
-        self.looks: dict[str, Sensor] = {}  # sensors that wait for `look`, the one that has waited longest first
+        self.asks: dict[str, Sensor] = {}  # sensors that wait for `ask`, the one that has waited longest first
+        self.looks: dict[str, Sensor] = {}  # the same for `look`
         self._set(scene, classifier)
 
     @property
@@ -88,6 +90,8 @@ class Hub:
             due = sensor.receive(arrivals, one.stamps, now, facts, taken=one.taken)
             if due < math.inf:
                 self._waits[name], self._due = sensor, min(self._due, due)
+            if sensor.shown is not None:
+                self.asks[name] = sensor
             if (self._asked is None or self._asked) and sensor.looks:
                 self.looks[name] = sensor
         return facts
@@ -118,6 +122,16 @@ class Hub:
             due = {name: sensor.arrives for name, sensor in self._waits.items()}
             self._waits = {name: sensor for name, sensor in self._waits.items() if due[name] < math.inf}
             self._due = min(due.values(), default=math.inf)
+        return facts
+
+    def ask(self, now: float) -> list[Fact]:
+        """Have the model name what was shown first of all that may soon be answered: one run."""
+        facts: list[Fact] = []
+        while self.asks:
+            sensor = self.asks.pop(next(iter(self.asks)))
+            if sensor.shown is not None:
+                sensor.ask_later(now, facts)
+                break
         return facts
 
     def look(self, now: float) -> list[Fact]:
@@ -239,10 +253,17 @@ class Hub:
         silent = {name: self._unheard(name, now) for name in self._scene.sensors}
         return silent | {name: sensor.reading(now) for name, sensor in tuple(self._sensors.items())}
 
+    def states(self, now: float) -> dict[str, str]:
+        """The state of each sensor that `readings` has, at a fraction of the price."""
+        silent = dict.fromkeys(self._scene.sensors, "no_data")
+        return silent | {name: sensor.condition(now)[0] for name, sensor in self._sensors.items()}
+
     def listening(self, now: float) -> list[Gate]:
         """What gates and arming say at `now`, of the sensors of which they say anything."""
-        gates = [reading.gate for reading in self.readings(now).values()]
-        return [gate for gate in gates if gate is not None and (gate.closed or gate.armed is not None)]
+        heard = dict(self._sensors)
+        unheard = [self._unheard(name, now).gate for name in self._scene.sensors if name not in heard]
+        told = [*unheard, *(sensor.listens(now) for sensor in heard.values())]
+        return [gate for gate in told if gate is not None and (gate.closed or gate.armed is not None)]
 
     def view(self, name: str, now: float, *, raw: bool) -> tuple[View, Reading] | None:
         """A sensor as it is felt now, and what is known of it; None where it was not heard."""
@@ -356,6 +377,7 @@ class Hub:
         """Give a sensor's place away. Should it return, its sequences and ids go on where they were."""
         del self._sensors[sensor.name], self._told[sensor.name]
         self._waits.pop(sensor.name, None)
+        self.asks.pop(sensor.name, None)
         self.looks.pop(sensor.name, None)
         if len(self._numbers) >= REMEMBERED:
             self._numbers.pop(next(iter(self._numbers)))

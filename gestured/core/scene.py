@@ -40,6 +40,9 @@ class Setup:
     arming: Arming | None = None
 
 
+AS_SCENE = Setup()
+
+
 @dataclass(frozen=True, slots=True)
 class Scene:
     """All that decides. Raises ValueError, which names the field, for a value that cannot be."""
@@ -119,7 +122,7 @@ class Scene:
 
     def setup(self, sensor: str) -> Setup:
         """What is set for a sensor; the defaults where it is not named."""
-        return self.sensors.get(sensor, Setup())
+        return self.sensors.get(sensor, AS_SCENE)
 
     def grid_of(self, sensor: str) -> tuple[int, int]:
         """Rows and columns of a sensor's frames, as they are sent."""

@@ -61,9 +61,12 @@ class Sensor:
         self._stamper = Stamper(scene.clock_of(name))
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # last; no scores where it failed
         self._placed: tuple[Segment, Where] | None = None  # where the last one that was shown was
+        self.shown: Shown | None = None  # what `ask` is to ask about
         self._foresight = Foresight(name, taps=scene.provisional_taps)
         self._fingers = Fingers(name, scene.setup(name).zones)
-        self._later = False  # whether looks for provisional events wait until `look`
+        # Whether looks for provisional events wait until `look`; and where nobody asks for these, the model's runs for
+        # answers until `ask`, or until the answer is due.
+        self._later = False
         self._habits, self._vitals = Habits(*self.front_end.sent), Vitals()
         self._square = self.front_end.rows == self.front_end.columns  # then idle frames say nothing of its habits
         self._fresh = True  # no frame was used since it came or restarted
@@ -144,8 +147,9 @@ class Sensor:
         told: list[Told] = []
         for one in found:
             if isinstance(one, Shown):
-                self._ask(one.segment)
-                self._at(one.segment)
+                self.shown = one
+                if self._foresight.asked or not self._later:
+                    self.ask()
                 continue
             self._habits.hear(one)
             if isinstance(one, Opened):
@@ -159,6 +163,14 @@ class Sensor:
             else:
                 told += self._decide(one) if isinstance(one, Cut) else [self._cancelled(one.reason)]
         return told
+
+    def ask(self) -> list[Told]:
+        """Find out all that an answer to what was shown will say. Nothing is told of that before the answer is due."""
+        if self.shown is not None:
+            self._ask(self.shown.segment)
+            self._at(self.shown.segment)
+        self.shown = None
+        return []
 
     def _ask(self, segment: Segment) -> Scores | None:
         """The classifier's scores of a segment, which is asked about once; None where it fails."""
@@ -182,7 +194,7 @@ class Sensor:
         """The answer to a segment, and `Decided` where a classifier gave scores."""
         name, segment, decision, listening = self.name, cut.segment, self._decision, self._listening
         answer = self._ask(segment)
-        self._asked = None
+        self._asked = self.shown = None
         if answer is None:
             return [self._cancelled("model")]
         at = self._at(segment)
@@ -216,6 +228,7 @@ class Sensor:
         return [self._foresight.judged(gesture), decided, *armed]
 
     def _cancelled(self, why: str) -> Cancelled:
+        self.shown = None
         return self._foresight.judged(Cancelled(self.name, self.segments, why))
 
     def _late(self, t: float) -> list[Told]:
@@ -407,6 +420,10 @@ class Sensor:
             facts += self._fingers.end()
         self._fingers.asked = asked
 
+    def ask_later(self, now: float, facts: list[Fact]) -> None:
+        """Do what `ask` does at `now` (s); a bug in it is added to `facts`."""
+        self._run(lambda _: self.ask(), now, facts)
+
     @property
     def looks(self) -> bool:
         """Whether there is something for `look`."""
@@ -433,6 +450,11 @@ class Sensor:
         if self.stale(now):
             return "stale", ""
         return self._vitals.condition(self.front_end, inverted=self._habits.inverted)
+
+    def listens(self, now: float) -> Gate | None:
+        """What gates and arming say at `now`; None of a sensor that always listens."""
+        always = not self._listening.closed and self._listening.arming is None
+        return None if always else self._gate(self._stamper.at(now))
 
     def reading(self, now: float) -> Reading:
         """All that is known of the sensor."""

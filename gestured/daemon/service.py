@@ -27,7 +27,7 @@ from gestured.daemon.reload import Loader, Reload
 from gestured.daemon.settings import TITLES
 from gestured.daemon.shift import Shift
 from gestured.daemon.sinks import Sink
-from gestured.daemon.snapshot import Models, Snapshot
+from gestured.daemon.snapshot import Models, Snapshot, overall
 from gestured.daemon.sockets import kernel_drops
 from gestured.daemon.status import status
 from gestured.daemon.tap import Taps
@@ -214,13 +214,13 @@ class Service:
         self._taps.tick()
         self._views.tick()
         self._own.tick()
-        snapshot = self.snapshot()
-        self._metrics.kernel(snapshot.kernel_drops)
-        self._publisher.publish(
-            Status(snapshot.state, snapshot.states, snapshot.models.active, snapshot.time, snapshot.listening)
-        )
-        states = ", ".join(f"{name} {state}" for name, state in list(snapshot.states.items())[:SHOWN])
-        words = f"{snapshot.state}: {snapshot.models.active} answers; sensors: {states or 'none yet'}"
+        now, active = time.monotonic(), self._ladder.active
+        self._metrics.kernel(kernel_drops(self._bound.udp))
+        states = self._hub.states(now - self._receiver.behind_s)  # no snapshot: of a thousand sensors that is a stall
+        state = overall(states, impaired=self._ladder.degraded or self._publisher.models_failed)
+        self._publisher.publish(Status(state, states, active, time.time(), self._listening(now)))
+        shown = ", ".join(f"{name} {state}" for name, state in list(states.items())[:SHOWN])
+        words = f"{state}: {active} answers; sensors: {shown or 'none yet'}"
         if words != self._said:
             self._said = words
             notify(f"STATUS={words}")

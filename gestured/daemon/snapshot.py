@@ -84,9 +84,7 @@ class Snapshot:
     @property
     def state(self) -> str:
         """One of "ok", "degraded" and "no_data"."""
-        if all(reading.state in SILENT for reading in self.sensors.values()):
-            return "no_data"
-        return "degraded" if self.models.degraded or self.models.failed else "ok"
+        return overall(self.states, impaired=self.models.degraded or self.models.failed)
 
     @property
     def hangs(self) -> bool:
@@ -118,3 +116,10 @@ class Snapshot:
             "degraded": self.models.degraded,
             "sensors": self.states,
         }
+
+
+def overall(states: Mapping[str, str], *, impaired: bool) -> str:
+    """The daemon's state by those of its sensors; `impaired`: the model that should answer does not."""
+    if all(state in SILENT for state in states.values()):
+        return "no_data"
+    return "degraded" if impaired else "ok"

@@ -76,13 +76,14 @@ class Receiver:
         self._again: asyncio.Handle | None = None
         self._due = math.inf  # s, when time alone will decide something
         self._alarm: asyncio.Handle | None = None
+        self._asking: asyncio.Handle | None = None
         self._foreseeing: asyncio.Handle | None = None
         self._loop.add_reader(sock, self._wake)
 
     def close(self) -> None:
         """Stop reading; the socket stays its owner's."""
         self._loop.remove_reader(self._sock)
-        for handle in (self._pause, self._again, self._alarm, self._foreseeing):
+        for handle in (self._pause, self._again, self._alarm, self._asking, self._foreseeing):
             if handle is not None:
                 handle.cancel()
 
@@ -223,6 +224,13 @@ class Receiver:
         self._desk.take(self._hub.receive(packets, now))
         self._expect()
 
+    def _ask(self) -> None:
+        """Have the model name one segment before its answer is due; whoever waits in the loop has a turn after it."""
+        self.read()
+        if self._again is None:
+            self._desk.take(self._hub.ask(self._clock()))
+        self._asking = self._loop.call_soon(self._ask) if self._hub.asks else None
+
     def _foresee(self) -> None:
         """Give a provisional event where nothing else is to be done: it costs a run of the model, and answers wait."""
         self.read()
@@ -236,6 +244,8 @@ class Receiver:
 
     def _expect(self) -> None:
         """Set the alarm for when time alone decides something. Packets that wait are served before."""
+        if self._hub.asks and self._asking is None:
+            self._asking = self._loop.call_soon(self._ask)
         if self._hub.looks and self._foreseeing is None:
             self._foreseeing = self._loop.call_soon(self._foresee)
         if self._hub.due != self._due and not self._backlog:

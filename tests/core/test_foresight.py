@@ -497,6 +497,24 @@ def test_what_waits_for_its_turn_is_looked_at_one_at_a_time_and_not_said_once_it
     assert hub.look(9.0) == [] and not hub.looks and len(seer.looked) == 2
 
 
+@pytest.mark.parametrize("time", [True, False])
+def test_what_may_soon_be_answered_is_asked_about_one_at_a_time_and_else_when_it_is_due(time: bool) -> None:
+    """The answers are the same; each segment is asked about once."""
+    seer = Seer()
+    hub = Hub(SCENE, seer, later=True)
+    sensors = {name: Hand() for name in ("one", "two")}
+    for name, hand in sensors.items():
+        feed(hub, name, [*hand.idle(2.0), *hand.tap(), *hand.idle(0.3)], 0.0)
+    assert list(hub.asks) == ["one", "two"] and not seer.asked
+    for asked in (1, 2) if time else ():
+        assert hub.ask(2.5) == [] and seer.asked == asked
+    assert bool(hub.asks) != time
+    told = [feed(hub, name, hand.idle(1.0), 2.5) for name, hand in sensors.items()]
+    for facts in told:
+        assert [one.gesture for one in facts if isinstance(one, Gesture)] == ["left"]
+    assert hub.ask(4.0) == [] and not hub.asks
+
+
 @pytest.mark.parametrize("looks", [[True], [True, False]])
 def test_what_is_looked_at_later_is_said_as_if_it_had_been_at_once(looks: list[bool]) -> None:
     stream = frames(IDLE, *[SWIPE, PAUSE, TAP, PAUSE, TAP, SHORT, SWIPE, PAUSE] * 3)
