@@ -124,6 +124,18 @@ def emit(daemon: Daemon, gesture: str, sensor: str = "armrest") -> None:
         control.ask("emit", gesture=gesture, sensor=sensor)
 
 
+def guarded(folder: Path, accounts: str, access: str) -> list[str]:
+    """Lines of a broker's configuration that let in these accounts alone, each NAME:PASSWORD, to what `access` says."""
+    if shutil.which("mosquitto_passwd") is None:
+        pytest.skip("mosquitto is not installed (apt-get install mosquitto)")
+    (folder / "passwords").write_text(accounts)
+    subprocess.run(["mosquitto_passwd", "-U", str(folder / "passwords")], check=True, timeout=60)
+    (folder / "access").write_text(access)
+    for name in ("passwords", "access"):
+        (folder / name).chmod(0o644)
+    return ["allow_anonymous false", f"password_file {folder}/passwords", f"acl_file {folder}/access", "user root"]
+
+
 class Broker:
     """Debian's mosquitto, on a port of the loopback."""
 

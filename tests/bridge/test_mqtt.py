@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.bridge.conftest import Broker, Process, emit, page, wait
+from tests.bridge.conftest import Broker, Process, emit, guarded, page, wait
 from tests.daemon.harness import DEADLINE_S, Daemon
 from tests.sockets import HELLO, FakeDaemon
 
@@ -483,12 +483,8 @@ def test_a_broker_with_tls_that_is_called_without_says_so(bridge, broker, fake, 
 
 
 def with_password(folder: Path) -> list[str]:
-    (folder / "passwords").write_text("car:secret\n")
-    subprocess.run(["mosquitto_passwd", "-U", str(folder / "passwords")], check=True, timeout=60)
-    (folder / "access").write_text("user car\ntopic write gestured/car/#\ntopic write homeassistant/+/gestured_car/#\n")
-    for name in ("passwords", "access"):
-        (folder / name).chmod(0o644)
-    return ["allow_anonymous false", f"password_file {folder}/passwords", f"acl_file {folder}/access", "user root"]
+    access = "user car\ntopic write gestured/car/#\ntopic write homeassistant/+/gestured_car/#\n"
+    return guarded(folder, "car:secret\n", access)
 
 
 def test_user_and_password_come_from_the_environment_or_a_file(bridge, broker, fake, tmp_path: Path):

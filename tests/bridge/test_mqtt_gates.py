@@ -1,6 +1,5 @@
 """A gate that a real broker closes and opens, of a real daemon, through the bridge."""
 
-import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ import pytest
 from gestured.bridge.counts import Counts
 from gestured.bridge.gates import OFF, ON, Gate
 from gestured.client.control import Control
-from tests.bridge.conftest import Broker, Process, page, wait
+from tests.bridge.conftest import Broker, Process, guarded, page, wait
 from tests.daemon.harness import Client, Daemon, Sensor
 
 paho = pytest.importorskip("paho.mqtt.client", reason="the bridge to MQTT needs the extra [mqtt]")
@@ -36,13 +35,7 @@ def gated(model: Path, tmp_path: Path) -> Iterator[Daemon]:
 @pytest.fixture
 def at(broker: Callable[..., Broker], tmp_path: Path) -> Broker:
     """A broker that knows the bridge and a house."""
-    (tmp_path / "passwords").write_text("car:secret\nhouse:open\n")
-    subprocess.run(["mosquitto_passwd", "-U", str(tmp_path / "passwords")], check=True, timeout=60)
-    (tmp_path / "access").write_text(ACCESS)
-    for name in ("passwords", "access"):
-        (tmp_path / name).chmod(0o644)
-    files = [f"password_file {tmp_path}/passwords", f"acl_file {tmp_path}/access"]
-    return broker("allow_anonymous false", *files, "user root")
+    return broker(*guarded(tmp_path, "car:secret\nhouse:open\n", ACCESS))
 
 
 @pytest.fixture
