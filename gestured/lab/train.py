@@ -60,9 +60,9 @@ class TrainingPlan:
     others: int = len(OTHER_TRIALS)
     forest: int = 20_000  # simulated samples for the forest
     days: int = 700  # of everyday life, twelve minutes of a person each
-    days_calibrate: int = 600  # days to learn the verifier from
-    chance: int = 350  # days as chance draws them, to learn from
-    chance_calibrate: int = 450  # the same for the verifier
+    days_calibrate: int = 1_000  # days to learn the verifier from
+    chance: int = 700  # days as chance draws them, to learn from
+    chance_calibrate: int = 1_000  # the same for the verifier
     days_points: int = 400  # days on the nominal sensor to choose the operating points by
     fit: FitConfig = field(default_factory=FitConfig)
 
