@@ -25,11 +25,12 @@ from gestured.daemon.asked import scene_of
 from gestured.daemon.settings import Settings
 from gestured.model.ladder import Ladder
 from gestured.record import tape as mcap
-from gestured.record.replay import Mute, Replay, maker
-from tests.golden.tape import Tape
+from gestured.record.replay import Mute, Replay, maker, opened
+from tests.golden.tape import Packet, Tape, arrived
 
 Line = dict[str, Any]
 COUNTED = {"taken": "ok", "lost": "lost", "duplicates": "duplicate", "late": "late"}  # as the metrics call them
+OUTSIDE = {"listen", "publish", "socket", "control", "gates", "metrics", "model", "fallback"}  # settings of no tape
 MODEL = Path(__file__).parent / "models" / "cnn_lstm.onnx"
 
 
@@ -113,6 +114,14 @@ def replay(tape: Tape, model: Ladder) -> list[Line]:
     packets = tuple(mcap.Packet(p.t_ns, p.source, p.data) for p in tape.packets)
     player = Replay(mcap.Tape(told, packets, (), True), maker(told).scene, model)
     return [as_line(event) for event in player.events()]
+
+
+def recorded(file: Path) -> Tape:
+    """What `gesturectl record` has written, as a golden tape."""
+    found, made = opened(file)
+    settings = {key: value for key, value in found.scene["settings"].items() if key not in OUTSIDE}
+    packets = (Packet(p.t_ns, tuple(p.source), p.data) for p in found.packets)
+    return arrived(file.stem, f"recorded with {made.models[0]}", packets, settings)
 
 
 def front_ends(tape: Tape) -> Iterator[tuple[str, FrontEnd, Stamp, list[tuple[int, Found]]]]:

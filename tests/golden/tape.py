@@ -1,13 +1,14 @@
 """Golden tapes: packets as they were found waiting, at times that are written down, and the scene that they play in.
 
-Several tapes stand in one compressed file. A file keeps equal things together (all times, all lengths, all packets),
-which compresses well, and tapes that damage the same session cost little more than one of them.
+A group of tapes stands in one compressed file. A file keeps equal things together (all times, all lengths, all
+packets), which compresses well, and tapes that damage the same session cost little more than one of them. They are
+data, and are not made anew: programs of the commits up to e5caf71 drew them from the simulator.
 """
 
 import hashlib
 import json
 import lzma
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
@@ -16,7 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 FOLDER = Path(__file__).parent / "tapes"
+GROUPS = tuple(sorted(path.stem for path in FOLDER.glob("*.xz")))
 TICK_NS = 250_000_000  # the daemon's loop comes round at least so often
+REST_NS = 2_500_000_000  # that a daemon goes on after the last packet
 Source = tuple[str, int]  # host and port of a sender
 
 
@@ -54,10 +57,12 @@ class Tape:
         return found.hexdigest()
 
 
-def ticks(start_ns: int, end_ns: int, stalls: Sequence[tuple[int, int]] = ()) -> tuple[int, ...]:
-    """The daemon's looks from start to end, but none during a stall (from, to) of its loop."""
-    every = range(start_ns + TICK_NS, end_ns + 1, TICK_NS)
-    return tuple(t for t in every if not any(since <= t < until for since, until in stalls))
+def arrived(name: str, about: str, packets: Iterable[Packet], settings: Mapping[str, Any]) -> Tape:
+    """A tape of packets at a daemon that never stands still and goes on for a while; times count from the first."""
+    every = list(packets)
+    found = tuple(packet._replace(t_ns=packet.t_ns - every[0].t_ns) for packet in every)
+    end = found[-1].t_ns + REST_NS
+    return Tape(name, about, found, tuple(range(TICK_NS, end + 1, TICK_NS)), end, settings)
 
 
 def write(name: str, tapes: Sequence[Tape], folder: Path = FOLDER) -> int:
