@@ -1,28 +1,25 @@
 """Read and write recordings: the contract's .npz, without pickles, readable with NumPy alone.
 
-A file may be damaged or hostile: its members are measured before they are unpacked (`npz`), and every field is held
-against the contract (`check`), the frames last. What is wrong is one `RecordingError`: file, field,
+A file may be damaged or hostile: what it unpacks to is bounded before any of it is, NumPy holds each member against its
+header, and every field is held against the contract (`check`). What is wrong is one `RecordingError`: file, field,
 recording, and what was expected.
 """
 
 import zipfile
 from dataclasses import fields
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gestured.core.errors import RecordingError
-from gestured.record.check import Wrong, check, check_all_but_frames, check_frames, shapes
+from gestured.record.check import Wrong, check
 from gestured.record.files import PRIVATE, atomic_write, open_regular
-from gestured.record.npz import Archive, brief
 from gestured.record.recordings import Recordings
 
 MAX_RECORDING_BYTES = 2 << 30  # unpacked
-
-
 _FIELDS = tuple(field.name for field in fields(Recordings))
-_KNOWN = frozenset(_FIELDS)
 _REQUIRED = _FIELDS[:5]
 
 
@@ -30,7 +27,7 @@ def read(path: str | Path) -> Recordings:
     """Read and check a file; RecordingError for what is no recording. It ignores unknown members."""
     try:
         found = _load(path)
-        check_frames(found)
+        check(found)
     except Wrong as error:
         raise RecordingError(f"{path}: {error}") from error
     return found
@@ -49,26 +46,39 @@ def write(path: str | Path, recordings: Recordings) -> None:
     except Wrong as error:
         raise RecordingError(f"{path}: not written: {error}") from error
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be written: {brief(error)}") from error
+        raise RecordingError(f"{path}: cannot be written: {_brief(error)}") from error
 
 
 def _load(path: str | Path) -> Recordings:
-    """A file's fields, checked but for the frames, which are unpacked last; raises Wrong."""
+    """A file's fields as they are; raises Wrong."""
     try:
-        with open_regular(path) as file:
-            archive = Archive(file, _KNOWN, MAX_RECORDING_BYTES)
-            forms = archive.forms
-            missing = [field for field in _REQUIRED if field not in forms]
-            if missing:
-                raise Wrong(f"{missing[0]}: is missing, expected the fields {', '.join(_REQUIRED)}", missing[0])
-            shapes(Recordings(**forms))
-            fields = {field: archive.array(field) for field in forms if field != "frames"}
-            check_all_but_frames(Recordings(frames=forms["frames"], **fields))
-            return Recordings(frames=archive.array("frames"), **fields)
+        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
+            held = {member.filename.removesuffix(".npy") for member in archive.infolist()}
+            total = sum(member.file_size for member in archive.infolist())
+            if total > MAX_RECORDING_BYTES:
+                raise Wrong(f"unpacks to {total} bytes, expected at most {MAX_RECORDING_BYTES}")
+            if missing := [field for field in _REQUIRED if field not in held]:
+                raise Wrong(f"{missing[0]}: is missing, expected the fields {', '.join(_REQUIRED)}")
+            return Recordings(**{field: _array(archive, field) for field in _FIELDS if field in held})
     except Wrong:
         raise
-    except Exception as error:  # of a damaged file zipfile raises a dozen types
-        raise Wrong(f"cannot be read as a recording (.npz): {brief(error)}") from error
+    except Exception as error:  # of a damaged archive zipfile raises a dozen types
+        raise Wrong(f"cannot be read as a recording (.npz): {_brief(error)}") from error
+
+
+def _array(archive: zipfile.ZipFile, field: str) -> NDArray[Any]:
+    """A field's values, in this machine's byte order; in memory they are only once."""
+    try:
+        with archive.open(f"{field}.npy") as member:
+            array: NDArray[Any] = np.lib.format.read_array(member, allow_pickle=False)
+    except Exception as error:  # of a damaged member zipfile and NumPy raise a dozen types
+        raise Wrong(f"{field}: is damaged: {_brief(error)}") from error
+    return array if array.dtype.isnative else array.byteswap(inplace=True).view(array.dtype.newbyteorder("="))
+
+
+def _brief(error: BaseException) -> str:
+    """What an exception of somebody else's says, in one short line."""
+    return getattr(error, "strerror", None) or " ".join(str(error).split())[:200] or type(error).__name__
 
 
 def _pack(file: IO[bytes], recordings: Recordings) -> None:

@@ -50,88 +50,53 @@ Right = tuple[str, NDArray[Any], str, NDArray[np.int64] | None]  # field; what i
 
 
 class Wrong(Exception):
-    """What is wrong with a field; the file's name is added outside."""
-
-    def __init__(self, text: str, field: str = "") -> None:
-        super().__init__(text)
-        self.field = field
+    """What is wrong with a recording; the text begins with the field, and the file's name is added outside."""
 
 
 def check(r: Recordings) -> None:
     """Everything the contract says of the fields; raises Wrong."""
-    check_all_but_frames(r)
-    check_frames(r)
-
-
-def check_all_but_frames(r: Recordings) -> None:
-    """Everything but what the frames hold; raises Wrong."""
-    structure(r)
+    _shapes(r)
+    n, first, last = len(r.frames), r.offsets[0], r.offsets[-1]
+    if (first, last) != (0, n):
+        raise Wrong(f"offsets: expected from 0 to {n}, the number of frames, found {first} to {last}")
     for field, value in r.present():
         if value.dtype.kind == "U" and value.size:  # Python would make broken strings of numbers that are no characters
             codes = np.ascontiguousarray(value).view(np.uint32)
             if ((codes > 0x10FFFF) | ((codes >= 0xD800) & (codes < 0xE000))).any():
-                raise Wrong(f"{field}: holds what is no text", field)
-    _hold(_values(r))
-    _hold(_touches(r))
-    _hold(_events(r))
+                raise Wrong(f"{field}: holds what is no text")
+    for rules in (_offsets, _values, _frames, _touches, _events):
+        for field, right, expected, owner in rules(r):
+            if not right.all():
+                wrong = int(np.argmin(right))
+                of = "event" if field in EVENT_FIELDS else "recording"
+                raise Wrong(f"{field} of {of} {wrong if owner is None else owner[wrong]}: expected {expected}")
 
 
-def check_frames(r: Recordings) -> None:
-    """What the frames hold; raises Wrong."""
-    if r.frames.dtype.kind == "f" and r.frames.size:
-        low, high = (ends(r.frames, axis=(1, 2)).astype(np.float64) for ends in (np.min, np.max))  # NaN is both
-        _hold([("frames", np.isfinite(low) & np.isfinite(high), "finite values", _owner(r))])
-        _hold([("frames", (low >= -LARGEST) & (high <= LARGEST), "values that a float32 holds", _owner(r))])
-
-
-def structure(r: Recordings) -> None:
-    """What must hold for the fields to be told apart, recording by recording: types, shapes, who owns what.
-
-    Raises Wrong with the field.
-    """
-    shapes(r)
-    n, ends = len(r.frames), r.offsets
-    if ends[0] != 0 or ends[-1] != n:
-        raise Wrong(f"offsets: expected from 0 to {n}, the number of frames, found {ends[0]} to {ends[-1]}", "offsets")
-    _hold([("offsets", ends[1:] >= ends[:-1], "at least one frame", None)])
-    if (of := r.event_recording) is not None:
-        _hold([("event_recording", (of >= 0) & (of < len(ends) - 1), f"0 to {len(ends) - 2}", None)])
-
-
-def shapes(r: Recordings) -> None:
-    """Types, shapes and numbers: what can be told before anything is unpacked. Raises Wrong with the field."""
+def _shapes(r: Recordings) -> None:
+    """Types, shapes and numbers: what must hold for the fields to be told apart. Raises Wrong."""
     if r.frames.ndim != 3 or not all(SIDES[0] <= side <= SIDES[1] for side in r.frames.shape[1:]):
         sides = f"R and C from {SIDES[0]} to {SIDES[1]}"
-        raise Wrong(f"frames: expected the shape (N, R, C), {sides}, found {r.frames.shape}", "frames")
+        raise Wrong(f"frames: expected the shape (N, R, C), {sides}, found {r.frames.shape}")
     if r.offsets.ndim != 1 or not len(r.offsets):
-        raise Wrong(f"offsets: expected the shape (G + 1), found {r.offsets.shape}", "offsets")
+        raise Wrong(f"offsets: expected the shape (G + 1), found {r.offsets.shape}")
     n, rows, columns = r.frames.shape
     e = 0 if r.event_recording is None else r.event_recording.size
     sizes = {"N": n, "R": rows, "C": columns, "G": len(r.offsets) - 1, "G + 1": len(r.offsets), "E": e}
     for field, value in r.present():
         form, names = FORMS[field]
         if value.dtype.kind not in DTYPE_KINDS.get(form, "") and value.dtype != form:
-            raise Wrong(f"{field}: expected {form}, found {value.dtype}", field)
+            raise Wrong(f"{field}: expected {form}, found {value.dtype}")
         if value.dtype.kind == "U" and value.dtype.itemsize > 4 * CHARACTERS:
-            raise Wrong(f"{field}: expected text of at most {CHARACTERS} characters, found {value.dtype}", field)
+            raise Wrong(f"{field}: expected text of at most {CHARACTERS} characters, found {value.dtype}")
         expected = tuple(name if isinstance(name, int) else sizes[name] for name in names)
         if value.shape != expected:
-            raise Wrong(f"{field}: expected the shape {expected}, found {value.shape}", field)
+            raise Wrong(f"{field}: expected the shape {expected}, found {value.shape}")
         if len(value) > MOST.get(field, len(value)):
-            raise Wrong(f"{field}: expected at most {MOST[field]}, found {len(value)}", field)
+            raise Wrong(f"{field}: expected at most {MOST[field]}, found {len(value)}")
     for group in (("touches", "touch_ids"), EVENT_FIELDS):
         present = [field for field in group if getattr(r, field) is not None]
         if missing := [field for field in group if present and field not in present]:
-            raise Wrong(f"{present[0]}: expected together with {', '.join(missing)}", present[0])
-
-
-def _hold(rules: Iterator[Right] | list[Right]) -> None:
-    """Wrong for the first recording or event of which one is not right."""
-    for field, right, expected, owner in rules:
-        if not right.all():
-            wrong = int(np.argmin(right))
-            of = "event" if field in EVENT_FIELDS else "recording"
-            raise Wrong(f"{field} of {of} {wrong if owner is None else owner[wrong]}: expected {expected}", field)
+            raise Wrong(f"{present[0]}: expected together with {', '.join(missing)}")
 
 
 def _owner(r: Recordings) -> NDArray[np.int64]:
@@ -139,9 +104,19 @@ def _owner(r: Recordings) -> NDArray[np.int64]:
     return np.repeat(np.arange(len(r)), np.diff(r.offsets))
 
 
+def _offsets(r: Recordings) -> Iterator[Right]:
+    yield "offsets", np.diff(r.offsets) > 0, "at least one frame", None
+
+
+def _frames(r: Recordings) -> Iterator[Right]:
+    if r.frames.dtype.kind == "f" and r.frames.size:
+        low, high = (ends(r.frames, axis=(1, 2)).astype(np.float64) for ends in (np.min, np.max))  # NaN is both
+        yield "frames", np.isfinite(low) & np.isfinite(high), "finite values", _owner(r)
+        yield "frames", (low >= -LARGEST) & (high <= LARGEST), "values that a float32 holds", _owner(r)
+
+
 def _values(r: Recordings) -> Iterator[Right]:
     lengths, owner = np.diff(r.offsets), _owner(r)
-    yield "offsets", lengths > 0, "at least one frame", None
     yield "times", np.isfinite(r.times), "finite seconds", owner
     yield "times", np.abs(r.times) <= LATEST_S, f"seconds, at most {LATEST_S:g}", owner
     later = np.asarray((np.diff(r.times) > 0) | (np.diff(owner) > 0))
@@ -170,8 +145,10 @@ def _touches(r: Recordings) -> Iterator[Right]:
 def _events(r: Recordings) -> Iterator[Right]:
     if r.event_recording is None or r.event_labels is None or r.event_onsets is None or r.event_offsets is None:
         return
+    of, last = r.event_recording, len(r) - 1
+    yield "event_recording", (of >= 0) & (of <= last), f"0 to {last}", None
     yield "event_labels", _match(GESTURE_NAME, r.event_labels), "1 to 64 of a-z, 0-9 and _", None
-    start, end = r.times[r.offsets[:-1]][r.event_recording], r.times[r.offsets[1:] - 1][r.event_recording]
+    start, end = r.times[r.offsets[:-1]][of], r.times[r.offsets[1:] - 1][of]
     onsets, offsets = r.event_onsets, r.event_offsets
     yield "event_onsets", (onsets >= start) & (onsets <= end), "a time within the recording", None
     yield "event_offsets", (offsets >= onsets) & (offsets <= end), "a time from the onset to the recording's end", None
