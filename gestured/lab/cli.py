@@ -19,7 +19,7 @@ from gestured.lab.recordings.flags import add_recordings
 
 CACHE = Path(".cache/lab")
 MODELS = Path("models")
-LAB_PACKAGES = ("torch", "sklearn", "onnx", "mpmath", "pywt", "jinja2", "matplotlib")
+LAB_PACKAGES = ("torch", "sklearn", "onnx", "pywt", "jinja2", "matplotlib")
 # The module whose `run` each command is, imported when it is asked for: some need seconds, or what others do not.
 PROGRAMS = {
     "train": "gestured.lab.commands",
@@ -123,15 +123,13 @@ def parser() -> argparse.ArgumentParser:
     stability.add_argument("--document", type=Path, metavar="FILE",
                            help="a page whose tables are written anew, such as docs/numerics.md")  # fmt: skip
     study = add("study", "compare every method of the paper, and some beyond it, under several protocols; "
-                "writes its tables and figures, study.json and CSV files; goes on where it was interrupted",
+                "writes its tables, its figures and study.json; goes on where it was interrupted",
                 "gestured-lab study --out report/ --jobs 2")  # fmt: skip
     study.add_argument("--out", type=Path, default=Path("report"), help="folder for the report (default: report)")
     study.add_argument("--seeds", type=int, default=3, help="seeds of each figure of the main tables (default: 3)")
-    study.add_argument("--draw", type=Path, metavar="FILE", help="compute nothing: draw the picture of error against "
-                       "run time again, from the study.json or operating-points.json of an earlier run")  # fmt: skip
-    study.add_argument("--document", type=Path, metavar="PAGE", help="a page whose block `study` is written anew, such "
-                       "as docs/study.md, and the picture beside it; with --draw one whose block `choice` is, such as "
-                       "docs/figures.md")  # fmt: skip
+    study.add_argument("--document", type=Path, nargs="+", metavar="PAGE", help="a page whose block `study` is written "
+                       "anew, such as docs/study.md, with the picture beside it, and others whose block `choice` is, "
+                       "such as docs/figures.md")  # fmt: skip
     study.add_argument("--foreign", type=Path, metavar="FILE", help="recordings that judge, and teach nothing: of "
                        "another generator (python -m experiments.foreign.recordings) or another sensor")  # fmt: skip
     study.add_argument("--cluster", metavar="ADDRESS", help="compute on this Dask cluster, such as tcp://HOST:8786")

@@ -25,7 +25,7 @@ def code_digest(module: str, aside: frozenset[str] = frozenset()) -> str:
         path = todo.pop()
         if path not in found:
             found[path] = tree = _WithoutTexts().visit(ast.parse(path.read_bytes()))
-            todo += [other for name in _named(tree, path) if name not in aside for other in _files(name)]
+            todo += [other for name in _named(tree) if name not in aside for other in _files(name)]
     total = hashlib.sha256()
     for path in sorted(found):
         total.update(f"{path.relative_to(PACKAGE)}\n{ast.dump(found[path])}\n".encode())
@@ -45,17 +45,14 @@ class _WithoutTexts(ast.NodeTransformer):
         return None if isinstance(node.value, ast.Constant) else self.generic_visit(node)
 
 
-def _named(tree: ast.Module, path: Path) -> Iterator[str]:
-    """Every name in a file's code that may be a module's."""
-    package = path.relative_to(PACKAGE.parent).parts[:-1]
+def _named(tree: ast.Module) -> Iterator[str]:
+    """Every name in a file's code that may be a module's; no import is relative (ruff's TID252)."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            above = package[: len(package) - node.level + 1] if node.level else ()
-            base = ".".join([*above, *([node.module] if node.module else [])])
-            yield base
-            yield from (f"{base}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             yield node.value
 

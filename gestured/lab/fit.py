@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from gestured.lab.augment import symmetry_table, turned, varied
 from gestured.lab.checkpoints import restore, store
-from gestured.lab.nets import CnnGru, CnnLstm, Lstm, Opinion
+from gestured.lab.nets import CnnLstm, Lstm, Opinion
 from gestured.lab.prefixes import askable, drawn, floors, shortened
 from gestured.lab.progress import progress
 from gestured.lab.samples import EVERYDAY, WINDOW, Samples
@@ -56,7 +56,6 @@ KINDS: dict[str, tuple[type[Opinion], float]] = {  # each with its learning rate
     "cnn_lstm": (CnnLstm, 4e-3),
     "lstm": (Lstm, 8e-3),
     "trajectory": (TrajectoryNet, 3e-3),
-    "cnn_gru": (CnnGru, 4e-3),
 }
 
 

@@ -63,14 +63,9 @@ class Recurrent(Opinion):
         """(B, T, R, C) -> (B, T, inputs); the whole frame, flattened."""
         return SCALE * x.flatten(2)
 
-    def states(self, features: Tensor) -> Tensor:
-        """(B, T, inputs) -> (B, T, units): what is remembered after each frame."""
-        remembered: Tensor = self.lstm(features)[0]
-        return remembered
-
     def embed(self, x: Tensor, lengths: Tensor | None = None) -> Tensor:
         """(B, T, R, C) -> (B, units): the state at `read_at`."""
-        states = self.states(self.features(x))
+        states: Tensor = self.lstm(self.features(x))[0]
         index = read_at(x, lengths)[:, None, None].expand(-1, 1, states.shape[2])
         return states.gather(1, index)[:, 0]
 
@@ -107,20 +102,6 @@ class CnnLstm(Recurrent):
         batch, time = x.shape[0], x.shape[1]
         y: Tensor = self.convolutions(SCALE * x.reshape(-1, 1, x.shape[2], x.shape[3]))
         return y.reshape(batch, time, -1)
-
-
-class CnnGru(CnnLstm):
-    """The same convolutions, then gated recurrent units, which have fewer weights. Compared, not shipped."""
-
-    def __init__(self, rows: int, columns: int, classes: int) -> None:
-        super().__init__(rows, columns, classes)
-        self.gru = nn.GRU(self.lstm.input_size, self.lstm.hidden_size, batch_first=True)
-        del self.lstm
-
-    def states(self, features: Tensor) -> Tensor:
-        """(B, T, inputs) -> (B, T, units): what is remembered after each frame."""
-        remembered: Tensor = self.gru(features)[0]
-        return remembered
 
 
 class Perceptron(nn.Module):

@@ -39,7 +39,8 @@ from gestured.lab.verifier import Evidence, fit_verifier, taught, with_past_of
 from gestured.model.context import NAMES
 from gestured.model.features import feature_names
 from gestured.record.arrays import read
-from gestured.simulator import GESTURES, NONE, wide
+from gestured.simulator import GESTURES
+from gestured.simulator.cohort import wide_plan
 
 REAL_SETS = ("taps and swipes", "with non-gestures")  # sets of real recordings that judge
 REAL_FILES = ("capfingerid_gestures_dev.npz", "capfingerid_sessions_dev.npz")
@@ -127,7 +128,7 @@ def load_data(
         {"nominal": both.take(person >= 28), "wide": test},
         {
             "nominal": int((plans >= 28).sum()),
-            "wide": sum(wide(3, index).label != NONE for index in range(plan.wide_check)),
+            "wide": sum(wide_plan(3, index).kind in GESTURES for index in range(plan.wide_check)),
             **performed,
         },
         found and found[0],

@@ -258,8 +258,8 @@ def test_no_real_subject_is_judged_by_a_net_that_has_seen_it(
     # A candidate is another training: nothing of the shipped networks is taken for it.
     monkeypatch.setattr(train, "pretrain", lambda *given: build(given[-1]))
     monkeypatch.setattr(train, "finetune", tune)
-    candidate = train.learn(train.TrainingPlan(), data, tmp_path, ["cnn_gru"])
-    assert set(candidate.nets) == {"cnn_gru"} == set(candidate.held_out or ())
+    candidate = train.learn(train.TrainingPlan(), data, tmp_path, ["lstm"])
+    assert set(candidate.nets) == {"lstm"} == set(candidate.held_out or ())
 
 
 def test_stage_two_starts_from_stage_one_and_leaves_it_alone(samples: Samples) -> None:

@@ -3,8 +3,8 @@
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
+from gestured.lab.drawing import INK, SOFT, sheet, styled, svg
 from gestured.lab.everyday.report import RULED, Figures, not_right
-from gestured.lab.study.report.drawing import INK, SOFT, sheet, styled, svg
 
 WIDTH, HEIGHT = 700, 460  # pixels
 MODELS = (("#0067a5", "o"), ("#b9480a", "s"), ("#96498a", "^"), ("#007a5a", "D"))  # colour and mark of each in turn

@@ -9,7 +9,7 @@ from gestured.lab.made_of import made_of, renew
 from gestured.lab.stability.day import day_table
 from gestured.lab.stability.decisions import decisions_table
 from gestured.lab.stability.extremes import whole_path_table
-from gestured.lab.stability.relaxation import filters_table
+from gestured.lab.stability.filters import filters_table
 from gestured.lab.stability.stiff import stiff_table
 from gestured.lab.table import Table
 from gestured.model.opening import open_model

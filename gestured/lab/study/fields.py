@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from gestured.lab.decide import confidence
-from gestured.lab.digest import file_digest
 from gestured.lab.evaluate import model_answers
 from gestured.lab.manifest import measured
 from gestured.lab.samples import WINDOW, Samples
@@ -78,15 +77,3 @@ def _manifest(name: str) -> dict[str, Any] | None:
         found |= {"wrong_low": wrong["low"], "wrong_high": wrong["high"]}
         found |= {"error_low": 1 - right["high"], "error_high": 1 - right["low"]}
     return {name: round(share, 4) for name, share in found.items()} | {"performed": row["gestures"]}
-
-
-def renewed(study: Mapping[str, Any]) -> dict[str, Any]:
-    """The same study with the manifest's real figures of the shipped models, where it timed those that are here."""
-    here = {name: file_digest(path) for name, path in shipped().items()}
-    rows = []
-    for row in study["run_time"]:
-        name = SHIPPED.get(row["method"]) if row["settings"] == "shipped" else None
-        same = name and (study["about"].get("models") or {}).get(name) == here[name]
-        real = _manifest(name) if name and same else None
-        rows.append({**row, "fields": row["fields"] | {"real": real}} if real else row)
-    return {**study, "run_time": rows}

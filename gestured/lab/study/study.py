@@ -1,11 +1,14 @@
 """`gestured-lab study`, put together: data, hyperparameters, cells, and every section of study.json."""
 
 import argparse
-import csv
 import json
+import os
+import platform
+import re
 import time
 from collections.abc import Mapping
 from dataclasses import asdict
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +17,16 @@ import torch
 import gestured
 from gestured.core.errors import GesturedError
 from gestured.lab.digest import file_digest
-from gestured.lab.made_of import OLDER, made_of, renew
+from gestured.lab.made_of import made_of, renew
 from gestured.lab.study import cohort, recorded, tables
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.choices import choices
-from gestured.lab.study.fields import renewed, with_fields
-from gestured.lab.study.machine import machine
+from gestured.lab.study.fields import with_fields
 from gestured.lab.study.material import Data
 from gestured.lab.study.methods import METHODS
+from gestured.lab.study.picture import write_picture
 from gestured.lab.study.plan import Plan
-from gestured.lab.study.report.choice import table
-from gestured.lab.study.report.page import write_report
-from gestured.lab.study.report.picture import write_picture
+from gestured.lab.study.report import choice, write_report
 from gestured.lab.study.run_time import measure
 from gestured.lab.study.sessions import online
 from gestured.lab.study.tuning import TUNING, tune
@@ -43,17 +44,6 @@ PAPER_CITED = (
 def run(args: argparse.Namespace) -> int:
     """`gestured-lab study`."""
     torch.set_num_threads(1)
-    if args.draw:
-        args.out.mkdir(parents=True, exist_ok=True)
-        kept = renewed(_kept(args.draw))
-        path = write_picture(kept, args.out)
-        older = kept["about"]["models"] != {name: file_digest(path) for name, path in shipped().items()}
-        below = [made_of(args.words, [path, path.with_suffix(".json")]), *(["", OLDER] if older else []), ""]
-        below += table(kept)
-        if args.document:
-            renew(args.document, "choice", below)
-        print("\n".join([str(path), *below]))
-        return 0
     if args.seeds < 1:
         raise GesturedError(f"--seeds: expected 1 or more, found {args.seeds}")
     plan = Plan.small(args.seed) if args.quick else Plan(args.seed, seeds=args.seeds)
@@ -61,25 +51,18 @@ def run(args: argparse.Namespace) -> int:
     study = compute(plan, schedule, args.real, args.foreign)
     study["about"]["command"] = args.words
     args.out.mkdir(parents=True, exist_ok=True)
-    write(study, args.out)
+    with atomic_write(args.out / "study.json", PUBLIC) as file:
+        file.write(json.dumps(study).encode())
     tables_path = write_report(study, args.out)
     if args.document:
         lines = tables_path.read_text("utf-8").splitlines()[1:]  # the first says what they were made of, as `made` does
         made = made_of(args.words, shipped().values())
-        renew(args.document, "study", [made, "", *(line for line in lines if not line.startswith("!["))])
-        write_picture(study, args.document.parent)
+        renew(args.document[0], "study", [made, "", *(line for line in lines if not line.startswith("!["))])
+        write_picture(study, args.document[0].parent)
+        for document in args.document[1:]:
+            renew(document, "choice", [made, "", *choice(study)])
     print(json.dumps(study, indent=2) if args.json else f"{tables_path}: {study['machine']['minutes']} minutes")
     return 0
-
-
-def _kept(path: Path) -> dict[str, Any]:
-    """What an earlier run wrote. Raises GesturedError where it is not that."""
-    try:
-        found = json.loads(path.read_text())
-        needed = ("about", "machine", "methods", "run_time", "online", "online_shipped")
-        return {name: found[name] for name in needed}
-    except (ValueError, KeyError, TypeError) as error:
-        raise GesturedError(f"--draw: {path}: expected study.json or operating-points.json: {error!r}") from None
 
 
 def compute(plan: Plan, schedule: Schedule, folder: Path | None, others: Path | None = None) -> dict[str, Any]:
@@ -161,15 +144,12 @@ def _about(name: str, tuned: Mapping[str, Values]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def write(study: Mapping[str, Any], out: Path) -> None:
-    """study.json, and a CSV file for each section that is a table."""
-    with atomic_write(out / "study.json", PUBLIC) as file:
-        file.write(json.dumps(study).encode())
-    for name in ("cells", "copies", "run_time", "online"):
-        rows = [{k: v for k, v in row.items() if not isinstance(v, list | dict)} for row in study.get(name, [])]
-        if not rows:
-            continue
-        with (out / f"{name}.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)))
-            writer.writeheader()
-            writer.writerows(rows)
+def machine() -> dict[str, object]:
+    """Processor, cores, versions and today's date; `minutes` is filled in at the end."""
+    info = Path("/proc/cpuinfo")
+    model = re.search(r"model name\s*: (.*)", info.read_text()) if info.exists() else None
+    return {
+        "cpu": model[1] if model else platform.processor() or platform.machine(), "cores": os.cpu_count(),
+        "python": platform.python_version(), "date": time.strftime("%Y-%m-%d"), "minutes": 0.0,
+        **{name: version(name) for name in ("numpy", "torch", "scikit-learn", "onnxruntime")},
+    }  # fmt: skip

@@ -26,9 +26,7 @@ def made_study() -> Study:
         "version": "0.0-made-up", "command": "gestured-lab study --out report/", "seed": 0, "seeds": 3, "quick": False,
         "models": {"lstm": "ab" * 32}, "paper": "somebody, made up", "gestures": list(GESTURES),
     }  # fmt: skip
-    machine = {
-        "cpu": "A made-up CPU", "cores": 2, "memory_gib": 7.8, "system": "Linux", "date": "2001-02-03", "minutes": 87.5,
-    }  # fmt: skip
+    machine = {"cpu": "A made-up CPU", "cores": 2, "date": "2001-02-03", "minutes": 87.5}
     data = {
         "simulated": {"name": "a simulator", "participants": 34, "performed": 3060, "cut": 3011, "lost": 49},
         "real": {"name": "CapFingerId (made-up figures)", "subjects": 20, "gestures": 1801, "non_gestures": 350},

@@ -1,4 +1,4 @@
-"""The report as a reader meets it: every figure of the study in its tables, and its pictures beside them."""
+"""The report as a reader meets it: every figure of the study in its tables, its pictures, the table of choices."""
 
 import re
 import subprocess
@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from gestured.lab.study.report.page import write_report
-from gestured.lab.study.report.reading import PROTOCOLS
+from gestured.lab.study.picture import FIELDS
+from gestured.lab.study.report import PROTOCOLS, choice, write_report
 from tests.lab.study.made_study import METHODS, Study, made_study
 
 
@@ -35,6 +35,24 @@ def test_every_picture_that_it_shows_is_drawn(report: Path) -> None:
         drawn = report.with_name(name).read_text("utf-8")
         assert ElementTree.fromstring(drawn).tag.endswith("svg")
         assert not re.search(r"\b(nan|inf|None)\b", drawn)
+
+
+def test_the_picture_names_what_ships_in_every_field(report: Path) -> None:
+    root = ElementTree.parse(report.with_name("operating-points.svg")).getroot()
+    words = {text.text for text in root.iter("{http://www.w3.org/2000/svg}text")}
+    assert words >= {*FIELDS.values(), "LSTM, ships", "CNN-LSTM, ships"}
+
+
+def test_who_takes_which_model(study: Study) -> None:
+    lines = choice(study)
+    ships = next(line for line in lines if line.startswith("| CNN-LSTM |"))
+    (row,) = [r for r in study["run_time"] if (r["method"], r["settings"]) == ("cnn_lstm", "shipped")]
+    wrong = [f"{100 * row['fields'][field]['wrong']:.1f}" for field in FIELDS]
+    simulated = row["fields"]["simulated"]
+    error, low, high = (f"{100 * simulated[name]:.1f}" for name in ("error", "error_low", "error_high"))
+    assert ships.split(" | ")[3].startswith(f"{error} ({low}–{high}), ")
+    assert ships.split(" | ")[2] == ", ".join(wrong) and ships.endswith("| 0.31 |")
+    assert len({line.count("|") for line in lines}) == 1
 
 
 def test_every_cell_of_the_main_tables_stands_in_the_row_of_its_method(report: Path, study: Study) -> None:

@@ -1,23 +1,22 @@
-"""operating-points.svg: error against run time in three fields."""
+"""The study's pictures: error against run time in three fields, and which gesture is taken for which."""
 
 import json
 import math
-import shlex
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from gestured.core.timing import Timing
-from gestured.lab.made_of import command_of
+from gestured.lab.drawing import INK, SOFT, sheet, styled, svg
 from gestured.lab.samples import WINDOW
 
-from . import reading
-from .drawing import INK, SOFT, sheet, styled, svg
-from .reading import Row, Study
-
+Study = dict[str, Any]
+Row = dict[str, Any]
 FIELDS = {"simulated": "simulated people", "foreign": "another generator", "real": "real fingers"}
 LEAST = 0.001  # an error of 0 is drawn here: a logarithm cannot show it
 WIDTH, HEIGHT = 1060, 430  # pixels
@@ -27,6 +26,17 @@ WAIT_MS = FRAME_MS + 1000 * Timing().release_s  # a contact is over after so muc
 Name = tuple[float, float, bool, str]  # error, time, whether the model ships, words
 LINE = 15  # pixels of a name
 NAMED = 2  # methods beside those that ship, the best ones of a field
+SHORT = {" features, ": " ", "k nearest neighbours": "KNN", "support vector machine": "SVM", " (RBF)": ""}
+CONFUSION = "Which gesture is taken for which"
+ACROSS = 4  # matrices beside each other
+
+
+def title(study: Study, method: str) -> str:
+    """A method's name, as short as it is clear."""
+    name = str(study["methods"][method]["title"])
+    for words, fewer in SHORT.items():
+        name = name.replace(words, fewer)
+    return name
 
 
 def write_picture(study: Study, out: Path) -> Path:
@@ -40,14 +50,11 @@ def write_picture(study: Study, out: Path) -> Path:
 
 def points(study: Study) -> Study:
     """What the picture is drawn from, and where it comes from: the part of a study that is kept beside it."""
-    about = {name: study["about"].get(name) for name in ("command", "version", "seed", "models", "quick")}
-    about["command"] = command_of(shlex.split(about["command"] or ""))  # an older run named its folders
     timed = {row["method"] for row in study["run_time"]}
-    named = {name: of for name, of in study["methods"].items() if name in timed}
     return {
-        "about": about,
+        "about": {name: study["about"][name] for name in ("command", "version", "seed", "models", "quick")},
         "machine": study["machine"],
-        "methods": {name: {"title": of["title"], "family": of["family"]} for name, of in named.items()},
+        "methods": {name: {"title": of["title"]} for name, of in study["methods"].items() if name in timed},
         "run_time": study["run_time"],
         **{name: [_false(row) for row in study[name]] for name in ("online", "online_shipped")},
     }
@@ -116,7 +123,7 @@ def _field(study: Study, axes: Axes, rows: list[Row], field: str) -> list[Name]:
 def _point(study: Study, row: Row, field: str) -> tuple[float, float, bool, str]:
     """When a model answers (ms), how often it is wrong or loses a gesture, whether it ships, and its name."""
     error = max(LEAST, row["fields"][field]["error"])
-    return WAIT_MS + row["cold_us"] / 1000, error, row["settings"] == "shipped", reading.title(study, row["method"])
+    return WAIT_MS + row["cold_us"] / 1000, error, row["settings"] == "shipped", title(study, row["method"])
 
 
 def _name(axes: Axes, names: list[Name]) -> None:
@@ -131,3 +138,30 @@ def _name(axes: Axes, names: list[Name]) -> None:
             words, (time, error), (16, up), textcoords="offset points", va="center",
             fontweight="bold" if ships else "normal", arrowprops=arrow if up else None,
         )  # fmt: skip
+
+
+def confusion(study: Study) -> Figure:
+    """Of each method which gesture (row) is taken for which (column), in per cent of the row.
+
+    The cells are those of people never seen, tuned, with shifted copies.
+    """
+    wanted = {"protocol": "participants", "settings": "tuned", "augmentation": "shift", "data": "simulated"}
+    rows = [row for row in study["cells"] if all(row[name] == value for name, value in wanted.items())]
+    names = [name.replace("_", " ") for name in study["about"]["gestures"]]
+    down = -(-len(rows) // ACROSS)
+    figure = sheet(180 + 250 * min(ACROSS, len(rows)), 150 + 280 * down)
+    panels = figure.subplots(down, min(ACROSS, len(rows)), sharey=True, squeeze=False).ravel()
+    for axes in panels[len(rows) :]:
+        axes.set_visible(False)
+    for k, (axes, row) in enumerate(zip(panels, rows, strict=False)):
+        counts = np.array(row["confusion"], float)
+        shares = 100 * counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+        axes.imshow(shares, cmap="Blues", vmin=0, vmax=140)  # no darker than that the number can be read
+        axes.set_title(title(study, row["method"]), color=INK)
+        axes.grid(visible=False)
+        below = names if k + ACROSS >= len(rows) else [""] * len(names)
+        axes.set_xticks(range(len(names)), below, rotation=90)
+        axes.set_yticks(range(len(names)), names)
+        for i, j in np.argwhere(shares):
+            axes.text(j, i, f"{shares[i, j]:.0f}", ha="center", va="center", fontsize=8)
+    return figure

@@ -1,4 +1,4 @@
-"""The look of the study's figures: matplotlib's style, and how a figure is written."""
+"""The look of the laboratory's figures: matplotlib's style, and how a figure is written."""
 
 import io
 from contextlib import AbstractContextManager
