@@ -14,8 +14,6 @@ import signal
 import subprocess
 import sys
 import threading
-import weakref
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -27,16 +25,19 @@ START = "import sys; sys.path[:] = sys.argv[1:]; from gestured.model.worker impo
 ENVIRONMENT_KEPT = ("LD_LIBRARY_PATH",)  # of the environment: some systems find the C++ library by it
 
 _turn = threading.Lock()  # one file is opened at a time: each child may take memory of the same service
-_birth = threading.Lock()  # held from a child's start until it is among `_children`
-_children: "weakref.WeakSet[subprocess.Popen[bytes]]" = weakref.WeakSet()  # those that run; the set keeps none alive
+_child: "subprocess.Popen[bytes] | None" = None  # the one that was started last
 _ending = False
 
 
 def try_out(data: bytes) -> dict[str, Any]:
     """`Model.report` of a file that opens and passes its self-test. ValueError says what is wrong with it."""
-    with _turn, _start() as child:  # leaving this block waits for the child's end
+    global _child
+    with _turn, _started() as child:  # leaving this block waits for the child's end
+        _child = child
         assert child.stdin is not None and child.stdout is not None
         try:
+            if _ending:
+                raise ValueError("was not opened: the program ends")
             with suppress(OSError):  # the child has ended already
                 child.stdin.write(bytes([OPEN_S]))
                 child.stdin.write(data)
@@ -53,6 +54,17 @@ def try_out(data: bytes) -> dict[str, Any]:
     return answer
 
 
+def end_all() -> None:
+    """End the child, and let none do any work from now on: the program ends. A signal's handler may ask for it.
+
+    A child that is being started meanwhile finds the end of its input, and ends by itself.
+    """
+    global _ending
+    _ending = True
+    if _child is not None:
+        _child.kill()
+
+
 def _end_of(child: "subprocess.Popen[bytes]") -> str:
     """Why a child has ended without an answer."""
     child.kill()
@@ -65,41 +77,20 @@ def _end_of(child: "subprocess.Popen[bytes]") -> str:
     return f"onnxruntime dies of it ({what})"
 
 
-def end_all() -> None:
-    """End all children, and let no more begin: the program ends. A signal's handler may ask for it."""
-    global _ending
-    with _birth:
-        _ending = True
-        for child in tuple(_children):
-            child.kill()
-
-
-def _start() -> "subprocess.Popen[bytes]":
-    """Start a child, in a thread of its own, so that a handler that interrupts this one can wait for its birth."""
-    if _ending:  # no thread can be started then
-        raise ValueError("was not opened: the program ends")
-    with ThreadPoolExecutor(1) as pool:
-        return pool.submit(_bear).result()
-
-
-def _bear() -> "subprocess.Popen[bytes]":
+def _started() -> "subprocess.Popen[bytes]":
+    """A child that waits for its input."""
     root = Path(__file__).resolve().parents[2]
     folders = [str(root), *(folder for folder in sys.path if os.path.isabs(folder))]
-    with _birth:
-        try:
-            child = subprocess.Popen(
-                [sys.executable, "-I", "-S", "-c", START, *folders],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                cwd="/",
-                env={name: os.environ[name] for name in ENVIRONMENT_KEPT if name in os.environ}
-                | {"ORT_DISABLE_TELEMETRY": "1", "OPENBLAS_NUM_THREADS": "1"},
-                start_new_session=True,  # Ctrl-C is for us
-            )
-        except OSError as error:
-            raise ValueError(f"no process could be started to try it: {error.strerror or error}") from error
-        _children.add(child)
-        if _ending:
-            child.kill()
-        return child
+    try:
+        return subprocess.Popen(
+            [sys.executable, "-I", "-S", "-c", START, *folders],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            cwd="/",
+            env={name: os.environ[name] for name in ENVIRONMENT_KEPT if name in os.environ}
+            | {"ORT_DISABLE_TELEMETRY": "1", "OPENBLAS_NUM_THREADS": "1"},
+            start_new_session=True,  # Ctrl-C is for us
+        )
+    except OSError as error:
+        raise ValueError(f"no process could be started to try it: {error.strerror or error}") from error
