@@ -31,7 +31,7 @@ def explain(settings: Settings, sources: Mapping[str, str]) -> str:
     used = gestures_in_use(ladder, settings.gestures)
     path = settings.socket or default_socket(os.environ)
     grid = settings.grid or f"{ladder.rows}x{ladder.columns}"
-    rungs = [f"{rung.name}{'' if rung.model is None else ', in use'}" for rung in ladder.rungs[1:]]
+    rungs = [f"{rung.name}{', in use' if rung.name == ladder.active else ''}" for rung in ladder.rungs[1:]]
     forest = model.metadata.features is not None
     timing = Timing(tap_gap_s=settings.tap_gap_s)
     waits, rate_hz = DOUBLE_TAP in used, model.metadata.rate_hz

@@ -28,10 +28,10 @@ RETRY_S = 30.0  # how long a rung is put aside: trying it again may delay anothe
 class Ladder:
     """Models, best first, as one `Classifier`: a rung that fails hands the same segment to the next.
 
-    A rung that cannot be opened, raises or gives scores that are not finite is put aside for RETRY_S of `clock`, as is
-    one that took more than `slow_s` seconds SLOW_RUNS times in a row; then it is tried again. Rungs that are aside
-    still come last, before giving up. What another rung than the first says is `degraded`. Gestures of the user's own
-    are compared by the rung that answers.
+    A rung that raises or gives scores that are not finite is put aside for RETRY_S of `clock`, as is one that took more
+    than `slow_s` seconds SLOW_RUNS times in a row; then it is tried again. One that cannot be opened is put aside for
+    good. Rungs that are aside still come last, before giving up. What another rung than the first says is `degraded`.
+    Gestures of the user's own are compared by the rung that answers.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class Ladder:
     @property
     def source(self) -> str:
         """The file, or the shipped name, of `active`."""
-        return str(self._active.source) if isinstance(self._active.source, str | Path) else self.active
+        return str(self._active.source)
 
     @property
     def rung(self) -> int:
@@ -151,7 +151,7 @@ class Ladder:
         failed: list[tuple[Rung, str]] = []
         for rung in self.rungs:
             try:
-                opened = rung.open_first()
+                opened = rung.open()
             except ModelError as error:
                 failed.append((rung, str(error)))
                 continue
@@ -161,15 +161,12 @@ class Ladder:
         raise ModelError("; ".join(reason for _, reason in failed))
 
     def _check_gestures(self, rung: Rung) -> None:
-        """A fallback that cannot be read now may come back; one that knows other gestures is a mistake."""
+        """Put a fallback that cannot be opened aside; one that knows other gestures is a mistake."""
         try:
             gestures = rung.gestures()
         except ModelError as error:
             if rung.aside_until == -math.inf:
-                if rung.gone:
-                    self._put_aside(rung, str(error))
-                else:
-                    self.report(f"{rung.name} could not be used: {error}")
+                self._put_aside(rung, str(error))
             return
         if gestures != self.gestures:
             raise ModelError(
@@ -179,9 +176,9 @@ class Ladder:
 
     def _put_aside(self, rung: Rung, reason: str) -> None:
         rung.slow = 0
-        rung.aside_until = math.inf if rung.gone else self._clock() + RETRY_S
+        rung.aside_until = self._clock() + RETRY_S if rung.refused is None else math.inf
         self.failures += 1
-        until = "until a reload" if rung.gone else f"for {RETRY_S:g} s"
+        until = f"for {RETRY_S:g} s" if rung.refused is None else "until a reload"
         self.report(f"{rung.name} is put aside {until}: {reason}")
 
     def _timed(self, rung: Rung, took: float) -> None:

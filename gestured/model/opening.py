@@ -1,4 +1,4 @@
-"""Ways to open a model's file: here, in a process of its own, or only to learn its gestures.
+"""A model's file is opened here, or looked at in a process of its own.
 
 A file is read once, checked against the manifest (where it ships) or tried in a process of its own first (where it
 does not: `process`), and opened from those bytes. Whatever is wrong is one `ModelError`: the file, what is wrong, what
@@ -11,42 +11,26 @@ from weakref import WeakValueDictionary
 
 from gestured.model.model import Model
 from gestured.model.process import try_out
-from gestured.model.shipped import manifest_gestures, naming, read
+from gestured.model.shipped import naming, read
 
 # Models of this process by sha256 and name: they have no state, so that any number of ladders may hold one.
 _opened: WeakValueDictionary[tuple[str, str], Model] = WeakValueDictionary()
 
 
-def open_model(source: str | Path, tried: str | None = None) -> Model:
+def open_model(source: str | Path) -> Model:
     """Open and verify a model: a path, or the bare name of a shipped one. Raises ModelError.
 
     A file that does not ship is tried in a process of its own first, which takes about half a second, at most some
-    seconds, unless `tried` is its sha256, of an earlier try. A model that is open already is shared.
+    seconds. A model that is open already is shared.
     """
     path, name, data, sha256 = read(source)
     with naming(path):
-        if name is None and tried is not None and tried != sha256:
-            raise ValueError("is not the file that was tried any more; a reload takes the new one")
         model = _opened.get((sha256, path.stem))
         if model is None:
-            if name is None and tried is None:
+            if name is None:
                 try_out(data)
             model = _opened[sha256, path.stem] = Model(data, path.stem)
         return model
-
-
-def look_at(source: str | Path) -> tuple[tuple[str, ...], str]:
-    """(gestures, sha256) of a model that `open_model` will open at once, because it ships or was tried here.
-
-    Raises ModelError.
-    """
-    path, name, data, sha256 = read(source)
-    with naming(path):
-        if (model := _opened.get((sha256, path.stem))) is not None:
-            return model.gestures, sha256
-        if name is None:
-            return tuple(try_out(data)["gestures"]), sha256
-        return manifest_gestures(path), sha256
 
 
 def check(source: str | Path) -> dict[str, Any]:

@@ -1,58 +1,49 @@
-"""One model of a ladder, opened when it is first needed."""
+"""One model of a ladder, and whether it can be used now."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from gestured.core.errors import ModelError
 from gestured.model.model import Model
-from gestured.model.opening import look_at, open_model
-from gestured.model.shipped import shipped_name
+from gestured.model.opening import open_model
+from gestured.model.shipped import shipped_gestures, shipped_name
+
+T = TypeVar("T")
 
 
 class Rung:
-    """What is known of a model before it is opened, and whether it can be used now."""
+    """A model: open already, or a file that is opened when it is first needed.
+
+    A file that was refused is not looked at again before a reload: trying one may take seconds.
+    """
 
     def __init__(self, source: str | Path | Model) -> None:
-        self.source = source  # a file, a shipped model's name, or a model that is open already
-        self.model = None if isinstance(source, str | Path) else source
-        self.name = Path(source).stem if isinstance(source, str | Path) else source.name
+        self.model = source if isinstance(source, Model) else None
+        self.source = source.name if isinstance(source, Model) else source  # a file, or a shipped model's name
+        self.name = Path(self.source).stem
         self.slow = 0  # runs in a row that took too long
         self.aside_until = -math.inf  # s, on the clock of whoever puts it aside
-        self._ships = isinstance(source, str | Path) and shipped_name(source) is not None
-        self._tried = ""  # sha256 of the file that was tried and found good
-        self._refused: ModelError | None = None  # why the file that was tried is no model
+        self.refused: ModelError | None = None
 
     def open(self) -> Model:
-        """The rung's model, at once: a file that does not ship was tried by `gestures` before. Raises ModelError."""
-        if self._refused is not None:
-            raise self._refused
+        """The rung's model. Raises ModelError."""
         if self.model is None:
-            assert isinstance(self.source, str | Path)
-            self.model = open_model(self.source, self._tried)
+            self.model = self._once(lambda: open_model(self.source))
         return self.model
 
-    def open_first(self) -> Model:
-        """The rung's model, however long it takes to try its file. Raises ModelError."""
-        if self.model is None and not self._ships:
-            self.gestures()
-        return self.open()
-
     def gestures(self) -> tuple[str, ...]:
-        """The gestures that the model knows. A file that ships is not opened for this; any other is tried, once."""
-        if self.model is not None:
-            return self.model.gestures
-        assert isinstance(self.source, str | Path)
-        if self._refused is not None:
-            raise self._refused
-        try:
-            gestures, self._tried = look_at(self.source)
-        except ModelError as error:
-            if not self._ships:
-                self._refused = error
-            raise
-        return gestures
+        """The gestures that the model knows. A file that does not ship is opened for them. Raises ModelError."""
+        if self.model is None and shipped_name(self.source) is not None:
+            return self._once(lambda: shipped_gestures(self.source))
+        return self.open().gestures
 
-    @property
-    def gone(self) -> bool:
-        """Whether the rung cannot be used again before a reload."""
-        return self._refused is not None
+    def _once(self, look: Callable[[], T]) -> T:
+        if self.refused is not None:
+            raise self.refused
+        try:
+            return look()
+        except ModelError as error:
+            self.refused = error
+            raise

@@ -82,9 +82,11 @@ def naming(path: Path) -> Iterator[None]:
         raise ModelError(f"{path}: {error}") from error
 
 
-def manifest_gestures(path: Path) -> tuple[str, ...]:
-    """The gestures of a shipped model, without opening it; ValueError where its manifest does not say."""
-    return tuple(_manifest(path, "gestures"))
+def shipped_gestures(source: str | Path) -> tuple[str, ...]:
+    """The gestures of a shipped model whose file is sound, without opening it. Raises ModelError."""
+    path, *_ = read(source)
+    with naming(path):
+        return tuple(_manifest(path, "gestures"))
 
 
 def _manifest(path: Path, key: str) -> Any:
