@@ -52,15 +52,12 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", metavar="PART", help="parts of the table")
     parser.add_argument("--scenes", action="store_true", help="the table of scenes instead")
     parser.add_argument("--json", action="store_true", help="print the rows as JSON")
-    parser.add_argument(
-        "--document", type=Path, metavar="PAGE", help="a page whose block `bench` or `scenes` is written"
-    )
+    parser.add_argument("--document", type=Path, metavar="PAGE", help="a page whose block `bench` is written")
     args = parser.parse_args()
     if args.scenes:
         from benchmarks import scenes
 
-        _write("scenes", args.document, ["", text := scenes.table(args.model)])
-        print(text)
+        print(scenes.table(args.model))
         return 0
     parts = _parts(args.model)
     unknown = set(args.only or ()) - set(parts)
@@ -83,17 +80,11 @@ def main() -> int:
                 print(told[-1], flush=True)
     if args.json:
         print(json.dumps({"machine": machine(), "rows": rows}, indent=2))
-    _write("bench", args.document, ["", where, "", *told])
-    return 0
-
-
-def _write(block: str, document: Path | None, lines: list[str]) -> None:
-    """Write a block into a page, where one is named; its line names the code of the hub and of a model's answer."""
-    if document:
-        flags = "--scenes " if block == "scenes" else ""
+    if args.document:
         code = ("gestured.core.hub", "gestured.model.model")
-        line = made_of(f'make bench ARGS="{flags}--document {document}"', shipped().values(), code)
-        renew(document, block, [line, *lines])
+        line = made_of(f'make bench ARGS="--document {args.document}"', shipped().values(), code)
+        renew(args.document, "bench", [line, "", where, "", *told])
+    return 0
 
 
 if __name__ == "__main__":
