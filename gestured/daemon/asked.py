@@ -10,8 +10,8 @@ from gestured.core.scene import Scene
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.settings import Settings
-from gestured.daemon.sinks import Output, outputs
-from gestured.daemon.tuio import TUIO
+from gestured.daemon.sinks import OscSink, UdpOut
+from gestured.daemon.tuio import TUIO, TuioSink
 from gestured.model import own_file
 from gestured.model.ladder import (
     Ladder,
@@ -31,14 +31,20 @@ class Asked:
 
     settings: Settings
     ladder: Ladder
-    outputs: list[Output]
+    outputs: list[UdpOut]
     own: Path | None  # the file of the user's own gestures
 
 
 def open_all(settings: Settings, metrics: Metrics, *, insist: bool = False) -> Asked:
     """Open what may take long: models, and names of hosts. Raises as `open_ladder`."""
     ladder = open_ladder(settings, insist=insist)
-    return Asked(settings, ladder, outputs(settings, metrics), own_file.where(settings.own_gestures, os.environ))
+    outputs: list[UdpOut] = [
+        TuioSink(one.address, metrics)
+        if one.scheme == TUIO
+        else OscSink(one.address, metrics, provisional=settings.publish_provisional)
+        for one in settings.publish
+    ]
+    return Asked(settings, ladder, outputs, own_file.where(settings.own_gestures, os.environ))
 
 
 def open_ladder(settings: Settings, *, insist: bool = False) -> Ladder:

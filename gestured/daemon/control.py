@@ -17,9 +17,19 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from gestured.core.errors import GesturedError
-from gestured.daemon.caller import Connection, Peer, peer_of
 from gestured.daemon.log import Throttle
-from gestured.daemon.request import MAX_REQUEST_BYTES, Refusal, Reply, ReplyStream, Verb, json_line, parse_request
+from gestured.daemon.request import (
+    MAX_REQUEST_BYTES,
+    Connection,
+    Peer,
+    Refusal,
+    Reply,
+    ReplyStream,
+    Verb,
+    json_line,
+    parse_request,
+    peer_of,
+)
 
 OPERATORS = 16  # connections at a time
 OPERATORS_KEPT = 4  # connections beyond OPERATORS for root and our own user: no member of the group can lock them out

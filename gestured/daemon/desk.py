@@ -1,26 +1,34 @@
-"""What becomes of the hub's facts: events are published, other facts are counted, logged and compared."""
+"""What becomes of the hub's facts: events go to every sink, other facts are counted, logged and compared."""
 
+import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from gestured.core import messages
 from gestured.core.address import Address
+from gestured.core.events import Cancelled, Event, Gesture, Status, Touch, Unknown
 from gestured.core.facts import Arrived, Changed, Decided, Dropped, Fact, Fault, Taken
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.own import OwnGestures
-from gestured.daemon.publisher import Publisher
 from gestured.daemon.shift import Shift
+from gestured.daemon.sinks import Sink
 from gestured.daemon.views import Views
 
+RECENT = 10  # answers that `gesturectl status` shows
 CHANGES = {"silent": "sensor is silent", "restarted": "sensor restarted"}
 
 
 class Desk:
-    """Takes the hub's facts, and what its reader has dropped."""
+    """Takes the hub's facts, events that nobody performed, and what the reader of packets has dropped."""
 
-    def __init__(self, metrics: Metrics, publisher: Publisher, shift: Shift, own: OwnGestures, views: Views) -> None:
-        self._metrics, self._publisher, self._own, self._views = metrics, publisher, own, views
+    def __init__(self, metrics: Metrics, shift: Shift, own: OwnGestures, views: Views, sinks: tuple[Sink, ...]) -> None:
+        self._metrics, self._own, self._views = metrics, own, views
+        self.sinks = sinks  # may be replaced between two events
         self.shift = shift  # how the segments differ from the training data of the model that answers
+        self.models_failed = False  # whether no model could answer the last segment
+        self.recent: deque[dict[str, Any]] = deque(maxlen=RECENT)  # the last answers, oldest first
         self._throttle = Throttle()
 
     def take(self, facts: Sequence[Fact]) -> None:
@@ -39,12 +47,36 @@ class Desk:
             elif isinstance(fact, Fault):
                 self.bug("in the path of a sensor; its front end is reset", fact.error, sensor=fact.sensor)
             elif not isinstance(fact, Taken):
-                self._publisher.publish(fact)
+                self.publish(fact)
         if decided:
             self._beside("in what compares segments with the training's", self.shift.see, decided)
         if self._own.enrolling:
             self._beside("in what judges an example", self._own.see, facts)
         self._views.see(facts)
+
+    def publish(self, event: Event, *, test: bool = False) -> None:
+        """Give an event to every sink, then count it. A `test` was made up, so it counts as no model's answer."""
+        epoch = time.time() - time.monotonic()
+        for sink in self.sinks:
+            try:
+                sink.publish(event, epoch, test=test)
+            except Exception as error:  # a bug in one sink must not keep the event from the others
+                self.bug(f"in the sink {type(sink).__name__}", error)
+        if isinstance(event, Touch):
+            return  # up to 60 a second, which say nothing of what was answered
+        if not test:
+            self._metrics.event(event)
+            if isinstance(event, Gesture | Unknown):
+                self.models_failed = False
+            elif isinstance(event, Cancelled) and event.reason == "model":
+                self.models_failed = True
+        elif isinstance(event, Gesture):
+            self._metrics.tests.add()
+        if isinstance(event, Gesture | Unknown | Cancelled):
+            self.recent.append(_answer(event, epoch, test))
+        if not isinstance(event, Status):
+            name = getattr(event, "gesture", None)
+            log.debug(messages.event_type(event), sensor=event.sensor, id=getattr(event, "id", None), gesture=name)
 
     def drop(self, reason: str, count: int = 1, **fields: object) -> None:
         """Count packets that were dropped; log the reason at a bounded rate."""
@@ -70,15 +102,11 @@ class Desk:
                 self.bug(what, error)
 
     def _count(self, arrived: Arrived) -> None:
-        frames, label = self._metrics.frames, self._metrics.sensor_label(arrived.sensor)
-        if arrived.taken:
-            frames.add(label, "ok", count=arrived.taken)
-        if arrived.lost:
-            frames.add(label, "lost", count=arrived.lost)
-        if arrived.duplicates:
-            frames.add(label, "duplicate", count=arrived.duplicates)
-        if arrived.late:
-            frames.add(label, "late", count=arrived.late)
+        label = self._metrics.sensor_label(arrived.sensor)
+        counts = (arrived.taken, arrived.lost, arrived.duplicates, arrived.late)
+        for result, count in zip(("ok", "lost", "duplicate", "late"), counts, strict=True):
+            if count:
+                self._metrics.frames.add(label, result, count=count)
         if arrived.implausible:
             self._metrics.implausible.add(count=arrived.implausible)
 
@@ -87,3 +115,12 @@ class Desk:
             log.info("new sensor", sensor=change.sensor, source=str(Address(*change.source[:2])))
         else:
             self._throttle.warn(CHANGES[change.what], change.what, sensor=change.sensor)
+
+
+def _answer(event: Gesture | Unknown | Cancelled, epoch: float, test: bool) -> dict[str, Any]:
+    if isinstance(event, Cancelled):
+        when, answer, confidence = time.time(), f"cancelled: {event.reason}", None
+    else:
+        answer = event.gesture if isinstance(event, Gesture) else "unknown"
+        when, confidence = event.decided + epoch, round(event.confidence, 3)
+    return {"time": when, "sensor": event.sensor, "answer": answer, "confidence": confidence, "test": test}

@@ -1,52 +1,52 @@
 """All numbers of the daemon in Prometheus's text format, made where /metrics is asked for and nowhere else."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from gestured import __version__
-from gestured.core.beside.reading import STATES, Reading
+from gestured.core.beside.reading import STATES
 from gestured.daemon.metrics import Counter, Histogram, Metrics
-from gestured.daemon.snapshot import Snapshot
+
+Status = Mapping[str, Any]  # what `status` gives
 
 
-def exposition(metrics: Metrics, snapshot: Snapshot) -> bytes:
-    """The text of /metrics: counters, and gauges of a snapshot. Imports prometheus_client."""
+def exposition(metrics: Metrics, status: Status) -> bytes:
+    """The text of /metrics: counters, and gauges of a status. Imports prometheus_client."""
     from prometheus_client import CollectorRegistry, generate_latest
 
     registry = CollectorRegistry()
-    registry.register(_Collector(metrics, snapshot))
+    registry.register(_Collector(metrics, status))
     return generate_latest(registry)
 
 
-def _silent(reading: Reading) -> bool:
-    return reading.gate is not None and bool(reading.gate.closed)
-
-
 # Figures of each sensor. Sensors that share a label show one figure: the worst of theirs, or the sum of bad taxels.
-_OF_SENSORS: tuple[tuple[str, str, Callable[[Iterable[float]], float], Callable[[Reading], float]], ...] = (
-    ("gestured_sensor_rate_hertz", "Frames a second", min, lambda r: r.rate_hz),
-    ("gestured_sensor_jitter_seconds", "Interarrival jitter of packets", max, lambda r: r.jitter_s),
-    ("gestured_sensor_bad_taxels", "Taxels that are bridged from their neighbours", sum, lambda r: r.bad_taxels),
-    ("gestured_sensor_drift_ratio", "How far the baseline has gone, in units of noise", max, lambda r: r.drift),
+_OF_SENSORS: tuple[tuple[str, str, Callable[[Iterable[float]], float], str], ...] = (
+    ("gestured_sensor_rate_hertz", "Frames a second", min, "rate_hz"),
+    ("gestured_sensor_jitter_seconds", "Interarrival jitter of packets", max, "jitter_s"),
+    ("gestured_sensor_bad_taxels", "Taxels that are bridged from their neighbours", sum, "bad_taxels"),
+    ("gestured_sensor_drift_ratio", "How far the baseline has gone, in units of noise", max, "drift"),
 )
-_OF_THE_DAEMON: tuple[tuple[str, str, Callable[[Snapshot], float]], ...] = (
-    ("gestured_sensors", "Sensors that were heard", lambda s: sum(r.source is not None for r in s.sensors.values())),
-    ("gestured_sensors_silent", "Sensors of which a gate is closed", lambda s: sum(map(_silent, s.sensors.values()))),
-    ("gestured_clients", "Clients of the event socket", lambda s: s.clients),
-    ("gestured_backlog_bytes", "Bytes that wait for slow clients", lambda s: s.backlog_bytes),
-    ("gestured_kernel_drops_total", "Packets that found no room", lambda s: s.kernel_drops),
-    ("gestured_loop_lag_seconds", "How late the event loop is", lambda s: s.loop_lag_s),
-    ("gestured_model_rung", "How far down the ladder stands what answers", lambda s: s.models.rung),
-    ("gestured_model_failures_total", "Models put aside since the last reload", lambda s: s.models.failures),
-    ("gestured_start_time_seconds", "When the daemon started", lambda s: s.started),
+_OF_THE_DAEMON: tuple[tuple[str, str, Callable[[Status], float]], ...] = (
+    ("gestured_sensors", "Sensors that were heard", lambda s: sum("source" in one for one in s["sensors"].values())),
+    (
+        "gestured_sensors_silent",
+        "Sensors of which a gate is closed",
+        lambda s: sum(bool(one["closed"]) for one in s["sensors"].values()),
+    ),
+    ("gestured_clients", "Clients of the event socket", lambda s: s["output"]["subscribers"]),
+    ("gestured_backlog_bytes", "Bytes that wait for slow clients", lambda s: s["output"]["backlog_bytes"]),
+    ("gestured_kernel_drops_total", "Packets that found no room", lambda s: s["input"]["kernel_drops"]),
+    ("gestured_loop_lag_seconds", "How late the event loop is", lambda s: s["loop_lag_s"]),
+    ("gestured_model_rung", "How far down the ladder stands what answers", lambda s: s["model"]["rung"]),
+    ("gestured_model_failures_total", "Models put aside since the last reload", lambda s: s["model"]["failures"]),
+    ("gestured_start_time_seconds", "When the daemon started", lambda s: s["started"]),
 )
 
 
 class _Collector:
     """Reads all numbers once, for one answer to /metrics."""
 
-    def __init__(self, metrics: Metrics, snapshot: Snapshot) -> None:
-        self._metrics, self._snapshot = metrics, snapshot
+    def __init__(self, metrics: Metrics, status: Status) -> None:
+        self._metrics, self._status = metrics, status
 
     def collect(self) -> Iterator[Any]:
         from prometheus_client.core import (
@@ -71,29 +71,29 @@ class _Collector:
                     cumulated = [sum(buckets[: i + 1]) for i in range(len(buckets))]
                     histogram.add_metric(labels, list(zip(bounds, cumulated, strict=True)), sum_value=total[0])
                 yield histogram
-        snapshot = self._snapshot
+        status = self._status
         for name, text, read in _OF_THE_DAEMON:
             if name.endswith("_total"):
-                yield CounterMetricFamily(name.removesuffix("_total"), text, value=read(snapshot))
+                yield CounterMetricFamily(name.removesuffix("_total"), text, value=read(status))
             else:
-                yield GaugeMetricFamily(name, text, value=read(snapshot))
-        labelled: dict[str, list[Reading]] = {}
-        for sensor, reading in snapshot.sensors.items():
-            labelled.setdefault(self._metrics.sensor_label(sensor), []).append(reading)
-        for name, text, together, read_one in _OF_SENSORS:
+                yield GaugeMetricFamily(name, text, value=read(status))
+        labelled: dict[str, list[Status]] = {}
+        for name, sensor in status["sensors"].items():
+            labelled.setdefault(self._metrics.sensor_label(name), []).append(sensor)
+        for name, text, together, key in _OF_SENSORS:
             family = GaugeMetricFamily(name, text, labels=["sensor"])
-            for label, readings in labelled.items():
-                family.add_metric([label], together(map(read_one, readings)))
+            for label, sensors in labelled.items():
+                family.add_metric([label], together(one[key] for one in sensors))
             yield family
         state = GaugeMetricFamily("gestured_sensor_state", "1 for the state of a sensor", labels=["sensor", "state"])
-        for label, readings in labelled.items():
-            state.add_metric([label, max((r.state for r in readings), key=STATES.index)], 1)
+        for label, sensors in labelled.items():
+            state.add_metric([label, max((one["state"] for one in sensors), key=STATES.index)], 1)
         yield state
         text = "Share of the last gestures outside of what the model was trained on"
         shift = GaugeMetricFamily("gestured_shift_ratio", text, labels=["quantity"])
-        for quantity, share in snapshot.models.shift.items():
+        for quantity, share in status["shift"]["outside"].items():
             shift.add_metric([quantity], share)
         yield shift
         info = InfoMetricFamily("gestured_active_model", "The model that answers")
-        info.add_metric([], {"model": snapshot.models.active, "version": __version__})
+        info.add_metric([], {"model": status["model"]["active"], "version": status["version"]})
         yield info

@@ -14,9 +14,9 @@ from functools import partial
 
 from gestured.daemon.exposition import exposition
 from gestured.daemon.log import Throttle
-from gestured.daemon.metrics import Metrics
-from gestured.daemon.snapshot import Snapshot
+from gestured.daemon.parts import Parts
 from gestured.daemon.sockets import AGAIN_S, AddressError, reason_of
+from gestured.daemon.status import healthy, status
 
 DEADLINE_S = 5.0  # for a connection, from its start to its answer
 REQUEST_BYTES = 8192  # of a request's head, at most
@@ -38,20 +38,21 @@ def as_json(status: int, body: Mapping[str, object]) -> Response:
     return status, "application/json", json.dumps(body).encode() + b"\n"
 
 
-def serve_pages(sock: socket.socket, snapshot: Callable[[], Snapshot], metrics: Metrics) -> "HttpThread":
-    """Serve the daemon's pages on a listening socket; each request takes a snapshot of its own."""
+def serve_pages(sock: socket.socket, parts: Parts) -> "HttpThread":
+    """Serve the daemon's pages on a listening socket; each request asks how the daemon is by itself."""
 
-    def counted() -> Response:
-        return 200, "text/plain; version=0.0.4; charset=utf-8", exposition(metrics, snapshot())
+    def metrics() -> Response:
+        return 200, "text/plain; version=0.0.4; charset=utf-8", exposition(parts.metrics, status(parts))
 
-    return HttpThread(
-        sock,
-        {
-            "/metrics": counted,
-            "/healthz": lambda: as_json(*snapshot().healthz()),
-            "/readyz": lambda: as_json(*snapshot().readyz()),
-        },
-    )
+    def healthz() -> Response:
+        found = healthy(parts)
+        return as_json(200 if found["healthy"] else 503, found)
+
+    def readyz() -> Response:
+        found = status(parts)["ready"]
+        return as_json(200 if found["ready"] else 503, found)
+
+    return HttpThread(sock, {"/metrics": metrics, "/healthz": healthz, "/readyz": readyz})
 
 
 class HttpThread:
@@ -64,13 +65,13 @@ class HttpThread:
         self._sock, self._routes = sock, routes
         self._throttle = Throttle()
         self._open: dict[asyncio.StreamWriter, None] = {}  # oldest first
-        self._started = threading.Event()
-        self._failed: OSError | None = None
+        self._stop = asyncio.Event()
+        try:
+            self._loop = asyncio.SelectorEventLoop()
+        except OSError as error:
+            raise AddressError(f"metrics: cannot serve: {error.strerror}") from error
         self._thread = threading.Thread(target=self._run, name="http", daemon=True)
         self._thread.start()
-        self._started.wait()
-        if self._failed is not None:
-            raise AddressError(f"metrics: cannot serve: {self._failed.strerror}")
 
     def close(self) -> None:
         """Stop serving and close the socket."""
@@ -78,19 +79,11 @@ class HttpThread:
         self._thread.join(1.0)
 
     def _run(self) -> None:
-        try:
-            with asyncio.Runner(loop_factory=asyncio.SelectorEventLoop) as runner:
-                runner.run(self._main())
-        except OSError as error:
-            if self._started.is_set():
-                raise
-            self._failed = error
-            self._started.set()
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            runner.run(self._main())
 
     async def _main(self) -> None:
-        self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
         accepting = asyncio.create_task(self._accept())
-        self._started.set()
         await self._stop.wait()
         accepting.cancel()
         self._sock.close()

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from gestured.core.errors import SettingsError
 from gestured.daemon.settings import FLAGS, INSIDE, TITLES, Part, Settings
+from gestured.daemon.values import expected
 from gestured.record.files import open_regular
 
 ENVIRONMENT = "GESTURED_"
@@ -120,15 +121,12 @@ def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     if problem["type"] == "missing":
         return f"{key} ({source}): is missing"
     if problem["type"] == "extra_forbidden":
-        expected = _unknown(str(place[-1]), _keys_at(place))
+        said = _unknown(str(place[-1]), _keys_at(place))
+    elif problem["type"] == "model_type":
+        said = f"expected a table [{key}]"
     else:
-        ours = problem["type"] == "value_error"
-        message = problem["msg"].removeprefix("Value error, " if ours else "Input should be ")
-        message = message if ours else message[0].lower() + message[1:]
-        expected = message if "expected" in message else "expected " + message
-    if problem["type"] == "model_type":
-        expected = f"expected a table [{key}]"
-    return f"{key} = {problem['input']!r} ({source}): {expected}"
+        said = expected(problem)
+    return f"{key} = {problem['input']!r} ({source}): {said}"
 
 
 def load_settings(flags: Mapping[str, Any], environ: Mapping[str, str]) -> tuple[Settings, dict[str, str]]:

@@ -10,10 +10,9 @@ from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled
 from gestured.core.facts import Decided, Fact
 from gestured.core.own import EXAMPLES, MOST, Examples, is_name
-from gestured.daemon.caller import Connection
 from gestured.daemon.keeper import Change, Keeper
 from gestured.daemon.log import log
-from gestured.daemon.request import Refusal, json_line
+from gestured.daemon.request import Connection, Refusal, json_line
 from gestured.model import own_file
 from gestured.model.enrolment import Enrolment, Examiner
 from gestured.model.ladder import Ladder

@@ -1,14 +1,26 @@
-"""Requests of the control socket, checked as a whole against the table of verbs, and replies; both JSON lines."""
+"""Requests of the control socket: who asks, what each verb takes, and how it is answered. Both are JSON lines."""
 
+import asyncio
 import json
+import os
+import socket
+import struct
 from collections.abc import Awaitable, Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cache
+from inspect import signature
 from typing import Any
 
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
+
+from gestured.client.peer import CREDENTIALS
 from gestured.core.errors import GesturedError
 from gestured.core.messages import json_object, quoted
+from gestured.daemon.values import expected
 
 MAX_REQUEST_BYTES = 4096  # bytes of a request
+BACKLOG_BYTES = 8 << 20  # bytes that wait for a connection with a stream at most; lines beyond are lost, and counted
+SO_PEERGROUPS = 59  # Linux 4.13; not in Python's socket module
 
 Reply = dict[str, Any]
 _ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
@@ -17,6 +29,65 @@ _ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 def json_line(reply: Reply) -> bytes:
     """A reply, or what is streamed after one, as a line of the control socket. Raises ValueError for NaN, infinity."""
     return _ENCODER.encode(reply).encode() + b"\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """The process and account of an operator's program."""
+
+    pid: int
+    uid: int
+    ours: bool  # whether it is root, or the daemon's own user
+    may: bool  # whether it may control the daemon: root, our own user, or a member of our group
+
+
+def peer_of(sock: socket.socket) -> Peer:
+    """Who is at the other end of a connected Unix socket: the kernel says it, whatever the peer claims."""
+    pid, uid, gid = CREDENTIALS.unpack(sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size))
+    groups = {gid}
+    try:
+        raw = sock.getsockopt(socket.SOL_SOCKET, SO_PEERGROUPS, 1024)
+        groups |= set(struct.unpack(f"{len(raw) // 4}I", raw))
+    except OSError:
+        pass  # an old kernel, or in more groups than fit: its first group counts
+    ours = uid in (0, os.geteuid())
+    return Peer(pid, uid, ours, ours or os.getegid() in groups)
+
+
+class Connection:
+    """One operator's connection to the control socket."""
+
+    def __init__(self, writer: asyncio.StreamWriter) -> None:
+        self._writer = writer
+        self.lost = 0  # lines that found no room in the backlog
+        self.streams = False  # whether it is sent a stream of lines, and need not ask for anything
+        self.flush: Callable[[], None] = lambda: None  # has what waits for this connection sent
+        self._over = False
+
+    def send(self, text: bytes, *, lines: int = 1) -> bool:
+        """Send a line, or several, or count them as lost where too much waits already; never blocks."""
+        if self.closed:
+            return False
+        if self.unread > BACKLOG_BYTES:
+            self.lost += lines
+            return False
+        self._writer.write(text)
+        return True
+
+    @property
+    def unread(self) -> int:
+        """Bytes that wait to be read, without those that the kernel keeps."""
+        return 0 if self.closed else self._writer.transport.get_write_buffer_size()
+
+    @property
+    def closed(self) -> bool:
+        """Whether the operator has gone, or wants no more."""
+        return self._over or self._writer.is_closing()
+
+    def end(self) -> None:
+        """Send nothing more after what waits for this connection already."""
+        self.flush()
+        self._over = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,42 +103,42 @@ class Refusal(GesturedError):
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
-    """One key of a request: its JSON type, the same in words for the refusal, and whether it must be there."""
-
-    kind: type | tuple[type, ...]
-    words: str
-    required: bool = False
-    check: Callable[[Any], bool] = lambda value: True
-
-
-@dataclass(frozen=True, slots=True)
 class Verb:
-    """One verb: `run(connection, **parameters)` gives the answer or raises Refusal."""
+    """One verb: `run(connection, **keys)` answers or raises Refusal; its signature says which keys it takes."""
 
     run: Callable[..., Awaitable[Reply | ReplyStream]]
-    parameters: Mapping[str, Parameter] = field(default_factory=dict)
     changes: bool = True  # whether it changes anything, so that it is logged
     slow: bool = False  # whether it waits for another thread; quick verbs do not wait for slow ones
 
 
+@cache
+def _keys_of(run: Callable[..., object]) -> type[BaseModel]:
+    """The keys of a verb and their types. Made when it is first asked for, since that takes a while."""
+    found = [one for one in signature(run).parameters.values() if one.name != "connection"]
+    keys: dict[str, Any] = {
+        one.name: (one.annotation, ... if one.default is one.empty else one.default) for one in found
+    }
+    return create_model("Keys", __config__=ConfigDict(extra="forbid", strict=True, allow_inf_nan=False), **keys)
+
+
 def parse_request(line: bytes, verbs: Mapping[str, Verb]) -> tuple[str, dict[str, Any]]:
-    """(verb, parameters) of one line; raises Refusal with the key, what was found and what was expected."""
+    """(verb, keys) of one line; raises Refusal with the key, what was found and what was expected."""
     request = json_object(line)
     if request is None or not isinstance(request.get("verb"), str):
         raise Refusal('expected one JSON object a line with a "verb", such as {"verb":"status"}')
     name = request.pop("verb")
     if name not in verbs:
         raise Refusal(f"verb: unknown {quoted(name)}, expected one of {', '.join(verbs)}")
-    known = verbs[name].parameters
-    for key, value in request.items():
-        if key not in known:
-            raise Refusal(f"{name}: unknown key {quoted(key)}, expected {', '.join(known) or 'no key'}")
-        parameter = known[key]
-        wrong = isinstance(value, bool) and parameter.kind is not bool
-        if wrong or not isinstance(value, parameter.kind) or not parameter.check(value):
-            raise Refusal(f"{name}.{key}: expected {parameter.words}, found {quoted(value)}")
-    for key, parameter in known.items():
-        if parameter.required and key not in request:
-            raise Refusal(f"{name}.{key}: is missing, expected {parameter.words}")
-    return name, request
+    keys = _keys_of(verbs[name].run)
+    try:
+        found = keys.model_validate(request)
+    except ValidationError as error:
+        problem = error.errors(include_url=False, include_context=False)[-1]  # unknown keys stand at the end
+        if problem["type"] == "extra_forbidden":
+            known = ", ".join(keys.model_fields) or "no key"
+            raise Refusal(f"{name}: unknown key {quoted(problem['loc'][0])}, expected {known}") from error
+        place = ".".join(map(str, (name, *problem["loc"])))
+        if problem["type"] == "missing":
+            raise Refusal(f"{place}: is missing") from error
+        raise Refusal(f"{place}: {expected(problem)}, found {quoted(problem['input'])}") from error
+    return name, {key: getattr(found, key) for key in found.model_fields_set}

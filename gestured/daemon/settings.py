@@ -15,11 +15,11 @@ from gestured.daemon.values import (
     AddressField,
     DestinationField,
     FileField,
-    GateNameField,
+    GateName,
     GridField,
     Listed,
     NetworkField,
-    SensorNameField,
+    SensorName,
     SocketField,
 )
 
@@ -56,7 +56,7 @@ class ArmingSettings(Part):
 class GatesSettings(Part):
     """`[gates]`: what keeps sensors silent."""
 
-    start: tuple[GateNameField, ...] = Field(
+    start: tuple[GateName, ...] = Field(
         default=(), description="names of gates that are closed at every start, until they are allowed"
     )
 
@@ -76,7 +76,7 @@ class SensorSettings(Part):
     strictness: Strictness | None = Field(
         default=None, description="eager, normal or strict; by default the general `strictness`"
     )
-    zones: dict[SensorNameField, ZoneSettings] = Field(
+    zones: dict[SensorName, ZoneSettings] = Field(
         default={}, description="tables `[sensors.NAME.zones.ZONE]`, in the file only"
     )
     arming: ArmingSettings | None = Field(
@@ -213,7 +213,7 @@ class Settings(Part):
         "else ~/.local/state/gestured/own-gestures.json",
     )
     log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="how much is logged")
-    sensors: dict[SensorNameField, SensorSettings] = Field(
+    sensors: dict[SensorName, SensorSettings] = Field(
         default={}, description="tables `[sensors.NAME]`, in the file only"
     )
     per_gesture: dict[str, GestureSettings] = Field(

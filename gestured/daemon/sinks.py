@@ -1,14 +1,14 @@
 """Where events go. A sink takes every event and never blocks; what it cannot deliver it counts."""
 
+import socket
 from typing import Protocol
 
 from gestured.core.address import Address
 from gestured.core.beside.reading import SILENT
 from gestured.core.events import Cancelled, Event, Gesture, Provisional, Status, Unknown
+from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.settings import Settings
-from gestured.daemon.tuio import TUIO, TuioSink
-from gestured.daemon.udp_out import UdpOut
+from gestured.daemon.sockets import resolve
 
 
 class Sink(Protocol):
@@ -22,25 +22,60 @@ class Sink(Protocol):
         ...
 
 
-class Output(Sink, Protocol):
-    """A sink that the configuration names; a reload replaces it."""
+class UdpOut(Sink):
+    """A sink that the configuration names, at one UDP address: it never blocks, and counts what it cannot deliver.
 
-    foresees: bool  # whether it wants provisional events
-    follows: bool  # whether it wants touch events
+    A reload replaces it. The socket is connected, so that a port where nobody listens is told to us (by the next
+    call). A destination that cannot be reached costs a failed system call a packet, nothing more.
+    """
+
+    wants: frozenset[str] = frozenset()  # types of events that are made only where somebody wants them
+
+    def __init__(self, destination: Address, metrics: Metrics) -> None:
+        from gestured.client import osc_out  # python-osc: a daemon that publishes nothing does not load it
+
+        self._out = osc_out
+        self.destination = destination
+        self._metrics, self._throttle = metrics, Throttle()
+        self._socket: socket.socket | None = None
+        self._connected = False
+        try:
+            family, self._where = resolve(destination, socket.SOCK_DGRAM)  # once: a look-up may block for seconds
+            self._socket = socket.socket(family, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
+        except OSError as error:
+            log.error("publish: no such destination", destination=str(destination), error=error.strerror)
 
     def close(self) -> None:
-        """Let go of what the output holds; no event comes after this."""
-        ...
+        """Close the socket; nothing is sent after it."""
+        if self._socket is not None:
+            self._socket.close()
 
+    def send(self, packet: bytes) -> None:
+        """Send a packet, or count that it could not be sent."""
+        if self._socket is None:
+            self._failed("unresolved")
+            return
+        for _ in range(2):
+            try:
+                if not self._connected:
+                    self._socket.connect(self._where)
+                    self._connected = True
+                self._socket.send(packet)
+                self._metrics.sent.add("sent")
+                return
+            except ConnectionRefusedError:
+                self._failed("refused")  # the refusal of an earlier packet: this one was not sent yet
+            except BlockingIOError:
+                self._failed("full")
+                return
+            except OSError:
+                self._connected = False  # our own address may have changed with the network
+                self._failed("unreachable")
+                return
 
-def outputs(settings: Settings, metrics: Metrics) -> list[Output]:
-    """All outputs that a configuration names. It looks up names of hosts, which may take long."""
-    return [
-        TuioSink(one.address, metrics)
-        if one.scheme == TUIO
-        else OscSink(one.address, metrics, provisional=settings.publish_provisional)
-        for one in settings.publish
-    ]
+    def _failed(self, result: str) -> None:
+        self._metrics.sent.add(result)
+        self._throttle.warn("event not delivered", result, destination=str(self.destination))
 
 
 class OscSink(UdpOut):
@@ -51,7 +86,7 @@ class OscSink(UdpOut):
 
     def __init__(self, destination: Address, metrics: Metrics, *, provisional: bool = False) -> None:
         super().__init__(destination, metrics)
-        self.foresees = provisional
+        self.wants = frozenset({"provisional"} if provisional else ())
         self._said: dict[str, Provisional] = {}  # by sensor: the provisional event that was sent, until its answer
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
@@ -61,7 +96,7 @@ class OscSink(UdpOut):
         """
         if isinstance(event, Gesture | Unknown | Cancelled):
             self._judge(event)
-        if isinstance(event, Provisional) and self.foresees:
+        if isinstance(event, Provisional) and self.wants:
             self._said[event.sensor] = event
             said = (event.gesture, event.confidence, event.id)
             self.send(self._out.message(f"/gestured/{event.sensor}/provisional", "sfi", said).dgram)

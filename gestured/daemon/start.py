@@ -22,8 +22,7 @@ from gestured.daemon.asked import open_all
 from gestured.daemon.bound import Bound, bind_all
 from gestured.daemon.log import Throttle, log
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.reload import Loader
-from gestured.daemon.service import Service
+from gestured.daemon.service import Loader, Service
 from gestured.daemon.settings import Settings
 from gestured.daemon.sockets import AddressError
 from gestured.model.process import end_all
@@ -138,9 +137,8 @@ def _end_surely(loop: asyncio.AbstractEventLoop) -> None:
 
 
 def _announce(service: Service) -> None:
-    snapshot = service.snapshot()
-    model = snapshot.models.active
-    where = {key: value for key, value in snapshot.addresses.items() if value is not None}
+    model = service.parts.ladder.active
+    where = {key: value for key, value in service.parts.bound.addresses().items() if value is not None}
     control = where.pop("control")
     ready: dict[str, Any] = {"type": "ready", **where, "model": model, "control": control}
     log.info("ready", **where, model=model)

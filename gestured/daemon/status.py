@@ -1,54 +1,54 @@
-"""What `gesturectl status` shows: a snapshot and what was counted, as one JSON object."""
+"""How the daemon is: what `gesturectl status` shows, of which /readyz and the gauges of /metrics are parts."""
 
 import os
+import time
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gestured import __version__
+from gestured.core import messages
 from gestured.core.address import Address, Grid
-from gestured.core.beside.reading import Reading, View
-from gestured.core.own import Examples, to_dict
-from gestured.daemon.metrics import Counter, Metrics
+from gestured.core.beside.reading import SILENT, Reading
+from gestured.daemon.metrics import Counter
+from gestured.daemon.parts import Parts
 from gestured.daemon.settings import Settings
-from gestured.daemon.snapshot import Snapshot
+from gestured.daemon.sockets import kernel_drops
 
-OPEN = {"armed": None, "closed": (), "until": None}  # of a sensor that always listens
+HANG_S = 2.0  # the loop counts as hanging after so long without a beat
 
 
-def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
-    """The answer to `status`; durations in seconds, `time` in seconds since the Unix epoch."""
-    models, gates = snapshot.models, snapshot.listening
+def status(parts: Parts) -> dict[str, Any]:
+    """The answer to `status`; durations in seconds, `time` and `started` in seconds since the Unix epoch."""
+    now, metrics, ladder, shift = time.monotonic(), parts.metrics, parts.ladder, parts.desk.shift
+    readings = parts.readings()
+    states = {name: reading.state for name, reading in readings.items()}
+    ready = _ready(parts, states)
     return {
         "version": __version__,
-        "instance": snapshot.instance,
+        "instance": parts.instance,
         "pid": os.getpid(),
-        "time": snapshot.time,
-        "uptime_s": round(snapshot.uptime_s, 1),
-        "state": snapshot.state,
-        "ready": snapshot.readyz()[1],
-        "addresses": snapshot.addresses,
+        "time": time.time(),
+        "started": parts.started,
+        "uptime_s": round(now - parts.begun, 1),
+        "state": ready["state"],
+        "ready": ready,
+        "addresses": parts.bound.addresses(),
         "model": {
-            "active": models.active,
-            "asked": models.asked,
-            "rung": models.rung,
-            "degraded": models.degraded,
-            "failures": models.failures,
-            "file": models.file,
-            "version": models.version,
-            "sha256": models.sha256,
-            "gestures": list(snapshot.gestures),
+            "active": ladder.active,
+            "asked": ladder.name,
+            "rung": ladder.rung,
+            "degraded": ladder.degraded,
+            "failures": ladder.failures,
+            "file": ladder.source,
+            "version": ladder.model.metadata.version,
+            "sha256": ladder.model.sha256,
+            "gestures": list(parts.hub.scene.gestures),
         },
-        "own": dict(snapshot.own),
-        "sensors": {
-            name: {**_sensor(reading, snapshot.now), **gates.get(name, OPEN), "zones": _zones(snapshot.settings, name)}
-            for name, reading in snapshot.sensors.items()
-        },
-        "gates": list(snapshot.gates),
-        "overdue": {gate: round(seconds, 1) for gate, seconds in snapshot.overdue.items()},
-        "recent": list(snapshot.recent),
+        "own": parts.own.report(),
+        "sensors": {name: sensor(name, reading, now, parts.settings) for name, reading in readings.items()},
+        "gates": sorted(parts.hub.gates.of(None)),
+        "overdue": {gate: round(seconds, 1) for gate, seconds in parts.gates.overdue(now).items()},
+        "recent": list(parts.desk.recent),
         "answers": {
             "gestures": _by_label(metrics.gestures.values),
             "unknown": metrics.unknown.total(),
@@ -58,81 +58,52 @@ def status(snapshot: Snapshot, metrics: Metrics) -> dict[str, Any]:
         },
         "provisional": {"given": 0, "confirmed": 0, "revoked": 0} | _by_label(metrics.provisional.values),
         "shift": {
-            "gestures": models.shift_count,
-            "outside": {name: round(share, 3) for name, share in models.shift.items()},
-            "unlike": list(models.unlike),
+            "gestures": shift.count,
+            "outside": {name: round(share, 3) for name, share in shift.shares().items()},
+            "unlike": shift.unlike(),
         },
-        "input": {"dropped": _by_label(metrics.dropped.values), "kernel_drops": snapshot.kernel_drops},
+        "input": {"dropped": _by_label(metrics.dropped.values), "kernel_drops": kernel_drops(parts.bound.udp)},
         "output": {
-            "subscribers": snapshot.clients,
-            "backlog_bytes": snapshot.backlog_bytes,
+            "subscribers": parts.clients.count,
+            "backlog_bytes": parts.clients.backlog,
             "lines_lost": metrics.lost_lines.total(),
             "evicted": _by_label(metrics.evicted.values),
             "osc": _by_label(metrics.sent.values),
         },
         "last_s_ago": {
-            "dropped": _ages(metrics.dropped, snapshot.now),
-            "kernel_drops": round(snapshot.now - metrics.kernel_dropped_at, 1) if metrics.kernel_drops else None,
-            "lines_lost": _ages(metrics.lost_lines, snapshot.now),
-            "evicted": _ages(metrics.evicted, snapshot.now),
-            "osc": _ages(metrics.sent, snapshot.now),
-            "internal_errors": _ages(metrics.internal_errors, snapshot.now),
-            "reloads": _ages(metrics.reloads, snapshot.now),
+            "dropped": _ages(metrics.dropped, now),
+            "kernel_drops": round(now - metrics.kernel_dropped_at, 1) if metrics.kernel_drops else None,
+            "lines_lost": _ages(metrics.lost_lines, now),
+            "evicted": _ages(metrics.evicted, now),
+            "osc": _ages(metrics.sent, now),
+            "internal_errors": _ages(metrics.internal_errors, now),
+            "reloads": _ages(metrics.reloads, now),
         },
-        "loop_lag_s": round(snapshot.loop_lag_s, 4),
+        "loop_lag_s": round(parts.pulse.lag_s, 4),
         "internal_errors": metrics.internal_errors.total(),
         "reloads": _by_label(metrics.reloads.values),
-        "taps": snapshot.taps,
-        "flight_recorder": {"limit_bytes": snapshot.flight_limit_bytes, "held_bytes": snapshot.flight_held_bytes},
+        "taps": parts.taps.count,
+        "flight_recorder": {"limit_bytes": parts.taps.ring_bytes, "held_bytes": parts.taps.held_bytes},
     }
 
 
-def scene(snapshot: Snapshot, epoch_ns: int, own: Examples) -> dict[str, Any]:
-    """What a recording must know to be understood without this daemon; `epoch_ns`: from the loop's clock to 1970."""
-    models = snapshot.models
-    return {
-        "version": __version__,
-        "instance": snapshot.instance,
-        "epoch_ns": epoch_ns,
-        "model": {
-            "name": models.active,
-            "sha256": models.sha256,
-            "rows": models.grid[0],
-            "columns": models.grid[1],
-        },
-        "gestures": list(snapshot.gestures),
-        "own": to_dict(own),
-        "settings": snapshot.settings.model_dump(mode="json"),
-    }
+def healthy(parts: Parts) -> dict[str, Any]:
+    """What /healthz says: whether the loop turns."""
+    age_s = parts.pulse.age_s
+    return {"healthy": age_s < HANG_S, "loop_age_s": round(age_s, 3)}
 
 
-def viewed(sensor: str, view: View, reading: Reading) -> dict[str, Any]:
-    """One sensor at a moment, grids row by row; `values` are counts above the baseline, activity is in noise units."""
-    return {
-        "sensor": sensor,
-        "state": reading.state,
-        "t": view.t,
-        "grid": list(view.values.shape if view.values is not None else reading.grid),
-        "values": None if view.values is None else _rounded(view.values),
-        "bad": [] if view.bad is None else np.flatnonzero(view.bad).tolist(),
-        "raw_grid": list(reading.grid),
-        "raw": None if view.raw is None else _rounded(view.raw),
-        "noise": round(view.noise, 3),
-        "activity": round(view.activity, 2),
-        "on": round(view.on, 2),
-        "off": round(view.off, 2),
-        "phase": view.phase,
-        "centroid": None if view.centroid is None else [round(place, 3) for place in view.centroid],
-        "contact": reading.contact,
-    }
+def overall(states: Mapping[str, str], *, impaired: bool) -> str:
+    """The daemon's state by those of its sensors: "ok", "degraded" (where it is `impaired`) or "no_data"."""
+    if all(state in SILENT for state in states.values()):
+        return "no_data"
+    return "degraded" if impaired else "ok"
 
 
-def _rounded(grid: NDArray[Any]) -> list[float]:
-    numbers: list[float] = np.round(grid.astype(np.float64), 2).reshape(-1).tolist()
-    return numbers
-
-
-def _sensor(reading: Reading, now: float) -> dict[str, Any]:
+def sensor(name: str, reading: Reading, now: float, settings: Settings) -> dict[str, Any]:
+    """One sensor as the status shows it at `now`, in monotonic s."""
+    gates = () if reading.gate is None else (reading.gate,)
+    own = settings.sensors.get(name)
     shown = {
         "state": reading.state,
         "reason": reading.reason,
@@ -142,24 +113,38 @@ def _sensor(reading: Reading, now: float) -> dict[str, Any]:
         "drift": round(reading.drift, 4),
         "grid": str(Grid(*reading.grid)),
     }
-    if reading.source is None:
-        return shown
-    return shown | {
-        "source": str(Address(*reading.source[:2])),
-        "heard_s_ago": round(now - reading.heard, 3),
-        "lost": reading.lost,
-        "lost_s_ago": None if reading.lost_at is None else round(now - reading.lost_at, 1),
-        "exchanged": reading.exchanged,
-        "noise": round(reading.noise, 4),
-        "touched": reading.touched,
-        "gestures": reading.sequence,
+    if reading.source is not None:
+        shown |= {
+            "source": str(Address(*reading.source[:2])),
+            "heard_s_ago": round(now - reading.heard, 3),
+            "lost": reading.lost,
+            "lost_s_ago": None if reading.lost_at is None else round(now - reading.lost_at, 1),
+            "exchanged": reading.exchanged,
+            "noise": round(reading.noise, 4),
+            "touched": reading.touched,
+            "gestures": reading.sequence,
+        }
+    shown |= messages.listening(gates, time.time() - now).get(name, {})
+    return shown | {"zones": {} if own is None else {zone: one.at for zone, one in own.zones.items()}}
+
+
+def _ready(parts: Parts, states: Mapping[str, str]) -> dict[str, Any]:
+    """What /readyz says: whether frames that come now would be answered, and why not."""
+    reasons = {
+        "the event loop hangs": not healthy(parts)["healthy"],
+        "the daemon is stopping": parts.stopping,
+        "no model could classify the last segment": parts.desk.models_failed,
     }
-
-
-def _zones(settings: Settings, sensor: str) -> dict[str, tuple[float, ...]]:
-    """Left, bottom, right and top edge of each zone of a sensor, in fractions of it."""
-    own = settings.sensors.get(sensor)
-    return {} if own is None else {name: zone.at for name, zone in own.zones.items()}
+    return {
+        "ready": not any(reasons.values()),
+        "reason": "; ".join(reason for reason, holds in reasons.items() if holds) or None,
+        "state": overall(states, impaired=parts.impaired),
+        "loop_lag_s": round(parts.pulse.lag_s, 3),
+        "shift": parts.desk.shift.unlike(),
+        "model": parts.ladder.active,
+        "degraded": parts.ladder.degraded,
+        "sensors": states,
+    }
 
 
 def _by_label(values: Mapping[tuple[str, ...], int]) -> dict[str, int]:

@@ -16,8 +16,7 @@ from itertools import islice
 from gestured.core import messages
 from gestured.core.events import Event, Status, Touch
 from gestured.core.owner import Source
-from gestured.daemon.caller import Connection
-from gestured.daemon.request import json_line
+from gestured.daemon.request import Connection, json_line
 
 KEPT_S = 30.0  # how long the flight recorder keeps a packet
 OVERHEAD_BYTES = 200  # what Python adds to a packet that it keeps

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from gestured.core.address import Address
 from gestured.core.events import Event, Status, Touch
 from gestured.daemon.metrics import Metrics
-from gestured.daemon.udp_out import UdpOut
+from gestured.daemon.sinks import UdpOut
 
 TUIO = "tuio"  # the scheme of such a destination
 CURSOR = "/tuio/2Dcur"
@@ -34,7 +34,7 @@ class Source:
 class TuioSink(UdpOut):
     """TUIO to one destination: `alive` and `set` with each event of a finger, `alive` alone once a second."""
 
-    follows = True
+    wants = frozenset({"touch"})
 
     def __init__(self, destination: Address, metrics: Metrics) -> None:
         super().__init__(destination, metrics)

@@ -2,8 +2,9 @@
 
 import ipaddress
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator
 
@@ -11,6 +12,14 @@ from gestured.core.address import Address, Destination, Grid, is_sensor
 
 SCHEMES = ("osc", "tuio")  # in which events are sent
 SOCKET_PATH_BYTES = 107  # sun_path on Linux, without its final NUL
+
+
+def expected(problem: Mapping[str, Any]) -> str:
+    """What was expected, in words that follow a comma or a colon: of one of the `errors()` of a ValidationError."""
+    ours = problem["type"] == "value_error"
+    message: str = problem["msg"].removeprefix("Value error, " if ours else "Input should be ")
+    message = message if ours else message[0].lower() + message[1:]
+    return message if "expected" in message else "expected " + message
 
 
 def _address(value: object) -> Address:
@@ -76,7 +85,8 @@ AddressField = Annotated[Address, BeforeValidator(_address)]
 GridField = Annotated[Grid, BeforeValidator(_grid)]
 NetworkField = Annotated[ipaddress.IPv4Network | ipaddress.IPv6Network, BeforeValidator(_network)]
 DestinationField = Annotated[Destination, BeforeValidator(_destination)]
-SensorNameField = Annotated[str, _name("sensor")]
-GateNameField = Annotated[str, _name("gate")]
+SensorName = Annotated[str, _name("sensor")]
+GateName = Annotated[str, _name("gate")]
+BridgeName = Annotated[str, _name("bridge")]
 SocketField = Annotated[Path, BeforeValidator(_socket)]
 FileField = Annotated[Path, BeforeValidator(lambda value: _named(value, "the path of a file"))]

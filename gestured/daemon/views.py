@@ -9,18 +9,20 @@ import math
 import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.beside.reading import Reading, View
 from gestured.core.events import Event, Provisional, Status, Touch
 from gestured.core.facts import Arrived, Fact
 from gestured.core.hub import Hub
 from gestured.core.messages import to_json
-from gestured.daemon.caller import Connection
-from gestured.daemon.request import Reply, json_line
-from gestured.daemon.status import viewed
+from gestured.daemon.request import Connection, Reply, json_line
 from gestured.daemon.tap import SOON_S
 
 VIEW_S = 1 / 30  # between two views of one sensor, since nobody sees more than 30 a second
-VIEWS = 16  # sensors whose last view is kept for clients that ask again
 UNREAD_BYTES = 32 << 10  # bytes that may wait for a connection; where more do, it misses views until it has read them
 
 
@@ -37,12 +39,11 @@ class Look:
 
 
 class Views:
-    """Views for those who ask, and for those who look on."""
+    """Views for those who look on."""
 
     def __init__(self, hub: Hub, state: Callable[[], Reply], changed: Callable[[], None]) -> None:
         """`state` gives the daemon's state; `changed` is called when other sensors are looked at than before."""
         self._hub, self._state, self._changed = hub, state, changed
-        self._made: dict[tuple[str, bool], tuple[float, Reply | None]] = {}  # when (s), and the view
         self._looks: dict[Connection, Look] = {}
         self._due: set[str] = set()  # sensors that are looked at and have sent frames since
         self._said: list[tuple[Event, float, bool]] = []  # events that those who look have not been told, as published
@@ -54,11 +55,6 @@ class Views:
     def sensors(self) -> frozenset[str]:
         """The sensors that somebody looks at."""
         return frozenset().union(*(look.sensors for look in self._looks.values()))
-
-    def view(self, sensor: str, *, raw: bool) -> Reply | None:
-        """A sensor as it is felt now, or up to VIEW_S s ago; None where it was not heard."""
-        made, view = self._made.get((sensor, raw), (-math.inf, None))
-        return view if time.monotonic() - made < VIEW_S else self._make(sensor, raw)
 
     def follow(self, connection: Connection, sensors: Collection[str], *, raw: bool) -> None:
         """Stream to a connection: the state and the views of sensors as they are now, and then what is new."""
@@ -131,9 +127,9 @@ class Views:
         self._due.discard(sensor)
         for raw in (False, True):
             lookers = [one for one, look in self._looks.items() if sensor in look.sensors and look.raw is raw]
-            view = self._make(sensor, raw) if lookers else None
+            view = self._hub.view(sensor, time.monotonic(), raw=raw) if lookers else None
             if view is not None:
-                self._send(json_line({"type": "view"} | view), lookers)
+                self._send(json_line({"type": "view"} | viewed(sensor, *view)), lookers)
 
     def _send(self, line: bytes, connections: Collection[Connection]) -> None:
         """Send a view or a state; a connection that has not read the last ones misses it."""
@@ -147,13 +143,29 @@ class Views:
         if self.sensors != before:
             self._changed()
 
-    def _make(self, sensor: str, raw: bool) -> Reply | None:
-        now = time.monotonic()
-        found = self._hub.view(sensor, now, raw=raw)
-        if found is None:
-            return None
-        if len(self._made) >= VIEWS:
-            self._made.clear()
-        view = viewed(sensor, *found) | {"time": time.time()}
-        self._made[sensor, raw] = now, view
-        return view
+
+def viewed(sensor: str, view: View, reading: Reading) -> dict[str, Any]:
+    """One sensor at a moment, grids row by row; `values` are counts above the baseline, activity is in noise units."""
+    return {
+        "sensor": sensor,
+        "state": reading.state,
+        "t": view.t,
+        "grid": list(view.values.shape if view.values is not None else reading.grid),
+        "values": None if view.values is None else _rounded(view.values),
+        "bad": [] if view.bad is None else np.flatnonzero(view.bad).tolist(),
+        "raw_grid": list(reading.grid),
+        "raw": None if view.raw is None else _rounded(view.raw),
+        "noise": round(view.noise, 3),
+        "activity": round(view.activity, 2),
+        "on": round(view.on, 2),
+        "off": round(view.off, 2),
+        "phase": view.phase,
+        "centroid": None if view.centroid is None else [round(place, 3) for place in view.centroid],
+        "contact": reading.contact,
+        "time": time.time(),
+    }
+
+
+def _rounded(grid: NDArray[Any]) -> list[float]:
+    numbers: list[float] = np.round(grid.astype(np.float64), 2).reshape(-1).tolist()
+    return numbers

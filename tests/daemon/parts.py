@@ -1,34 +1,28 @@
 """A hub with the daemon's desk behind it, at times that are written down, for tests of parts."""
 
-from collections.abc import Mapping
+import asyncio
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
+from typing import TypeVar
 
-from gestured.core.beside.reading import Reading
 from gestured.core.events import Event
 from gestured.core.hub import Hub
-from gestured.daemon.asked import scene_of
+from gestured.daemon.asked import open_all, scene_of
+from gestured.daemon.bound import bind_all
 from gestured.daemon.cli import parser
 from gestured.daemon.desk import Desk
 from gestured.daemon.merge import load_settings
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.own import OwnGestures
-from gestured.daemon.publisher import Publisher
+from gestured.daemon.service import Service
 from gestured.daemon.settings import Settings
 from gestured.daemon.shift import Shift
-from gestured.daemon.snapshot import Models, Snapshot
 from gestured.daemon.tap import Taps
 from gestured.daemon.views import Views
 from gestured.model.ladder import ladder_for
 from tests.daemon.harness import Frame, floats
 
 SOURCE = ("10.0.0.1", 1)
-SNAPSHOT = Snapshot(
-    instance="i", time=1.7e9, now=10.0, started=1.7e9, uptime_s=10.0, stopping=False, loop_age_s=0.1, loop_lag_s=0.0,
-    models=Models("m", "m", 0, False, 0, "m.onnx", "1", "", (9, 9), False, 0, {}, ()), gestures=("one_tap",),
-    own={"gestures": {}}, sensors={"arm": Reading("ok", (9, 9))}, listening={}, gates=(), overdue={}, recent=(),
-    clients=0, backlog_bytes=0, kernel_drops=0, taps=0, flight_limit_bytes=0, flight_held_bytes=0, addresses={},
-    settings=Settings(), awaiting_restart=[],
-)  # fmt: skip
 
 
 def settings_of(*flags: object, env: Mapping[str, str] = {}) -> tuple[Settings, dict[str, str]]:
@@ -36,6 +30,25 @@ def settings_of(*flags: object, env: Mapping[str, str] = {}) -> tuple[Settings, 
     given = vars(parser().parse_args(list(map(str, flags))))
     given.pop("explain")
     return load_settings(given, env)
+
+
+Found = TypeVar("Found")
+
+
+def with_service(model: Path, folder: Path, act: Callable[[Service], Awaitable[Found]]) -> Found:
+    """What `act` returns of a daemon in this process."""
+
+    async def main() -> Found:
+        settings = settings_of("--model", model, "--listen", "127.0.0.1:0", "--socket", folder / "events.sock")[0]
+        metrics, bound = Metrics(), bind_all(settings)
+        try:
+            service = Service(open_all(settings, metrics), metrics, bound, lambda: settings)
+            await service.start()
+            return await act(service)
+        finally:
+            bound.close()
+
+    return asyncio.run(main())
 
 
 class Kept:
@@ -58,8 +71,7 @@ class Parts:
         self.events = kept.events
         self.hub = Hub(scene_of(load_settings({"model": str(model), **given}, {})[0], ladder), ladder)
         self.views = Views(self.hub, dict, lambda: None)
-        publisher = Publisher(self.metrics, (kept,))
-        self.desk = Desk(self.metrics, publisher, Shift.of(ladder.model), OwnGestures(lambda: None), self.views)
+        self.desk = Desk(self.metrics, Shift.of(ladder.model), OwnGestures(lambda: None), self.views, (kept,))
 
     def feed(self, name: str, frames: list[Frame], t: float) -> float:
         """Frames of a sensor at 15 Hz, from `t` s on; when the last one came."""

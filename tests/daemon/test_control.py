@@ -18,8 +18,7 @@ from pythonosc.osc_packet import OscPacket
 
 from gestured.client.control import Control
 from gestured.client.lines import Refused, Unreachable
-from gestured.daemon.operations import Operations
-from gestured.daemon.request import Parameter, Refusal, Verb, parse_request
+from gestured.daemon.request import Refusal, Verb, parse_request
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon, Sensor
 
@@ -69,7 +68,7 @@ def test_a_stranger_is_refused_even_where_the_file_lets_him_in(start, nobody) ->
         (b"[]\n", ("verb",)),
         (b'{"verb":"launch"}\n', ("verb", '"launch"', "status")),
         (b'{"verb":"emit"}\n', ("emit.gesture", "missing")),
-        (b'{"verb":"emit","gesture":7}\n', ("emit.gesture", "7", "name")),
+        (b'{"verb":"emit","gesture":7}\n', ("emit.gesture", "7", "string")),
         (b'{"verb":"emit","gesture":"wink"}\n', ("wink", "one_tap")),
         (b'{"verb":"emit","gesture":"one_tap","sensor":"a b"}\n', ("emit.sensor", '"a b"')),
         (b'{"verb":"emit","gesture":"one_tap","loud":true}\n', ("emit", '"loud"', "gesture, sensor")),
@@ -251,10 +250,13 @@ values = flat | st.lists(flat, max_size=4) | st.dictionaries(words, flat | st.li
 
 @given(st.binary(max_size=200) | values.map(lambda value: json.dumps(value).encode()))
 def test_any_line_is_a_request_that_fits_the_table_or_is_refused(line: bytes) -> None:
-    async def nothing(connection, **parameters):
+    async def status(connection):
         return {}
 
-    table = {"status": Verb(nothing), "emit": Verb(nothing, {"gesture": Parameter(str, "a name", required=True)})}
+    async def emit(connection, gesture: str):
+        return {}
+
+    table = {"status": Verb(status), "emit": Verb(emit)}
     try:
         name, parameters = parse_request(line, table)
     except Refusal as refusal:
@@ -270,7 +272,13 @@ DOCUMENT = (Path(__file__).resolve().parents[2] / "docs" / "control.md").read_te
 def test_the_table_of_verbs_in_the_documents(daemon: Daemon) -> None:
     rows = re.findall(r"^\| `(\w+)` \| (.*?) \|", DOCUMENT, re.MULTILINE)
     described = {verb: tuple(re.findall(r"`(\w+)`", keys)) for verb, keys in rows}
-    assert described == {name: tuple(verb.parameters) for name, verb in Operations(*[None] * 9).verbs().items()}
+    with Control(Path(daemon.ready["control"])) as control:
+        with pytest.raises(Refused) as unknown:
+            control.ask("?")
+        assert set(str(unknown.value).partition("expected one of ")[2].split(", ")) == set(described)
+        for verb, keys in described.items():
+            with pytest.raises(Refused, match=f'unknown key "x", expected {", ".join(keys) or "no key"}$'):
+                control.ask(verb, x=1)
 
 
 def test_the_example_in_the_documents(daemon: Daemon) -> None:

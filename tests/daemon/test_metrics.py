@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +18,13 @@ from gestured.core.listening import MOST_GATES
 from gestured.core.window import Window
 from gestured.daemon.exposition import exposition
 from gestured.daemon.metrics import NAMED_SENSORS, Metrics
+from gestured.daemon.service import Service
+from gestured.daemon.settings import Settings
 from gestured.daemon.shift import LAST, LEAST_GESTURES, Shift, measured
+from gestured.daemon.status import sensor, status
 from gestured.model.features import MEASURES
 from tests.daemon.harness import Hand
-from tests.daemon.parts import SNAPSHOT, Parts
+from tests.daemon.parts import Parts, with_service
 
 WINDOW = Window(rows=9, columns=9, rate_hz=15.0, smooth_frames=1, lead_s=1 / 15, tail_s=1 / 15, floor=4.0)
 ROOT = Path(__file__).resolve().parents[2]
@@ -50,7 +52,22 @@ def everything() -> Iterator[Event]:
         yield Cancelled("s", 1, reason)
 
 
-def test_there_are_at_most_200_series_whatever_arrives() -> None:
+@pytest.fixture(scope="module")
+def usual(model: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """The status of a daemon that has heard nothing."""
+
+    async def look(service: Service) -> dict[str, Any]:
+        return status(service.parts)
+
+    return with_service(model, tmp_path_factory.mktemp("usual"), look)
+
+
+def shown(readings: dict[str, Reading]) -> dict[str, Any]:
+    """Sensors as a status shows them."""
+    return {name: sensor(name, one, 0.0, Settings()) | {"closed": ()} for name, one in readings.items()}
+
+
+def test_there_are_at_most_200_series_whatever_arrives(usual: dict[str, Any]) -> None:
     metrics = Metrics()
     for event in everything():
         metrics.event(event)
@@ -69,14 +86,10 @@ def test_there_are_at_most_200_series_whatever_arrives() -> None:
         for label in labels:
             counter.add(label)
     shift = dict.fromkeys(("strength", *MEASURES, "confidence", "unknown"), 0.1)
-    snapshot = replace(
-        SNAPSHOT,
-        sensors={name: Reading(STATES[n % len(STATES)], (9, 9)) for n, name in enumerate(names)},
-        models=replace(SNAPSHOT.models, shift=shift),
-    )
+    sensors = shown({name: Reading(STATES[n % len(STATES)], (9, 9)) for n, name in enumerate(names)})
     real = (Path(__file__).parent / "metrics.txt").read_text()
     gauges = set(re.findall(r"^# TYPE (\S+) ", real, re.MULTILINE))
-    text = exposition(metrics, snapshot).decode()
+    text = exposition(metrics, usual | {"sensors": sensors, "shift": {"outside": shift}}).decode()
     assert set(re.findall(r"^# TYPE (\S+) ", text, re.MULTILINE)) == gauges
     series = [line for line in text.splitlines() if not line.startswith("#")]
     assert len(series) == len({line.rsplit(" ", 1)[0] for line in series}) <= 200
@@ -91,13 +104,13 @@ def test_every_reason_to_drop_has_its_place_in_that_count() -> None:
     assert found <= set(REASONS), found - set(REASONS)
 
 
-def test_several_sensors_together_are_as_their_worst() -> None:
+def test_several_sensors_together_are_as_their_worst(usual: dict[str, Any]) -> None:
     still, gone = np.zeros(81), np.full(81, 3.0)
     one = Reading("ok", (9, 9), 1 / 15, 0.001, 1, 1.0, first=still, baseline=still)
     other = Reading("stale", (9, 9), 1 / 15, 0.1, 2, 1.0, first=still, baseline=gone)
     named = [f"named{n}" for n in range(NAMED_SENSORS)]
     sensors = dict.fromkeys(named, one) | {"a": one, "b": other}
-    text = exposition(Metrics(), replace(SNAPSHOT, sensors=sensors)).decode()
+    text = exposition(Metrics(), usual | {"sensors": shown(sensors)}).decode()
     found = dict(re.findall(r'^gestured_sensor_(\w+\{sensor="(?:other|named0)".*\}) (\S+)$', text, re.MULTILINE))
     alone = {"rate_hertz": "15.0", "jitter_seconds": "0.001", "bad_taxels": "1.0", "drift_ratio": "0.0"}
     together = {"rate_hertz": "0.0", "jitter_seconds": "0.1", "bad_taxels": "3.0", "drift_ratio": "3.0"}

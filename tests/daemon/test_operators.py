@@ -17,9 +17,8 @@ import uvloop
 from gestured.client.control import Control
 from gestured.client.lines import Refused
 from gestured.daemon import control, log
-from gestured.daemon.caller import Connection
 from gestured.daemon.control import ControlServer
-from gestured.daemon.request import Reply, ReplyStream, Verb
+from gestured.daemon.request import Connection, Reply, ReplyStream, Verb
 from tests.daemon.harness import Daemon, Sensor, lines_of
 
 LINE = b"x" * 999 + b"\n"

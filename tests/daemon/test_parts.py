@@ -9,7 +9,6 @@ import time
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -22,15 +21,16 @@ from gestured.core.sensor import Sensor
 from gestured.core.where import Zone
 from gestured.core.wire import Decoder
 from gestured.daemon import http, log, udp
-from gestured.daemon.health import Pulse
 from gestured.daemon.http import HttpThread, as_json
 from gestured.daemon.merge import load_settings
+from gestured.daemon.service import Service
 from gestured.daemon.settings import FLAGS, Settings
 from gestured.daemon.sockets import AGAIN_S, AddressError, bind_udp
+from gestured.daemon.status import healthy, overall, status
 from gestured.daemon.udp import Receiver
 from tests.daemon import harness
 from tests.daemon.harness import DEADLINE_S, Hand
-from tests.daemon.parts import SNAPSHOT, SOURCE, Parts
+from tests.daemon.parts import SOURCE, Parts, with_service
 
 
 def test_flags_win_over_the_environment_that_over_the_file_that_over_defaults(tmp_path: Path) -> None:
@@ -220,24 +220,26 @@ def test_wherever_in_a_read_a_stall_begins_no_frame_moves(
     assert served[0] - sent < 5.0
 
 
-def test_healthz_and_readyz_say_what_is_wrong() -> None:
-    assert SNAPSHOT.healthz()[0] == 200 == SNAPSHOT.readyz()[0]
-    hanging = replace(SNAPSHOT, loop_age_s=10.0)
-    assert hanging.healthz()[0] == 503
-    status, body = hanging.readyz()
-    assert status == 503 and "hangs" in str(body["reason"])
-    assert "stopping" in str(replace(SNAPSHOT, stopping=True).readyz()[1]["reason"])
-    failed = replace(SNAPSHOT, models=replace(SNAPSHOT.models, failed=True))
-    assert failed.readyz()[0] == 503 and (failed.state, SNAPSHOT.state) == ("degraded", "ok")
-    assert replace(SNAPSHOT, sensors={}).state == "no_data"
+def test_health_and_readiness_say_what_is_wrong(model: Path, tmp_path: Path) -> None:
+    async def look(service: Service) -> None:
+        parts = service.parts
+        assert healthy(parts)["healthy"] and status(parts)["ready"]["reason"] is None
+        parts.stopping = parts.desk.models_failed = True
+        parts.pulse.beat -= 10.0
+        assert not healthy(parts)["healthy"] and healthy(parts)["loop_age_s"] >= 10
+        told = "the event loop hangs; the daemon is stopping; no model could classify the last segment"
+        assert status(parts)["ready"]["reason"] == told and status(parts)["loop_lag_s"] >= 9
+
+    with_service(model, tmp_path, look)
 
 
-def test_while_the_loop_hangs_its_age_grows() -> None:
-    pulse = Pulse()
-    pulse.beat -= 10
-    assert pulse.age_s >= 10 and pulse.lag_s >= 9
-    pulse.woke(0.0)
-    assert pulse.age_s < 10
+@pytest.mark.parametrize(
+    ("sensors", "impaired", "state"),
+    [({}, True, "no_data"), ({"a": "stale"}, False, "no_data"), ({"a": "stale", "b": "ok"}, False, "ok"),
+     ({"a": "ok"}, True, "degraded")],
+)  # fmt: skip
+def test_the_daemons_state_is_made_of_its_sensors(sensors: dict[str, str], impaired: bool, state: str) -> None:
+    assert overall(sensors, impaired=impaired) == state
 
 
 @pytest.fixture
@@ -268,11 +270,11 @@ def test_http_answers_whatever_it_is_asked(web) -> None:
     head, body = answer.split(b"\r\n\r\n")
     assert head.startswith(b"HTTP/1.1 200 OK") and json.loads(body) == {"fine": True}
     assert ask(address, b"HEAD /ok HTTP/1.0\r\n\r\n").endswith(b"\r\n\r\n")
-    for request, status in (
+    for request, code in (
         (b"GET /no HTTP/1.1\r\n\r\n", b"404"), (b"POST /ok HTTP/1.1\r\n\r\n", b"405"),
         (b"rubbish\r\n\r\n", b"400"), (b"GET /broken HTTP/1.1\r\n\r\n", b"500"),
     ):  # fmt: skip
-        assert ask(address, request).split()[1] == status
+        assert ask(address, request).split()[1] == code
     assert ask(address, b"x" * 20_000) == b""
 
 

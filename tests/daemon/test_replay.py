@@ -17,11 +17,10 @@ from gestured.core.facts import events_of
 from gestured.core.frames import Frame
 from gestured.core.messages import event_type
 from gestured.core.scene import Scene
-from gestured.daemon import status
+from gestured.daemon import operations
 from gestured.daemon.asked import scene_of
 from gestured.daemon.merge import load_settings
-from gestured.daemon.shift import Shift
-from gestured.daemon.snapshot import Models, Snapshot
+from gestured.daemon.parts import Parts
 from gestured.model.ladder import ladder_for
 from gestured.model.opening import open_model
 from gestured.record.replay import maker
@@ -122,9 +121,8 @@ def test_a_tape_knows_everything_that_decides(model: Path, tmp_path: Path) -> No
     ladder = ladder_for(model)
     usual, odd = (load_settings({"model": str(model), **given}, {})[0] for given in ({}, {"config": str(file)}))
     scene = scene_of(odd, ladder)
-    models = Models.of(ladder, Shift.of(ladder.model), failed=False)
-    daemon = SimpleNamespace(models=models, instance="", gestures=scene.gestures, settings=odd)
-    told = status.scene(cast(Snapshot, daemon), 0, {})
+    hub, own = SimpleNamespace(scene=scene), SimpleNamespace(gestures={})
+    told = operations.scene(cast(Parts, SimpleNamespace(ladder=ladder, instance="", hub=hub, own=own, settings=odd)))
     read, other = maker(json.loads(json.dumps(told))).scene, scene_of(usual, ladder)
     kept = {"touches", "frames"}  # what is told beside the answers decides nothing
     for name in {field.name for field in dataclasses.fields(scene)} - kept:

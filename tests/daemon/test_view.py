@@ -1,7 +1,8 @@
-"""The control verb `view`: one sensor as it is felt now."""
+"""The control verb `follow`: sensors as they are felt, all events, and the state of the daemon."""
 
 import asyncio
 import json
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,85 +12,74 @@ import pytest
 
 from gestured.client.control import Control
 from gestured.client.lines import Refused
-from gestured.daemon import operations, views
-from gestured.daemon.asked import open_all
-from gestured.daemon.bound import bind_all
-from gestured.daemon.metrics import Metrics
+from gestured.daemon import views
 from gestured.daemon.service import Service
 from tests.daemon.harness import Daemon, Hand, Sensor
-from tests.daemon.parts import SNAPSHOT, Parts, settings_of
+from tests.daemon.parts import Parts, with_service
 
 
-def test_a_sensor_is_shown_as_it_is_felt(shared: Daemon) -> None:
-    sensor = Sensor(shared, "seen").begin()
-    frame = sensor.hand.frame(6.0, 2.0)
-    with Control(Path(shared.ready["control"])) as control:
-        sensor.send([frame, frame])
-        while (found := control.ask("view", sensor="seen", raw=True))["phase"] != "CONTACT":
-            pass
-        again = control.ask("view", sensor="seen")
-        with pytest.raises(Refused, match="no sensor 'nobody', expected one of .*seen"):
-            control.ask("view", sensor="nobody")
-        with pytest.raises(Refused, match="view.raw: expected true or false"):
-            control.ask("view", sensor="seen", raw=1)
-    assert found["raw"] == frame.ravel().tolist() and again["raw"] is None and found["grid"] == [9, 9]
-    values = np.array(found["values"]).reshape(9, 9)
-    assert np.abs(values - (frame - 20)).max() < 3 and values.argmax() == 6 * 9 + 2
-    assert found["activity"] > found["on"] > found["off"] > 0 and found["bad"] == []
-    assert found["centroid"] == pytest.approx([6.0, 2.0], abs=0.2)
-    sensor.perform()
-    shared.client().close()
-
-
-def test_it_is_made_at_most_thirty_times_a_second_and_only_when_somebody_asks(model, monkeypatch) -> None:
-    parts = Parts(model)
-    made: list[str] = []
-    view = parts.hub.view
-
-    def counted(sensor: str, now: float, *, raw: bool):
-        made.append(sensor)
-        return view(sensor, now, raw=raw)
-
-    monkeypatch.setattr(parts.hub, "view", counted)
-    clock: Any = SimpleNamespace(now=100.0, monotonic=lambda: clock.now, time=lambda: 1.7e9 + clock.now)
-    monkeypatch.setattr(views, "time", clock)
-    verbs = operations.Operations(
-        parts.hub, parts.desk, None, parts.taps, None, parts.views, lambda: SNAPSHOT, dict, None
-    ).verbs()
-    parts.feed("arm", Hand().idle(2.0), 90.0)
-    assert made == []
-    for _ in range(300):  # three viewers, a second
-        asyncio.run(verbs["view"].run(None, sensor="arm"))
-        clock.now += 1 / 300
-    assert 20 < len(made) <= 31
-
-
-def test_who_follows_is_shown_each_sensor_as_it_is_and_then_each_frame(shared: Daemon) -> None:
+def test_who_follows_is_shown_each_sensor_as_it_is_felt_and_then_each_frame(shared: Daemon) -> None:
     path = Path(shared.ready["control"])
     sensor = Sensor(shared, "followed").begin()
     with Control(path) as control, Control(path) as other:
         while "followed" not in control.ask("status")["sensors"]:
             pass
-        assert control.ask("follow", sensors=["followed", "later"])["sensors"] == ["followed", "later"]
+        asked = control.ask("follow", sensors=["followed", "later"], raw=True)
+        assert asked["sensors"] == ["followed", "later"]
         views = (line for line in control.lines() if line["type"] == "view")
         newest = next(views)["t"]
         for n in range(9):
-            sensor.send([sensor.hand.frame(4.0, n)])
+            frame = sensor.hand.frame(4.0, n)
+            sensor.send([frame])
             while (found := next(views))["t"] <= newest:
                 pass
             newest = found["t"]
-            assert (found["sensor"], found["raw"]) == ("followed", None)
-            assert np.array(found["values"]).reshape(9, 9)[4].argmax() == n
+            assert found["sensor"] == "followed" and found["raw"] == frame.ravel().tolist()
+            values = np.array(found["values"]).reshape(found["grid"])
+            assert np.abs(values - (frame - 20)).max() < 3 and found["bad"] == []
+            assert found["phase"] == "CONTACT" and found["activity"] > found["on"] > found["off"] > 0
+            assert found["centroid"] == pytest.approx([4.0, n], abs=0.6)
         Sensor(shared, "later").begin()
         while next(views)["sensor"] != "later":
             pass
         for wrong in (["no name!"], [1], [["followed"]], [None], "followed"):
-            with pytest.raises(Refused, match="follow.sensors: expected a list of sensors' names"):
+            with pytest.raises(Refused, match="follow.sensors.*: expected"):
                 other.ask("follow", sensors=wrong)
+        with pytest.raises(Refused, match="follow.raw: expected"):
+            other.ask("follow", sensors=[], raw=1)
         other.ask("follow", sensors=[])
         with pytest.raises(Refused, match="a tap already, or another stream"):
             other.ask("tap")
     sensor.send(sensor.hand.idle(1.0))
+
+
+def test_it_is_made_at_most_thirty_times_a_second_once_for_all_and_only_where_somebody_looks(
+    model: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parts, hand = Parts(model), Hand()
+    made: list[str] = []
+    view = parts.hub.view
+    monkeypatch.setattr(parts.hub, "view", lambda name, *when, **how: made.append(name) or view(name, *when, **how))
+    due: list[tuple[float, Callable[..., object], tuple[Any, ...]]] = []
+    clock: Any = SimpleNamespace(now=100.0, monotonic=lambda: clock.now, time=lambda: 1.7e9 + clock.now)
+    loop = SimpleNamespace(
+        call_later=lambda wait, act, *what: due.append((clock.now + wait, act, what)) or SimpleNamespace(),
+        call_soon=lambda act, *what: due.append((clock.now, act, what)) or SimpleNamespace(),
+    )
+    monkeypatch.setattr(views, "time", clock)
+    monkeypatch.setattr(views, "asyncio", SimpleNamespace(get_running_loop=lambda: loop))
+    t = parts.feed("arm", hand.idle(2.0), 90.0)
+    assert made == [] and due == []
+    followers = [Follower() for _ in range(3)]
+    for follower in followers:
+        parts.views.follow(follower, ["arm"], raw=False)
+    for _ in range(300):  # frames in a second
+        t = parts.feed("arm", [hand.frame()], t)
+        clock.now += 1 / 300
+        while ready := [one for one in due if one[0] <= clock.now]:
+            due.remove(ready[0])
+            ready[0][1](*ready[0][2])
+    assert 20 < len(made) <= 31 and {len(follower.seen) for follower in followers} == {len(made)}
 
 
 def test_who_follows_hears_the_state_and_every_event_once(shared: Daemon) -> None:
@@ -127,11 +117,12 @@ def test_who_ends_following_has_heard_all_that_was_published(shared: Daemon) -> 
     assert heard[:2] == ["onset", "gesture"]
 
 
-def test_a_daemon_that_ends_asks_for_no_state_any_more(model, tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_daemon_that_ends_asks_for_no_state_any_more(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A view that is due tells of the daemon's sockets, and they may be closed before its time comes."""
-    settings = settings_of("--model", model, "--listen", "127.0.0.1:0", "--socket", tmp_path / "events.sock")[0]
 
-    async def main() -> list[asyncio.TimerHandle]:
+    async def main(service: Service) -> list[asyncio.TimerHandle]:
         loop, stop = asyncio.get_running_loop(), asyncio.Event()
         waiting: list[asyncio.TimerHandle] = []
 
@@ -140,18 +131,14 @@ def test_a_daemon_that_ends_asks_for_no_state_any_more(model, tmp_path, monkeypa
             return waiting[-1]  # its time does not come by itself
 
         clock = SimpleNamespace(call_later=call_later, call_soon=loop.call_soon)
-        bound, metrics = bind_all(settings), Metrics()
-        service = Service(open_all(settings, metrics), metrics, bound, lambda: settings)
-        await service.start()
-        with Control(bound.control.path) as control:
+        with Control(service.parts.bound.control.path) as control:
             monkeypatch.setattr(views, "asyncio", SimpleNamespace(get_running_loop=lambda: clock))
             await asyncio.to_thread(control.ask, "follow", sensors=[])
             stop.set()
             await service.serve(stop, asyncio.Event())
-        bound.close()
         return waiting
 
-    waiting = asyncio.run(main())
+    waiting = with_service(model, tmp_path, main)
     assert waiting and all(handle.cancelled() for handle in waiting)
 
 

@@ -1,0 +1,90 @@
+"""What a running daemon is made of, for those who look at several of its parts."""
+
+import secrets
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+from gestured.core import messages
+from gestured.core.beside.reading import Reading
+from gestured.core.hub import Hub
+from gestured.daemon.asked import Asked
+from gestured.daemon.bound import Bound
+from gestured.daemon.clients import EventServer
+from gestured.daemon.desk import Desk
+from gestured.daemon.gatekeeper import Gatekeeper
+from gestured.daemon.health import Pulse
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.own import OwnGestures
+from gestured.daemon.settings import TITLES, Settings
+from gestured.daemon.tap import Taps
+from gestured.daemon.udp import Receiver
+from gestured.daemon.views import Views
+from gestured.model.ladder import Ladder
+
+# Settings that a reload cannot change.
+AT_A_RESTART = ("listen", "socket", "control", "gates", "gate", "metrics", "flight_recorder")
+
+
+@dataclass
+class Parts:
+    """The parts of one daemon. A reload replaces `asked`; any thread may read."""
+
+    asked: Asked  # the configuration in use, and what was opened for it
+    bound: Bound
+    metrics: Metrics
+    hub: Hub
+    own: OwnGestures
+    desk: Desk
+    clients: EventServer
+    taps: Taps
+    views: Views
+    receiver: Receiver
+    gates: Gatekeeper
+    pulse: Pulse = field(default_factory=Pulse)
+    instance: str = field(default_factory=lambda: secrets.token_hex(8))  # changes at every start
+    started: float = field(default_factory=time.time)  # s since the Unix epoch
+    begun: float = field(default_factory=time.monotonic)  # s, monotonic
+    stopping: bool = False
+
+    def __post_init__(self) -> None:
+        self._started_with = self.settings
+
+    @property
+    def settings(self) -> Settings:
+        """The configuration in use."""
+        return self.asked.settings
+
+    @property
+    def ladder(self) -> Ladder:
+        """The models in use."""
+        return self.asked.ladder
+
+    @property
+    def impaired(self) -> bool:
+        """Whether the model that should answer does not."""
+        return self.ladder.degraded or self.desk.models_failed
+
+    @property
+    def gestures(self) -> tuple[str, ...]:
+        """The gestures that a client may hear of: the model's in use, and the user's own."""
+        return (*self.hub.scene.gestures, *self.own.gestures)
+
+    @property
+    def served(self) -> float:
+        """Until when packets were served as of now, in monotonic s: a sensor whose packets wait is not silent."""
+        return time.monotonic() - self.receiver.behind_s
+
+    def readings(self) -> dict[str, Reading]:
+        """What is known of each sensor, heard or in the configuration."""
+        return self.hub.readings(self.served)
+
+    def listening(self) -> dict[str, dict[str, Any]]:
+        """What gates and arming say of the sensors of which they say anything."""
+        now = time.monotonic()
+        return messages.listening(self.hub.listening(now), time.time() - now)
+
+    def awaiting_restart(self) -> list[str]:
+        """Settings that a reload has read, but that a restart alone can put to use."""
+        new, old = self.settings, self._started_with
+        return [TITLES.get(key, key) for key in AT_A_RESTART if getattr(new, key) != getattr(old, key)]
