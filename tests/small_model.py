@@ -64,6 +64,27 @@ def oracle(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return softmax(np.stack([40 * mean, 0 * mean], 1)), 1 / (1 + np.exp(2 * inputs.max(axis=axes)))
 
 
+def properties(takes: str = "frames") -> dict[str, str]:
+    """The metadata of the test's model."""
+    names = feature_names(9, 9)
+    shape = (2, len(names)) if takes == "features" else (2, 5, 9, 9)
+    example = 0.05 * np.random.default_rng(1).random(shape, np.float32)
+    made = {
+        "gestures": json.dumps(GESTURES),
+        "kind": "test_net",
+        "version": "3",
+        "rows": "9",
+        "columns": "9",
+        "rate_hz": "15.0",
+        "window": WINDOW.to_json(),
+        "calibration": '{"temperature": 1.5}',
+        "self_test": SelfTest(example, *oracle(example)).to_json(),
+        "training_data": "0" * 64,
+        "quantiles": '{"duration_s": [0.1, 0.5]}',
+    }
+    return made | ({"features": json.dumps(names)} if takes == "features" else {})
+
+
 def build(
     path: Path,
     *,
@@ -138,24 +159,7 @@ def build(
         tensors,
     )
     proto = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
-    random = np.random.default_rng(1)
-    example = 0.05 * random.random((2, len(names)) if features else (2, 5, 9, 9), np.float32)
-    props = {
-        "gestures": json.dumps(GESTURES),
-        "kind": "test_net",
-        "version": "3",
-        "rows": "9",
-        "columns": "9",
-        "rate_hz": "15.0",
-        "window": WINDOW.to_json(),
-        "calibration": '{"temperature": 1.5}',
-        "self_test": SelfTest(example, *oracle(example)).to_json(),
-        "training_data": "0" * 64,
-        "quantiles": '{"duration_s": [0.1, 0.5]}',
-    }
-    if features:
-        props["features"] = json.dumps(names)
-    props |= metadata
+    props = properties(takes) | metadata
     helper.set_model_props(proto, {k: v for k, v in props.items() if k not in drop})
     if not keep_graph:
         proto.ClearField("graph")

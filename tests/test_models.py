@@ -6,7 +6,7 @@ import os
 import resource
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +25,7 @@ from gestured.model import file as model_file
 from gestured.model import points
 from gestured.model import process as model_process
 from gestured.model.features import touch_pattern
+from gestured.model.metadata import Metadata
 from gestured.model.model import Model
 from gestured.model.opening import check, open_model
 from gestured.model.prototypes import Space
@@ -33,7 +34,7 @@ from gestured.model.shipped import LADDER, shipped
 from tests.daemon import tiny_model
 from tests.hostile import bad_models
 from tests.opening import NO_FILES, no_file
-from tests.small_model import GESTURES, STRICTER, WINDOW, build, operating_points, oracle, segment
+from tests.small_model import GESTURES, STRICTER, WINDOW, build, operating_points, oracle, properties, segment
 
 
 def refusal(path: Path | str) -> str:
@@ -140,117 +141,102 @@ def test_truncated(tmp_path: Path, share: float) -> None:
     wrong(path)
 
 
-KEYS = (
-    "gestures", "kind", "version", "rows", "columns", "rate_hz", "window", "calibration", "self_test",
-    "training_data", "quantiles",
-)  # fmt: skip
+# --- metadata ---
 
 
-@pytest.mark.parametrize("key", KEYS)
-def test_missing_metadata_is_named(tmp_path: Path, key: str) -> None:
-    assert repr(key) in wrong(build(tmp_path / "m.onnx", drop=(key,)))
+def told(**changes: Any) -> Metadata:
+    return Metadata.parse({key: value for key, value in (properties() | changes).items() if value is not None})
+
+
+@pytest.mark.parametrize("key", properties())
+def test_missing_metadata_is_named(key: str) -> None:
+    with pytest.raises(ValueError, match=f"has no metadata '{key}', expected"):
+        told(**{key: None})
 
 
 def test_no_metadata_at_all(tmp_path: Path) -> None:
-    assert "'gestures', 'kind'" in refusal(build(tmp_path / "m.onnx", drop=KEYS))
+    assert "'gestures', 'kind'" in refusal(build(tmp_path / "m.onnx", drop=tuple(properties())))
 
 
-OTHER_WINDOW = json.dumps(json.loads(WINDOW.to_json()) | {"rows": 8})
-HALF_WINDOW = json.dumps({"rows": 9})
+ONE = np.ones(1)
+ENTRIES = {
+    "window": WINDOW.to_json(),
+    "own": Space(ONE, ONE[None], ONE, np.ones((2, 2, 1)), (0.0,) * EXAMPLES, 1.0, 0.0).to_json(),
+    "operating_points": operating_points(),
+    "provisional": json.dumps(
+        {"in_a_row": 2, "elapsed_s": [0, 0.2], "thresholds": [0.9, None], "gestures": {"one_tap": [1, 0]}, "tap": None}
+    ),
+    "self_test": json.dumps({"shape": [1, 1], "values": "AAAAAA==", "scores": [[1, 0]], "unknown": [0]}),
+}
 
 
-def own(**changes: Any) -> str:
-    """The space of one direction of a model with two gestures, changed."""
-    one = np.ones(1)
-    return json.dumps(
-        json.loads(Space(one, one[None], one, np.ones((2, 2, 1)), (0.0,) * EXAMPLES, 1.0, 0.0).to_json()) | changes
-    )
+def changed(entry: str, **changes: Any) -> str:
+    """One of the entries that are objects, with other values."""
+    return json.dumps(json.loads(ENTRIES[entry]) | changes)
 
 
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("gestures", "one_tap, swipe_up"),
-        ("gestures", '{"one_tap": 1}'),
-        ("gestures", '["one_tap"]'),
-        ("gestures", '["one_tap", "one_tap"]'),
-        ("gestures", '["one_tap", "Swipe Up"]'),
-        ("gestures", '["one_tap", ""]'),
-        ("gestures", '["one_tap", 3]'),
-        ("gestures", json.dumps([f"g{i}" for i in range(65)])),
-        ("gestures", "[" * 100_000),
-        ("kind", "A kind"),
-        ("version", ""),
-        ("version", "1\n2"),
-        ("rows", "8"),
-        ("rows", "nine"),
-        ("columns", "10"),
-        ("rate_hz", "nan"),
-        ("window", "{}"),
-        ("window", HALF_WINDOW),
-        ("rows", OTHER_WINDOW),
-        ("calibration", "[1]"),
-        ("calibration", '{"temperature": NaN}'),
-        ("training_data", "yesterday"),
-        ("quantiles", "null"),
-        ("own", own(slope=10**400)),
-        ("own", own(thresholds=[10**400] * EXAMPLES)),
-        ("provisional", "[]"),
-        ("operating_points", "[]"),
-        ("operating_points", operating_points().replace("12.0", "NaN")),
-        ("provisional", '{"in_a_row":0,"elapsed_s":[0],"thresholds":[0.9],"tap":null}'),
-        ("provisional", '{"in_a_row":2,"elapsed_s":[0,0.2,0.2],"thresholds":[0.9,0.9,0.9],"tap":null}'),
-        ("provisional", '{"in_a_row":2,"elapsed_s":[0],"thresholds":[1.5],"tap":null}'),
-        ("provisional", '{"in_a_row":2,"elapsed_s":[0],"thresholds":[0.9],"gestures":{"zigzag":[0.9]},"tap":null}'),
-        ("self_test", "{}"),
-        ("self_test", '{"shape": [1], "values": "", "scores": [], "unknown": []}'),
-        ("self_test", '{"shape": [1000, 1000, 1000, 9], "values": "", "scores": [], "unknown": []}'),
-        ("self_test", '{"shape": [1, 1, 9, 9], "values": "AAAA", "scores": [[1, 0]], "unknown": [0]}'),
-        ("self_test", '{"shape": [1, 1, 9, 9], "values": "*", "scores": [[1, 0]], "unknown": [0]}'),
-        ("self_test", '{"shape": [1, 1, 9, 9], "values": 7, "scores": "x", "unknown": {}}'),
-        ("features", '["mean_pressure"]'),
+WRONG = {  # by key, what it may not be
+    "gestures": [
+        "one_tap, swipe_up", '{"one_tap": 1}', '["one_tap"]', '["one_tap", "one_tap"]', '["one_tap", "Swipe Up"]',
+        '["one_tap", ""]', '["one_tap", 3]', json.dumps([f"g{i}" for i in range(65)]), "[" * 100_000,
     ],
-)
-def test_malformed_metadata_is_named(tmp_path: Path, key: str, value: str) -> None:
-    assert f"'{key}'" in wrong(build(tmp_path / "m.onnx", **{key: value}))
+    "kind": ["A kind"], "version": ["", "1\n2"], "training_data": ["yesterday"], "rate_hz": ["nan"], "columns": ["10"],
+    "rows": ["8", "nine", changed("window", rows=8)], "window": ["{}", '{"rows": 9}'], "quantiles": ["null"],
+    "calibration": ["[1]", '{"temperature": NaN}', '{"threshold": 1.5}'],
+    "features": ['["mean_pressure"]'], "context": ['["weather"]'],
+    "self_test": ["{}", '{"shape": [1, 1]}'], "operating_points": ["[]"], "provisional": ["[]", "{}"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("key", "value"), [(key, value) for key, several in WRONG.items() for value in several])
+def test_malformed_metadata_is_named(key: str, value: str) -> None:
+    with pytest.raises(ValueError, match=f"'{key}'.* expected "):
+        told(**{key: value})
 
 
 POINT = json.loads(operating_points())["normal"]
+NO_CONFIDENCES = (2, -1, "0.5", [], True, 10**400)
+WRONG_PARTS: list[tuple[str, str, Sequence[Any]]] = [
+    ("own", "slope", (10**400,)), ("own", "thresholds", ([10**400] * EXAMPLES,)),
+    ("self_test", "shape", ([1], [], [1000, 1000, 1000, 9], 5)), ("self_test", "values", ("AAAA", "*", 7, "AADAfw==")),
+    ("self_test", "scores", ("x", [1, 0])), ("self_test", "unknown", ([0.5, 0.5], {})),
+    ("operating_points", "lax", (POINT,)), ("operating_points", "strict", (None, POINT | {"more": 1})),
+    ("operating_points", "eager", [POINT | {key: value} for key in POINT for value in NO_CONFIDENCES[1:]]),
+    ("operating_points", "normal", [POINT | {"thresholds": value} for value in (
+        {"one_tap": 0.5}, *({"one_tap": 0.5, "swipe_up": value} for value in NO_CONFIDENCES)
+    )]),
+    ("operating_points", "curve", ([], [[0.5, 0.1]], [[0.5, 0.1, 3], [0.5, 0.2, 2]])),
+    ("provisional", "more", (1,)), ("provisional", "in_a_row", (0, -1, 1.5, True, "2", None, 10**9)),
+    ("provisional", "elapsed_s", ([], None, [0.1, 0.2], [0, 0], ["0", 1], [0, True], [0, 1e300])),
+    ("provisional", "thresholds", ([], [0.9], [0.9] * 3, {}, *([value, None] for value in NO_CONFIDENCES))),
+    ("provisional", "gestures", ({"zigzag": [0.9, 0.9]}, {"one_tap": [0.9]}, [1])),
+    ("provisional", "tap", NO_CONFIDENCES),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"lax": POINT}, "expected eager, normal, strict and curve"),
-        ({"strict": None}, "strict: expected an object with thresholds, provisional"),
-        (
-            {"strict": POINT | {"thresholds": {"one_tap": 0.5}}},
-            "strict: thresholds: expected one for each of the model's",
-        ),
-        (
-            {"eager": POINT | {"thresholds": {"one_tap": 0.5, "swipe_up": 1.1}}},
-            "eager: thresholds: swipe_up: expected a",
-        ),
-        ({"normal": POINT | {"provisional": "0.9"}}, "normal: provisional: expected a number from 0 to 1, found '0.9'"),
-        ({"normal": POINT | {"missed": True}}, "normal: missed: expected a number from 0 to 1, found True"),
-        ({"normal": POINT | {"false_per_hour": 10**400}}, "normal: false_per_hour: expected a number from 0 to 1e"),
-        ({"curve": []}, "curve: expected a list of 1 to 1000 rows"),
-        ({"curve": [[0.5, 0.1]]}, "curve: expected rows of threshold, missed and false an hour"),
-        ({"curve": [[0.5, 0.1, 3], [0.5, 0.2, 2]]}, "curve: expected thresholds that rise, found 0.5 after 0.5"),
-    ],
-)
-def test_operating_points_that_cannot_be_are_named(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
-    message = wrong(build(tmp_path / "m.onnx", operating_points=operating_points(**changes)))
-    assert f"metadata 'operating_points': {words}" in message
+@pytest.mark.parametrize(("entry", "part", "values"), WRONG_PARTS)
+def test_a_wrong_part_of_an_entry_is_named(entry: str, part: str, values: Sequence[Any]) -> None:
+    named = "" if entry in ("own", "self_test") else f"{part}|an object with"
+    for value in values:
+        with pytest.raises(ValueError, match=f"'{entry}'.*({named})"):
+            told(**{entry: changed(entry, **{part: value})})
+
+
+def test_entries_that_may_be_missing_are_understood() -> None:
+    found = told(**{key: ENTRIES[key] for key in ("own", "operating_points", "provisional")})
+    assert found.own is not None and found.points is not None and found.provisional is not None
+    assert [found.provisional.needed("swipe_up", t) for t in (0.0, 0.19, 0.2, 9.0)] == [0.9, 0.9, None, None]
+    assert [found.provisional.needed("one_tap", t) for t in (0.0, 0.3)] == [1.0, 0.0]
+    assert (told().own, told().points, told().provisional, told().threshold) == (None, None, None, 0.5)
 
 
 def test_a_model_without_operating_points_is_as_before_and_one_with_them_reports_them(tmp_path: Path) -> None:
     assert open_model(build(tmp_path / "old.onnx")).points is None
     assert check(tmp_path / "old.onnx")["operating_points"] is None
     path = build(tmp_path / "new.onnx", operating_points=operating_points())
-    model, told = open_model(path), json.loads(operating_points())
-    assert model.points is not None and [list(row) for row in model.points.curve] == told.pop("curve")
-    assert json.loads(json.dumps(check(path)))["operating_points"] == told
+    model, stored = open_model(path), json.loads(operating_points())
+    assert model.points is not None and [list(row) for row in model.points.curve] == stored.pop("curve")
+    assert json.loads(json.dumps(check(path)))["operating_points"] == stored
     assert model.classify(segment()).points is model.points
 
 
@@ -265,9 +251,9 @@ JSON = st.recursive(
 def test_whatever_stands_for_operating_points_is_taken_or_refused_in_a_sentence(
     changes: dict[str, Any], key: str, value: Any
 ) -> None:
-    told = json.loads(operating_points()) | {"eager": POINT | {key: value}} | changes
+    stored = json.loads(operating_points()) | {"eager": POINT | {key: value}} | changes
     try:
-        found = points.operating_points(told, GESTURES)
+        found = points.operating_points(stored, GESTURES)
     except ValueError as error:
         assert "expected" in str(error) and "\n" not in str(error)
         return
@@ -275,7 +261,7 @@ def test_whatever_stands_for_operating_points_is_taken_or_refused_in_a_sentence(
 
 
 def test_grid_of_the_window_must_be_that_of_the_graph(tmp_path: Path) -> None:
-    path = build(tmp_path / "m.onnx", window=OTHER_WINDOW, rows="8")
+    path = build(tmp_path / "m.onnx", window=changed("window", rows=8), rows="8")
     assert "'frames' has the shape (any, any, 9, 9), expected (any, any, 8, 9)" in refusal(path)
 
 

@@ -4,10 +4,8 @@ Functions here raise ValueError with the reason; `model.open_model` adds the fil
 """
 
 import base64
-import binascii
 import hashlib
 import json
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,7 +21,6 @@ from gestured.record.files import open_regular
 MAX_MODEL_BYTES = 32 << 20
 # What stands in a file before the 64 characters of its digest: the head of a protobuf entry of `metadata_props`.
 DIGEST = b"\x72\x4a\x0a\x06digest\x12\x40"
-MAX_SELF_TEST = 400_000  # numbers of a self-test's input; more do not fit into metadata.MAX_TEXT
 # The word `location`, by which a tensor names the file of its data, after the word's length as protobuf writes it.
 _LOCATION = re.compile(rb"(?:\x08|\x88\x80*\x00)location")
 
@@ -92,26 +89,16 @@ class SelfTest:
     @classmethod
     def from_json(cls, stored: Mapping[str, Any]) -> "SelfTest":
         """The self-test that `to_json` wrote, parsed; ValueError says what was expected."""
-        missing = [key for key in ("shape", "values", "scores", "unknown") if key not in stored]
-        if missing:
-            raise ValueError(f"metadata 'self_test' has no {missing[0]!r}")
-        shape = stored["shape"]
-        if not (
-            isinstance(shape, list)
-            and len(shape) in (2, 4)
-            and all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in shape)
-            and math.prod(shape) <= MAX_SELF_TEST
-        ):
-            raise ValueError("metadata 'self_test': expected a shape (B, T, R, C) or (B, F)")
         try:
-            values = np.frombuffer(base64.b64decode(stored["values"], validate=True), "<f4")
-            values = values.reshape(shape).astype(np.float32)
-            scores = np.asarray(stored["scores"], np.float32)
-            unknown = np.asarray(stored["unknown"], np.float32)
-        except (TypeError, ValueError, OverflowError, binascii.Error):
-            raise ValueError("metadata 'self_test': expected base64 float32 and lists of numbers") from None
-        if scores.ndim != 2 or unknown.shape != (shape[0],) or len(scores) != shape[0]:
-            raise ValueError("metadata 'self_test': expected scores (B, G) and unknown (B,) of its input")
+            flat = np.frombuffer(base64.b64decode(stored["values"], validate=True), "<f4")
+            values = flat.reshape(stored["shape"]).astype(np.float32)
+            scores, unknown = (np.asarray(stored[key], np.float32) for key in ("scores", "unknown"))
+        except (KeyError, TypeError, ValueError, OverflowError):
+            raise ValueError("expected a shape, its values as base64 float32, and lists: scores, unknown") from None
+        batch = values.shape[:1]
+        same = batch == scores.shape[:1] == unknown.shape
+        if values.ndim not in (2, 4) or not values.size or scores.ndim != 2 or not same:
+            raise ValueError("expected values (B, T, R, C) or (B, F), scores (B, G) and unknown (B,)")
         if not all(np.isfinite(array).all() for array in (values, scores, unknown)):
-            raise ValueError("metadata 'self_test': a value is not finite")
+            raise ValueError("a value is not finite")
         return cls(values, scores, unknown)

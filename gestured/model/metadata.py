@@ -6,18 +6,17 @@ Functions here raise ValueError with the key and what was expected; `model.open_
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, TypeVar
 
 from gestured.core.points import Certainty, OperatingPoints
 from gestured.core.window import Window
-from gestured.model.certainty import certainty
 from gestured.model.context import NAMES as CONTEXT
 from gestured.model.features import feature_names
 from gestured.model.file import SelfTest
-from gestured.model.points import operating_points
+from gestured.model.points import certainty, operating_points
 from gestured.model.prototypes import Space
 
 MAX_TEXT = 2 << 20  # characters of one value; the longest is the self-test, some thousands
@@ -25,6 +24,13 @@ MAX_ITEMS = 50_000  # of the lists and objects in one value; each costs a hundre
 MAX_NESTING = 16  # lists and objects inside each other in one value
 USUAL_THRESHOLD = 0.5  # of a model whose calibration has none: more probably right than wrong
 GESTURE_NAME = re.compile(r"[a-z0-9_]{1,64}")
+# What is plain text, and what it may be, in words.
+TEXTS = {
+    "kind": (GESTURE_NAME, "1 to 64 of a-z, 0-9, _"),
+    "version": (re.compile(r"[ -~]{1,64}"), "1 to 64 printable characters"),
+    "training_data": (re.compile(r"[0-9a-f]{64}"), "a sha256 in hexadecimal"),
+}
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,32 +67,26 @@ class Metadata:
         missing = [k for k in (*required, "self_test", "training_data", "quantiles") if k not in properties]
         if missing:
             raise ValueError(f"has no metadata {', '.join(map(repr, missing))}, expected gestured's own")
+
         for key, text in properties.items():
             _check_extent(key, text)
-        gestures = _names(properties, "gestures", 2, 64)
-        if not all(GESTURE_NAME.fullmatch(name) for name in (*gestures, properties["kind"])):
-            raise ValueError("metadata 'gestures' and 'kind': expected 1 to 64 of a-z, 0-9, _ each")
-        if not 1 <= len(properties["version"]) <= 64 or not properties["version"].isprintable():
-            raise ValueError("metadata 'version': expected 1 to 64 printable characters")
-        if not re.fullmatch(r"[0-9a-f]{64}", properties["training_data"]):
-            raise ValueError("metadata 'training_data': expected a sha256 in hexadecimal")
-        with _naming("window"):
-            window = Window.from_json(properties["window"])
-        provisional = own = points = None
-        if "provisional" in properties:
-            with _naming("provisional"):
-                provisional = certainty(properties["provisional"], gestures)
-        if "operating_points" in properties:
-            told = _json(properties["operating_points"], "operating_points", dict)
-            with _naming("operating_points"):
-                points = operating_points(told, gestures)
-        if "own" in properties:
-            told = _json(properties["own"], "own", dict)
-            with _naming("own"):
-                own = Space.from_json(told, len(gestures))
-        context = _context(properties) if "context" in properties else None
+        for key, (pattern, words) in TEXTS.items():
+            if not pattern.fullmatch(properties[key]):
+                raise ValueError(f"metadata {key!r}: expected {words}")
+
+        def told(key: str, read: Callable[[str], T]) -> T:
+            try:
+                return read(properties[key])
+            except ValueError as error:
+                raise ValueError(f"metadata {key!r}: {error}") from error
+
+        def perhaps(key: str, read: Callable[[str], T]) -> T | None:
+            return told(key, read) if key in properties else None
+
+        window = told("window", Window.from_json)
         _check_grid(properties, window)
-        calibration = _json(properties["calibration"], "calibration", dict)
+        gestures = told("gestures", partial(_names, 2, 64))
+        calibration = told("calibration", _object)
         return cls(
             gestures=gestures,
             kind=properties["kind"],
@@ -95,16 +95,16 @@ class Metadata:
             columns=window.columns,
             rate_hz=window.rate_hz,
             window=window,
-            features=_features(properties, window) if "features" in properties else None,
-            context=context,
+            features=perhaps("features", partial(_features, window)),
+            context=perhaps("context", _context),
             calibration=calibration,
             threshold=_threshold(calibration),
             training_data=properties["training_data"],
-            quantiles=_json(properties["quantiles"], "quantiles", dict),
-            self_test=SelfTest.from_json(_json(properties["self_test"], "self_test", dict)),
-            provisional=provisional,
-            points=points,
-            own=own,
+            quantiles=told("quantiles", _object),
+            self_test=told("self_test", lambda text: SelfTest.from_json(_object(text))),
+            provisional=perhaps("provisional", lambda text: certainty(_object(text), gestures)),
+            points=perhaps("operating_points", lambda text: operating_points(_object(text), gestures)),
+            own=perhaps("own", lambda text: Space.from_json(_object(text), len(gestures))),
         )
 
 
@@ -118,15 +118,6 @@ def _check_grid(properties: Mapping[str, str], window: Window) -> None:
             found = math.nan
         if found != expected:
             raise ValueError(f"metadata {key!r} is {properties[key][:40]!r}, expected {expected} as in 'window'")
-
-
-@contextmanager
-def _naming(key: str) -> Iterator[None]:
-    """Have a ValueError say in which key of the metadata the mistake is."""
-    try:
-        yield
-    except ValueError as error:
-        raise ValueError(f"metadata {key!r}: {error}") from error
 
 
 def _check_extent(key: str, text: str) -> None:
@@ -143,35 +134,37 @@ def _check_extent(key: str, text: str) -> None:
             )
 
 
-def _names(properties: Mapping[str, str], key: str, least: int, most: int) -> tuple[str, ...]:
-    names = _json(properties[key], key, list)
-    if not (least <= len(names) <= most and all(isinstance(name, str) for name in names)):
-        raise ValueError(f"metadata {key!r}: expected {least} to {most} names")
-    if len(set(names)) != len(names):
-        raise ValueError(f"metadata {key!r}: expected names that differ")
+def _names(least: int, most: int, text: str) -> tuple[str, ...]:
+    names = _json(text, list)
+    right = all(isinstance(name, str) and GESTURE_NAME.fullmatch(name) for name in names)
+    if not right or not least <= len(names) <= most or len(set(names)) != len(names):
+        raise ValueError(f"expected {least} to {most} names that differ, each 1 to 64 of a-z, 0-9, _")
     return tuple(names)
 
 
-def _features(properties: Mapping[str, str], window: Window) -> tuple[str, ...]:
+def _features(window: Window, text: str) -> tuple[str, ...]:
     """The names of what a model takes instead of frames: all touch-pattern features of its grid, in their order."""
     expected = feature_names(window.rows, window.columns)
-    if _names(properties, "features", 1, 10_000) != expected:
-        raise ValueError(
-            f"metadata 'features': expected the {len(expected)} touch-pattern features of a "
-            f"{window.rows} x {window.columns} grid in their order"
-        )
+    if _json(text, list) != list(expected):
+        grid = f"{window.rows} x {window.columns}"
+        raise ValueError(f"expected the {len(expected)} touch-pattern features of a {grid} grid in their order")
     return expected
 
 
-def _context(properties: Mapping[str, str]) -> tuple[str, ...]:
+def _context(text: str) -> tuple[str, ...]:
     """The names of what surrounds a segment, all of which this version can tell."""
-    names = _names(properties, "context", 1, len(CONTEXT))
+    names = _names(1, len(CONTEXT), text)
     if odd := [name for name in names if name not in CONTEXT]:
-        raise ValueError(f"metadata 'context': {odd[0]!r} is unknown, expected some of {', '.join(CONTEXT)}")
+        raise ValueError(f"{odd[0]!r} is unknown, expected some of {', '.join(CONTEXT)}")
     return names
 
 
-def _json(text: str, key: str, kind: type) -> Any:
+def _object(text: str) -> dict[str, Any]:
+    found: dict[str, Any] = _json(text, dict)
+    return found
+
+
+def _json(text: str, kind: type) -> Any:
     def refuse(constant: str) -> None:
         raise ValueError(constant)  # NaN and Infinity are no JSON
 
@@ -180,7 +173,7 @@ def _json(text: str, key: str, kind: type) -> Any:
     except (ValueError, RecursionError):
         value = None
     if not isinstance(value, kind):
-        raise ValueError(f"metadata {key!r}: expected a JSON {'list' if kind is list else 'object'}")
+        raise ValueError(f"expected a JSON {'list' if kind is list else 'object'}")
     return value
 
 

@@ -1,8 +1,6 @@
 """Provisional events: what is said of a contact before its answer, and that no answer depends on it."""
 
 import hashlib
-import json
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
@@ -21,7 +19,6 @@ from gestured.core.hub import Hub
 from gestured.core.points import Certainty, OperatingPoints, Point
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
-from gestured.model.certainty import certainty
 from gestured.model.ladder import RETRY_S, SLOW_RUNS, Ladder
 from gestured.model.model import Model
 from tests.daemon.harness import Hand, floats
@@ -546,63 +543,3 @@ def test_what_was_said_is_judged_whatever_happens_meanwhile(how: str, monkeypatc
     expected = ["cancelled revoked", "release"] if how == "bug" else ["left confirmed", "release"]
     assert names([fact for fact in facts if isinstance(fact, Event)]) == expected
     assert any(isinstance(fact, Fault) for fact in facts) == (how == "bug")
-
-
-# --- what a model says of itself
-
-
-GOOD: dict[str, Any] = {
-    "in_a_row": 2,
-    "elapsed_s": [0.0, 0.2, 0.5],
-    "thresholds": [0.98, None, 0.9],
-    "gestures": {"left": [None, 0.9, 0.8]},
-    "tap": 0.9,
-}
-
-
-def test_thresholds_by_elapsed_time_and_gesture() -> None:
-    found = certainty(json.dumps(GOOD), GESTURES)
-    assert [found.needed("right", t) for t in (0.0, 0.19, 0.2, 0.49, 0.5, 9.0)] == [0.98, 0.98, None, None, 0.9, 0.9]
-    assert [found.needed("left", t) for t in (0.0, 0.3, 0.7)] == [None, 0.9, 0.8]
-    assert (found.in_a_row, found.tap) == (2, 0.9)
-    without = certainty(json.dumps({k: v for k, v in GOOD.items() if k != "gestures"} | {"tap": None}), ())
-    assert without.needed("left", 0.1) == 0.98 and without.tap is None
-
-
-BAD: list[tuple[Any, str]] = [
-    ([], "expected a JSON object"),
-    ({}, "expected a JSON object with"),
-    (GOOD | {"more": 1}, "expected a JSON object with"),
-    ({k: v for k, v in GOOD.items() if k != "tap"}, "expected a JSON object with"),
-    *[(GOOD | {"in_a_row": value}, "in_a_row: ") for value in (0, -1, 1.5, True, "2", None, 10**9)],
-    *[
-        (GOOD | {"elapsed_s": value}, "elapsed_s: ")
-        for value in ([], None, [0.1, 0.2, 0.5], [0, 0.5, 0.5], [0, 0.5, 0.2], ["0", 1, 2], [0, True, 2], [0, 1, 1e300])
-    ],
-    *[
-        (GOOD | {"thresholds": value}, "thresholds: ")
-        for value in ([], [0.9], [0.9] * 4, [1.1, 0.5, 0.5], [-0.1, None, None], ["0.5", 1, 1], {}, [False, 0.5, 0.5])
-    ],
-    (GOOD | {"gestures": {"zigzag": [0.9, 0.9, 0.9]}}, "gestures: .*zigzag"),
-    (GOOD | {"gestures": {"left": [0.9]}}, "gestures: left: "),
-    (GOOD | {"gestures": [1]}, "gestures: "),
-    *[(GOOD | {"tap": value}, "tap: ") for value in (2, -1, "0.5", [], True)],
-]
-
-
-@pytest.mark.parametrize(("found", "says"), BAD)
-def test_metadata_that_do_not_fit_are_refused(found: Any, says: str) -> None:
-    with pytest.raises(ValueError, match=says):
-        certainty(json.dumps(found), GESTURES)
-
-
-@pytest.mark.parametrize("text", ["", "x", "NaN", "[" * 5000, '{"in_a_row":2'])
-def test_what_is_no_json_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match="expected a JSON object"):
-        certainty(text, GESTURES)
-
-
-def test_nan_is_no_threshold() -> None:
-    text = json.dumps(GOOD | {"tap": math.nan})
-    with pytest.raises(ValueError, match="tap"):
-        certainty(text, GESTURES)
