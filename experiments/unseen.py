@@ -118,12 +118,7 @@ def held_out_kinds(trained: Trained, data: TrainingData, plan: TrainingPlan) -> 
     """Non-gestures of kinds that the heads and the calibration have not seen: three groups of kinds, in turn."""
     heads = Heads.of(trained, data, plan, NAME)
     groups = [group_of(number) for number in range(len(GROUPS))]
-    found = rejected([Said(*given, classes) for classes in groups for given in heads.without(classes, plan)])
-    print(f"{f'{NAME}, non-gestures of held-out kinds':<40}{found['count']:>49}{found['rejected']:>9.3f}", flush=True)
-    return found
-
-
-HOW = {"known": "knows them", "heads": "heads without", "whole": "whole without"}
+    return rejected([Said(*given, classes) for classes in groups for given in heads.without(classes, plan)])
 
 
 def whole_left_out(trained: Trained, data: TrainingData, plan: TrainingPlan, cache: Path, path: Path) -> dict[str, Any]:
@@ -144,12 +139,7 @@ def whole_left_out(trained: Trained, data: TrainingData, plan: TrainingPlan, cac
     found: dict[str, Any] = {"kinds": [CLASSES[k] for k in classes]}
     for how, said in answers.items():
         found[how] = rejected(said)
-        results = {one.test: one.judged(data.performed[one.test]) for one in said}
-        found[how]["simulated"] = {test: asdict(result) for test, result in results.items()}
-        for test, result in results.items():
-            print(result.rows(f"{NAME}, {HOW[how]}, {test}"), flush=True)
-        both = " ".join(f"{found[how][value]:.3f}" for value in ("rejected", "low", "high"))
-        print(f"{NAME}, {HOW[how]}: of {found[how]['count']} of these kinds rejected, low, high: {both}", flush=True)
+        found[how]["simulated"] = {one.test: asdict(one.judged(data.performed[one.test])) for one in said}
     return found
 
 
@@ -205,10 +195,10 @@ def main() -> None:
     path = args.models / f"{NAME}.onnx"
     heads = held_out_kinds(found, data, plan)
     whole = whole_left_out(found, data, plan, args.cache, path) if args.whole else None
-    if args.document:
-        lines = [made_of(command(), [path]), ""]
-        for document in (args.document, path.with_suffix(".md")):
-            renew(document, "unseen", [*lines, *lines_of(heads, whole)])
+    lines = lines_of(heads, whole)
+    print("\n".join(lines))
+    for document in (args.document, path.with_suffix(".md")) if args.document else ():
+        renew(document, "unseen", [made_of(command(), [path]), "", *lines])
 
 
 if __name__ == "__main__":

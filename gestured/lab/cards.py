@@ -32,12 +32,16 @@ def write_blocks(
     GesturedError where their marks are missing.
     """
     files = [*(folder / f"{name}.onnx" for name in figures), folder / NAME]
-    rows = [row for name, found in figures.items() for row in _rows(found, f"`{name}.onnx`, ")]
     name, found = next(iter(figures.items()))
-    tables = [*HEAD, *rows, "", *_worst(figures), "", *_by_kind(name, found)]
+    tables = [*table(figures), "", *_worst(figures), "", *_by_kind(name, found)]
     renew(documents[0], "figures", [made_of(command, files), "", *tables])
     for document in documents[1:]:
         renew(document, "worst", [made_of(command, files[:1]), "", *_worst({name: found})])
+
+
+def table(figures: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """What each model is worth on each set that judged it."""
+    return [*HEAD, *(row for name, found in figures.items() for row in _rows(found, f"`{name}.onnx`, "))]
 
 
 def _worst(figures: Mapping[str, Mapping[str, Any]]) -> list[str]:

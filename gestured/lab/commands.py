@@ -7,8 +7,8 @@ from typing import Any
 
 import torch
 
-from gestured.lab.cards import write_blocks, write_cards
-from gestured.lab.evaluate import Evaluation, real_figures, simulated_figures
+from gestured.lab.cards import table, write_blocks, write_cards
+from gestured.lab.evaluate import real_figures, simulated_figures
 from gestured.lab.manifest import write_manifest
 from gestured.lab.own import command as own
 from gestured.lab.train import TrainingPlan, calibration_set, learn, load_data, train
@@ -47,12 +47,12 @@ def evaluate_models(plan: TrainingPlan, args: argparse.Namespace) -> None:
     for path in paths.values():
         open_model(path)  # says what is wrong before anything is simulated
     data = load_data(plan, args.cache, args.real, args.jobs, args.recordings)
-    print(Evaluation.HEAD, flush=True)
     found = simulated_figures(paths, data)
     figures: dict[str, dict[str, Any]] = {name: {"simulated": of} for name, of in found.items()}
     trained = learn(plan, data, args.cache)
     for name, of in real_figures(trained, calibration_set(trained, data, plan), data).items():
         figures[name]["real"] = of
+    print("\n".join(table(figures)), flush=True)
     write_manifest(args.models, figures)
     write_cards(args.models, figures, plan)
     if args.document:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from gestured.lab.decide import Answers, confidence
 from gestured.lab.prefixes import floors
@@ -65,14 +66,7 @@ def chance_of(people: NDArray[np.int64], revoked: NDArray[np.bool_]) -> float:
     if not len(people):
         return 1.0
     each = _revoked(people, revoked)
-    return at_most(math.ceil(each.sum() - 1e-9), len(each), 1 - CONFIRMED)
-
-
-def at_most(most: int, of: int, chance: float) -> float:
-    """The probability that at most so many of `of` events come, each with that chance (binomial)."""
-    logs = (math.lgamma(of + 1) - math.lgamma(k + 1) - math.lgamma(of - k + 1)
-            + k * math.log(chance) + (of - k) * math.log1p(-chance) for k in range(most + 1))  # fmt: skip
-    return math.fsum(map(math.exp, logs))
+    return float(stats.binom.cdf(math.ceil(each.sum() - 1e-9), len(each), 1 - CONFIRMED))
 
 
 def safe_from(
@@ -106,7 +100,7 @@ def deceives(questions: Questions, level: float) -> bool:
     if not len(events):
         return False
     each = _revoked(person[events], wrong[events])
-    return 1 - at_most(math.floor(each.sum() + 1e-9) - 1, len(each), 1 - CONFIRMED) <= DOUBT
+    return bool(stats.binom.sf(math.floor(each.sum() + 1e-9) - 1, len(each), 1 - CONFIRMED) <= DOUBT)
 
 
 def calibrated(asked: Asked, gestures: Sequence[str], tap: float | None) -> dict[str, Any]:

@@ -41,23 +41,6 @@ class Evaluation:
     people: int = 0  # who performed; 0 where nobody said who
     intervals: dict[str, dict[str, float]] = field(default_factory=dict)  # low and high, 95 % over people, by name
 
-    HEAD = f"{'set':<40}{'gestures':>9}{'right*':>8}{'right':>8}{'wrong':>8}{'lost':>8}{'others':>8}{'rejected':>9}"
-
-    def row(self, title: str) -> str:
-        """One row of a table; right* is before rejection."""
-        return (
-            f"{title:<40}{self.gestures:>9}{self.right_before:>8.3f}{self.right:>8.3f}{self.wrong:>8.3f}"
-            f"{self.lost:>8.3f}{self.others:>8}{self.rejected:>9.3f}"
-        )
-
-    def rows(self, title: str) -> str:
-        """The row, and below it where its intervals begin and end."""
-        lines = [self.row(title)]
-        for end, words in (("low", f"  95 % over {self.people} people, from"), ("high", "  to")):
-            right, wrong, lost, rejected = (self.intervals[name][end] for name in SHARES)
-            lines.append(f"{words:<57}{right:>8.3f}{wrong:>8.3f}{lost:>8.3f}{'':>8}{rejected:>9.3f}")
-        return "\n".join(lines)
-
 
 def outcome(
     answers: Answers,
@@ -136,7 +119,6 @@ def simulated_figures(models: Mapping[str, Path], data: TrainingData) -> dict[st
             result = outcome(given, targets(samples), model.threshold, data.performed[test], samples.people)
             more = {"kinds": by_kind(given, samples, model.threshold), "worst": worst(given, samples, model.threshold)}
             found[name][test] = asdict(result) | more
-            print(result.rows(f"{name}, simulated, {test}"), flush=True)
     return found
 
 
@@ -202,6 +184,5 @@ def real_figures(trained: Trained, calibrated: Calibrated, data: TrainingData) -
             answers = scores[chosen], unknown[chosen]
             result = outcome(answers, labels[chosen], least, data.performed.get(title), real.people[chosen])
             found.setdefault(name, {})[title] = asdict(result) | {"worst": worst(answers, real.take(chosen), least)}
-            print(result.rows(f"{name}, real, {title}"), flush=True)
         found[name]["kinds"] = by_kind((scores, unknown), real, least)
     return found

@@ -6,7 +6,7 @@ the split (`augment`), and some of its windows are cut short (`prefixes`). Nothi
 networks are told how long each window is.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -239,18 +239,23 @@ def optimiser_of(
     )
 
 
+def asked(samples: Samples, ask: Callable[[Tensor, Tensor], Sequence[Tensor]]) -> list[Tensor]:
+    """What is answered to all samples, in their order.
+
+    `ask` takes batches of windows of similar length, and the frames of each, as `batch_of` gives them.
+    """
+    order = np.argsort(samples.lengths(), kind="stable")
+    with torch.no_grad():
+        found = [ask(*batch_of(samples, order[i : i + 256])) for i in range(0, len(order), 256)]
+    back = torch.from_numpy(np.argsort(order, kind="stable"))
+    return [torch.cat(parts)[back] for parts in zip(*found, strict=True)]
+
+
 def logits(nets: nn.ModuleDict, samples: Samples) -> dict[str, Tensor]:
     """(G, K) logits of each network for all samples, in their order."""
     nets.eval()
-    order = np.argsort(samples.lengths(), kind="stable")
-    found: dict[str, list[Tensor]] = {name: [] for name in nets}
-    with torch.no_grad():
-        for i in range(0, len(order), 256):
-            x, lengths = batch_of(samples, order[i : i + 256])
-            for name, net in nets.items():
-                found[name].append(net(x, lengths))
-    back = torch.from_numpy(np.argsort(order, kind="stable"))
-    return {name: torch.cat(parts)[back] for name, parts in found.items()}
+    found = asked(samples, lambda x, lengths: [net(x, lengths) for net in nets.values()])
+    return dict(zip(nets, found, strict=True))
 
 
 def load_nets(path: Path) -> nn.ModuleDict:

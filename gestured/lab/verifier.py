@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from gestured.lab.decide import Answers, decided
-from gestured.lab.fit import batch_of
+from gestured.lab.fit import asked
 from gestured.lab.nets import Decision, Opinion, Verifier
 from gestured.lab.samples import EVERYDAY, LIKE_A_TAP, PART, Samples
 from gestured.model.context import PAST
@@ -42,17 +42,13 @@ class Evidence:
         net, trajectory = nets[name], nets["trajectory"]
         assert isinstance(net, Opinion)
         assert isinstance(trajectory, Opinion)
-        net.eval()
-        trajectory.eval()
-        order = np.argsort(samples.lengths(), kind="stable")
-        found: list[tuple[Tensor, Tensor, Tensor]] = []
-        with torch.no_grad():
-            for i in range(0, len(order), 256):
-                x, lengths = batch_of(samples, order[i : i + 256])
-                state, hidden = net.embed(x, lengths), trajectory.embed(x, lengths)
-                found.append((net.judge(state), trajectory.judge(hidden), torch.cat([state, hidden], 1)))
-        back = torch.from_numpy(np.argsort(order, kind="stable"))
-        first, second, embedding = (torch.cat(parts)[back] for parts in zip(*found, strict=True))
+        nets.eval()
+
+        def ask(x: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+            state, hidden = net.embed(x, lengths), trajectory.embed(x, lengths)
+            return net.judge(state), trajectory.judge(hidden), torch.cat([state, hidden], 1)
+
+        first, second, embedding = asked(samples, ask)
         return cls(first, second, embedding, torch.from_numpy(samples.context))
 
     def beside(self, context: NDArray[np.float32]) -> "Evidence":

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gestured.lab.evaluate import Evaluation, outcome, worst
+from gestured.lab.evaluate import outcome, worst
 from gestured.lab.fit import CLASSES
 from gestured.lab.samples import Samples
 
@@ -50,11 +50,6 @@ def test_the_shares_of_the_gestures_add_up(least: float) -> None:
     assert stricter.rejected >= found.rejected
 
 
-def test_a_row_stands_under_its_heading() -> None:
-    found = outcome(answer((0, 0.0), (1, 0.0)), np.array([0, 4]), 0.5)
-    assert len(found.row("a set")) == len(Evaluation.HEAD)
-
-
 def test_people_are_what_is_drawn_for_an_interval() -> None:
     """As many right answers, from people who are all alike, and from people of whom half cannot do it at all."""
     people = np.repeat(np.arange(8), 10)
@@ -77,8 +72,6 @@ def test_intervals_hold_the_shares_that_they_are_of(performed: int | None) -> No
         assert 0 <= ends["low"] < getattr(found, name) < ends["high"] <= 1
     never = found.gestures - int((labels < 3).sum())
     assert found.intervals["lost"]["low"] >= never / found.gestures  # what was never cut out is lost whoever is drawn
-    assert found.rows("a set").splitlines()[0] == found.row("a set")
-    assert {len(line) for line in found.rows("a set").splitlines()} == {len(Evaluation.HEAD)}
 
 
 def test_the_worst_is_found_among_those_that_are_there_often_enough() -> None:

@@ -14,14 +14,12 @@ from gestured.lab.intervals import summary
 from gestured.lab.samples import WINDOW, Samples
 from gestured.lab.study.cells import Schedule
 from gestured.lab.study.cohort import Cohort
-from gestured.lab.study.material import SHIFT, UNCHANGED, Data
+from gestured.lab.study.material import SHIFT, THRESHOLD, UNCHANGED, Data
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.protocols import LENGTH, PAPER, PARTICIPANTS, Task
-from gestured.lab.study.shifting import THRESHOLD
 from gestured.lab.study.tables import right, task
-from gestured.lab.study.views import Values
-from gestured.lab.study.wavelets import POOLED, TAXELS
+from gestured.lab.study.views import POOLED, TAXELS, Values
 
 WAVELET_NAMES, WAVELET_LEVELS = ("haar", "db2", "db4", "sym4"), (1, 2, 3, 4)
 READINGS = {

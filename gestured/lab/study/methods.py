@@ -20,18 +20,20 @@ from sklearn.preprocessing import StandardScaler
 from torch import nn
 
 from gestured.lab.study import views
-from gestured.lab.study.nets import HistoryNet, sequence_net
+from gestured.lab.study.nets import HistoryNet, SequenceNet
 from gestured.lab.study.training import Indices, Inputs, train_net
 from gestured.lab.study.vectors import VectorMachine
-from gestured.lab.study.views import FRAMES, TOUCHES, TRAJECTORIES, WAVELETS, Values, View
-from gestured.lab.study.wavelets import TAXELS, WAVELET, WAVELET_LEVEL
-
-SPATIO_TEMPORAL, TOUCH_PATTERN, MOTION_HISTORY = (
-    "spatio-temporal features",
-    "touch-pattern features",
-    "motion history image",
+from gestured.lab.study.views import (
+    FRAMES,
+    TAXELS,
+    TOUCHES,
+    TRAJECTORIES,
+    WAVELET,
+    WAVELET_LEVEL,
+    WAVELETS,
+    Values,
+    View,
 )
-RECURRENT, BEYOND = "recurrent", "beyond the paper"
 
 
 class Scorer(Protocol):
@@ -94,8 +96,6 @@ class Method:
 
     id: str
     title: str
-    family: str
-    what: str  # one sentence
     view: View
     fit: Callable[[Any, Indices, Indices, int, Values, int], Scorer]  # inputs, chosen, labels, classes, values, seed
     grid: tuple[Values, ...]  # candidates for tuning, whole sets of hyperparameters
@@ -122,7 +122,7 @@ FOREST = {"trees": 200, "depth": 9}
 
 
 def _classical(
-    prefix: str, family: str, seen: str, view: View, given: Values,
+    prefix: str, family: str, view: View, given: Values,
     variants: tuple[Values, ...], settings: Mapping[str, tuple[Values, Values]],
     published: Mapping[str, tuple[float, float]],
 ) -> list[Method]:  # fmt: skip
@@ -134,8 +134,6 @@ def _classical(
             Method(
                 f"{prefix}_{kind}",
                 f"{family}, {title}",
-                family,
-                f"{title.capitalize()} on {seen}.",
                 view,
                 partial(_estimate, build),
                 tuple({**v, **g} for v in variants for g in grid),
@@ -152,7 +150,7 @@ TRAINING_STEPS = 800  # batches
 
 
 def _net(
-    kind: str, title: str, what: str, rates: tuple[float, ...], widths: tuple[int, ...],
+    kind: str, title: str, rates: tuple[float, ...], widths: tuple[int, ...],
     published: tuple[float, float, float] | None,
 ) -> Method:  # fmt: skip
     channels = {"channels": 8} if kind.startswith("cnn_") else {}
@@ -160,10 +158,10 @@ def _net(
     given = {"units": 32, "rate": rates[0], "steps": TRAINING_STEPS, **channels}
 
     def make(classes: int, values: Values) -> nn.Module:
-        return sequence_net(kind, values["units"], classes, values.get("channels", 16))
+        return SequenceNet(kind, values["units"], classes, values.get("channels", 16))
 
     return Method(
-        kind, title, RECURRENT if published else BEYOND, what, FRAMES, partial(_train, make), tuple(grid),
+        kind, title, FRAMES, partial(_train, make), tuple(grid),
         dict.fromkeys(("none", "shift"), given) if published else None,
         {"none": published[0], "shift": published[1]} if published else {},
         published_online=published[2] if published else None,
@@ -185,7 +183,7 @@ METHODS: dict[str, Method] = {
     method.id: method
     for method in [
         *_classical(
-            "st", SPATIO_TEMPORAL, "statistics of the wavelet bands of each taxel's signal", WAVELETS, HAAR, (HAAR,),
+            "st", "spatio-temporal features", WAVELETS, HAAR, (HAAR,),
             {
                 "knn": ({"neighbours": 7}, {"neighbours": 7}),
                 "rf": (FOREST, FOREST),
@@ -194,8 +192,8 @@ METHODS: dict[str, Method] = {
             {"knn": (0.62, 0.79), "rf": (0.58, 0.96), "svm": (0.58, 0.98)},
         ),
         *_classical(
-            "tp", TOUCH_PATTERN, "pressure, contact area and duration, without the order of the frames", TOUCHES,
-            {"features": "paper"}, ({"features": "paper"}, {"features": "daemon"}),
+            "tp", "touch-pattern features", TOUCHES, {"features": "paper"},
+            ({"features": "paper"}, {"features": "daemon"}),
             {
                 "knn": ({"neighbours": 4}, {"neighbours": 1}),
                 "rf": (FOREST, FOREST),
@@ -204,22 +202,16 @@ METHODS: dict[str, Method] = {
             {"knn": (0.56, 0.98), "rf": (0.60, 0.98), "svm": (0.56, 0.97)},
         ),
         Method(
-            "mhi_cnn", "CNN on motion history images", MOTION_HISTORY,
-            "Four convolutions with leaky ReLU and two fully connected layers on one image of the whole movement.",
-            views.HISTORY, partial(_train, lambda classes, values: HistoryNet(classes, values["channels"])),
+            "mhi_cnn", "CNN on motion history images", views.HISTORY,
+            partial(_train, lambda classes, values: HistoryNet(classes, values["channels"])),
             tuple(HISTORY_GRID), dict.fromkeys(("none", "shift"), HISTORY_GRID[2]),
             {"none": 0.77, "shift": 0.81},
         ),
-        _net("lstm", "LSTM", "An LSTM of 32 units on the 81 taxels of each frame (81 -> 32 -> 10).", (8e-3, 4e-3),
-             (32, 64), (0.82, 0.97, 0.89)),
-        _net("cnn_lstm", "CNN-LSTM", "Two convolutions with ReLU and max-pooling on each frame, then an LSTM.",
-             (8e-3, 4e-3), (32,), (0.89, 0.97, 0.93)),
-        _net("cnn_gru", "CNN-GRU", "The same convolutions, then gated recurrent units: fewer weights than an LSTM.",
-             (8e-3, 4e-3), (32,), None),
+        _net("lstm", "LSTM", (8e-3, 4e-3), (32, 64), (0.82, 0.97, 0.89)),
+        _net("cnn_lstm", "CNN-LSTM", (8e-3, 4e-3), (32,), (0.89, 0.97, 0.93)),
+        _net("cnn_gru", "CNN-GRU", (8e-3, 4e-3), (32,), None),
         Method(
-            "trajectory_gb", "trajectory features, gradient boosting", BEYOND,
-            "Gradient boosting on where the centroid went, how it turned and how many fingers there were.",
-            TRAJECTORIES, partial(_estimate, _boosting),
+            "trajectory_gb", "trajectory features, gradient boosting", TRAJECTORIES, partial(_estimate, _boosting),
             tuple({"rounds": n, "rate": r, "leaves": 15} for n, r in ((40, 0.2), (80, 0.1))), None, {},
         ),
     ]

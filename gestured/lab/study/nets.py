@@ -8,79 +8,59 @@ layers; the convolutions' widths are left open: ours are 16 and 32 channels of 3
 import torch
 from torch import Tensor, nn
 
-from gestured.lab.nets import SCALE
+from gestured.lab.nets import SCALE, last_active
 
 SENSOR_SIDE = 9
 
 
-class Flat(nn.Module):
-    """The frame's 81 taxels as they are."""
-
-    width = SENSOR_SIDE * SENSOR_SIDE
-
-    def forward(self, x: Tensor) -> Tensor:
-        """(N, 1, R, C) -> (N, R * C)."""
-        return x.flatten(1)
-
-
-class Convolutions(nn.Module):
-    """Two convolutions with ReLU and max-pooling (the paper's CNN-LSTM)."""
-
-    def __init__(self, channels: int = 16) -> None:
-        super().__init__()
-        self.width = 2 * channels * 4
-        self.layers = nn.Sequential(
-            nn.Conv2d(1, channels, 3, padding=1), nn.ReLU(), nn.MaxPool2d(2, ceil_mode=True),
-            nn.Conv2d(channels, 2 * channels, 3, padding=1), nn.ReLU(), nn.MaxPool2d(2),
-        )  # fmt: skip
-
-    def forward(self, x: Tensor) -> Tensor:
-        """(N, 1, R, C) -> (N, width)."""
-        y: Tensor = self.layers(x)
-        return y.flatten(1)
-
-
-class RecurrentNet(nn.Module):
-    """LSTM or GRU over the frames."""
-
-    def __init__(self, inputs: int, units: int, kind: str) -> None:
-        super().__init__()
-        self.cell = (
-            nn.LSTM(inputs, units, batch_first=True) if kind == "lstm" else nn.GRU(inputs, units, batch_first=True)
-        )
-        if kind == "lstm":
-            with torch.no_grad():  # remember by default (Jozefowicz et al. 2015), as in the shipped models
-                dict(self.cell.named_parameters())["bias_hh_l0"][units : 2 * units] += 1.0
-
-    def forward(self, x: Tensor) -> Tensor:
-        """(B, T, inputs) -> (B, T, units)."""
-        states: Tensor = self.cell(x)[0]
-        return states
+def convolutions(channels: int) -> nn.Sequential:
+    """Two convolutions with ReLU and max-pooling, the paper's CNN-LSTM's: (N, 1, R, C) -> (N, 8 * channels)."""
+    layers = nn.Sequential(
+        nn.Conv2d(1, channels, 3, padding=1), nn.ReLU(), nn.MaxPool2d(2, ceil_mode=True),
+        nn.Conv2d(channels, 2 * channels, 3, padding=1), nn.ReLU(), nn.MaxPool2d(2), nn.Flatten(),
+    )  # fmt: skip
+    return layers.to(memory_format=torch.channels_last)  # type: ignore[call-overload, no-any-return]  # a quarter faster
 
 
 class SequenceNet(nn.Module):
-    """A frame encoder, a temporal part, a linear head read at one frame."""
+    """The taxels of each frame, or convolutions of them; LSTM or GRU over the frames; a linear head read at one frame.
 
-    def __init__(self, encoder: nn.Module, temporal: nn.Module, units: int, classes: int) -> None:
+    `kind` is lstm, cnn_lstm or cnn_gru.
+    """
+
+    def __init__(self, kind: str, units: int, classes: int, channels: int = 16) -> None:
         super().__init__()
-        self.encoder, self.temporal, self.head = encoder, temporal, nn.Linear(units, classes)
+        convolved = kind.startswith("cnn_")
+        self.encoder = convolutions(channels) if convolved else nn.Flatten()
+        inputs = 8 * channels if convolved else SENSOR_SIDE * SENSOR_SIDE
+        if kind.endswith("lstm"):
+            self.temporal: nn.RNNBase = nn.LSTM(inputs, units, batch_first=True)
+            with torch.no_grad():  # remember by default (Jozefowicz et al. 2015), as in the shipped models
+                dict(self.temporal.named_parameters())["bias_hh_l0"][units : 2 * units] += 1.0
+        else:
+            self.temporal = nn.GRU(inputs, units, batch_first=True)
+        self.head = nn.Linear(units, classes)
 
     def forward(self, x: Tensor, at: Tensor) -> Tensor:
         """(B, T, R, C), (B,) index of the frame to answer after -> (B, classes) logits."""
         batch, time = x.shape[0], x.shape[1]
         seen = self.encoder(SCALE * x.reshape(-1, 1, x.shape[2], x.shape[3])).reshape(batch, time, -1)
-        states = self.temporal(seen)
+        states = self.temporal(seen)[0]
         logits: Tensor = self.head(states.gather(1, at[:, None, None].expand(-1, 1, states.shape[2]))[:, 0])
         return logits
 
 
-def sequence_net(kind: str, units: int, classes: int, channels: int = 16) -> SequenceNet:
-    """`kind` is lstm, cnn_lstm or cnn_gru."""
-    convolved = kind.startswith("cnn_")
-    encoder = Convolutions(channels) if convolved else Flat()
-    temporal = RecurrentNet(encoder.width, units, kind.removeprefix("cnn_"))
-    encoder.to(memory_format=torch.channels_last)  # type: ignore[call-overload]  # a quarter faster
-    return SequenceNet(encoder, temporal, units, classes)
+class Answering(nn.Module):
+    """A sequence net as the daemon runs it: probabilities at the last frame with contact, and nothing rejected."""
+
+    def __init__(self, net: nn.Module) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, T, R, C) -> scores (B, G), unknown (B,)."""
+        scores = self.net(frames, last_active(frames)).softmax(1)
+        return scores, 0.0 * scores[:, 0]
 
 
 class HistoryNet(nn.Module):

@@ -20,9 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.lab.study.material import JUDGE, SHIFT, Data, Form, Pool, pool
+from gestured.lab.study.material import JUDGE, SHIFT, THRESHOLD, Data, Form, Pool, pool
 from gestured.lab.study.methods import METHODS, Scorer
-from gestured.lab.study.shifting import THRESHOLD
 from gestured.lab.study.training import Indices
 from gestured.simulator import GESTURES
 

@@ -11,17 +11,16 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor, nn
 
 import gestured
 from gestured.lab.export import Facts, export_forest, export_net
 from gestured.lab.intervals import interval
-from gestured.lab.nets import last_active
 from gestured.lab.online import play, takes, tallied
 from gestured.lab.progress import progress
 from gestured.lab.samples import WINDOW
 from gestured.lab.study.material import SHIFT, Data, pool
 from gestured.lab.study.methods import METHODS, Estimator
+from gestured.lab.study.nets import Answering
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.runners import SHIPPED
 from gestured.lab.study.training import Net
@@ -32,19 +31,6 @@ from gestured.simulator import GESTURES, Take
 FIRST_PERSON = 900  # the cohort's are 0 to 33
 SPEED = 100.0  # times real time
 CALIBRATION = {"threshold": 0.0}  # nothing is rejected
-
-
-class Answering(nn.Module):
-    """A sequence net as the daemon runs it: probabilities at the last frame with contact, and nothing rejected."""
-
-    def __init__(self, net: nn.Module) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, frames: Tensor) -> tuple[Tensor, Tensor]:
-        """(B, T, R, C) -> scores (B, G), unknown (B,)."""
-        scores = self.net(frames, last_active(frames)).softmax(1)
-        return scores, 0.0 * scores[:, 0]
 
 
 def export(name: str, values: Values, data: Data, seed: int, path: Path) -> None:

@@ -139,7 +139,7 @@ def _about(name: str, tuned: Mapping[str, Values]) -> dict[str, Any]:
     method = METHODS[name]
     given = {k: dict(v) for k, v in method.paper.items()} if method.paper else None
     return {
-        "title": method.title, "family": method.family, "paper": method.paper is not None, "what": method.what,
+        "title": method.title, "paper": method.paper is not None,
         "hyperparameters": {"paper": given, "tuned": dict(tuned[name])},
     }  # fmt: skip
 

@@ -68,9 +68,11 @@ def test_every_cell_of_the_main_tables_stands_in_the_row_of_its_method(report: P
 
 def test_all_else_is_told(report: Path, study: Study) -> None:
     cells = {cell for row in rows_of(report) for cell in row}
-    assert any(study["data"]["real"]["name"] in cell for cell in cells)
-    told = [study["machine"]["cpu"], "neighbours = 7"]
-    told += [row["choice"] for row in study["choices"]] + [about["title"] for about in study["methods"].values()]
+    told = (
+        ["neighbours = 7"]
+        + [row["choice"] for row in study["choices"]]
+        + [about["title"] for about in study["methods"].values()]
+    )
     told += ["C = 128, gamma = 0.000488; shift: C = 512, gamma = 0.0001221"]
     told += [f"{row['cold_us']:.0f}" for row in study["run_time"]]
     told += [f"{row['false_per_minute']:.2f}" for row in study["online"] + study["online_shipped"]]

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gestured.lab.study.shifting import EDGES, bounding_box, copies, shifted, shifts
+from gestured.lab.study.material import EDGES, bounding_box, copies, shifted, shifts
 from tests.lab.study.material_made import samples
 
 

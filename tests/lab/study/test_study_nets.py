@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 import torch
 
-from gestured.lab.study import onnx_form, training
+from gestured.lab.study import training
 from gestured.lab.study.material import classes
 from gestured.lab.study.methods import METHODS
-from gestured.lab.study.nets import HistoryNet, sequence_net
+from gestured.lab.study.nets import HistoryNet, SequenceNet
+from gestured.lab.study.runners import Graph
 from tests.lab.study.material_made import samples
 
 KINDS = ("lstm", "cnn_lstm", "cnn_gru")
@@ -15,7 +16,7 @@ KINDS = ("lstm", "cnn_lstm", "cnn_gru")
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_comes_later_changes_nothing(kind: str) -> None:
-    net = sequence_net(kind, 16, 10, 4).eval()
+    net = SequenceNet(kind, 16, 10, 4).eval()
     x, at = torch.rand(3, 12, 9, 9), torch.tensor([4, 7, 0])
     other = x.clone()
     for row, last in enumerate(at):
@@ -27,12 +28,12 @@ def test_what_comes_later_changes_nothing(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_graph_answers_as_the_network_for_every_length(kind: str) -> None:
-    net = sequence_net(kind, 16, 10, 4).eval()
-    graph = onnx_form.of_net(net, images=False)
+    net = SequenceNet(kind, 16, 10, 4).eval()
+    graph = Graph.of_net(net)
     for frames in (1, 3, 40):
         x = torch.rand(1, frames, 9, 9)
         with torch.no_grad():
-            expected = net(x, torch.tensor([frames - 1])).numpy()
+            expected = net(x, torch.tensor([frames - 1])).softmax(1).numpy()
         assert np.allclose(graph.run(x.numpy()), expected, atol=1e-4)
 
 
@@ -40,7 +41,7 @@ def test_the_graph_of_the_image_network() -> None:
     net = HistoryNet(10, 4).eval()
     x = torch.rand(1, 9, 9)
     with torch.no_grad():
-        assert np.allclose(onnx_form.of_net(net, images=True).run(x.numpy()), net(x).numpy(), atol=1e-4)
+        assert np.allclose(Graph.of_net(net).run(x.numpy()), net(x).numpy(), atol=1e-4)
 
 
 def test_the_same_seed_gives_the_same_network_and_another_seed_another() -> None:
@@ -58,6 +59,6 @@ def test_the_same_seed_gives_the_same_network_and_another_seed_another() -> None
 def test_scores_come_in_the_order_that_was_asked_for() -> None:
     made = samples(2)
     inputs = training.Windows(made, False)
-    net = training.Net(sequence_net("lstm", 8, 10).eval())
+    net = training.Net(SequenceNet("lstm", 8, 10).eval())
     index = np.random.default_rng(0).permutation(len(made))
     assert np.allclose(net.scores(inputs, index), net.scores(inputs, np.arange(len(made)))[index], atol=1e-6)

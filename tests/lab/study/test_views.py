@@ -8,8 +8,7 @@ from sklearn.svm import SVC
 from gestured.lab.study.methods import METHODS
 from gestured.lab.study.training import Images, Windows
 from gestured.lab.study.vectors import VectorMachine
-from gestured.lab.study.views import motion_history, paper_features
-from gestured.lab.study.wavelets import POOLED, band_statistics, spatio_temporal
+from gestured.lab.study.views import POOLED, band_statistics, motion_history, paper_features, spatio_temporal
 from tests.lab.made import gestures, line, window
 from tests.lab.study.material_made import samples
 
