@@ -18,7 +18,6 @@ from gestured.daemon.client import Client
 from gestured.daemon.log import Throttle
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.sockets import AGAIN_S, reason_of
-from gestured.daemon.touches import Touches
 
 CLIENTS = 1024  # connections at a time; each costs a descriptor, and at most BACKLOG_BYTES of memory
 STALLED_S = 30.0  # a client that takes nothing for this long is cut off
@@ -49,7 +48,6 @@ class EventServer:
         self._listener, self._hello, self._throttle = listener, hello, Throttle()
         self._clients: set[Client] = set()
         self._audience = Audience()
-        self._touches = Touches(self._audience)
         self._queue: deque[Client] = deque()  # clients with a line that waits for its answer, each once
         self.loop.add_reader(listener, self._accept)
 
@@ -66,7 +64,7 @@ class EventServer:
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:
         """Send an event to everyone who wants it; it is encoded once, and only if somebody does."""
         if isinstance(event, Touch):
-            self._touches.publish(event, epoch)
+            self._audience.follow(event, epoch)
             return
         line = None
         for client in self._audience.of(event):
@@ -86,18 +84,16 @@ class EventServer:
         """Change what a client wants."""
         if client not in self._clients:
             return  # it went while it was being answered
-        self._leave(client)
-        self._audience.join(client, subscription)
-        self._touches.change(client, subscription)
-        if subscription.costly:
+        before = client.subscription
+        if (self._audience.change(client, subscription) and before.costly) or subscription.costly:
             self._changed()
 
     def remove(self, client: Client) -> None:
         """Forget a client that is gone."""
         if client in self._clients:
             self._clients.discard(client)
-            self._touches.forget(client)
-            self._leave(client)
+            if self._audience.forget(client) and client.subscription.costly:
+                self._changed()
             self.loop.remove_reader(client.sock)
             self.loop.remove_writer(client.sock)
             client.sock.close()
@@ -148,10 +144,6 @@ class EventServer:
             await asyncio.sleep(DRAINED_S)
         for client in tuple(self._clients):
             self.remove(client)
-
-    def _leave(self, client: Client) -> None:
-        if self._audience.leave(client) and client.subscription.costly:
-            self._changed()
 
     def _accept(self) -> None:
         for _ in range(ACCEPTED):
