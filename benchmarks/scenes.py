@@ -14,9 +14,10 @@ from benchmarks.latency import play
 from benchmarks.timing import Ratio, Row, cpu_s_of, cpu_us, interleaved, percentile, ratio, resident_kib
 from benchmarks.traffic import RATE_HZ, touched
 from gestured.client.engine import Engine
+from gestured.client.lines import read_ahead
 from gestured.client.osc_out import dated
 from gestured.client.sensor import Form
-from gestured.client.stream import Stream
+from gestured.client.subscriber import Subscriber
 from gestured.core.address import Grid
 from gestured.core.frames import Frame, Touch
 from gestured.core.wire import Addresses, Decoder
@@ -173,7 +174,9 @@ def _wait(model: str, flags: tuple[str, ...]) -> float:
     """Seconds from the last touched frame to the answer, of the sensor's clock: median of ten taps."""
     found = []
     with Engine(model, 9, 9, "--clock", "sensor", *flags) as engine:
-        stream = Stream(engine.socket, {"types": ["gesture", "unknown"]})
+        subscriber = Subscriber(engine.socket, types=["gesture", "unknown"])
+        heard = read_ahead(line for _, line in subscriber.lines())
+        heard.get()  # the hello
         for n in range(10):
             take = gesture_take(
                 "one_tap", Participant(960 + n), SimulatedSensor.nominal(day=n), generator(960, n), "normal", 0
@@ -181,9 +184,9 @@ def _wait(model: str, flags: tuple[str, ...]) -> float:
             form, epoch = Form(f"tap{n}"), time.time()
             packets = [form.packet(Frame(0.0, f), k, epoch + k / 15) for k, f in enumerate(take.frames)]
             play(engine.listen[1], packets)
-        for event in stream:
+        for event in iter(heard.get, None):
             found.append(event["decided"] - event["offset"])
             if len(found) == 8:  # a light tap may pass unseen
                 break
-        stream.close()
+        subscriber.close()
     return percentile(found, 0.5)

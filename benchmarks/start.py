@@ -9,7 +9,7 @@ from benchmarks.timing import Row, interleaved, ratio, resident_kib
 from benchmarks.traffic import idle
 from gestured.client.engine import Engine
 from gestured.client.sensor import Form, Sensor
-from gestured.client.stream import Stream
+from gestured.client.subscriber import Subscriber
 from gestured.core.frames import Frame
 from gestured.model.opening import open_model
 from gestured.model.shipped import shipped
@@ -69,15 +69,13 @@ def further_sensors(model: str) -> Row:
 
 def _heard(engine: Engine, names: list[str]) -> int:
     """Send three seconds of frames from each sensor; KiB once the daemon has them all."""
-    stream = Stream(engine.socket, {"types": ["status"]})
     epoch = time.time()
     for k in range(45):
         for n, name in enumerate(names):
             sensor = Sensor(engine.listen, Form(name))
             sensor.socket.send(sensor.form.packet(Frame(0.0, idle(n, 45)[k]), k, epoch + k / 15))
             sensor.close()
-    for event in stream:
-        if event["type"] == "status" and len(event["sensors"]) >= len(names):
-            break
-    stream.close()
+    with Subscriber(engine.socket, types=["status"]) as statuses:
+        while len(next(statuses)["sensors"]) < len(names):
+            pass
     return resident_kib(engine.pid)

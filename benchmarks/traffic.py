@@ -17,7 +17,7 @@ from benchmarks.process import Program
 from benchmarks.timing import Row, cpu_s_of, delay_ms, interleaved, percentile, ratio
 from gestured.client.engine import Engine
 from gestured.client.sensor import Form
-from gestured.client.stream import Stream
+from gestured.client.subscriber import Subscriber
 from gestured.core.frames import Frame
 from gestured.simulator import Participant, SimulatedSensor, Take, generator, session
 
@@ -151,11 +151,11 @@ def _one_core(pid: int) -> Iterator[None]:
 def sensors(model: str, number: int, seconds: float = 25.0) -> Row:
     """Sensors at 15 Hz on one core: loss, and the time from an answer to the event once all have settled."""
     with Engine(model, 9, 9, "--max-sensors", str(number)) as engine, _one_core(engine.pid):
-        stream = Stream(engine.socket, {"types": ["gesture", "unknown"]})
+        subscriber = Subscriber(engine.socket, types=["gesture", "unknown"])
         heard: list[tuple[float, float]] = []  # monotonic s, and ms since the answer was decided
 
         def listen() -> None:
-            for event in stream:
+            for event in subscriber:
                 if event["type"] in ("gesture", "unknown"):
                     heard.append((at := time.monotonic(), delay_ms(event, at)))
 
@@ -175,7 +175,7 @@ def sensors(model: str, number: int, seconds: float = 25.0) -> Row:
         cpu = (cpu_s_of(engine.pid) - cpu) / (time.monotonic() - settled)
         sender.join()
         lost = waiting(port)[1] - before
-        stream.close()
+        subscriber.close()
         reader.join()
     late = [delay for at, delay in heard if at >= settled]
     p99 = percentile(late, 0.99)

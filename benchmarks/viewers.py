@@ -13,7 +13,7 @@ from benchmarks.timing import Row, cpu_s_of, delay_ms, interleaved, percentile, 
 from benchmarks.traffic import RATE_HZ, touched
 from gestured.client.engine import Engine
 from gestured.client.sensor import Form
-from gestured.client.stream import Stream
+from gestured.client.subscriber import Subscriber
 from gestured.core.frames import Frame
 
 VIEWERS = 3
@@ -64,10 +64,10 @@ def viewers(model: str) -> list[Row]:
                 play(sender, 1)  # so that there is something to look at
                 looking = [stack.enter_context(viewer(control, "bench0")) for _ in range(watchers)]
                 play(sender, WARM)  # what the pause has left behind is over
-                stream = stack.enter_context(Stream(engine.socket, {"types": TYPES}))
+                subscriber = stack.enter_context(Subscriber(engine.socket, types=TYPES))
 
                 def hear() -> None:
-                    for event in stream:
+                    for event in subscriber:
                         delays.append(delay_ms(event, time.monotonic()))
 
                 listener = threading.Thread(target=hear, daemon=True)
@@ -78,7 +78,7 @@ def viewers(model: str) -> list[Row]:
                 ours, *theirs = (1e3 * (b - a) / took for a, b in zip(before, after, strict=True))
                 daemon_ms[watchers].append(ours)
                 viewers_ms.append(sum(theirs))
-                stream.socket.shutdown(socket.SHUT_RDWR)
+                subscriber.close()
                 listener.join()
             return percentile(delays, 0.99)
 

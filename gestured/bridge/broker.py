@@ -3,7 +3,6 @@
 import argparse
 import os
 import ssl
-from pathlib import Path
 from typing import Any
 
 from gestured.bridge.options import BridgeError, peer_address
@@ -12,7 +11,7 @@ PLAIN_PORT, TLS_PORT = 1883, 8883  # registered with IANA
 BROKER_S = 5.0  # s that the broker may take to answer a call
 KEEPALIVE_S = 5  # a broker that vanished without a word is noticed, and ours declared dead, after one and a half
 MOST_BYTES = 65_536  # of a packet from the broker, which is told so; we subscribe to commands at most, which are small
-_LOGIN = "set MQTT_USER and MQTT_PASSWORD, or --credentials FILE, as the broker knows them"
+_LOGIN = "set MQTT_USER and MQTT_PASSWORD as the broker knows them"
 # Reason codes of MQTT 5 (docs.oasis-open.org/mqtt/mqtt/v5.0, 2.4) after which waiting is no help.
 REFUSALS = {
     132: "it does not speak MQTT 5: use a broker that does, such as mosquitto 1.6 or newer",
@@ -35,7 +34,7 @@ class Broker:
         except argparse.ArgumentTypeError as error:
             raise BridgeError(f"--broker {error}") from None
         self._host, self._prefix = host, args.discovery
-        self._user, self._password = credentials(args.credentials)
+        self._user, self._password = os.environ.get("MQTT_USER"), os.environ.get("MQTT_PASSWORD")
         if args.gates is not None and self._user is None and args.cert is None:
             raise BridgeError(f"--gates: a broker that knows nobody may close no gate: {_LOGIN}, or name a --cert")
         self._tls = tls_context(args)
@@ -104,22 +103,6 @@ def properties(packet: str, **values: int) -> Any:
     for name, value in values.items():
         setattr(found, name, value)
     return found
-
-
-def credentials(path: Path | None) -> tuple[str | None, str | None]:
-    """User and password, from the file or else from the environment. Raises BridgeError."""
-    if path is None:
-        return os.environ.get("MQTT_USER"), os.environ.get("MQTT_PASSWORD")
-    try:
-        with path.open() as file:
-            if os.fstat(file.fileno()).st_mode & 0o007:
-                raise BridgeError(f"--credentials {path}: everybody can read it: chmod o= {path}")
-            user, colon, password = file.readline(4096).rstrip("\n").partition(":")
-    except (OSError, UnicodeDecodeError) as error:
-        raise BridgeError(f"--credentials {path}: {getattr(error, 'strerror', 'is no text')}") from None
-    if not user or not colon:
-        raise BridgeError(f"--credentials {path}: expected one line, USER:PASSWORD")
-    return user, password
 
 
 def tls_context(args: argparse.Namespace) -> ssl.SSLContext | None:

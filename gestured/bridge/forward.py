@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gestured.bridge.counts import Counts
-from gestured.bridge.options import destination
-from gestured.client.sensor import sent_after_refusal
+from gestured.client.sensor import connected, sent_after_refusal
 from gestured.core.address import Address, is_sensor
 from gestured.core.errors import ProtocolError
 from gestured.core.osc import decode
@@ -46,9 +45,10 @@ class Forward:
     """Frames from Zenoh to the daemon, byte by byte as they came: their counter and time stay."""
 
     def __init__(self, site: str, to: Address, counts: Counts, clock: Callable[[], float] = time.monotonic) -> None:
-        """`site` is what all keys begin with. Raises BridgeError where `to` is no address."""
+        """`site` is what all keys begin with. Raises GesturedError where `to` is no address."""
         self._site, self._counts, self._clock = site, counts, clock
-        self._family, self._address = destination(to)
+        with connected(to) as found:  # a name is looked up once
+            self._to = Address(*found.getpeername()[:2])
         self._senders: dict[str, _Sender] = {}  # by name; who was heard last stands last
         self._flooding: set[str] = set()
         self._closed = False
@@ -133,7 +133,6 @@ class Forward:
                 if self._senders[longest].due > now - SILENT_S:
                     return None
                 self._senders.pop(longest).socket.close()
-            sender = _Sender(socket.socket(self._family, socket.SOCK_DGRAM), now)
-            sender.socket.connect(self._address)
+            sender = _Sender(connected(self._to), now)
         self._senders[name] = sender
         return sender

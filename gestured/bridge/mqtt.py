@@ -31,11 +31,9 @@ def add(commands: Commands) -> None:
         "mqtt",
         help="events to an MQTT broker",
         description="Publish events under gestured/HOST/SENSOR/TYPE, with Home Assistant discovery.\n"
-        "User and password are the variables MQTT_USER and MQTT_PASSWORD, or a file that holds USER:PASSWORD.",
+        "User and password are the variables MQTT_USER and MQTT_PASSWORD.",
         epilog="examples:\n  gestured-bridge mqtt --broker 192.168.7.2\n"
-        "  gestured-bridge mqtt --broker broker.example --tls --credentials /etc/gestured/mqtt-user\n"
-        "  gestured-bridge mqtt --broker broker.example --tls --credentials /etc/gestured/mqtt-user \\\n"
-        "                       --gates /run/gestured/gates.sock",
+        "  gestured-bridge mqtt --broker broker.example --tls --gates /run/gestured/gates.sock",
     )
     text = f"the broker (port {PLAIN_PORT}, with TLS {TLS_PORT}, unless named)"
     parser.add_argument("--broker", required=True, metavar="HOST[:PORT]", help=text)
@@ -44,7 +42,6 @@ def add(commands: Commands) -> None:
     parser.add_argument("--tls", action="store_true", help="encrypt, and check the broker's certificate")
     parser.add_argument("--ca", type=Path, metavar="FILE", help="certificates to trust instead of the system's (PEM)")
     parser.add_argument("--cert", type=Path, metavar="FILE", help="our own certificate and key (PEM)")
-    parser.add_argument("--credentials", type=Path, metavar="FILE", help="a file of one line, USER:PASSWORD")
     text = "discovery prefix of Home Assistant (default: homeassistant)"
     parser.add_argument("--discovery", default="homeassistant", metavar="PREFIX", help=text)
     parser.add_argument("--no-discovery", action="store_true", help="publish nothing for Home Assistant")

@@ -8,7 +8,6 @@ import signal
 import socket
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from gestured.client.address import find_socket
 from gestured.client.subscriber import Subscriber
@@ -55,15 +54,6 @@ def add_destination(parser: argparse.ArgumentParser) -> None:
     """Add which daemon takes frames."""
     text = "where the daemon listens for frames (default: 127.0.0.1:9000)"
     parser.add_argument("--to", type=host_port, default=Address("127.0.0.1", 9000), metavar="HOST:PORT", help=text)
-
-
-def destination(to: Address) -> tuple[int, Any]:
-    """The family and the address of a UDP socket that sends to `--to`. Raises BridgeError where it is no address."""
-    try:
-        family, _, _, _, address = socket.getaddrinfo(to.host, to.port, type=socket.SOCK_DGRAM)[0]
-    except OSError as error:
-        raise BridgeError(f"--to {to}: {error.strerror}") from None
-    return family, address
 
 
 def plain(name: str) -> str:

@@ -8,17 +8,16 @@ import argparse
 import errno
 import os
 import select
-import socket
 import stat
 import time
 from typing import Any
 
 from gestured.bridge.counts import Counts
-from gestured.bridge.options import BridgeError, add_destination, add_metrics, destination, need, on_stop
+from gestured.bridge.options import BridgeError, add_destination, add_metrics, need, on_stop
 from gestured.bridge.protocols import PROTOCOLS, looks_like
 from gestured.bridge.readings import MOST_TAXELS, Reading, Unwrapped, signed
 from gestured.client.program import Commands
-from gestured.client.sensor import Form, sent_after_refusal
+from gestured.client.sensor import Form, connected, sent_after_refusal
 from gestured.client.values import rows_by_columns
 from gestured.core.address import is_sensor
 from gestured.core.frames import Frame
@@ -79,10 +78,7 @@ class Serial:
         self._sensor = args.sensor
         self._forms = {form: Form(args.sensor, form) for form in ("floats", "ints", "uint8", "uint16")}
         self._counts = counts
-        family, address = destination(args.to)
-        self._to = args.to
-        self._socket = socket.socket(family, socket.SOCK_DGRAM)
-        self._socket.connect(address)
+        self._to, self._socket = args.to, connected(args.to)
         self._counter, self._own = 0, Unwrapped()  # ours where the sensor has none, and the sensor's
         self._stopped = False
         self._opened = False  # ever

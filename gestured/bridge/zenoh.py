@@ -26,12 +26,9 @@ def add(commands: Commands) -> None:
         epilog="examples:\n  gestured-bridge zenoh --connect tcp/192.168.7.2:7447 --site car7\n"
         "  gestured-bridge zenoh --frames --to 127.0.0.1:9000",
     )
-    text = f"a router or peer to call; may be repeated (default: {ROUTER}, unless --listen or --scout is given)"
+    text = f"a router or peer to call; may be repeated (default: {ROUTER})"
     parser.add_argument("--connect", action="append", metavar="ENDPOINT", help=text)
-    text = "where peers may call us, such as tcp/0.0.0.0:7448; may be repeated"
-    parser.add_argument("--listen", action="append", metavar="ENDPOINT", help=text)
-    parser.add_argument("--scout", action="store_true", help="look for routers and peers on the network by multicast")
-    text = "Zenoh's own configuration (JSON5): certificates, users; the flags come on top of it"
+    text = "Zenoh's own configuration (JSON5): certificates, users, where peers may call us"
     parser.add_argument("--config", type=Path, metavar="FILE", help=text)
     parser.add_argument("--site", metavar="NAME", help="name of this place in keys (default: the hostname)")
     add_filters(parser)

@@ -15,6 +15,10 @@ from gestured.bridge.options import FIRST_S, LONGEST_S, BridgeError, host_name
 from gestured.core.address import is_sensor
 
 ROUTER = "tcp/127.0.0.1:7447"  # where a router of this machine listens unless told otherwise
+CLIENT = '"client"'  # the mode of a session that calls a router; any other one may be called
+# What holds unless --config says otherwise: nobody is looked for on the network.
+UNLESS_SAID = {"mode": "client", "scouting/multicast/enabled": False, "scouting/gossip/enabled": False}
+ALWAYS = {"transport/shared_memory/enabled": False}  # the unit's filter denies it, and then Zenoh opens no session
 HEARD = frozenset(("ok", "degraded", "starting", "faulty"))  # states of a sensor whose frames come
 
 
@@ -30,7 +34,7 @@ class Zenoh:
         if not is_sensor(self._site):
             raise BridgeError(f"--site {self._site}: expected letters, digits, _ and -, at most 64")
         self._config = _configuration(args)
-        self._is_called = bool(args.listen or args.scout)  # nobody has to be there
+        self._is_called = self._config.get_json("mode") != CLIENT  # nobody has to be there
         self._daemon = Daemon(args.sensors, args.gestures, counts)
         self._counts = counts
         self._forward = Forward(self._key(), args.to, counts) if args.frames else None
@@ -149,26 +153,16 @@ def _configuration(args: argparse.Namespace) -> Any:
     """Zenoh's own, from the flags. Raises BridgeError."""
     import zenoh
 
-    connect, listen = args.connect or [], args.listen or []
-    if not connect and not listen and not args.scout and args.config is None:
-        connect = [ROUTER]
     try:
         config = zenoh.Config() if args.config is None else zenoh.Config.from_file(str(args.config))
-        settings: dict[str, object] = {
-            "scouting/multicast/enabled": args.scout,
-            "scouting/gossip/enabled": args.scout,
-            "transport/shared_memory/enabled": False,  # the unit's filter denies it, and then Zenoh opens no session
-        }
-        if args.config is None:
-            settings["mode"] = "peer" if listen or args.scout else "client"
-        if connect or args.config is None:
-            settings["connect/endpoints"] = connect
-        if listen or args.config is None:
-            settings["listen/endpoints"] = listen
-        for key, value in settings.items():
+        settings = {key: value for key, value in UNLESS_SAID.items() if config.get_json(key) == "null"}
+        for key, value in (settings | ALWAYS).items():
             config.insert_json5(key, json.dumps(value))
+        calls_nobody = config.get_json("mode") == CLIENT and config.get_json("connect/endpoints") == "[]"
+        if args.connect or calls_nobody:
+            config.insert_json5("connect/endpoints", json.dumps(args.connect or [ROUTER]))
     except zenoh.ZError as error:
-        where = f"--config {args.config}" if args.config else "--connect or --listen"
+        where = f"--config {args.config}" if args.config else "--connect"
         raise BridgeError(f"{where}: {_first_words(error)}: an endpoint is such as {ROUTER}") from None
     return config
 

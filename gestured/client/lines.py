@@ -53,18 +53,13 @@ class Lines:
             raise
         self._file = self.socket.makefile("rb")
 
-    def raw(self) -> Iterator[tuple[str, dict[str, Any]]]:
-        """Each line as it came, and parsed; ends when the daemon closes the connection. Raises Refused."""
+    def lines(self) -> Iterator[dict[str, Any]]:
+        """Each line, parsed from JSON; ends when the daemon closes the connection. Raises Refused."""
         try:
             for line in self._file:
-                message = parsed(line, self.path)
-                yield line.decode().rstrip("\n"), message
+                yield parsed(line, self.path)
         except ConnectionError:
             return
-
-    def lines(self) -> Iterator[dict[str, Any]]:
-        """The lines of the connection, each parsed from JSON."""
-        return (message for _, message in self.raw())
 
     def close(self) -> None:
         """Hang up; a reader in another thread comes to its end."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gestured.client import osc_out
 from gestured.core.address import Address
+from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame, Touch
 
 BLOBS: dict[str, np.dtype[Any]] = {
@@ -57,6 +58,17 @@ class Form:
         return osc_out.head(f"/{self.sensor}/trajectory", types) + struct.pack(">" + types, *args)
 
 
+def connected(to: tuple[str, int]) -> socket.socket:
+    """A UDP socket that sends to an address. Raises GesturedError where it is none."""
+    try:
+        family, kind, _, _, where = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
+        sock = socket.socket(family, kind)
+        sock.connect(where)
+    except OSError as error:
+        raise GesturedError(f"cannot send to {Address(*to)}: {error.strerror or error}") from None
+    return sock
+
+
 def sent_after_refusal(sock: socket.socket, packet: bytes) -> bool:
     """Send on a connected UDP socket; whether a closed port has refused an earlier packet.
 
@@ -71,12 +83,10 @@ def sent_after_refusal(sock: socket.socket, packet: bytes) -> bool:
 
 
 class Sensor:
-    """Sends frames at the pace of their times. A frame's time in seconds counts from the first frame."""
+    """Sends frames at the pace of their times, in seconds from the first one. Raises GesturedError for no address."""
 
     def __init__(self, to: tuple[str, int], form: Form) -> None:
-        family, kind, _, _, address = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
-        self.socket = socket.socket(family, kind)
-        self.socket.connect(address)
+        self.socket = connected(to)
         self.to, self.form = Address(*to), form
         self.sent = 0
         self.unheard = 0  # packets to which a closed port answered

@@ -7,7 +7,7 @@ import selectors
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from os import PathLike
@@ -17,12 +17,14 @@ from typing import Any, Self
 
 from gestured.client.fields import wrong_field
 from gestured.client.lines import Forbidden, Lines, Refused, Unreachable, Unsubscribed, parsed
-from gestured.client.stream import GREETING_S, SILENT, check_hello
 from gestured.core.errors import GesturedError
 
 FIRST_S, LONGEST_S = 0.1, 2.0  # between attempts to connect, doubled each time; a restart takes a second
 CHUNK = 65536  # bytes read at a time
 LINE_BYTES = 4 << 20  # of a line, at most; a hello with all sensors that a daemon keeps has an eighth of that
+PROTOCOL = 1
+GREETING_S = 10.0  # to wait for the hello, which a daemon sends at once
+SILENT = f"says nothing within {GREETING_S:g} s: it hangs, or this is not its event socket (--socket)"
 LOG = logging.getLogger("gestured")
 
 
@@ -193,7 +195,7 @@ class Subscriber:
             self._gone(source, Unreachable(refusal))
             return None
         if not source.hello:
-            check_hello(text, message, source.path)
+            _check_hello(text, message, source.path)
             source.hello, source.due, source.wait_s = message, math.inf, FIRST_S
         elif words := wrong_field(message):
             self._say(f"a line of the daemon on {source.path} is passed over: {words}")
@@ -212,6 +214,14 @@ class Subscriber:
         source.begun.clear()
         source.due = time.monotonic() + source.wait_s
         source.wait_s = min(2.0 * source.wait_s, LONGEST_S)
+
+
+def _check_hello(line: str, message: Mapping[str, Any], path: Path) -> None:
+    """Raises Refused unless the first line on `path` is the hello of a daemon that this client understands."""
+    if message.get("type") != "hello" or message.get("protocol") != PROTOCOL:
+        raise Refused(f"{path} does not speak protocol {PROTOCOL} of gestured: {line[:80]!r}")
+    if words := wrong_field(message):
+        raise Refused(f"{path} is not served by gestured, its hello is wrong: {words}")
 
 
 @dataclass(eq=False)

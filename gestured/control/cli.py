@@ -8,27 +8,24 @@ from importlib import import_module
 
 from gestured.client import program
 
-# Which function of which module adds which subcommands: only the module of the one that runs is imported.
+# Which module adds which subcommands: only that of the one that runs is imported.
 SUBCOMMANDS = (
-    ("status", "add", ("status",)),
-    ("listen", "add", ("listen",)),
-    ("view", "add", ("view",)),
-    ("pad", "add", ("pad",)),
-    ("doctor", "add", ("doctor",)),
-    ("sniff", "add", ("sniff",)),
-    ("operate", "add_reload", ("reload",)),
-    ("operate", "add_recalibrate", ("recalibrate",)),
-    ("operate", "add_emit", ("emit",)),
-    ("gates", "add", ("inhibit", "allow")),
-    ("own", "add", ("enrol", "gestures", "forget")),
-    ("record", "add", ("record",)),
-    ("flag", "add", ("flag",)),
-    ("replay", "add", ("replay",)),
-    ("export", "add", ("export",)),
-    ("tune", "add", ("tune",)),
-    ("simulate", "add", ("simulate",)),
-    ("check", "add", ("check",)),
-    ("demo", "add", ("demo",)),
+    ("status", ("status",)),
+    ("listen", ("listen",)),
+    ("view", ("view",)),
+    ("pad", ("pad",)),
+    ("doctor", ("doctor",)),
+    ("sniff", ("sniff",)),
+    ("operate", ("reload", "recalibrate", "emit", "inhibit", "allow", "gestures", "forget")),
+    ("enrol", ("enrol",)),
+    ("record", ("record",)),
+    ("flag", ("flag",)),
+    ("replay", ("replay",)),
+    ("export", ("export",)),
+    ("tune", ("tune",)),
+    ("simulate", ("simulate",)),
+    ("check", ("check",)),
+    ("demo", ("demo",)),
 )
 
 
@@ -40,9 +37,9 @@ def parser(argv: Sequence[str] = ()) -> program.Parser:
         description="The operator's client of gestured.",
         epilog="example: gesturectl listen --gesture swipe_left",
     )
-    asked = [row for row in SUBCOMMANDS if argv and argv[0] in row[2]]
-    for module, add, _ in asked or SUBCOMMANDS:
-        getattr(import_module(f"gestured.control.{module}"), add)(commands)
+    asked = [row for row in SUBCOMMANDS if argv and argv[0] in row[1]]
+    for module, _ in asked or SUBCOMMANDS:
+        import_module(f"gestured.control.{module}").add(commands)
     return top
 
 

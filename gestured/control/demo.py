@@ -21,7 +21,7 @@ from gestured.client.picture import trace
 from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json
 from gestured.client.sensor import Form, Sensor
-from gestured.client.stream import Stream
+from gestured.client.subscriber import Subscriber
 from gestured.control.play import add_arguments, frames, takes
 from gestured.control.screen import Felt, Screen, in_colour
 from gestured.control.show import as_dict, block, in_words
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
                 Control(Path(engine.ready["control"])) as control,
                 nullcontext("") if args.json else page(control.path) as address,
                 nullcontext() if args.json else pad(engine, args.grid, args.rate) as touched,
-                closing(Stream(engine.socket, {"types": HEARD, "sensors": [DEMO_SENSOR]})) as stream,
+                Subscriber(engine.socket, types=HEARD, sensors=[DEMO_SENSOR], reconnect=False) as stream,
                 closing(Sensor(engine.listen, Form(DEMO_SENSOR))) as sensor,
                 show.screen or nullcontext(),
             ):
@@ -130,7 +130,7 @@ class Show:
         if not self.as_json:
             say(*lines)
 
-    def follow(self, sensor: Sensor, stream: Stream, control: Control) -> None:
+    def follow(self, sensor: Sensor, stream: Subscriber, control: Control) -> None:
         """Send the take and show what comes of it, until its end; at a terminal also the finger as it moves."""
         heard = read_ahead((time.time(), event) for event in stream)
         threading.Thread(target=sensor.send, args=(frames(0.0, self.take),), daemon=True).start()

@@ -1,7 +1,7 @@
 """What the doctor finds in a daemon's status: of itself, its model, its input, its sensors and its output."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,6 +36,30 @@ DROPS = {  # why, and what to do
     "flood": "were more than the daemon can take: each sender is held to its share of the time",
     "not_osc": "were not OSC: something else is sent to this port",
     "not_finite": "held NaN or infinity: look at the sensor's firmware",
+}
+
+
+STATES = {  # of a sensor: level, what it is unless its status says why, with keys of that status, and what to do
+    "ok": ("ok", "{rate_hz:.1f} Hz from {source}", ""),
+    "starting": ("warn", "is being learned", "leave it untouched for a second"),
+    "degraded": (
+        "warn",
+        "{bad_taxels} bad taxels are bridged",
+        "look at its lines, and at what lies on it; gesturectl recalibrate",
+    ),
+    "faulty": ("bad", "{bad_taxels} bad taxels", "replace it, or look at its connector"),
+    "stale": ("bad", "was heard {heard_s_ago:.0f} s ago", "is it powered, and is the network up?"),
+    "no_data": ("bad", "is configured, but was never heard", "gesturectl sniff; is its name right?"),
+    "intermittent": (
+        "bad",
+        "falls silent between touches, so the idle sensor cannot be learned",
+        "let it send idle frames, too: all the time, at one rate",
+    ),
+    "inverted": (
+        "bad",
+        "its counts fall when it is touched",
+        "[sensors.{name}] invert = true in the configuration file",
+    ),
 }
 
 
@@ -148,32 +172,9 @@ def _sensors(status: dict[str, Any]) -> Iterator[Finding]:
 
 
 def _sensor(name: str, sensor: dict[str, Any]) -> Iterator[Finding]:
-    words: dict[str, Callable[[dict[str, Any]], Finding]] = {
-        "ok": lambda s: Finding("ok", f"{s['rate_hz']:.1f} Hz from {s['source']}"),
-        "starting": lambda s: Finding("warn", s.get("reason") or "is being learned", "leave it untouched for a second"),
-        "degraded": lambda s: Finding(
-            "warn",
-            s.get("reason") or f"{s['bad_taxels']} bad taxels are bridged",
-            "look at its lines, and at what lies on it; gesturectl recalibrate",
-        ),
-        "faulty": lambda s: Finding("bad", f"{s['bad_taxels']} bad taxels", "replace it, or look at its connector"),
-        "stale": lambda s: Finding(
-            "bad", f"was heard {s['heard_s_ago']:.0f} s ago", "is it powered, and is the network up?"
-        ),
-        "no_data": lambda s: Finding(
-            "bad", "is configured, but was never heard", "gesturectl sniff; is its name right?"
-        ),
-        "intermittent": lambda s: Finding(
-            "bad",
-            "falls silent between touches, so the idle sensor cannot be learned",
-            "let it send idle frames, too: all the time, at one rate",
-        ),
-        "inverted": lambda s: Finding(
-            "bad", "its counts fall when it is touched", f"[sensors.{name}] invert = true in the configuration file"
-        ),
-    }
-    if sensor["state"] in words:  # else a later daemon's
-        yield words[sensor["state"]](sensor)
+    if found := STATES.get(sensor["state"]):  # else a later daemon's
+        level, what, remedy = found
+        yield Finding(level, sensor.get("reason") or what.format(**sensor), remedy.format(name=name))
     if sensor.get("closed"):
         remedy = "; ".join(f"gesturectl allow {name} --gate {gate}" for gate in sensor["closed"])
         yield Finding("warn", f"is silent, since gates are closed: {', '.join(sensor['closed'])}", remedy)

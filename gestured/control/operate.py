@@ -1,7 +1,7 @@
-"""`gesturectl reload`, `recalibrate` and `emit`: what the daemon is asked to do, once."""
+"""`gesturectl reload`, `recalibrate`, `emit`, `inhibit`, `allow`, `gestures`, `forget`: the daemon is asked, once."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
@@ -9,11 +9,11 @@ from gestured.client.program import Commands, Parser
 from gestured.client.say import tell
 from gestured.control.address import add_sockets, connect
 
-Words = Callable[[dict[str, Any]], str]  # an answer of the daemon's for a person
+Words = Callable[[dict[str, Any]], Iterable[str]]  # an answer of the daemon's for a person, in lines
 
 
-def add_reload(commands: Commands) -> None:
-    """Add `reload`: the daemon takes another model or other settings, and loses no gesture."""
+def add(commands: Commands) -> None:
+    """Add the subcommands to gesturectl's command line."""
     parser = commands.add_parser(
         "reload",
         help="read model and configuration again",
@@ -22,18 +22,7 @@ def add_reload(commands: Commands) -> None:
         "and the exit status is 1. Settings that only a restart can change are named.",
         epilog="example:\n  gesturectl reload",
     )
-    asks(parser, "reload", _reloaded)
-
-
-def _reloaded(answer: dict[str, Any]) -> str:
-    """What a reload has done, and what it could not."""
-    waiting = ", ".join(answer.get("awaiting_restart", ()))  # a daemon of before does not say
-    rest = f"; not yet in use, since only a restart changes it: {waiting}" if waiting else ""
-    return f"reloaded; {answer['model']} answers{rest}"
-
-
-def add_recalibrate(commands: Commands) -> None:
-    """Add `recalibrate`: the daemon learns what a sensor shows that nobody touches."""
+    _asks(parser, "reload", _reloaded)
     parser = commands.add_parser(
         "recalibrate",
         help="learn the idle sensor anew",
@@ -42,16 +31,7 @@ def add_recalibrate(commands: Commands) -> None:
         epilog="example:\n  gesturectl recalibrate --sensor armrest",
     )
     parser.add_argument("--sensor", metavar="NAME", help="only this sensor (default: all)")
-    asks(
-        parser,
-        "recalibrate",
-        lambda answer: f"learning {', '.join(answer['sensors'])} anew; do not touch for a second",
-        "sensor",
-    )
-
-
-def add_emit(commands: Commands) -> None:
-    """Add `emit`: the daemon sends a made-up gesture through every output."""
+    _asks(parser, "recalibrate", _recalibrated, "sensor")
     parser = commands.add_parser(
         "emit",
         help="publish a marked test event",
@@ -62,16 +42,54 @@ def add_emit(commands: Commands) -> None:
     )
     parser.add_argument("gesture", metavar="GESTURE", help="one of the gestures in use")
     parser.add_argument("--sensor", metavar="NAME", help="the sensor named in the event (default: test)")
-    asks(
-        parser,
-        "emit",
-        lambda a: f"published {a['gesture']} of {a['sensor']} as #{a['sequence']}, marked as a test",
-        "gesture",
-        "sensor",
+    _asks(parser, "emit", _emitted, "gesture", "sensor")
+    _add_gates(commands)
+    parser = commands.add_parser(
+        "gestures",
+        help="list the gestures, and your own",
+        description="List the model's gestures that are in use, and your own with how many examples each has.",
+        epilog="example:\n  gesturectl gestures",
     )
+    _asks(parser, "gestures", _known)
+    parser = commands.add_parser(
+        "forget",
+        help="forget a gesture of your own",
+        description="Have the daemon recognise a gesture of your own no longer. Nothing of its examples stays in the\n"
+        "daemon's files; a recording that somebody made keeps what it holds.",
+        epilog="example:\n  gesturectl forget knock",
+    )
+    parser.add_argument("name", metavar="NAME", help="the gesture's name")
+    _asks(parser, "forget", lambda answer: [f"forgot {answer['forgotten']}"], "name")
 
 
-def asks(parser: Parser, verb: str, words: Words, *parameters: str) -> None:
+def _add_gates(commands: Commands) -> None:
+    inhibit = commands.add_parser(
+        "inhibit",
+        help="close a gate, so that a sensor is silent",
+        description="Close a gate of a sensor, or of all. While any of its gates is closed, every contact on the\n"
+        "sensor is unknown. A gate stays closed until somebody allows it, across reloads too, unless --for\n"
+        "says how long.",
+        epilog="examples:\n  gesturectl inhibit --all --gate door\n"
+        "  gesturectl inhibit armrest --gate cleaning --for 600",
+    )
+    allow = commands.add_parser(
+        "allow",
+        help="open a gate",
+        description="Open a gate of a sensor, or of all. The sensor listens again once all its gates are open.",
+        epilog="examples:\n  gesturectl allow --all --gate door\n  gesturectl allow armrest --gate cleaning",
+    )
+    for parser in (inhibit, allow):
+        which = parser.add_mutually_exclusive_group(required=True)
+        which.add_argument("sensor", nargs="?", metavar="SENSOR", help="one sensor")
+        which.add_argument("--all", action="store_true", help="all sensors, and all that come")
+        parser.add_argument("--gate", required=True, metavar="NAME", help="the gate, by a name of your choice")
+    text = "seconds after which the gate opens by itself (default: it does not)"
+    inhibit.add_argument("--for", dest="seconds", type=float, metavar="S", help=text)
+    _asks(inhibit, "inhibit", _gates, "gate", "sensor", "seconds")
+    _asks(allow, "allow", _gates, "gate", "sensor")
+
+
+def _asks(parser: Parser, verb: str, words: Words, *parameters: str) -> None:
     """Have a subcommand ask the daemon `verb`, with the values of these of its arguments, and print the answer."""
     add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print the daemon's answer")
@@ -81,5 +99,37 @@ def asks(parser: Parser, verb: str, words: Words, *parameters: str) -> None:
 def _ask(verb: str, words: Words, parameters: tuple[str, ...], args: argparse.Namespace) -> int:
     with connect(args) as control:
         answer = control.ask(verb, **{name: getattr(args, name) for name in parameters})
-    tell(args.json, answer, words(answer))
+    tell(args.json, answer, *words(answer))
     return 0
+
+
+def _reloaded(answer: dict[str, Any]) -> Iterable[str]:
+    waiting = ", ".join(answer.get("awaiting_restart", ()))  # a daemon of before does not say
+    rest = f"; not yet in use, since only a restart changes it: {waiting}" if waiting else ""
+    yield f"reloaded; {answer['model']} answers{rest}"
+
+
+def _recalibrated(answer: dict[str, Any]) -> Iterable[str]:
+    yield f"learning {', '.join(answer['sensors'])} anew; do not touch for a second"
+
+
+def _emitted(answer: dict[str, Any]) -> Iterable[str]:
+    yield f"published {answer['gesture']} of {answer['sensor']} as #{answer['sequence']}, marked as a test"
+
+
+def _gates(answer: dict[str, Any]) -> Iterable[str]:
+    """Which sensors are silent now, and by which gates."""
+    silent = [f"{name} ({', '.join(gates)})" for name, gates in answer["sensors"].items() if gates]
+    listen = [name for name, gates in answer["sensors"].items() if not gates]
+    parts = [f"{word}: {', '.join(names)}" for word, names in (("silent", silent), ("no gate closed", listen)) if names]
+    yield "; ".join(parts) or f"{answer['gate']}: noted for the sensors that come"
+
+
+def _known(answer: dict[str, Any]) -> Iterable[str]:
+    """The model's gestures and one's own, and what is wrong with these."""
+    own = answer["own"]
+    yield from (f"{name:<32} {answer['model']}" for name in answer["gestures"])
+    yield from (f"{name:<32} your own, {count} examples" for name, count in own["gestures"].items())
+    if not own["gestures"]:
+        yield "none of your own"
+    yield from (f"  {said}" for said in (own["fault"], own["gestures"] and own["off"], *own["doubtful"]) if said)

@@ -25,6 +25,8 @@ from gestured.simulator.everyday import day
 from gestured.simulator.places import PLACES
 
 KINDS = GESTURES + NON_GESTURES + SEQUENCES
+FIRST = 900  # the person of `--seed 0`; the models learned from 0 to 33
+OTHERS = 0.2  # share of performances that are no gesture, where no kinds are named
 PART_S = 600.0  # what is simulated at a time; between two parts the sensor is off
 OFF_S = 3.0
 UNTOUCHED_S = 2.0  # untouched at first: the daemon learns the baseline
@@ -65,12 +67,14 @@ def _sensor(args: argparse.Namespace, of_day: int) -> SimulatedSensor:
 
 
 def _take(args: argparse.Namespace, part: int, seconds: float, first: str | None) -> Take:
-    rng = generator(args.seed, 0xC7, args.participant, part)
-    sensor = _sensor(args, args.participant)
+    person = FIRST + args.seed
+    rng = generator(args.seed, 0xC7, person, part)
     at_first = [first] if first else []
-    kinds = cycle(args.kinds) if args.kinds else chain(at_first, at_random(rng, args.non_gestures))
-    person = Participant(args.participant)
-    return session(person, sensor, rng, seconds, idle_s=BETWEEN_S, kinds=kinds, lead_s=UNTOUCHED_S, speed=args.speed)
+    kinds = cycle(args.kinds) if args.kinds else chain(at_first, at_random(rng, OTHERS))
+    return session(
+        Participant(person), _sensor(args, person), rng, seconds,
+        idle_s=BETWEEN_S, kinds=kinds, lead_s=UNTOUCHED_S, speed=args.speed,
+    )  # fmt: skip
 
 
 def frames(start: float, take: Take) -> Iterator[tuple[int, Frame]]:
@@ -84,27 +88,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The flags of what is played; the help ends with the kinds that there are."""
     kinds = textwrap.indent(textwrap.fill(", ".join(KINDS), 98), "  ")
     parser.epilog = f"{parser.epilog}\n\nkinds for --kinds:\n{kinds}"
-    parser.add_argument(
-        "--participant",
-        type=int,
-        default=900,
-        metavar="N",
-        help="who performs (default: 900; the models learned from 0 to 33)",
-    )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="another sequence of gestures (default: 0)")
+    text = "another person, and another sequence of gestures (default: 0)"
+    parser.add_argument("--seed", type=number(0, 10**6, whole=True), default=0, metavar="N", help=text)
     parser.add_argument(
         "--kinds",
         type=some_of(KINDS),
         default=(),
         metavar="A,B",
         help="perform these kinds, listed below, in turn (default: at random)",
-    )
-    parser.add_argument(
-        "--non-gestures",
-        type=number(0.0, 1.0),
-        default=0.2,
-        metavar="SHARE",
-        help="share of performances that are no gesture (default: 0.2)",
     )
     parser.add_argument("--speed", choices=tuple(SPEEDS), help="how fast the person moves (default: mixed)")
     parser.add_argument(

@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterator
 
 from gestured.client import osc_out
-from gestured.client.sensor import sent_after_refusal
+from gestured.client.sensor import connected, sent_after_refusal
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 from gestured.record.tape import Packet, Tape
@@ -18,17 +18,12 @@ def send(found: Tape, to: Address, speed: float) -> int:
 
     Each sender of the tape gets a socket of its own: a sensor belongs to its source.
     """
-    try:
-        family, kind, _, _, where = socket.getaddrinfo(*to, type=socket.SOCK_DGRAM)[0]
-    except OSError as error:
-        raise GesturedError(f"cannot send to {to}: {error.strerror or error}") from error
     senders: dict[tuple[str, int], socket.socket] = {}
     unheard = 0
     try:
         for packet, data in _paced(found, speed):
             if packet.source not in senders:
-                senders[packet.source] = socket.socket(family, kind)
-                senders[packet.source].connect(where)
+                senders[packet.source] = connected(to)
             unheard += sent_after_refusal(senders[packet.source], data)
     except OSError as error:  # such as a packet that is longer than UDP allows
         raise GesturedError(f"a packet for {to} cannot be sent: {error.strerror}") from error

@@ -45,12 +45,8 @@ def add(commands: Commands) -> None:
         help="everyday contact at a place (default: armrest), in which few gestures are meant; --seed says whose",
     )
     add_arguments(parser)
-    form = parser.add_mutually_exclusive_group()
-    form.add_argument("--ints", action="store_true", help="send integers instead of floats")
-    form.add_argument("--blob", nargs="?", const="uint16", choices=tuple(BLOBS), help="send a blob (default: uint16)")
-    parser.add_argument(
-        "--plain", action="store_true", help="the matrix alone: no bundle, no counter, no finger positions"
-    )
+    text = "send a blob instead of floats (default: uint16)"
+    parser.add_argument("--blob", nargs="?", const="uint16", choices=tuple(BLOBS), help=text)
     parser.add_argument("--json", action="store_true", help="print what is performed as JSON lines")
     parser.set_defaults(run=run)
 
@@ -59,11 +55,7 @@ def run(args: argparse.Namespace) -> int:
     """Send until the time is over, or Ctrl-C. Raises GesturedError where nobody listens from the first packet on."""
     if args.everyday and (args.kinds or args.speed):
         raise GesturedError("--everyday: expected neither --kinds nor --speed, a day has its own")
-    form = Form(args.sensor, "ints" if args.ints else args.blob or "floats", args.plain)
-    try:
-        sensor = Sensor(args.to, form)
-    except OSError as error:
-        raise GesturedError(f"cannot send to {args.to}: {error.strerror or error}") from error
+    sensor = Sensor(args.to, Form(args.sensor, args.blob or "floats"))
     rows, columns = args.grid
     what = f"{rows} x {columns} taxels at {args.rate:g} Hz"
     say(f"sending {what} to {args.to} as {args.sensor}; Ctrl-C ends", to=sys.stderr)

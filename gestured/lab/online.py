@@ -1,14 +1,14 @@
 """Continuous sessions over UDP to a real daemon; its events from the Unix socket, scored against what was performed."""
 
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing
 from typing import Any
 
 from gestured.client.engine import Engine
+from gestured.client.lines import read_ahead
 from gestured.client.sensor import Form, Sensor
-from gestured.client.stream import Stream
+from gestured.client.subscriber import Subscriber
 from gestured.core.errors import GesturedError
 from gestured.core.frames import Frame
 from gestured.record.judge import Outcome, Performed, Tally
@@ -33,14 +33,13 @@ def play(model: str, take: Take, speed: float) -> tuple[list[dict[str, Any]], fl
     the arrival of the first frame, and times after it are the sensor's.
     """
     rows, columns = take.frames.shape[1:]
-    heard: list[dict[str, Any]] = []
     with Engine(model, rows, columns, "--clock", "sensor") as engine:
         with (
-            closing(Stream(engine.socket, {"types": ["gesture", "unknown"]})) as stream,
+            Subscriber(engine.socket, types=["gesture", "unknown"], reconnect=False) as subscriber,
             closing(Sensor(engine.listen, Form("lab"))) as sensor,
         ):
-            reader = threading.Thread(target=lambda: heard.extend(stream), daemon=True)
-            reader.start()
+            heard = read_ahead(line for _, line in subscriber.lines())
+            heard.get()  # the hello: from here on nothing is missed
             epoch, start = time.time(), time.monotonic()
             first = float(take.sensor_times[0])
             for n in range(len(take.frames)):
@@ -49,11 +48,11 @@ def play(model: str, take: Take, speed: float) -> tuple[list[dict[str, Any]], fl
                 if wait > 0.002:  # in small bursts: a sleep for each frame would be the slowest part
                     time.sleep(wait)
                 sensor.socket.send(sensor.form.packet(Frame(t, take.frames[n]), int(take.counter[n]), epoch + t))
-            engine.close()  # it flushes what is open, and the stream ends
-            reader.join(10)
+            engine.close()  # it flushes what is open, and hangs up
+            events = [line for line in iter(heard.get, None) if line["type"] in ("gesture", "unknown")]
     if sensor.unheard:
         raise GesturedError(f"{sensor.unheard} packets were refused by the daemon's port")
-    return [e for e in heard if e["type"] in ("gesture", "unknown")], epoch - first
+    return events, epoch - first
 
 
 def tallied(take: Take, zero: float, events: list[dict[str, Any]]) -> tuple[Tally, list[Outcome]]:

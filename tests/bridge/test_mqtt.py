@@ -487,21 +487,6 @@ def with_password(folder: Path) -> list[str]:
     return guarded(folder, "car:secret\n", access)
 
 
-def test_user_and_password_come_from_the_environment_or_a_file(bridge, broker, fake, tmp_path: Path):
-    at = broker(*with_password(tmp_path))
-    process = begin(bridge, at, fake, env={"MQTT_USER": "car", "MQTT_PASSWORD": "secret"})
-    fake.accept()
-    process.ready()
-    process.stop()
-    fake.close()
-    file = tmp_path / "user"
-    file.write_text("car:secret\n")
-    file.chmod(0o600)
-    process = begin(bridge, at, fake, "--credentials", file)
-    fake.accept()
-    process.ready()
-
-
 def test_a_broker_that_refuses_and_topics_that_are_not_allowed(bridge, broker, fake, tmp_path: Path):
     at = broker(*with_password(tmp_path))
     process = begin(bridge, at, fake, env={"MQTT_USER": "car", "MQTT_PASSWORD": "wrong"})
@@ -521,20 +506,11 @@ def test_a_broker_that_refuses_and_topics_that_are_not_allowed(bridge, broker, f
         (["--broker", "a b"], "expected HOST:PORT"),
         (["--broker", "localhost", "--ca", "x.pem"], "add --tls"),
         (["--broker", "localhost", "--tls", "--ca", "/none.pem"], "/none.pem"),
-        (["--broker", "localhost", "--credentials", "/none"], "/none"),
         (["--broker", "localhost", "--types", "gestures"], "--types"),
     ],
 )
 def test_bad_input_is_one_sentence(refused, tmp_path: Path, flags: list[str], words: str):
     assert words in refused("mqtt", "--socket", tmp_path / "none.sock", *flags)
-
-
-def test_credentials_that_everybody_can_read_are_refused(bridge, tmp_path: Path):
-    file = tmp_path / "user"
-    file.write_text("car:secret\n")
-    process = bridge("mqtt", "--broker", "localhost", "--credentials", file)
-    assert process.end() == 1
-    assert f"chmod o= {file}" in process.said() and "secret" not in process.said()
 
 
 def test_lines_of_a_mad_daemon_are_passed_over(bridge, broker, listen, fake):

@@ -230,7 +230,7 @@ def test_nobody_who_listens_is_said_and_heals(bridge, line):
         ("/dev/null", ["--sensor", "a/b"], "--sensor a/b"),
         ("/dev/null", ["--protocol", "e256", "--grid", "8x8"], "16x16"),
         ("/dev/null", ["--grid", "1x1"], "ROWSxCOLUMNS"),
-        ("/dev/null", ["--to", "nowhere.invalid:9000"], "--to nowhere.invalid:9000"),
+        ("/dev/null", ["--to", "nowhere.invalid:9000"], "cannot send to nowhere.invalid:9000"),
     ],
 )
 def test_bad_input_is_one_sentence(refused, tmp_path: Path, device: str, more: list[str], words: str):

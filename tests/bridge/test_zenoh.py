@@ -165,9 +165,11 @@ def test_a_router_that_goes_and_comes_back(bridge, site, fake):
     assert site.event()[1]["sequence"] == 50
 
 
-def test_peers_need_no_router(bridge, fake):
-    endpoint = f"tcp/{free_address(socket.SOCK_STREAM)}"
-    bridge("zenoh", "--listen", endpoint, "--site", "car", "--socket", fake.path)
+def test_peers_need_no_router(bridge, fake, tmp_path):
+    """By Zenoh's own file, which says how the bridge may be called."""
+    endpoint, config = f"tcp/{free_address(socket.SOCK_STREAM)}", tmp_path / "zenoh.json5"
+    config.write_text(f'{{mode: "peer", listen: {{endpoints: ["{endpoint}"]}}}}')
+    bridge("zenoh", "--config", config, "--site", "car", "--socket", fake.path)
     fake.accept()
 
     def called() -> Any:
@@ -309,7 +311,7 @@ def test_a_router_that_is_not_there_is_asked_for_ever_more_seldom(monkeypatch):
         (["--connect", "rubbish"], "tcp/127.0.0.1:7447"),
         (["--site", "a/b"], "--site a/b"),
         (["--config", "/none.json5"], "/none.json5"),
-        (["--frames", "--to", "nowhere.invalid:9000"], "--to nowhere.invalid:9000"),
+        (["--frames", "--to", "nowhere.invalid:9000"], "cannot send to nowhere.invalid:9000"),
     ],
 )
 def test_bad_input_is_one_sentence(bridge, tmp_path, flags, words):

@@ -6,9 +6,10 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryFile
+from threading import Thread
 from typing import Any
 
 import pytest
@@ -17,7 +18,7 @@ from gestured.client.control import Control
 from gestured.control.cli import main
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
-from tests.sockets import free_address
+from tests.sockets import FakeDaemon, free_address
 
 ROOT = Path(__file__).resolve().parents[2]
 Start = Callable[..., "subprocess.Popen[bytes]"]
@@ -80,6 +81,26 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str, str]]:
             out.seek(0)
             err.seek(0)
             return status, out.read(), err.read()
+
+    return finish
+
+
+@pytest.fixture
+def told(run: Callable[..., tuple[int, str, str]], fake: FakeDaemon) -> Callable[..., tuple[int, str, str]]:
+    """Runs gesturectl, in this process, while `fake` takes one connection, says these lines and hangs up."""
+
+    def finish(said: Sequence[object], *arguments: object) -> tuple[int, str, str]:
+        def daemon() -> None:
+            fake.accept(said[0])
+            fake.say(*said[1:])
+            fake.close()
+
+        serving = Thread(target=daemon)
+        serving.start()
+        try:
+            return run(*arguments)
+        finally:
+            serving.join()
 
     return finish
 

@@ -51,7 +51,7 @@ def test_every_change_of_code_that_is_used_changes_it(copy: Path, module: str, r
     assert digest(copy, module) != before
 
 
-@pytest.mark.parametrize("room", ["control/cli.py", "core/osc.py", "core/sensor.py", "client/stream.py"])
+@pytest.mark.parametrize("room", ["control/cli.py", "core/osc.py", "core/sensor.py", "client/subscriber.py"])
 def test_code_that_is_not_used_does_not_count(copy: Path, room: str) -> None:
     before = digest(copy, "gestured.lab.dataset")
     (copy / room).write_text("")

@@ -35,10 +35,7 @@ class Pad:
         self.contacts = Contacts(sensor)
         self.lock = threading.Lock()  # for the contacts
         self._textile = LiveTextile(sensor, time.time_ns())
-        try:
-            self._sender = Sensor(to, Form(name))
-        except OSError as error:
-            raise GesturedError(f"cannot send to {to}: {error.strerror or error}") from error
+        self._sender = Sensor(to, Form(name))
 
     def begin(self, tell: Tell, events: Iterable[dict[str, Any]] = ()) -> None:
         """Send frames from now on; the page is told them, and events, as they come."""

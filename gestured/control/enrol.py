@@ -1,4 +1,4 @@
-"""`gesturectl enrol`, `gestures` and `forget`: gestures of one's own, taught, listed and forgotten."""
+"""`gesturectl enrol`: a gesture of one's own is taught."""
 
 import argparse
 from typing import Any
@@ -8,14 +8,13 @@ from gestured.client.lines import Unreachable
 from gestured.client.program import Commands
 from gestured.client.say import say, say_json
 from gestured.control.address import add_sockets, connect
-from gestured.control.operate import asks
 from gestured.core.own import is_name
 
 EXAMPLES = 3
 
 
 def add(commands: Commands) -> None:
-    """Add the three subcommands to gesturectl's command line."""
+    """Add the subcommand to gesturectl's command line."""
     parser = commands.add_parser(
         "enrol",
         help="teach a gesture of your own",
@@ -33,28 +32,10 @@ def add(commands: Commands) -> None:
     )
     add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")
-    parser.set_defaults(run=enrol)
-    parser = commands.add_parser(
-        "gestures",
-        help="list the gestures, and your own",
-        description="List the model's gestures that are in use, and your own with how many examples each has.",
-        epilog="example:\n  gesturectl gestures",
-    )
-    add_sockets(parser)
-    parser.add_argument("--json", action="store_true", help="print the daemon's answer as JSON")
-    parser.set_defaults(run=gestures)
-    parser = commands.add_parser(
-        "forget",
-        help="forget a gesture of your own",
-        description="Have the daemon recognise a gesture of your own no longer. Nothing of its examples stays in the\n"
-        "daemon's files; a recording that somebody made keeps what it holds.",
-        epilog="example:\n  gesturectl forget knock",
-    )
-    parser.add_argument("name", metavar="NAME", help="the gesture's name")
-    asks(parser, "forget", lambda answer: f"forgot {answer['forgotten']}", "name")
+    parser.set_defaults(run=run)
 
 
-def enrol(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """Enrol it; 1 where it was given up."""
     with connect(args) as control:
         control.ask("enrol", name=args.name, sensor=args.sensor, examples=args.examples)
@@ -64,22 +45,6 @@ def enrol(args: argparse.Namespace) -> int:
             return _follow(control, args)
         except KeyboardInterrupt:
             return 1
-
-
-def gestures(args: argparse.Namespace) -> int:
-    """Print the model's gestures and one's own."""
-    with connect(args) as control:
-        answer = control.ask("gestures")
-    if args.json:
-        say_json({key: value for key, value in answer.items() if key != "ok"})
-        return 0
-    own = answer["own"]
-    say(*(f"{name:<32} {answer['model']}" for name in answer["gestures"]))
-    say(*(f"{name:<32} your own, {count} examples" for name, count in own["gestures"].items()) or ["none of your own"])
-    for sentence in (own["fault"], own["gestures"] and own["off"], *own["doubtful"]):
-        if sentence:
-            say(f"  {sentence}")
-    return 0
 
 
 def _follow(control: Control, args: argparse.Namespace) -> int:
