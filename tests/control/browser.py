@@ -91,11 +91,6 @@ class Browser:
         """What the reader prefers: dark or light."""
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
 
-    def picture(self, path: Path) -> None:
-        """The whole page as a PNG."""
-        found = self.call("Page.captureScreenshot", captureBeyondViewport=True)
-        path.write_bytes(base64.b64decode(found["data"]))
-
     def complaints(self) -> list[str]:
         """Errors and warnings of the console, exceptions, and requests that failed."""
         self.run("1")

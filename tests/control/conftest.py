@@ -1,5 +1,6 @@
 """gesturectl as a process, and a real daemon for it."""
 
+import json
 import os
 import signal
 import socket
@@ -7,7 +8,10 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from itertools import count
 from pathlib import Path
+from socketserver import StreamRequestHandler, ThreadingUnixStreamServer
 from tempfile import TemporaryFile
 from threading import Thread
 from typing import Any
@@ -16,11 +20,14 @@ import pytest
 
 from gestured.client.control import Control
 from gestured.control.cli import main
+from tests.control.browser import PROGRAM, Browser
+from tests.control.pages import Page, viewing
 from tests.daemon import tiny_model
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
 from tests.sockets import FakeDaemon, free_address
 
 ROOT = Path(__file__).resolve().parents[2]
+NUMBERS = count()
 Start = Callable[..., "subprocess.Popen[bytes]"]
 
 
@@ -147,6 +154,49 @@ def ctl(run: Callable[..., tuple[int, str, str]], daemon: Daemon) -> Callable[..
     return lambda *arguments: run(*arguments, "--control", daemon.ready["control"])
 
 
+@pytest.fixture(scope="module")
+def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """A real daemon to look at, with provisional events, fingers, a flight recorder and a sensor with a zone."""
+    folder = tmp_path_factory.mktemp("real")
+    model = tiny_model.make(folder / "tiny.onnx", provisional=tiny_model.PROVISIONAL)
+    config = folder / "gestured.toml"
+    config.write_text("touch = true\nflight_recorder = 4\n[sensors.zoned.zones.left]\nat = [0, 0, 0.5, 1]\n")
+    daemon = Daemon.start(folder, model, "--clock", "sensor", "--stale-s", 30, "--config", config)
+    yield daemon
+    assert daemon.stop() == 0, daemon.stderr()
+    assert "Traceback" not in daemon.stderr()
+
+
+@pytest.fixture
+def arm() -> str:
+    """A sensor that no other test has."""
+    return f"arm{next(NUMBERS)}"
+
+
+@pytest.fixture
+def view(real: Daemon, tmp_path: Path) -> Iterator[Page]:
+    """The page of `gesturectl view` of that daemon."""
+    with viewing(real.ready["control"], tmp_path) as page:
+        yield page
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A browser for all tests of a module."""
+    if PROGRAM is None:
+        pytest.skip("chromium is not installed (apt install chromium)")
+    with Browser(tmp_path_factory.mktemp("chromium")) as browser:
+        yield browser
+
+
+@pytest.fixture
+def browser(chromium: Browser) -> Iterator[Browser]:
+    """A browser that shows nothing yet."""
+    yield chromium
+    chromium.call("Page.navigate", url="about:blank")
+    chromium.said.clear()
+
+
 @pytest.fixture
 def recorded(start, daemon: Daemon, tmp_path: Path):
     """Records what the function does to the daemon, to the end of the file."""
@@ -171,3 +221,32 @@ def gestures(daemon: Daemon, name: str, *directions: str):
         client.events("release", name, len(directions))
 
     return perform
+
+
+@pytest.fixture
+def fake_control(tmp_path: Path) -> Iterator[Callable[..., Path]]:
+    """A daemon whose version, model and only sensor have this name, which may be one that no real one has."""
+    with ExitStack() as held:
+
+        def begin(name: str, **wrong: object) -> Path:
+            sensor = {"state": name, "rate_hz": 15.0, "jitter_s": 0.0, "lost": 0, "bad_taxels": 0, "source": "a:1"}
+            status = {
+                "type": "state", "version": name, "state": "ok", "sensors": {name: sensor},
+                "model": {"active": name, "gestures": [name]}, "flight_recorder": {"limit_bytes": 0},
+                "input": {"dropped": {}, "kernel_drops": 0},
+            } | wrong  # fmt: skip
+
+            class Answers(StreamRequestHandler):
+                def handle(self) -> None:
+                    for line in self.rfile:
+                        follows = json.loads(line)["verb"] == "follow"
+                        for told in [{"ok": True}, status] if follows else [{"ok": False, "reason": name}]:
+                            self.wfile.write(json.dumps(told).encode() + b"\n")
+
+            server = held.enter_context(ThreadingUnixStreamServer(str(tmp_path / "fake.ctl"), Answers))
+            server.daemon_threads = True
+            Thread(target=server.serve_forever, daemon=True).start()
+            held.callback(server.shutdown)
+            return tmp_path / "fake.ctl"
+
+        yield begin

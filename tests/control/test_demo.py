@@ -12,7 +12,7 @@ import pytest
 import gestured
 from gestured.client.engine import Engine
 from gestured.model.shipped import shipped
-from tests.control.test_view import Page
+from tests.control.pages import Page
 from tests.sockets import PATIENCE_S
 
 pytestmark = [

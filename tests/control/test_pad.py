@@ -2,12 +2,10 @@
 
 import json
 import math
-import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -23,8 +21,8 @@ from gestured.core.events import Gesture
 from gestured.core.frames import Frame
 from gestured.simulator import GESTURES, SimulatedSensor
 from gestured.simulator.live import LiveTextile
-from tests.control.browser import PROGRAM, Browser
-from tests.control.test_view import Page, Stream
+from tests.control.browser import Browser
+from tests.control.pages import Page, Stream
 from tests.sockets import free_address
 
 Way = Callable[[float], tuple[float, float]]  # share of the time -> x, y, from the bottom-left corner
@@ -182,14 +180,6 @@ def test_the_token_opens_once_for_contacts_and_nothing_else() -> None:
         assert status == 403 and b"Start gesturectl pad again" in body
 
 
-@pytest.mark.parametrize("headers", [{"Host": "evil.example:80"}, {"Origin": "http://evil.example"}])
-def test_another_site_touches_nothing(headers: dict[str, str]) -> None:
-    with served() as (_, page):
-        assert page.ask("/open", "POST", {}, X_Gestured_Token=page.token, **headers)[0] == 403
-        page.come_in()
-        assert page.ask("/touch", "POST", {}, **headers)[0] == 403 and page.ask("/stream", **headers)[0] == 403
-
-
 def test_what_is_no_message_is_refused_and_the_pad_goes_on() -> None:
     with served() as (_, page):
         _, number = seat(page.come_in())
@@ -313,19 +303,11 @@ class Hand:
         raise AssertionError(f"{gesture}: {self.browser.run('document.body.innerText')}")
 
 
-@pytest.fixture
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    if PROGRAM is None:
-        pytest.skip("chromium is not installed (apt install chromium)")
-    with Browser(tmp_path_factory.mktemp("chromium")) as browser:
-        browser.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=10)
-        yield browser
-
-
 @pytest.mark.e2e
 def test_a_telephone_draws_a_swipe_a_double_tap_and_two_fingers_and_a_mouse_a_circle(start, browser: Browser) -> None:
     process = start("pad", "--listen", "127.0.0.1:0")
     browser.size(400, 800)
+    browser.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=10)
     browser.call("Page.navigate", url=process.stdout.readline().decode().strip())
     browser.until("typeof state === 'object' && state.drawn > 30")  # a second in which the idle sensor was learned
     assert browser.run("location.hash") == ""
@@ -341,5 +323,3 @@ def test_a_telephone_draws_a_swipe_a_double_tap_and_two_fingers_and_a_mouse_a_ci
             break
     assert named == "circle clockwise"
     assert browser.complaints() == []
-    if folder := os.environ.get("PYTEST_PICTURES"):
-        browser.picture(Path(folder) / "pad-400.png")

@@ -20,7 +20,7 @@ from gestured.lab.cli import main
 from gestured.lab.recordings.collect import already
 from gestured.lab.recordings.protocol import order
 from gestured.record.arrays import read, write
-from tests.control.test_view import Page
+from tests.control.pages import Page
 from tests.small_recording import example
 from tests.sockets import free_address
 from tests.terminal import Terminal

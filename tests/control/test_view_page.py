@@ -1,0 +1,314 @@
+"""The page of `gesturectl view` in a real browser."""
+
+import re
+import threading
+import tomllib
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gestured.client.control import Control
+from gestured.control.view.server import PAGE
+from gestured.core.where import zones_of
+from gestured.record.tape_reader import read
+from tests.control.browser import Browser
+from tests.control.pages import Page, viewing
+from tests.daemon.harness import Daemon, Frame, Sensor
+from tests.documents.blocks import blocks
+
+
+def follow(page: Page, browser: Browser, name: str, real: Daemon) -> Sensor:
+    """Open the page, and a sensor that it looks at."""
+    sensor = Sensor(real, name).begin()
+    browser.size(1400, 900)
+    browser.call("Page.navigate", url=page.whole)
+    browser.until(f"[...document.getElementById('sensor')?.options ?? []].some(one => one.value === {name!r})")
+    browser.run(f"(all => {{ all.value = {name!r}; all.onchange() }})(document.getElementById('sensor'))")
+    browser.until("state.frames.length && state.drawn > 0")
+    return sensor
+
+
+@pytest.fixture
+def sensor(view: Page, browser: Browser, real: Daemon, arm: str) -> Sensor:
+    """A sensor that the page in the browser looks at."""
+    return follow(view, browser, arm, real)
+
+
+def perform(sensor: Sensor, browser: Browser, direction: str) -> None:
+    """A swipe, of which the page sees each frame."""
+    show(sensor, browser, [*sensor.hand.swipe(direction), *sensor.hand.idle(1.0)])
+
+
+def show(sensor: Sensor, browser: Browser, frames: list[Frame]) -> None:
+    """Frames, each of which the page sees before the next one comes."""
+    for frame in frames:
+        before = browser.run("state.frames.length ? state.frames[state.frames.length - 1].t : 0")
+        sensor.send([frame])
+        browser.until(f"state.frames[state.frames.length - 1].t > {before}")
+
+
+@pytest.mark.parametrize("width", [400, 1400])
+def test_a_swipe_is_drawn_named_and_flagged(sensor: Sensor, browser: Browser, tmp_path: Path, width: int) -> None:
+    browser.size(width, 900)
+    browser.colours("dark" if width < 600 else "light")
+    assert browser.run("location.hash + location.search") == ""  # the token is gone from the address
+    perform(sensor, browser, "right")
+    browser.until("document.getElementById('name').textContent === 'swipe right'")
+    for part in ("name", "matrix"):  # above the fold
+        assert browser.run(f"document.getElementById('{part}').getBoundingClientRect().bottom") < 800
+    path = browser.run("state.frames.filter(f => f.centroid).map(f => f.centroid[1])")
+    assert len(path) >= 6 and path[-1] - path[0] > 4
+    phases = browser.run("[...new Set(state.frames.map(f => f.phase))]")
+    assert {"IDLE", "CONTACT", "RELEASING"} <= set(phases)
+    rows = browser.run("[...document.querySelectorAll('#scores tbody td:first-child')].map(td => td.textContent)")
+    assert rows[0] == "swipe right" and rows[2:] == ["none of these"]
+    shares = browser.run("[...document.querySelectorAll('#scores meter')].map(meter => meter.value)")
+    assert 0.9 < shares[0] and sum(shares) <= 1.001
+    assert browser.run("document.querySelector('#events tbody tr').cells.length") == 5
+    rows = "[...document.querySelectorAll('#sensors tbody tr')]"
+    browser.until(
+        f"{rows}.find(row => row.cells[0].textContent === {sensor.name!r})?.cells[6].textContent === '1'"
+    )  # this hour
+    assert browser.run("document.documentElement.scrollWidth <= innerWidth")  # nothing sticks out
+    browser.run("document.getElementById('note').value = 'a test'; document.getElementById('flag').click()")
+    said = browser.until("document.getElementById('done').textContent.includes('.mcap') && done.textContent")
+    (kept,) = tmp_path.glob("flag-*.mcap")
+    assert str(kept) in said
+    tape = read(kept)
+    assert any(event["type"] == "gesture" for event in tape.events) and tape.scene["note"] == "a test"
+    assert browser.complaints() == []
+
+
+def test_a_provisional_answer_is_shown_as_such_and_then_confirmed_or_revoked(sensor: Sensor, browser: Browser) -> None:
+    browser.size(400, 900)
+    hand = sensor.hand
+
+    def said(name: str) -> str:
+        return browser.run(f"document.getElementById('{name}').textContent")
+
+    show(sensor, browser, hand.swipe("right"))
+    browser.until("document.getElementById('name').textContent === 'swipe right'")
+    assert browser.run("document.getElementById('name').className") == "guess"
+    assert re.fullmatch(r"a guess, \d+ %, \d+ ms after it began", said("name-note"))
+    show(sensor, browser, hand.idle(0.5))
+    browser.until("document.getElementById('name').className === 'gesture'")
+    assert said("name") == "swipe right"
+    note = r"\d+ %, \d+ ms after the finger left, confirmed, \d+ ms after the guess"
+    assert re.fullmatch(note, said("name-note"))
+    show(sensor, browser, [*hand.idle(1.0), *hand.tap(), *hand.idle(0.2)])
+    browser.until("document.getElementById('name').className === 'guess'")
+    assert said("name") == "one tap"
+    show(sensor, browser, [*hand.tap(), *hand.idle(1.0)])
+    browser.until("document.getElementById('name').className === 'gesture'")
+    assert said("name") == "one tap double tap"
+    assert browser.run("document.querySelector('#name s').textContent") == "one tap"
+    assert re.fullmatch(note.replace("confirmed", "revoked"), said("name-note"))
+    rows = browser.run("[...document.querySelectorAll('#events tbody tr')].map(row => row.cells[2].textContent)")
+    assert [row for row in reversed(rows) if row not in ("onset", "release")] == [
+        "probably swipe right", "swipe right; provisional confirmed",
+        "probably one tap", "double tap; provisional revoked",
+    ]  # fmt: skip
+    assert browser.run("document.documentElement.scrollWidth <= innerWidth")
+    assert browser.complaints() == []
+
+
+def test_the_scale_comes_back_after_an_outlier(sensor: Sensor, browser: Browser) -> None:
+    mad = sensor.hand.frame(4.0)
+    mad[2, 2] = 2000.0
+    show(sensor, browser, [mad, *sensor.hand.idle(0.5)])
+    perform(sensor, browser, "left")
+    assert browser.run("state.full") == 200
+
+
+def test_an_answer_is_drawn_where_it_was_and_a_zone_is_pulled_up_with_the_mouse(
+    view: Page, real: Daemon, browser: Browser
+) -> None:
+    sensor = follow(view, browser, "zoned", real)
+    browser.until("over.zones.left?.join() === '0,0,0.5,1'")
+    perform(sensor, browser, "right")
+    said = browser.until("document.getElementById('where').textContent")
+    assert re.fullmatch(r"From 1\d %, 5\d %.* way 0\.\d\d .* \d+ counts, one finger, in the zone left\.", said)
+    box = browser.run("(b => [b.left, b.top, b.width, b.height])(at('matrix').getBoundingClientRect())")
+
+    def pull(*places: tuple[float, float]) -> str:
+        for kind, (x, y) in zip(("mousePressed", "mouseMoved", "mouseReleased"), places, strict=True):
+            at = {"x": box[0] + (x * 8 + 0.5) / 9 * box[2], "y": box[1] + ((1 - y) * 8 + 0.5) / 9 * box[3]}
+            browser.call("Input.dispatchMouseEvent", type=kind, button="left", buttons=1, clickCount=1, **at)
+        return browser.run("document.getElementById('zone-note').textContent")
+
+    assert pull((0.6, 0.9), (1.0, 0.25), (1.0, 0.25)) == ""
+    lines = browser.run("document.getElementById('zone').textContent")
+    pulled = tomllib.loads(lines)["sensors"]["zoned"]["zones"]
+    assert pulled["volume"]["at"] == pytest.approx([0.6, 0.25, 1.0, 0.9], abs=0.02)
+    assert zones_of(pulled | {"left": (0, 0, 0.5, 1)})
+    browser.run("navigator.clipboard.writeText = async text => { window.copied = text }")
+    browser.run("document.getElementById('copy').click()")
+    browser.until("document.getElementById('zone-note').textContent.startsWith('Copied')")
+    assert browser.run("window.copied") == lines
+    assert pull((0.3, 0.9), (0.8, 0.25), (0.8, 0.25)) == "It overlaps left: zones must share no place."
+    assert browser.complaints() == []
+
+
+def test_sliders_follow_a_finger(sensor: Sensor, browser: Browser) -> None:
+    """One goes to the finger, the other one begins where it stands; the code is the documents' to the letter."""
+    (shown,) = [block.text for block in blocks() if block.language == "js"]
+    assert shown == (PAGE / "slider.js").read_text()
+    hand = sensor.hand
+    at = "['absolute', 'relative'].map(id => Number(document.getElementById(id).value))"
+    for begin, end in ((1, 3), (5, 6)):
+        before = browser.run(at)[1]
+        for column in np.linspace(begin, end, 10):
+            show(sensor, browser, [hand.frame(4.0, column)])
+        browser.until(f"Math.abs({at}[0] - {end / 8}) < 0.03")
+        assert browser.run(at)[1] == pytest.approx(before + (end - begin) / 8, abs=0.06)
+        show(sensor, browser, hand.idle(1.0))
+    assert browser.complaints() == []
+
+
+def test_what_lies_on_a_sensor_is_said(sensor: Sensor, browser: Browser) -> None:
+    sensor.send([sensor.hand.frame(4.0 + 2 * (k % 2)) for k in range(90)])  # it moves, so that it is not learned
+    browser.until("document.getElementById('name').textContent === 'something lies here'")
+    assert "learned" in browser.run("document.getElementById('name-note').textContent")
+    sensor.send(sensor.hand.idle(2.0))
+    browser.until("document.getElementById('name').textContent === '…'")
+
+
+def test_the_page_says_what_is_wrong_and_what_to_do(serve, browser: Browser) -> None:
+    daemon = serve("--clock", "sensor", "--stale-s", 30)
+    with viewing(daemon.ready["control"]) as page:
+        _is_told(page, daemon, browser)
+
+
+def _is_told(page: Page, daemon: Daemon, browser: Browser) -> None:
+    browser.call("Page.navigate", url=page.whole)
+    findings = "document.getElementById('findings')?.textContent ?? ''"
+    browser.until(f"({findings}).includes('no sensor was heard')")
+    assert "gesturectl sniff" in browser.run(findings)
+    assert browser.run("document.getElementById('flag').disabled")
+    assert "--flight-recorder" in browser.run("document.getElementById('done').textContent")
+    sensor = Sensor(daemon, "arm").begin()
+    swipe = sensor.hand.swipe("left")
+    for _ in range(6):
+        sensor.send([40.0 - frame for frame in swipe], sensor.hand.idle(1.0))
+    browser.until(f"({findings}).includes('[sensors.arm] invert = true')")
+    assert not browser.run("document.body.classList.contains('absent')")
+    daemon.stop()
+    browser.until("document.body.classList.contains('absent')")  # what is shown is of before
+
+
+def test_recalibrate_asks_before(sensor: Sensor, browser: Browser) -> None:
+    for answer in ("false", "true"):
+        assert browser.run("document.getElementById('done').textContent") == ""
+        browser.run(f"window.confirm = question => {{ window.asked = question; return {answer} }}")
+        browser.run("document.getElementById('recalibrate').click()")
+        assert f"Learn the idle sensor {sensor.name} anew?" in browser.run("window.asked")
+    browser.until("document.getElementById('done').textContent.includes('learned anew')")
+
+
+def test_pause_step_back_and_keys(sensor: Sensor, browser: Browser) -> None:
+    perform(sensor, browser, "left")
+
+    def key(name: str, code: str) -> None:
+        for kind in ("keyDown", "keyUp"):
+            browser.call("Input.dispatchKeyEvent", type=kind, key=name, code=code, text=name if len(name) == 1 else "")
+
+    key(" ", "Space")
+    assert browser.run("state.paused && document.getElementById('pause').getAttribute('aria-pressed')") == "true"
+    now = browser.run("state.moment")
+    for _ in range(5):
+        key("ArrowLeft", "ArrowLeft")
+    assert browser.run("state.moment") < now
+    shown = browser.run("state.moment")
+    sensor.send([sensor.hand.frame()])
+    browser.until("state.frames[state.frames.length - 1].time > state.moment + 0.1")
+    assert browser.run("state.moment") == shown
+    key("c", "KeyC")
+    assert browser.run("document.getElementById('counts').checked") is True
+    key(" ", "Space")
+    browser.until("!state.paused && document.getElementById('ago').textContent === 'now'")
+    key("m", "KeyM")
+    sensor.send([sensor.hand.frame()])
+    browser.until("document.getElementById('raw').checked && state.frames.some(f => f.raw)")
+    assert browser.complaints() == []
+
+
+def test_a_switch_silences_a_sensor_after_a_question(sensor: Sensor, real: Daemon, browser: Browser) -> None:
+
+    def says(word: str, hears: bool) -> None:
+        browser.until(f"document.getElementById('listens').textContent === {word!r}")
+        assert browser.run("document.getElementById('gate').getAttribute('aria-checked')") == str(hears).lower()
+
+    says("listens", True)
+    for answer, word in ((False, "listens"), (True, "silent, gates closed: view")):
+        browser.run(f"window.confirm = question => {{ window.asked = question; return {str(answer).lower()} }}")
+        browser.run("document.getElementById('gate').click()")
+        assert browser.run("window.asked") == (
+            f'Silence {sensor.name}? No program hears a gesture of it until its gate "view" is opened.'
+        )
+        says(word, not answer)
+    perform(sensor, browser, "left")
+    browser.until("document.getElementById('name-note').textContent.startsWith('inhibited view,')")
+    with Control(Path(real.ready["control"])) as control:
+        control.ask("inhibit", sensor=sensor.name, gate="door")
+    says("silent, gates closed: door, view", False)
+    browser.run("document.getElementById('gate').click()")
+    says("silent, gates closed: door", True)
+    browser.until(f"document.getElementById('done').textContent === '{sensor.name}: silent, gates closed: door'")
+    assert browser.complaints() == []
+
+
+def test_everything_has_a_name_for_who_does_not_see_it(sensor: Sensor, browser: Browser) -> None:
+    perform(sensor, browser, "left")
+    asked = {"button", "checkbox", "combobox", "slider", "textbox", "image", "region"}
+    seen = set()
+    for node in browser.call("Accessibility.getFullAXTree")["nodes"]:
+        role = node.get("role", {}).get("value", "").lower()
+        if role in asked | {"table", "meter", "group", "link"} and not node.get("ignored"):
+            assert node.get("name", {}).get("value"), node
+            seen.add(role)
+    assert asked <= seen
+    assert browser.run("document.querySelectorAll('[aria-live=polite]').length") == 1
+
+
+def test_a_page_on_another_port_of_this_machine_gets_nothing(sensor: Sensor, view: Page, browser: Browser) -> None:
+    """A neighbour serves it, and the owner's browser is led there after it has looked."""
+    secret = browser.run("door.secret")
+    heard: list[str] = []
+
+    class Neighbour(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            heard.append(str(self.headers))
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+            self.wfile.write(b"<p id=evil>evil")
+
+        def log_message(self, *_: Any) -> None: ...
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Neighbour) as neighbour:
+        threading.Thread(target=neighbour.serve_forever, daemon=True).start()
+        browser.call("Page.navigate", url="http://{}:{}/".format(*neighbour.server_address))
+        browser.until("document.getElementById('evil') !== null")
+        assert browser.run("document.cookie + JSON.stringify(sessionStorage) + JSON.stringify(localStorage)") == "{}{}"
+        tried = f"""Promise.all(['include', 'omit'].flatMap(credentials => [
+            fetch('http://{view.address}/stream', {{credentials}}).then(r => r.text(), () => 'refused'),
+            fetch('http://{view.address}/recalibrate', {{credentials, method: 'POST', body: '{{}}',
+              headers: {{'X-Gestured-Token': 'x'}}}}).then(r => r.text(), () => 'refused')]))"""
+        assert browser.run(tried) == ["refused"] * 4
+        neighbour.shutdown()
+    assert heard and not any(secret in what or "Cookie" in what for what in heard)
+    browser.call("Page.navigate", url=f"http://{view.address}/")
+    browser.until("document.getElementById('sensor')?.options.length")  # the tab has kept its secret
+
+
+def test_a_name_is_never_markup(fake_control, browser: Browser) -> None:
+    evil = "<img src=x onerror=document.title='owned'>"
+    with viewing(fake_control(evil)) as page:
+        browser.call("Page.navigate", url=page.whole)
+        browser.until("document.querySelectorAll('#sensors tbody tr').length === 1")
+        assert browser.run("document.querySelector('#sensors td').textContent") == evil
+        assert browser.run("document.querySelectorAll('img').length") == 0
+        assert browser.run("document.title") != "owned"
