@@ -8,13 +8,14 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, nullcontext, suppress
+from contextlib import closing, contextmanager, nullcontext
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, Popen
+from typing import Any
 
 from gestured.client.control import Control
 from gestured.client.engine import Engine, child_of_ours
-from gestured.client.lines import Refused, read_ahead
+from gestured.client.lines import read_ahead
 from gestured.client.pad.pad import Pad
 from gestured.client.pad.server import PadServer
 from gestured.client.picture import trace
@@ -64,14 +65,14 @@ def run(args: argparse.Namespace) -> int:
     rows, columns = args.grid
     show = Show(take, args.model, args.json)
     with Engine(args.model, rows, columns, "--flight-recorder", "4") as engine:  # the page can flag
+        control = Path(engine.ready["control"])
         try:
             with (
-                Control(Path(engine.ready["control"])) as control,
-                nullcontext("") if args.json else page(control.path) as address,
+                nullcontext("") if args.json else page(control) as address,
                 nullcontext() if args.json else pad(engine, args.grid, args.rate) as touched,
                 Subscriber(engine.socket, types=HEARD, sensors=[DEMO_SENSOR], reconnect=False) as stream,
                 closing(Sensor(engine.listen, Form(DEMO_SENSOR))) as sensor,
-                show.screen or nullcontext(),
+                show.drawn(control),
             ):
                 show.say(
                     f"The daemon listens on {engine.listen} with the model {engine.ready['model']}.",
@@ -81,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
                     "For two seconds nobody touches it. Ctrl-C ends.",
                     "",
                 )
-                show.follow(sensor, stream, control)
+                show.follow(sensor, stream)
                 if touched is not None and touched.open:
                     show.say("", "The pad is still open: the demo ends when its page is closed, or with Ctrl-C.")
                     await_closed(touched)
@@ -124,13 +125,25 @@ class Show:
         self.colour = in_colour()
         self.tally, self.felt = Tally(), Felt(self.colour)
         self.screen = Screen() if sys.stdout.isatty() and not as_json else None
+        self._views: queue.Queue[dict[str, Any] | None] = queue.Queue()  # lines of the daemon, for the screen
 
     def say(self, *lines: str) -> None:
         """Words for a person."""
         if not self.as_json:
             say(*lines)
 
-    def follow(self, sensor: Sensor, stream: Subscriber, control: Control) -> None:
+    @contextmanager
+    def drawn(self, control: Path) -> Iterator[None]:
+        """Meanwhile a terminal shows the sensor as the daemon with this control socket feels it."""
+        if self.screen is None:
+            yield
+            return
+        with Control(control) as daemon, self.screen:
+            daemon.ask("follow", sensors=[DEMO_SENSOR])
+            self._views = read_ahead(daemon.lines())
+            yield
+
+    def follow(self, sensor: Sensor, stream: Subscriber) -> None:
         """Send the take and show what comes of it, until its end; at a terminal also the finger as it moves."""
         heard = read_ahead((time.time(), event) for event in stream)
         threading.Thread(target=sensor.send, args=(frames(0.0, self.take),), daemon=True).start()
@@ -143,7 +156,7 @@ class Show:
                 self.tally.begin(Performed(event.label, event.kind, onset, offset))
             for outcome in self.tally.settle(now):
                 self._show(outcome, sensor)
-            self._draw(control)
+            self._draw()
             try:
                 item = heard.get(timeout=POLL_S)
             except queue.Empty:
@@ -178,11 +191,12 @@ class Show:
                 "gesturectl pad makes a sensor of a mouse, a touchscreen or a telephone.",
             )
 
-    def _draw(self, control: Control) -> None:
-        """The sensor as the daemon feels it, at a terminal."""
-        if self.screen is not None:
-            with suppress(Refused):  # its first frame has not come yet
-                self.screen.draw(self.felt.lines(control.ask("view", sensor=DEMO_SENSOR)))
+    def _draw(self) -> None:
+        """The newest view that has come."""
+        came = [self._views.get() for _ in range(self._views.qsize())]
+        views = [line for line in came if line is not None and line["type"] == "view"]
+        if self.screen is not None and views:
+            self.screen.draw(self.felt.lines(views[-1]))
 
     def _show(self, outcome: Outcome, sensor: Sensor) -> None:
         if self.as_json:
