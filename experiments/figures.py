@@ -45,8 +45,8 @@ def made(root: Path) -> Iterator[Made]:
                 why = [f"made of another {name}" for name in others(match, now)]
                 if other_code(match):
                     why.append("made with other code" if match["code"] else "does not say with which code")
-                if not why and OLDER in lines[number : number + 2]:
-                    why.append("says itself that it is older")
+                if OLDER in lines[number : number + 2]:
+                    why = ["says itself that it is older"]
                 yield Made(page, number, match[1], "; ".join(why))
 
 

@@ -29,7 +29,6 @@ CARRIES = frozenset((
     "gestured.core.beside.habits", "gestured.core.beside.reading", "gestured.core.beside.touch",
     "gestured.model.file", "gestured.model.limit",
 ))  # fmt: skip
-BLOCK = re.compile(r"^<!-- ([^:\n]+): begin -->\n(.*?)^<!-- \1: end -->$", re.MULTILINE | re.DOTALL)
 OLDER = "**Made with models that no longer ship, or with older code; to be made again.**"  # stands below such a line
 
 
@@ -96,12 +95,6 @@ def signed(lines: list[str]) -> list[str]:
     return [*lines[:at], line, *lines[at + 1 :]]
 
 
-def edited(text: str) -> list[str]:
-    """The names of the blocks of a text that are not as their command has written them."""
-    blocks = ((name, block.splitlines()) for name, block in BLOCK.findall(text))
-    return [name for name, lines in blocks if any("; block " in line for line in lines) and signed(lines) != lines]
-
-
 def kept(document: Path, name: str) -> str:
     """What a document says between the marks `name: begin` and `name: end`, with them; empty where it has none."""
     begin, end = _marks(name)
@@ -111,17 +104,6 @@ def kept(document: Path, name: str) -> str:
 
 def _marks(name: str) -> tuple[str, str]:
     return f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-
-
-def stale(text: str, files: Iterable[Path]) -> list[str]:
-    """Of the lines in a text those that name another file than these, and do not say so (`OLDER`), in words."""
-    now, lines, found = digests(files), text.splitlines(), list[str]()
-    for number, line in enumerate(lines):
-        match = LINE.fullmatch(line.strip())
-        if match is not None and OLDER not in lines[number + 1 : number + 3]:
-            for name in others(match, now):
-                found.append(f"line {number + 1}: `{match[1]}` was made of another {name}; run it again")
-    return found
 
 
 def digests(files: Iterable[Path]) -> dict[str, str]:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from gestured.lab.study.material import JUDGE, SHIFT, THRESHOLD, Data, Form, Pool, pool
 from gestured.lab.study.methods import METHODS, Scorer
 from gestured.lab.study.training import Indices
+from gestured.lab.study.views import View
 from gestured.simulator import GESTURES
 
 PAPER, PADDED, CLEAN, PARTICIPANTS, REAL, FOREIGN = "paper", "padded", "clean", "participants", "real", "foreign"
@@ -64,17 +65,18 @@ def _form(task: Task, data: Data) -> Form:
 
 @lru_cache(maxsize=6)
 def _inputs(
-    data: Data, augmentation: str, form: Form, box: float, method: str, prepared: tuple[tuple[str, Any], ...]
+    data: Data, augmentation: str, form: Form, box: float, view: View, prepared: tuple[tuple[str, Any], ...]
 ) -> Any:
-    return METHODS[method].view.all(pool(data, augmentation, form, box).samples, dict(prepared), form.frames > 0)
+    return view.all(pool(data, augmentation, form, box).samples, dict(prepared), form.frames > 0)
 
 
 def material(task: Task, data: Data) -> tuple[Pool, Any]:
     """The pool of a task, and its method's view of it."""
     form = _form(task, data)
-    prepared = tuple(item for item in task.values if item[0] in METHODS[task.method].view.by)
+    view = METHODS[task.method].view
+    prepared = tuple(item for item in task.values if item[0] in view.by)
     of = pool(data, task.augmentation, form, task.box)
-    return of, _inputs(data, task.augmentation, form, task.box, task.method, prepared)
+    return of, _inputs(data, task.augmentation, form, task.box, view, prepared)
 
 
 def splits(task: Task, of: Pool) -> Iterator[tuple[Indices, Indices]]:

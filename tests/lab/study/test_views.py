@@ -30,7 +30,7 @@ def test_one_window_looks_as_it_does_among_all(name: str) -> None:
 @pytest.mark.parametrize("frames", [1, 2, 7, 8, 9, 60])
 @pytest.mark.parametrize("level", [0.0, 1.0])
 def test_wavelet_features_of_a_constant_signal_are_finite(frames: int, level: float) -> None:
-    found = spatio_temporal(np.full((frames, 9, 9), level, np.float32))
+    found = spatio_temporal(np.full((1, frames, 9, 9), level, np.float32))[0]
     assert found.shape == (4 * 5 * (81 + 3),) and np.isfinite(found).all()
 
 
@@ -38,8 +38,8 @@ def test_the_two_readings_of_the_wavelet_features() -> None:
     """The paper's reading still knows which taxel it was; the pooled one is its last part."""
     swipe = gestures()["swipe_up"]
     turned = swipe[:, ::-1]
-    whole, mirrored = spatio_temporal(swipe), spatio_temporal(turned)
-    pooled, pooled_mirrored = (spatio_temporal(window, reading=POOLED) for window in (swipe, turned))
+    whole, mirrored = spatio_temporal(np.stack([swipe, turned]))
+    pooled, pooled_mirrored = spatio_temporal(np.stack([swipe, turned]), reading=POOLED)
     assert np.array_equal(whole[-len(pooled) :], pooled)
     assert np.allclose(pooled, pooled_mirrored, rtol=1e-5) and not np.allclose(whole, mirrored, rtol=1e-2)
 
@@ -66,7 +66,7 @@ def test_a_vector_machine_with_a_finished_kernel_answers_as_scikit_learns() -> N
 
 def test_statistics_against_a_second_opinion() -> None:
     band = np.random.default_rng(0).normal(size=(30, 5)) ** 3
-    found = band_statistics(band)
+    (found,) = band_statistics(band[np.newaxis])
     expected = [np.abs(band).sum(0), np.linalg.norm(band, axis=0), stats.skew(band), stats.kurtosis(band), band.std(0)]
     assert np.allclose(found, expected)
 
