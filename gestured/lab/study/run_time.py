@@ -11,18 +11,20 @@ import os
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from gestured.core.frames import Segment
-from gestured.lab.intervals import interval, summary
+from gestured.lab.evaluate import outcome
+from gestured.lab.intervals import summary
 from gestured.lab.progress import progress
 from gestured.lab.samples import WINDOW
 from gestured.lab.study.cohort import Cohort
+from gestured.lab.study.fields import field_of
 from gestured.lab.study.material import Data
 from gestured.lab.study.plan import Plan
 from gestured.lab.study.runners import Runner, runners
@@ -44,11 +46,12 @@ def measure(plan: Plan, tuned: Mapping[str, Values], judges: Cohort, data: Data)
         people = np.array([trial.participant for trial in judges.trials()])
         rows = []
         for runner, (cold, warm) in zip(found, times, strict=True):
-            answers = [runner.answer(segment) for segment in segments]
-            named, said = (np.array(column) for column in zip(*answers, strict=True))
+            named, said = map(np.array, zip(*map(runner.answer, segments), strict=True))
+            answers = np.eye(len(GESTURES), dtype=np.float32)[named], np.where(said, 0.0, 1.0).astype(np.float32)
+            judged = outcome(answers, truth, 0.5, len(truth) + judges.lost, people)
             rows.append({
-                "method": runner.method, "settings": runner.settings,
-                **summary(named == truth, people), **told(named, said, truth, people, judges.lost),
+                "method": runner.method, "settings": runner.settings, **summary(named == truth, people),
+                "fields": {"simulated": field_of(asdict(judged))},
                 "cold_us": round(float(np.median(cold)) * 1e6, 1), "median_us": round(float(np.median(warm)) * 1e6, 1),
                 "p95_us": round(float(np.quantile(warm, 0.95)) * 1e6, 1),
                 "file_bytes": runner.size(),
@@ -56,21 +59,6 @@ def measure(plan: Plan, tuned: Mapping[str, Values], judges: Cohort, data: Data)
     for row in rows:
         row["front"] = not any(_beats(other, row) for other in rows)
     return rows
-
-
-def told(
-    named: NDArray[np.int64], said: NDArray[np.bool_], truth: NDArray[np.int64], people: NDArray[np.int64], lost: int
-) -> dict[str, Any]:
-    """Of all gestures that were performed: `wrong` were said wrongly, `lost` rejected or never cut; with intervals."""
-    count = len(truth) + lost
-    wrong, low, high = interval(said & (named != truth), people)
-    either, either_low, either_high = interval(~said | (named != truth), people)
-    cut = len(truth) / count
-    return {
-        "wrong": round(wrong * cut, 4), "wrong_low": round(low * cut, 4), "wrong_high": round(high * cut, 4),
-        "error": round(either * cut + lost / count, 4), "error_low": round(either_low * cut + lost / count, 4),
-        "error_high": round(either_high * cut + lost / count, 4), "performed": count,
-    }  # fmt: skip
 
 
 def _timed(found: list[Runner], segments: list[Segment], seed: int) -> list[tuple[list[float], list[float]]]:

@@ -102,7 +102,7 @@ def _run_time(method: str) -> list[Study]:
             "error": 1.02 - right, "error_low": 0.9 * (1 - right), "error_high": 1.15 - right, "performed": 540,
         }  # fmt: skip
         rows.append({
-            "method": method, "settings": settings, **_between(right), **field, "median_us": median,
+            "method": method, "settings": settings, **_between(right), "median_us": median,
             "p95_us": 1.4 * median, "cold_us": 2.5 * median, "front": ships,
             "file_bytes": int(900 * median),
             "fields": {"simulated": field, "foreign": field, "real": {"wrong": 0.01, "error": 0.04, "performed": 3000}},

@@ -53,4 +53,4 @@ def test_a_small_study_has_every_section_and_is_the_same_again(tmp_path: Path, m
     assert (pages[0].parent / "operating-points.json").exists() and "| CNN-LSTM | you have" in pages[1].read_text()
     timed = {(row["method"], row["settings"]) for row in first["run_time"]}
     assert {("cnn_lstm", "shipped"), ("lstm", "tuned"), ("tp_knn", "tuned")} <= timed
-    assert all(0 <= row["wrong"] <= row["error"] <= 1 and row["cold_us"] > 0 for row in first["run_time"])
+    assert all(0 <= row["fields"]["simulated"]["wrong"] <= 1 and row["cold_us"] > 0 for row in first["run_time"])
