@@ -11,19 +11,35 @@ from gestured.model import own_file
 from gestured.model.own_file import OwnFile, OwnFileError
 from gestured.record.files import PRIVATE, delete_leftovers
 
-Change = Callable[[Examples], Examples]
 PID_DIGITS = 10  # of the process number in the lock, at most
 
 
 class Keeper:
-    """One path, and the lock beside it from the first success of `hold` on; one thread at a time may use it.
+    """One path, what was found there, and the lock beside it from the first success of `hold` on.
 
-    The lock is a file of its own, since each write puts another file into the place of the one that is kept.
+    The lock is a file of its own, since each write puts another file into the place of the one that is kept. One thread
+    at a time may use a keeper.
     """
 
     def __init__(self, path: Path | None) -> None:
         self.path = path
+        self.found = OwnFile(path, {})  # by `read`, or by what was written since
+        self.unkept: str | None = None  # why nothing can be written, as far as that was tried
         self._lock: BinaryIO | None = None
+
+    @property
+    def fault(self) -> str | None:
+        """Why the file cannot be read, or written."""
+        return self.found.fault or self.unkept
+
+    def read(self) -> None:
+        """Read the file, and lock it where its folder is there: who enrols nothing needs none."""
+        if self.path is not None and self.path.parent.is_dir():
+            try:
+                self.hold()
+            except OwnFileError as error:
+                self.unkept = str(error)
+        self.found = own_file.load(self.path, self.found)
 
     def hold(self) -> None:
         """Lock the file for this daemon. Raises OwnFileError, which names the daemon that holds it, or the fault."""
@@ -43,21 +59,21 @@ class Keeper:
             lock.write(str(os.getpid()).encode())
         except OSError as error:
             raise OwnFileError(f"{self.path}: cannot be written: {error.strerror}; {own_file.REMEDY}") from error
-        self._lock = lock
+        self._lock, self.unkept = lock, None
         delete_leftovers(self.path)
 
-    def change(self, known: OwnFile, change: Change, model: str) -> OwnFile:
-        """Write what `change` makes of the gestures that are in the file now; `known` is what was read of it last.
+    def change(self, change: Callable[[Examples], Examples], model: str) -> None:
+        """Write what `change` makes of the gestures that are in the file now.
 
         `model` is the digest of the model that answers. Raises OwnFileError, or what `change` raises.
         """
         self.hold()
         assert self.path is not None
         delete_leftovers(self.path)
-        found = own_file.load(self.path, known)
+        found = own_file.load(self.path, self.found)
         if found.fault is not None:
             raise OwnFileError(found.fault)
-        return own_file.write(self.path, change(found.gestures), model)
+        self.found = own_file.write(self.path, change(found.gestures), model)
 
     def _theirs(self, pid: bytes) -> str:
         who = f"gestured (pid {int(pid)})" if pid.isdigit() else "gestured"

@@ -4,33 +4,23 @@ import asyncio
 import time
 from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from gestured.core.errors import GesturedError
 from gestured.core.events import Cancelled
 from gestured.core.facts import Decided, Fact
 from gestured.core.own import EXAMPLES, MOST, Examples, is_name
-from gestured.daemon.keeper import Change, Keeper
+from gestured.daemon.keeper import Keeper
 from gestured.daemon.log import log
 from gestured.daemon.request import Connection, Refusal, json_line
-from gestured.model import own_file
 from gestured.model.enrolment import Enrolment, Examiner
 from gestured.model.ladder import Ladder
 from gestured.model.model import Model
 from gestured.model.own import Own
-from gestured.model.own_file import OwnFile, OwnFileError
+from gestured.model.own_file import OwnFileError
 
 ATTEMPT_S = 120.0  # an enrolment without an attempt for so long gives its place to others
 ANSWERED_TWICE = "refractory"  # a contact so cancelled was `Decided`, too, and counts once
-
-
-class Ready(NamedTuple):
-    """The gestures of a file, ready to be used by a ladder."""
-
-    keeper: Keeper
-    read: OwnFile
-    own: Own
-    unkept: str | None  # why nothing can be written, as far as that was tried
 
 
 class OwnGestures:
@@ -39,42 +29,33 @@ class OwnGestures:
     def __init__(self, changed: Callable[[], None]) -> None:
         """`follow` must be called before anything else."""
         self._changed = changed
-        self._keeper, self._read = Keeper(None), OwnFile(None, {})
-        self._unkept: str | None = None  # why nothing can be written, as far as that was tried
+        self._keeper = Keeper(None)
         self._open: tuple[Enrolment, Connection] | None = None  # what is being learned, and who waits for it
         self._heard = 0.0  # monotonic s, the last attempt
         self._finishing: asyncio.Task[None] | None = None
         self._preparing: asyncio.Task[None] | None = None
         self.writing = asyncio.Lock()  # held from where the file is read until what was read is used
 
-    def read(self, path: Path | None, ladder: Ladder) -> Ready:
-        """Read a file, and have the model that answers look at it; any thread that holds `writing` may call it.
+    def read(self, path: Path | None, ladder: Ladder) -> tuple[Keeper, Own]:
+        """Read a file, and have the model that answers look at it; any thread that holds `writing` may call it."""
+        keeper = self._keeper if path == self._keeper.path else Keeper(path)
+        keeper.read()
+        return keeper, ladder.compared(keeper.found.gestures)
 
-        It locks the file, but makes no folder for it, since who enrols nothing needs none.
-        """
-        keeper, unkept = self._keeper if path == self._keeper.path else Keeper(path), None
-        if path is not None and path.parent.is_dir():
-            try:
-                keeper.hold()
-            except OwnFileError as error:
-                unkept = str(error)
-        read = own_file.load(path, self._read)
-        return Ready(keeper, read, ladder.compared(read.gestures), unkept)
-
-    def follow(self, ladder: Ladder, ready: Ready) -> None:
+    def follow(self, ladder: Ladder, keeper: Keeper, own: Own) -> None:
         """Use what was read for these models: at the start, and after a reload."""
         if self._finishing is None:
             self._give_up("the daemon was told to reload; enrol again")
-        if ready.keeper is not self._keeper:
+        if keeper is not self._keeper:
             self._keeper.close()
-        self._ladder, self._keeper, self._unkept = ladder, ready.keeper, ready.unkept
-        for sentence in filter(None, (ready.read.fault, ready.unkept)):
+        self._ladder, self._keeper = ladder, keeper
+        for sentence in filter(None, (keeper.found.fault, keeper.unkept)):
             log.error("own gestures", what=sentence)
-        self._use(ready.read, ready.own)
+        self._use(own)
 
-    def _use(self, read: OwnFile, own: Own) -> None:
+    def _use(self, own: Own) -> None:
         """Compare with these from now on; log which of them the model that answers cannot tell apart."""
-        self._read, self._ladder.own = read, own
+        self._ladder.own = own
         own.missing = self._prepare
         self._warn()
 
@@ -111,7 +92,7 @@ class OwnGestures:
         held = self._open
         return {
             "file": None if self._keeper.path is None else str(self._keeper.path),
-            "fault": self._read.fault or self._unkept,
+            "fault": self._keeper.fault,
             "gestures": {name: len(examples) for name, examples in self.gestures.items()},
             "off": self.off,
             "doubtful": self._doubtful(),
@@ -126,10 +107,9 @@ class OwnGestures:
     async def writable(self) -> None:
         """Raises OwnFileError where nothing can be enrolled, because the file cannot be written."""
         async with self.writing:
-            if self._read.fault is not None:
-                raise OwnFileError(self._read.fault)
+            if self._keeper.found.fault is not None:
+                raise OwnFileError(self._keeper.found.fault)
             await asyncio.to_thread(self._keeper.hold)
-            self._unkept = None
 
     def begin(self, connection: Connection, name: str, sensor: str, examples: int, in_use: Collection[str]) -> None:
         """Take contacts of a sensor as examples, and tell the connection of each. Raises Refusal."""
@@ -137,7 +117,7 @@ class OwnGestures:
         if self._open is not None:
             before, _ = self._open
             raise Refusal(f"{before.name!r} is being enrolled on {before.sensor}; one at a time")
-        self._check(name, self._read.gestures)
+        self._check(name, self._keeper.found.gestures)
         if not 1 <= examples <= EXAMPLES:
             raise Refusal(f"expected 1 to {EXAMPLES} examples, found {examples}")
         model = self._ladder.model
@@ -180,7 +160,7 @@ class OwnGestures:
         """Forget a gesture and delete its examples from the file. Raises Refusal or OwnFileError."""
 
         def without(found: Examples) -> Examples:
-            if name not in found and name not in self._read.gestures:
+            if name not in found and name not in self._keeper.found.gestures:
                 known = ", ".join(found) or "none: nothing is enrolled"
                 raise Refusal(f"{name!r} is no gesture of your own, expected one of {known}")
             return {other: examples for other, examples in found.items() if other != name}
@@ -204,12 +184,12 @@ class OwnGestures:
         finally:
             self._finishing = None
 
-    async def _change(self, change: Change) -> None:
+    async def _change(self, change: Callable[[Examples], Examples]) -> None:
         """Write the file anew, and use what is in it then."""
         async with self.writing:
             ladder = self._ladder
-            read = await asyncio.to_thread(self._keeper.change, self._read, change, ladder.model.sha256)
-            self._use(read, await asyncio.to_thread(ladder.compared, read.gestures))
+            await asyncio.to_thread(self._keeper.change, change, ladder.model.sha256)
+            self._use(await asyncio.to_thread(ladder.compared, self._keeper.found.gestures))
         self._changed()
 
     def _check(self, name: str, gestures: Examples) -> None:

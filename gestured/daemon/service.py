@@ -19,10 +19,11 @@ from gestured.daemon.control import ControlServer
 from gestured.daemon.desk import Desk
 from gestured.daemon.gatekeeper import Gatekeeper
 from gestured.daemon.health import TICK_S, Canary, watchdog_period
+from gestured.daemon.keeper import Keeper
 from gestured.daemon.log import log
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.operations import Operations
-from gestured.daemon.own import OwnGestures, Ready
+from gestured.daemon.own import OwnGestures
 from gestured.daemon.parts import Parts
 from gestured.daemon.settings import Settings
 from gestured.daemon.shift import Shift
@@ -32,6 +33,7 @@ from gestured.daemon.status import overall, status
 from gestured.daemon.tap import Taps
 from gestured.daemon.udp import Receiver
 from gestured.daemon.views import Views
+from gestured.model.own import Own
 
 STATUS_S = 1.0  # from one status to the next
 DRAIN_S = 0.5  # for clients to read what waits for them, when the daemon ends
@@ -52,7 +54,7 @@ class Service:
         for name in settings.sensors:
             metrics.sensor_label(name)  # the sensors of the configuration get the first labels
         own = OwnGestures(self._own_changed)
-        own.follow(ladder, own.read(asked.own, ladder))
+        own.follow(ladder, *own.read(asked.own, ladder))
         hub = Hub(scene_of(settings, ladder), ladder, later=True)
         taps, views = Taps(settings.flight_recorder << 20), Views(hub, self._state, self._foresee)
         clients = EventServer(bound.events.sock, self._hello, metrics, known=self._known, changed=self._foresee)
@@ -205,13 +207,13 @@ class Service:
             else:
                 own = self.parts.own
                 async with own.writing:  # changes of own gestures wait until what was opened is in use
-                    self._go_on(asked, await asyncio.to_thread(own.read, asked.own, asked.ladder))
+                    self._go_on(asked, *await asyncio.to_thread(own.read, asked.own, asked.ladder))
                 self.parts.metrics.reloads.add("done")
                 return None
             finally:
                 notify("READY=1")
 
-    def _go_on(self, asked: Asked, own: Ready) -> None:
+    def _go_on(self, asked: Asked, keeper: Keeper, own: Own) -> None:
         """Go on with what a reload has opened."""
         parts, settings, ladder = self.parts, asked.settings, asked.ladder
         logging.configure(settings.log_level)
@@ -219,7 +221,7 @@ class Service:
         for key in parts.awaiting_restart():
             log.warning("this setting changes at a restart only", key=key)
         parts.desk.shift = Shift.of(ladder.model)
-        parts.own.follow(ladder, own)
+        parts.own.follow(ladder, keeper, own)
         parts.desk.take(parts.hub.change(scene_of(settings, ladder), ladder, time.monotonic()))
         if parts.gestures != before:
             parts.clients.tell(messages.gestures_json(parts.gestures))

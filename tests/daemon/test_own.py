@@ -404,7 +404,7 @@ def test_what_is_forgotten_during_a_reload_does_not_come_back(
     one, other = tmp_path / "one.json", tmp_path / "other.json"
     own_file.write(one, {"slash": (example,), "cut": (example,)}, "")
     own_file.write(other, {"slash": (example,), "wave": (example,)}, "")
-    own.follow(ladder, own.read(one, ladder))
+    own.follow(ladder, *own.read(one, ladder))
 
     async def forget_while(path: Path) -> None:
         async with own.writing:  # as a reload does
@@ -412,7 +412,7 @@ def test_what_is_forgotten_during_a_reload_does_not_come_back(
             forgetting = asyncio.create_task(own.forget("slash"))
             for _ in range(3):  # with one thread, what `forget` could begin there is over before these are
                 await asyncio.to_thread(int)
-            own.follow(ladder, found)
+            own.follow(ladder, *found)
         await forgetting
 
     async def reload_twice() -> None:
@@ -435,16 +435,16 @@ def test_a_model_looks_at_each_example_once_and_not_in_the_loop(
     examples = [one for frames in range(4, 9) if (one := Example.of(segment(frames), WINDOW))]
     path = tmp_path / "own.json"
     own_file.write(path, {f"g{k}": (one,) for k, one in enumerate(examples)}, "")
-    own.follow(ladder, own.read(path, ladder))
+    own.follow(ladder, *own.read(path, ladder))
     assert len(looked) == len(examples)
     for name in ("g0", "g1"):
         asyncio.run(own.forget(name))
-    own.follow(ladder, own.read(path, ladder))
+    own.follow(ladder, *own.read(path, ladder))
     assert len(looked) == len(examples)
     own_file.write(path, {"new": (dataclasses.replace(examples[0]),)}, "")
 
     async def reload() -> None:
-        own.follow(ladder, await asyncio.to_thread(own.read, path, ladder))
+        own.follow(ladder, *await asyncio.to_thread(own.read, path, ladder))
 
     asyncio.run(reload())
     assert len(looked) == len(examples) + 1
@@ -457,7 +457,7 @@ def test_a_fallback_that_comes_to_answer_looks_at_the_examples_beside_the_loop(
     below = tiny_model.make(tmp_path / "below.onnx", version="2", own=tiny_model.own())
     ladder, own = ladder_for(model, [below]), OwnGestures(lambda: None)
     own_file.write(tmp_path / "own.json", {"slash": (example,)}, "")
-    own.follow(ladder, own.read(tmp_path / "own.json", ladder))
+    own.follow(ladder, *own.read(tmp_path / "own.json", ladder))
     assert ladder.classify(example.segment()).own is not None
     monkeypatch.setattr(ladder.model, "classify", None)  # it fails from now on
 

@@ -12,17 +12,16 @@ import pytest
 from gestured.core.own import EXAMPLES, MOST, MOST_VALUES, Example
 from gestured.daemon.keeper import Keeper
 from gestured.model import own_file
-from gestured.model.own_file import OwnFile, OwnFileError
+from gestured.model.own_file import OwnFileError
 
 EXAMPLE = Example(np.zeros((4, 9, 9), np.float16), 15.0, 0, 3, 0.1)
 KILLED = """
 import os, signal, sys
 from pathlib import Path
 from gestured.daemon.keeper import Keeper
-from gestured.model.own_file import OwnFile
 os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
 path = Path(sys.argv[1])
-Keeper(path).change(OwnFile(path, {}), lambda found: {}, "")
+Keeper(path).change(lambda found: {}, "")
 """
 
 
@@ -56,21 +55,22 @@ def test_what_a_killed_writer_has_left_is_gone_with_the_next_start_and_the_next_
     keeper.hold()
     assert set(os.listdir(tmp_path)) == kept
     (tmp_path / left.pop()).touch()
-    keeper.change(OwnFile(path, {}), lambda found: {}, "")
+    keeper.change(lambda found: {}, "")
     assert set(os.listdir(tmp_path)) == kept
 
 
 def test_what_somebody_else_has_changed_meanwhile_is_read_before_it_is_written(tmp_path: Path) -> None:
     path = tmp_path / "own.json"
     keeper = Keeper(path)
-    known = keeper.change(OwnFile(path, {}), lambda found: {**found, "slash": (EXAMPLE,)}, "")
-    assert keeper.change(known, lambda found: found, "").gestures["slash"] == (EXAMPLE,)  # it is not read anew
+    keeper.change(lambda found: {**found, "slash": (EXAMPLE,)}, "")
+    keeper.change(lambda found: found, "")
+    assert keeper.found.gestures["slash"] == (EXAMPLE,)  # it is not read anew
     own_file.write(path, {"slash": (EXAMPLE,), "wave": (EXAMPLE,)}, "")
-    known = keeper.change(known, lambda found: {**found, "cut": (EXAMPLE,)}, "")
-    assert known.gestures.keys() == {"slash", "wave", "cut"} == own_file.load(path).gestures.keys()
+    keeper.change(lambda found: {**found, "cut": (EXAMPLE,)}, "")
+    assert keeper.found.gestures.keys() == {"slash", "wave", "cut"} == own_file.load(path).gestures.keys()
     path.write_text("no JSON")
     with pytest.raises(OwnFileError, match="is no file of own gestures"):
-        keeper.change(known, lambda found: {}, "")
+        keeper.change(lambda found: {}, "")
     assert path.read_text() == "no JSON"
 
 
