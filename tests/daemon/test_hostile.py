@@ -117,13 +117,3 @@ def test_more_sensors_than_allowed_are_dropped_but_those_in_the_file_have_a_plac
         ("a", "swipe_left"), ("b", "swipe_left"), ("mine", "swipe_right"),
     ]  # fmt: skip
     assert daemon.metric("gestured_dropped_total", reason="too_many_sensors") == 30 + 7 + 15
-
-
-def test_sensors_in_metrics_are_folded_together(shared: Daemon) -> None:
-    for i in range(12):
-        Sensor(shared, f"crowd{i}").begin()
-    client = shared.client().subscribe("status")
-    client.until(lambda line: "crowd11" in line["sensors"])
-    samples = [line for line in shared.get("/metrics")[1].splitlines() if line.startswith("gestured_frames_total")]
-    names = {line.split('sensor="')[1].split('"')[0] for line in samples}
-    assert len(names) <= 9 and "other" in names

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -16,28 +17,34 @@ from gestured.daemon import log
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor, lines_of
 
 
-@pytest.fixture(params=["pipe", "terminal", "socket"])
+@pytest.fixture(params=["pipe", "terminal", "socket", "closed pipe", "full disk"])
 def unread(request: pytest.FixtureRequest) -> Iterator[int]:
-    """A descriptor that takes not one byte more, as those are that nobody reads."""
-    if request.param == "socket":  # as journald's is
+    """A descriptor that takes not one byte more, as those are that nobody reads, or that fails."""
+    ours = None
+    if request.param == "full disk":
+        theirs = os.open("/dev/full", os.O_WRONLY)
+    elif request.param == "socket":  # as journald's is
         ours, theirs = (sock.detach() for sock in socket.socketpair())
     else:
-        ours, theirs = os.pipe() if request.param == "pipe" else pty.openpty()
-    os.set_blocking(theirs, False)
-    for size in (4096, 1):
-        try:
-            while True:
-                os.write(theirs, b"x" * size)
-        except BlockingIOError:
-            pass
-    os.set_blocking(theirs, True)
+        ours, theirs = pty.openpty() if request.param == "terminal" else os.pipe()
+    if request.param == "closed pipe":
+        os.close(ours)
+        ours = None
+    if ours is not None:
+        os.set_blocking(theirs, False)
+        for size in (4096, 1):
+            with suppress(BlockingIOError):
+                while True:
+                    os.write(theirs, b"x" * size)
+        os.set_blocking(theirs, True)
     yield theirs
-    os.close(ours)
-    os.close(theirs)
+    for descriptor in filter(None, (ours, theirs)):
+        os.close(descriptor)
 
 
 def test_a_daemon_whose_log_is_not_read_serves_and_ends(start, unread: int) -> None:
     daemon = start("--clock", "sensor", "--log-level", "debug", stderr=unread)
+    daemon.process.stdout.close()
     client = daemon.client()
     Sensor(daemon, "arm").begin().perform("left", "tap")
     assert [line["gesture"] for line in client.events("gesture", "arm", 2)] == ["swipe_left", "one_tap"]
@@ -46,6 +53,7 @@ def test_a_daemon_whose_log_is_not_read_serves_and_ends(start, unread: int) -> N
     assert os.get_blocking(unread)  # it is shared with others: whoever started the daemon finds it as it was
 
 
+@pytest.mark.parametrize("unread", ["pipe"], indirect=True)
 def test_a_start_that_fails_ends_even_where_nobody_reads_why(tmp_path: Path, unread: int) -> None:
     daemon = Daemon(tmp_path, "--config", tmp_path / "none.toml", stderr=unread)
     assert daemon.wait() == 2

@@ -77,18 +77,6 @@ def test_a_sensor_that_sends_keeps_its_place(room: Room) -> None:
     assert {"s1", "new"} <= set(room.hub.readings(room.now))
 
 
-def test_a_name_whose_sender_goes_on_is_not_given_to_another_port(room: Room) -> None:
-    """Two packets from another port of the host, just after the sensor's first frame."""
-    idle = Hand().idle(1.0)
-    room.send("arm", idle[:1])
-    for _ in range(2):
-        room.take(floats("/arm/pressure", idle[0], 0), ("10.0.0.1", 2), later=0.01)
-    before = room.dropped("second_source")
-    room.swipe("arm")
-    assert room.dropped("second_source") == before == 1
-    assert [e.gesture for e in room.events if isinstance(e, Gesture)] == ["swipe_left"]
-
-
 class Slow(Room):
     """A sensor with a clock of its own, which all but stands still once it is learned."""
 

@@ -1,6 +1,5 @@
 """SIGTERM, SIGINT, SIGHUP; and what systemd is told."""
 
-import os
 import signal
 import socket
 from pathlib import Path
@@ -78,33 +77,27 @@ def test_reload_with_other_gestures_changes_what_is_waited_for(start, tmp_path: 
     assert set(quick["scores"]) == {"one_tap", "swipe_left"} == set(daemon.client().hello["gestures"])
 
 
-@pytest.mark.parametrize("what", ["configuration", "FIFO for a configuration", "model", "model with a fallback"])
-def test_reload_of_something_invalid_changes_nothing(start, model: Path, tmp_path: Path, what: str) -> None:
+def test_reload_of_something_invalid_changes_nothing(start, model: Path, tmp_path: Path) -> None:
     path = tmp_path / "mine.onnx"
     path.write_bytes(model.read_bytes())
     config = tmp_path / "gestured.toml"
     config.write_text("")
-    flags: tuple[object, ...] = ("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0", "--stale-s", 30)
-    if what == "model with a fallback":
-        flags += ("--fallback", model)  # good enough to start with, but not to leave a good model for
-    daemon = start(*flags, model=path)
+    flags = ("--config", config, "--clock", "sensor", "--metrics", "127.0.0.1:0", "--stale-s", 30)
+    daemon = start(*flags, "--fallback", model, model=path)
     client = daemon.client()
     sensor = Sensor(daemon, "arm").begin()
-    config.write_text(
-        "[gestures.swipe_left]\nthreshold = 1.0\n" + ("nonsense = 1\n" if what == "configuration" else "")
-    )
-    if what == "FIFO for a configuration":
-        config.unlink()
-        os.mkfifo(config)
-    elif what != "configuration":
-        path.write_bytes(model.read_bytes()[:3000])
+    stricter = "[gestures.swipe_left]\nthreshold = 1.0\n"
+    config.write_text(stricter + "nonsense = 1\n")
+    reload(daemon, "refused")
+    config.write_text(stricter)
+    path.write_bytes(model.read_bytes()[:3000])  # the fallback would do at a start, but a good model runs
     reload(daemon, "refused")
     sensor.send(sensor.hand.idle(0.2))  # it may have been silent for long: a model is tried
     sensor.perform("left")
     (event,) = client.events("gesture", "arm")
     assert (event["gesture"], event["model"]) == ("swipe_left", "mine")
-    (said,) = (line for line in lines_of(daemon.stderr()) if "refused" in line["event"])
-    assert {"configuration": "nonsense", "FIFO for a configuration": str(config)}.get(what, str(path)) in said["reason"]
+    said = [line["reason"] for line in lines_of(daemon.stderr()) if "refused" in line["event"]]
+    assert len(said) == 2 and "nonsense" in said[0] and str(path) in said[1]
 
 
 def test_systemd_is_told(start, tmp_path: Path) -> None:
@@ -131,19 +124,6 @@ def test_systemd_is_told(start, tmp_path: Path) -> None:
         daemon.signal(signal.SIGTERM)
         until("STOPPING=1")
         assert daemon.wait() == 0
-
-
-def test_nobody_reads_its_output_any_more(start) -> None:
-    reader, writer = os.pipe()
-    daemon = start("--clock", "sensor", "--log-level", "debug", stderr=writer)
-    os.close(writer)
-    os.close(reader)
-    daemon.process.stdout.close()
-    client = daemon.client()
-    Sensor(daemon, "arm").begin().perform("left", "tap")  # each event is logged to a pipe without a reader
-    assert len(client.events("gesture", "arm", 2)) == 2
-    daemon.signal(signal.SIGTERM)
-    assert daemon.wait() == 0
 
 
 def test_a_stop_before_it_is_ready_is_no_failure(model: Path, tmp_path: Path) -> None:

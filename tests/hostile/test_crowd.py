@@ -6,7 +6,6 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import suppress
 
 import pytest
 
@@ -114,20 +113,3 @@ def read_until(sock: socket.socket, last: int) -> list[int]:
             if line["type"] == "gesture":
                 found.append(line["sequence"])
     return found
-
-
-def test_clients_that_send_rubbish_without_end_hold_nobody_up(start) -> None:
-    daemon = start("--clock", "sensor")
-    client = daemon.client()
-    rude = [connect(daemon) for _ in range(20)]
-    for sock in rude:
-        sock.setblocking(False)
-    sensor = Sensor(daemon, "arm").begin()
-    for n in range(1, 11):
-        for sock in rude:  # it does not read the answers either
-            with suppress(OSError):  # the daemon has read as much as is its turn, or has had enough of this one
-                sock.send(b'{"subscribe":7}\n' * 1000 if n % 2 else b"[" * 16_000)
-        sensor.perform("left")
-        assert client.line()["sequence"] == n
-    for sock in rude:
-        sock.close()

@@ -248,18 +248,6 @@ def test_a_model_file_that_nests_without_end_is_refused(tmp_path: Path) -> None:
         open_model(path)
 
 
-def test_a_full_disk_takes_the_log_and_nothing_else(start, tmp_path: Path) -> None:
-    full = Path("/dev/full")
-    if not full.exists():
-        pytest.skip("there is no /dev/full here")
-    (tmp_path / "stderr.txt").symlink_to(full)
-    daemon = start("--clock", "sensor", "--log-level", "debug")
-    client = daemon.client()
-    Sensor(daemon, "arm").begin().perform("left", "tap")
-    assert [line["gesture"] for line in client.events("gesture", "arm", 2)] == ["swipe_left", "one_tap"]
-    assert daemon.stop() == 0
-
-
 def test_a_destination_that_cannot_be_reached_costs_nobody_an_event(start) -> None:
     # The broadcast address is refused by our own kernel at once: no packet leaves this machine.
     daemon = start("--clock", "sensor", "--metrics", "127.0.0.1:0", "--publish", "osc://255.255.255.255:9")
