@@ -92,7 +92,11 @@ def bind_all(settings: Settings) -> Bound:
             if beside == path:
                 raise AddressError(f"control: {path} is the event socket, choose another path with --control")
             opened.append(control := UnixListener(beside, "control"))
-        gates = _gates(settings, given.get("gates"))
+        gates = None
+        if "gates" in given:
+            gates = Listener(given["gates"])
+        elif settings.gates is not None:
+            gates = UnixListener(settings.gates, "gates")
     except GesturedError:
         for sock in opened:
             sock.close()
@@ -100,13 +104,6 @@ def bind_all(settings: Settings) -> Bound:
     for name, sock in given.items():
         log.info("socket from systemd", name=name, address=_where(sock))
     return Bound(udp, since, events, control, gates, http)
-
-
-def _gates(settings: Settings, given: socket.socket | None) -> Listener | None:
-    """The bridges' socket, where there is to be one."""
-    if given is not None:
-        return Listener(given)
-    return None if settings.gates is None else UnixListener(settings.gates, "gates")
 
 
 def _passed() -> list[tuple[str, socket.socket]]:

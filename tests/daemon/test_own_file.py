@@ -89,6 +89,15 @@ def test_where_it_is_unless_somebody_says_it(environ: dict[str, str], expected: 
     assert own_file.where(Path("mine.json"), environ) == Path("mine.json")
 
 
+def test_a_folder_is_made_where_something_is_enrolled_and_not_before(tmp_path: Path) -> None:
+    path = tmp_path / "state" / "gestured" / "own.json"
+    keeper = Keeper(path)
+    keeper.read()
+    assert not path.parent.parent.exists() and keeper.fault is None
+    keeper.change(lambda found: {"slash": (EXAMPLE,)}, "")
+    assert path.stat().st_mode & 0o777 == 0o600 and path.parent.stat().st_mode & 0o777 == 0o700
+
+
 def test_who_has_let_go_of_a_file_must_lock_it_again(tmp_path: Path) -> None:
     one, other = Keeper(tmp_path / "own.json"), Keeper(tmp_path / "own.json")
     one.hold()

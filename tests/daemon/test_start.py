@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from gestured.core.errors import SettingsError
+from gestured.daemon.cli import parser
 from gestured.daemon.explain import explain
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor, lines_of
 from tests.daemon.parts import settings_of
@@ -51,17 +52,19 @@ def test_it_listens_on_ipv6_too(start) -> None:
     assert start("--listen", "[::1]:0").ready["listen"].startswith("[::1]:")
 
 
-@pytest.mark.parametrize("key", ["listen", "metrics"])
-def test_an_address_that_is_taken(model: Path, tmp_path: Path, key: str) -> None:
+@pytest.mark.parametrize(
+    ("key", "bound_to"), [("listen", "127.0.0.1"), ("listen", "0.0.0.0"), ("metrics", "127.0.0.1")]
+)
+def test_an_address_that_is_taken_and_by_whom(model: Path, tmp_path: Path, key: str, bound_to: str) -> None:
     kind = socket.SOCK_DGRAM if key == "listen" else socket.SOCK_STREAM
     with socket.socket(socket.AF_INET, kind) as taken:
-        taken.bind(("127.0.0.1", 0))
+        taken.bind((to, 0))
         if kind == socket.SOCK_STREAM:
             taken.listen()
         address = f"127.0.0.1:{taken.getsockname()[1]}"
         flags = {"--listen": "127.0.0.1:0", "--socket": tmp_path / "s", "--model": model, f"--{key}": address}
         said = refused(4, *(word for pair in flags.items() for word in pair))
-    assert key in said and address in said and "in use" in said
+    assert key in said and address in said and "in use" in said and f"(pid {os.getpid()})" in said
     assert list(tmp_path.iterdir()) == []
 
 
@@ -182,38 +185,30 @@ def test_what_a_container_platform_sets_by_itself_is_passed_over(start) -> None:
     assert [line["variable"] for line in said] == ["GESTURED_BUILT_BY"]
 
 
-def test_a_port_that_is_taken_names_the_process_that_has_it(model: Path, tmp_path: Path) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        taken.bind(("0.0.0.0", 0))  # whatever it was bound to
-        address = f"127.0.0.1:{taken.getsockname()[1]}"
-        said = refused(4, "--model", model, "--listen", address, "--socket", tmp_path / "s")
-    assert f"(pid {os.getpid()})" in said and "in use" in said
-
-
 def test_explain_names_keys_as_the_file_has_them(model: Path, tmp_path: Path) -> None:
     config = tmp_path / "gestured.toml"
     config.write_text(
         'stale_s = 2\n[gestures]\nuse = ["one_tap"]\n[gestures.one_tap]\nthreshold = 0.9\n[sensors.arm]\nrotate = 90\n'
     )
-    status, out, _ = run("--model", model, "--listen", "127.0.0.1:0", "--config", config, "--explain")
-    assert status == 0
-    where = out[out.index("set by:") :].split()
+    said = explain(*settings_of("--model", model, "--config", config))
+    where = said[said.index("set by:") :].split()
     assert {"gestures.one_tap.threshold:", "sensors.arm.rotate:", "gestures.use:", "stale_s:"} <= set(where)
-    assert "per_gesture" not in out
+    assert "per_gesture" not in said
 
 
 def test_settings_that_are_not_valid_end_the_program(model: Path, tmp_path: Path) -> None:
-    """One of them that reading finds, in a real process; and two that the model's gestures refute."""
+    said = refused(2, "--model", model, "--socket", tmp_path / "s", env={"GESTURED_STALE_S": "soon"})
+    assert all(word in said for word in ("stale_s", "'soon'", "number", "environment"))
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"), [("[gestures.one_tab]\nthreshold = 0.5", "one_tab"), ("gestures = ['wink']", "wink")]
+)
+def test_gestures_that_the_model_does_not_know(model: Path, tmp_path: Path, text: str, wrong: str) -> None:
     config = tmp_path / "gestured.toml"
-    flags = ("--listen", "127.0.0.1:0", "--model", model, "--socket", tmp_path / "s", "--config", config)
-    for text, env, said in (
-        ("", {"GESTURED_STALE_S": "soon"}, ("stale_s", "'soon'", "number", "environment")),
-        ("[gestures.one_tab]\nthreshold = 0.5", {}, ("gestures", "one_tab", "one_tap")),
-        ("gestures = ['wink']", {}, ("gestures", "wink", "one_tap")),
-    ):
-        config.write_text(text)
-        found = refused(2, *flags, env=env)
-        assert all(word in found for word in said), found
+    config.write_text(text)
+    with pytest.raises(SettingsError, match=f"gestures: '{wrong}' is no gesture of tiny, expected any of one_tap"):
+        explain(*settings_of("--model", model, "--config", config))
 
 
 @pytest.mark.parametrize("what", ["a FIFO", "a device", "too large"])
@@ -240,11 +235,11 @@ def test_a_limit_of_open_files_that_is_too_low(model: Path, tmp_path: Path, limi
     assert f"found {limit}" in done.stderr and "expected at least 64" in done.stderr
 
 
-def test_flags_nobody_knows_and_help() -> None:
-    assert run("--bogus")[0] == 2
-    status, out, _ = run("--help")
-    assert status == 0 and "gestured --model cnn_lstm.onnx" in out and "--stale-s" in out
-    assert run("--version")[1].startswith("gestured ")
+def test_flags_nobody_knows_and_help(capsys: pytest.CaptureFixture[str]) -> None:
+    for flag, status, said in (("--bogus", 2, "--bogus"), ("--help", 0, "--stale-s"), ("--version", 0, "gestured ")):
+        with pytest.raises(SystemExit) as ended:
+            parser().parse_args([flag])
+        assert ended.value.code == status and said in "".join(capsys.readouterr())
 
 
 def test_a_model_that_cannot_be_used(tmp_path: Path) -> None:
