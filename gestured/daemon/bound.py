@@ -3,8 +3,9 @@
 import os
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from gestured.client.address import control_beside, default_socket
 from gestured.core.errors import GesturedError
@@ -77,26 +78,18 @@ def bind_all(settings: Settings) -> Bound:
         if (http := given.get("metrics")) is None and settings.metrics is not None:
             opened.append(http := bind_tcp(settings.metrics))
         path = settings.socket
-        if "events" in given:
-            events = Listener(given["events"])
-            path = path or events.path
-        else:
-            if path is None:
-                path = default_socket(os.environ)
-                make_default_directory(path.parent)
-            opened.append(events := UnixListener(path))
-        if "control" in given:
-            control = Listener(given["control"])
-        else:
-            beside = settings.control or control_beside(path)
-            if beside == path:
-                raise AddressError(f"control: {path} is the event socket, choose another path with --control")
-            opened.append(control := UnixListener(beside, "control"))
+        if path is None and "events" not in given:
+            path = default_socket(os.environ)
+            make_default_directory(path.parent)
+        opened.append(events := _listener(given, "events", path, "socket"))
+        path = path or events.path
+        beside = settings.control or control_beside(path)
+        if beside == path and "control" not in given:
+            raise AddressError(f"control: {path} is the event socket, choose another path with --control")
+        opened.append(control := _listener(given, "control", beside, "control"))
         gates = None
-        if "gates" in given:
-            gates = Listener(given["gates"])
-        elif settings.gates is not None:
-            gates = UnixListener(settings.gates, "gates")
+        if "gates" in given or settings.gates is not None:
+            gates = _listener(given, "gates", settings.gates, "gates")
     except GesturedError:
         for sock in opened:
             sock.close()
@@ -104,6 +97,14 @@ def bind_all(settings: Settings) -> Bound:
     for name, sock in given.items():
         log.info("socket from systemd", name=name, address=_where(sock))
     return Bound(udp, since, events, control, gates, http)
+
+
+def _listener(given: Mapping[str, socket.socket], name: str, path: Path | None, key: str) -> Listener:
+    """What systemd passed under a name, else a socket at a path; `key` is the setting that an error names."""
+    if name in given:
+        return Listener(given[name])
+    assert path is not None
+    return UnixListener(path, key)
 
 
 def _passed() -> list[tuple[str, socket.socket]]:

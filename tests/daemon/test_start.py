@@ -52,10 +52,8 @@ def test_it_listens_on_ipv6_too(start) -> None:
     assert start("--listen", "[::1]:0").ready["listen"].startswith("[::1]:")
 
 
-@pytest.mark.parametrize(
-    ("key", "bound_to"), [("listen", "127.0.0.1"), ("listen", "0.0.0.0"), ("metrics", "127.0.0.1")]
-)
-def test_an_address_that_is_taken_and_by_whom(model: Path, tmp_path: Path, key: str, bound_to: str) -> None:
+@pytest.mark.parametrize(("key", "to"), [("listen", "127.0.0.1"), ("listen", "0.0.0.0"), ("metrics", "127.0.0.1")])
+def test_an_address_that_is_taken_and_by_whom(model: Path, tmp_path: Path, key: str, to: str) -> None:
     kind = socket.SOCK_DGRAM if key == "listen" else socket.SOCK_STREAM
     with socket.socket(socket.AF_INET, kind) as taken:
         taken.bind((to, 0))
