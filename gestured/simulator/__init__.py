@@ -29,26 +29,7 @@ from gestured.simulator.sensor import Act, SimulatedSensor, Take
 from gestured.simulator.variety import any_sensor
 
 __all__ = [
-    "GESTURES",
-    "INCLINATIONS",
-    "NONE",
-    "NON_GESTURES",
-    "SEQUENCES",
-    "SPEEDS",
-    "Act",
-    "Participant",
-    "Performance",
-    "SimulatedSensor",
-    "Take",
-    "Trial",
-    "any_sensor",
-    "at_random",
-    "cohort_plan",
-    "cohort_take",
-    "generator",
-    "gesture_take",
-    "perform",
-    "session",
-    "wide",
-    "wide_plan",
-]
+    "GESTURES", "INCLINATIONS", "NONE", "NON_GESTURES", "SEQUENCES", "SPEEDS", "Act", "Participant", "Performance",
+    "SimulatedSensor", "Take", "Trial", "any_sensor", "at_random", "cohort_plan", "cohort_take", "generator",
+    "gesture_take", "perform", "session", "wide", "wide_plan",
+]  # fmt: skip

@@ -4,14 +4,14 @@ Every take draws from a stream of its own (PCG64 on a SeedSequence of its coordi
 made alone and in parallel.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from gestured.simulator.gestures import TEN
-from gestured.simulator.occasion import Occasion
-from gestured.simulator.others import OTHERS, Made
+from gestured.simulator.occasion import Maker, Occasion
+from gestured.simulator.others import OTHERS
 from gestured.simulator.people import (
     INCLINATIONS,
     SPEEDS,
@@ -62,7 +62,7 @@ def perform(
 
 def performed(
     kind: str,
-    make: Callable[[Occasion], Made],
+    make: Maker,
     participant: Participant,
     rng: np.random.Generator,
     speed: str,

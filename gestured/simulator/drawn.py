@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 
+from gestured.simulator import kinematics
 from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP
-from gestured.simulator.kinematics import Array, arc, ellipse, grid, polyline, stroke_progress, turned, turning, wander
-from gestured.simulator.occasion import Occasion
+from gestured.simulator.kinematics import Array, ellipse, grid, polyline, stroke_progress, turned, turning, wander
+from gestured.simulator.occasion import Maker, Occasion, named
 from gestured.simulator.people import Press
 
 
@@ -99,14 +100,14 @@ def wave(occasion: Occasion) -> list[Press]:
     return drawn(occasion, t, *turned(x, y, rng.uniform(-math.pi, math.pi)))
 
 
-def arc_stroke(occasion: Occasion) -> list[Press]:
+def arc(occasion: Occasion) -> list[Press]:
     """An arc of 95 to 200 degrees: too bent for a swipe, too short for a circle."""
     rng = occasion.rng
     bend = math.radians(rng.uniform(95.0, 200.0)) * rng.choice([-1.0, 1.0])
     length = abs(bend) * occasion.small * rng.uniform(0.16, 0.4)
     move = float(np.clip(0.55 * (length / 50.0) ** 0.4 / occasion.rate, 0.25, 2.0))
     t = grid(move + rng.choice([0.0, 0.2]))
-    x, y = arc(stroke_progress(t / move, rng), length, rng.uniform(-math.pi, math.pi), bend)
+    x, y = kinematics.arc(stroke_progress(t / move, rng), length, rng.uniform(-math.pi, math.pi), bend)
     return drawn(occasion, t, x, y)
 
 
@@ -147,3 +148,8 @@ def rubbing(occasion: Occasion) -> list[Press]:
     radius = np.full_like(t, occasion.small * rng.uniform(0.08, 0.25))
     x, y = ellipse(phase, radius, rng.uniform(1.0, 3.0), rng.uniform(0.0, 3.1))
     return drawn(occasion, t, x + drift[0] * t, y + drift[1] * t)
+
+
+DRAWN: dict[str, Maker] = named(
+    back_and_forth, check_mark, corner, zigzag, wave, scribble, arc, figure_eight, spiral, rubbing
+)

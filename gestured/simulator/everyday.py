@@ -9,20 +9,19 @@ are meant at known times: after quiet, soon after something has left, or beside 
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from gestured.simulator.cohort import GESTURES, perform, performed
-from gestured.simulator.occasion import Occasion
-from gestured.simulator.others import Made
+from gestured.simulator.occasion import Maker, Occasion
 from gestured.simulator.people import Participant, Performance, Press, any_speed, generator
-from gestured.simulator.places import FINGERS, PLAYED, Place
+from gestured.simulator.places import FINGERS, Place
 from gestured.simulator.resting import NOBODY
 from gestured.simulator.sensor import Act, SimulatedSensor, Take
-from gestured.simulator.unmeant import Places
+from gestured.simulator.unmeant import PLAYED, Places
 
 TAP_S = 0.3  # what is longer is no tap, whatever was meant (99.7 % of intended touches: Matero and Colley, DIS 2012)
 TAP_TRAVEL = 0.15  # of the pad's shorter side
@@ -170,7 +169,7 @@ class _Life:
         count = int(self.rng.poisson(rate * seconds / 3600.0))
         return [float(at) for at in np.sort(self.rng.uniform(0.0, seconds, count))]
 
-    def _happen(self, kind: str, make: Callable[[Occasion], Made] | None) -> Performance:
+    def _happen(self, kind: str, make: Maker | None) -> Performance:
         """One short thing: what `make` makes, or one of the simulator's non-gestures."""
         speed, inclination = any_speed(self.rng), int(self.rng.integers(3))
         if make is not None:

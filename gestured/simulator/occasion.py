@@ -1,12 +1,14 @@
 """One person about to do one thing: where on the pad, how fast, how firmly, and the finger that does it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from gestured.simulator.kinematics import Array, wander
-from gestured.simulator.people import SPEEDS, Participant, Press
+from gestured.simulator.people import SPEEDS, Artefact, Participant, Press
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +116,16 @@ class Occasion:
         if rng.random() < 0.15 * person.rest_end:
             after += rng.uniform(0.0, 0.5)
         return before / max(hurry, 0.7), min(after / max(hurry, 0.7), 1.1)
+
+
+Made = list[Press] | list[Artefact]
+Maker = Callable[[Occasion], Made]  # makes one kind of thing that a person does
+M = TypeVar("M")
+
+
+def named(*makers: M) -> dict[str, M]:
+    """Functions by their names, which are those of the kinds that they make."""
+    return {maker.__name__: maker for maker in makers}  # type: ignore[attr-defined]
 
 
 def course(rng: np.random.Generator, t: Array, fade_in_s: float, fade_out_s: float) -> Array:

@@ -1,39 +1,16 @@
 """Presses, taps and strokes of one finger that are none of the ten, and the list of all non-gestures."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
-from gestured.simulator.drawn import (
-    arc_stroke,
-    back_and_forth,
-    check_mark,
-    corner,
-    drawn,
-    figure_eight,
-    rubbing,
-    scribble,
-    spiral,
-    wave,
-    zigzag,
-)
-from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP, swipe
+from gestured.simulator.drawn import DRAWN, drawn
+from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP
 from gestured.simulator.kinematics import arc, grid, stroke_progress
-from gestured.simulator.occasion import Occasion
-from gestured.simulator.people import Artefact, Press
-from gestured.simulator.several import drumming, knuckles, pinch, rotation, spread, three_finger_swipe, two_finger_tap
+from gestured.simulator.occasion import Maker, Occasion, named
+from gestured.simulator.people import Press
+from gestured.simulator.several import SEVERAL
 from gestured.simulator.strokes import fingers_on, stroke, swipe_length, touch_down
-from gestured.simulator.things import (
-    electrical_burst,
-    forearm,
-    heel_rest,
-    object_put_down,
-    palm,
-    sleeve_brush,
-    spike,
-    wipe,
-    wrinkle,
-)
+from gestured.simulator.things import THINGS
 
 
 def long_press(occasion: Occasion) -> list[Press]:
@@ -132,43 +109,7 @@ def tap_then_hold(occasion: Occasion) -> list[Press]:
     ]
 
 
-Made = list[Press] | list[Artefact]
-
-OTHERS: dict[str, Callable[[Occasion], Made]] = {
-    "long_press": long_press,
-    "slow_touch": slow_touch,
-    "triple_tap": triple_tap,
-    "taps_apart": taps_apart,
-    "tap_then_hold": tap_then_hold,
-    "tap_then_swipe": tap_then_swipe,
-    "press_and_slide": press_and_slide,
-    "diagonal_swipe": diagonal_swipe,
-    "back_and_forth": back_and_forth,
-    "check_mark": check_mark,
-    "corner": corner,
-    "zigzag": zigzag,
-    "wave": wave,
-    "scribble": scribble,
-    "arc": arc_stroke,
-    "figure_eight": figure_eight,
-    "spiral": spiral,
-    "rubbing": rubbing,
-    "two_finger_swipe_left": swipe(LEFT, 2),
-    "two_finger_swipe_right": swipe(RIGHT, 2),
-    "three_finger_swipe": three_finger_swipe,
-    "two_finger_tap": two_finger_tap,
-    "drumming": drumming,
-    "knuckles": knuckles,
-    "pinch": pinch,
-    "spread": spread,
-    "rotation": rotation,
-    "palm": palm,
-    "heel_rest": heel_rest,
-    "forearm": forearm,
-    "wipe": wipe,
-    "object_put_down": object_put_down,
-    "sleeve_brush": sleeve_brush,
-    "wrinkle": wrinkle,
-    "electrical_burst": electrical_burst,
-    "spike": spike,
-}
+PRESSES: dict[str, Maker] = named(
+    long_press, slow_touch, triple_tap, taps_apart, tap_then_hold, tap_then_swipe, press_and_slide, diagonal_swipe
+)
+OTHERS: dict[str, Maker] = PRESSES | DRAWN | SEVERAL | THINGS

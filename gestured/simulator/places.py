@@ -9,27 +9,10 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from gestured.simulator.gestures import one_tap
-from gestured.simulator.occasion import Occasion
-from gestured.simulator.others import Made
+from gestured.simulator.occasion import Maker, Occasion
 from gestured.simulator.people import Press
 from gestured.simulator.resting import HAND, NOBODY, POSTURES, THING, rest
-from gestured.simulator.unmeant import (
-    Places,
-    bump,
-    fidget,
-    fold,
-    graze,
-    hands,
-    landing,
-    pat,
-    playing_drum,
-    playing_press,
-    playing_rub,
-    playing_stretch,
-    playing_tap,
-    poke,
-    slide,
-)
+from gestured.simulator.unmeant import SHORT, Places
 
 # What the fingers of a hand that rests do, an hour of such rest; assumed.
 FINGERS: Mapping[str, float] = {
@@ -39,25 +22,7 @@ FINGERS: Mapping[str, float] = {
     "playing_press": 40.0,
     "playing_stretch": 40.0,
 }
-PLAYED = {
-    "playing_tap": playing_tap,
-    "playing_drum": playing_drum,
-    "playing_rub": playing_rub,
-    "playing_press": playing_press,
-    "playing_stretch": playing_stretch,
-}
-HAPPENINGS: Mapping[str, Callable[[Occasion], Made]] = {
-    "idle_tap": one_tap,
-    "bump": bump,
-    "graze": graze,
-    "landing": landing,
-    "pat": pat,
-    "poke": poke,
-    "slide": slide,
-    "fold": fold,
-    "fidget": fidget,
-    "hands": hands,
-}
+HAPPENINGS: Mapping[str, Maker] = {"idle_tap": one_tap, **SHORT}
 # What makes something that rests of an occasion, its seconds and the road: its presses, and where its fingers lie.
 Resting = Callable[[Occasion, float, float], tuple[list[Press], Places]]
 RESTS: Mapping[str, tuple[Resting, float]] = {  # with the median dwell time in s
@@ -75,7 +40,7 @@ class Place:
     road: float  # of the force, one standard deviation
     meant: float  # gestures an hour
     rests: Mapping[str, tuple[Resting, float]] = field(default_factory=lambda: RESTS)
-    happenings: Mapping[str, Callable[[Occasion], Made]] = field(default_factory=lambda: HAPPENINGS)
+    happenings: Mapping[str, Maker] = field(default_factory=lambda: HAPPENINGS)
 
 
 # What may happen anywhere, an hour; all assumed.

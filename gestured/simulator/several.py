@@ -6,7 +6,7 @@ import numpy as np
 
 from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP, swipe
 from gestured.simulator.kinematics import grid, stroke_progress
-from gestured.simulator.occasion import Occasion
+from gestured.simulator.occasion import Maker, Occasion, named
 from gestured.simulator.people import Press
 from gestured.simulator.strokes import touch_down
 
@@ -124,3 +124,10 @@ def rotation(occasion: Occasion) -> list[Press]:
 def three_finger_swipe(occasion: Occasion) -> list[Press]:
     """Three fingers side by side in any of the four directions."""
     return swipe(float(occasion.rng.choice([RIGHT, UP, LEFT, DOWN])), 3)(occasion)
+
+
+SEVERAL: dict[str, Maker] = {
+    "two_finger_swipe_left": swipe(LEFT, 2),
+    "two_finger_swipe_right": swipe(RIGHT, 2),
+    **named(three_finger_swipe, two_finger_tap, drumming, knuckles, pinch, spread, rotation),
+}

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from gestured.simulator.kinematics import Array, grid, stroke_progress, wander
-from gestured.simulator.occasion import Occasion
+from gestured.simulator.occasion import Maker, Occasion, named
 from gestured.simulator.people import Artefact, Press
 
 Pair = tuple[float, float]
@@ -195,3 +195,8 @@ def spike(occasion: Occasion) -> list[Artefact]:
     """One taxel jumps for a frame or two."""
     rng = occasion.rng
     return [Artefact(0.0, rng.uniform(0.01, 0.08), "taxel", rng.uniform(0.4, 4.0), 0.3)]
+
+
+THINGS: dict[str, Maker] = named(
+    palm, heel_rest, forearm, wipe, object_put_down, sleeve_brush, wrinkle, electrical_burst, spike
+)

@@ -5,13 +5,13 @@ learned one way in which a thing is drawn knows that drawing and not the thing.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from gestured.simulator.kinematics import Array, arc, grid, stroke_progress, wander
-from gestured.simulator.occasion import Occasion
+from gestured.simulator.occasion import Maker, Occasion, named
 from gestured.simulator.people import Press
 from gestured.simulator.strokes import touch_down
 from gestured.simulator.things import blob, palm
@@ -214,3 +214,10 @@ def playing_stretch(occasion: Occasion, places: Places) -> list[Press]:
     return [
         occasion.finger(t, x + way * math.cos(heading), y + way * math.sin(heading), force=force) for x, y in places
     ]
+
+
+SHORT: dict[str, Maker] = named(bump, graze, landing, pat, poke, slide, fold, fidget, hands)
+# What the fingers of a hand do that lie at given places.
+PLAYED: dict[str, Callable[..., list[Press]]] = named(
+    playing_tap, playing_drum, playing_rub, playing_press, playing_stretch
+)
