@@ -1,7 +1,7 @@
 """The records of an MCAP file (mcap.dev/spec) that may be cut off, damaged or hostile.
 
-The mcap library takes a record apart, once it lies in memory whole; it believes whatever size stands in a file. So each
-record's size, what its chunk unpacks to, and the sum of all chunks are held against a bound before.
+The mcap library takes records and chunks apart, once they lie in memory whole; it believes whatever size stands in a
+file. So each record's size, what its chunk unpacks to, and what all of it costs are held against a bound before.
 """
 
 import io
@@ -11,12 +11,11 @@ from collections.abc import Iterator
 from typing import Any, BinaryIO
 
 MAGIC = b"\x89MCAP0\r\n"
-RECORD_BYTES = 16 << 20  # of one record, and of what a chunk unpacks to; ours have little more than a mebibyte
-TEXT_BYTES = 8 << 20  # of one channel or metadata record; a scene may hold a user's own gestures
+RECORD_BYTES = 8 << 20  # of one record, and of what a chunk unpacks to; ours have little more than a mebibyte
 GROWTH = 500  # bytes of memory for a byte of the file: an idle sensor that sends zeros leaves next to nothing
 GROWTH_BYTES = 64 << 20  # bytes of memory for any file, however small
 KEPT_BYTES = 4 << 30  # bytes of memory at most, however large the file is
-PASSED_OVER = 4  # bytes that are unpacked for one that may be kept: nothing is kept of the pictures
+UNPACKED_COSTS = 0.25  # bytes of memory for an unpacked byte: little is kept of pictures, but they take time
 
 
 class CutOff(Exception):
@@ -32,94 +31,67 @@ class TooLarge(Exception):
 
 
 class Budget:
-    """What a file may become, in bytes; whoever takes more is told TooLarge."""
+    """The bytes of memory that a file may cost; whoever takes more is told TooLarge."""
 
     def __init__(self, file: BinaryIO) -> None:
-        allowed = GROWTH_BYTES + GROWTH * os.fstat(file.fileno()).st_size
-        self._kept, self._unpacked = min(allowed, KEPT_BYTES), PASSED_OVER * allowed
+        self._left: float = min(GROWTH_BYTES + GROWTH * os.fstat(file.fileno()).st_size, KEPT_BYTES)
 
-    def keep(self, count: int) -> None:
+    def spend(self, count: float) -> None:
         """So many bytes stay in memory."""
-        self._kept -= count
-        if self._kept < 0:
+        self._left -= count
+        if self._left < 0:
             raise TooLarge("needs more memory than a recording of its size does; expected a shorter recording")
-
-    def unpack(self, count: int) -> None:
-        """So many bytes were unpacked."""
-        self._unpacked -= count
-        if self._unpacked < 0:
-            raise TooLarge("unpacks to more than a recording of its size does")
 
 
 def records(file: BinaryIO, budget: Budget) -> Iterator[Any]:
     """The library's Channel, Message and Metadata records up to the footer; a chunk's stand in its place."""
-    from mcap.records import Chunk, Footer  # who reads no tape need not wait for it
+    from mcap.data_stream import ReadDataStream  # who reads no tape need not wait for it
+    from mcap.exceptions import McapError
+    from mcap.opcode import Opcode
+    from mcap.records import Channel, Chunk, Message, Metadata
+    from mcap.stream_reader import CRCValidationError
+    from zstandard import ZstdError
 
     if file.read(len(MAGIC)) != MAGIC:
         raise Damaged("expected an MCAP file")
-    for record in _records(file):
-        if isinstance(record, Chunk):
-            data = _unpacked(record)
-            budget.unpack(len(data))
-            yield from _records(io.BytesIO(data))
-        elif isinstance(record, Footer):
-            break
-        else:
-            yield record
-    if file.read(len(MAGIC)) != MAGIC:
+    opcode = 0
+    while opcode != Opcode.FOOTER:
+        opcode, size = struct.unpack("<BQ", _whole(file, 9))
+        if not opcode or size > RECORD_BYTES:
+            raise Damaged(f"a record of type {opcode} and {size} bytes, expected 1 to 255 and at most {RECORD_BYTES}")
+        stream = ReadDataStream(io.BytesIO(_whole(file, size)))
+        try:
+            if opcode == Opcode.CHUNK:
+                yield from _unpacked(Chunk.read(stream), budget)
+            elif opcode == Opcode.MESSAGE:
+                yield Message.read(stream, size)
+            elif opcode in (Opcode.CHANNEL, Opcode.METADATA):
+                yield (Channel if opcode == Opcode.CHANNEL else Metadata).read(stream)
+        except (McapError, ZstdError, CRCValidationError, struct.error, UnicodeDecodeError) as error:
+            raise Damaged(f"a record that cannot be read: {error}") from error
+    if _whole(file, len(MAGIC)) != MAGIC:
         raise CutOff
 
 
-def _records(file: BinaryIO) -> Iterator[Any]:
-    """Those that a tape is made of, until the file's end; what else there is is passed over."""
-    from mcap.data_stream import ReadDataStream
-    from mcap.exceptions import McapError
-    from mcap.opcode import Opcode
-    from mcap.records import Channel, Chunk, Footer, Message, Metadata
-
-    kinds: dict[int, Any] = {
-        Opcode.CHANNEL: Channel,
-        Opcode.CHUNK: Chunk,
-        Opcode.FOOTER: Footer,
-        Opcode.METADATA: Metadata,
-    }
-    while head := file.read(9):
-        if len(head) < 9:
-            raise CutOff
-        opcode, size = struct.unpack("<BQ", head)
-        most = TEXT_BYTES if opcode in (Opcode.CHANNEL, Opcode.METADATA) else RECORD_BYTES
-        if not opcode or size > most:
-            raise Damaged(f"a record of type {opcode} and {size} bytes, expected one of 1 to 255 and at most {most}")
-        content = file.read(size)
-        if len(content) < size:
-            raise CutOff
-        if opcode != Opcode.MESSAGE and opcode not in kinds:
-            continue
-        stream = ReadDataStream(io.BytesIO(content))
-        try:
-            record = Message.read(stream, size) if opcode == Opcode.MESSAGE else kinds[opcode].read(stream)
-        except (McapError, struct.error, UnicodeDecodeError) as error:
-            raise Damaged(f"a record that cannot be read: {error}") from error
-        yield record
+def _whole(file: BinaryIO, size: int) -> bytes:
+    """So many bytes; CutOff where the file ends before."""
+    data = file.read(size)
+    if len(data) < size:
+        raise CutOff
+    return data
 
 
-def _unpacked(chunk: Any) -> bytes:
-    """What is in a chunk; Damaged where that is not as long as it says."""
-    import zstandard
-    from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
+def _unpacked(chunk: Any, budget: Budget) -> list[Any]:
+    """The records of a chunk; Damaged where it says another size than it unpacks to."""
+    from mcap.stream_reader import breakup_chunk
+    from zstandard import frame_content_size
 
     size, packed = chunk.uncompressed_size, chunk.data
-    if size > RECORD_BYTES:
-        raise Damaged(f"a chunk unpacks to {size} bytes, expected at most {RECORD_BYTES}")
     if chunk.compression not in ("zstd", ""):
         raise Damaged(f"a chunk is packed as {chunk.compression[:20]!r}, expected zstd")
-    try:
-        told = zstandard.frame_content_size(packed) if chunk.compression else len(packed)
-        if told not in (size, -1):  # the library unpacks as much as this says; nothing said (-1), as the chunk says
-            raise Damaged(f"a chunk unpacks to {told} bytes, expected its {size}")
-        stream, found = get_chunk_data_stream(chunk, validate_crc=True)
-    except (zstandard.ZstdError, CRCValidationError) as error:
-        raise Damaged(f"a chunk cannot be unpacked: {error}") from error
-    if found != size:
-        raise Damaged(f"a chunk unpacks to {found} bytes, expected its {size}")
-    return stream.read(size)
+    told = frame_content_size(packed) if chunk.compression else len(packed)
+    if size > RECORD_BYTES or told not in (size, -1):  # where nothing is told (-1), no more than `size` is unpacked
+        raise Damaged(f"a chunk unpacks to {told} bytes, expected its {size}, and at most {RECORD_BYTES}")
+    budget.spend(UNPACKED_COSTS * size)
+    found: list[Any] = breakup_chunk(chunk, validate_crc=True)
+    return found

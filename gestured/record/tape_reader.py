@@ -6,7 +6,7 @@ from typing import Any
 
 from gestured.core.address import Address
 from gestured.core.errors import RecordingError
-from gestured.core.messages import json_object
+from gestured.core.messages import json_object, quoted
 from gestured.record.files import open_regular
 from gestured.record.mcap import Budget, CutOff, Damaged, TooLarge, records
 from gestured.record.tape import EVENT_SCHEMA, EVENTS, PACKETS, SCENE, Packet, Tape
@@ -18,6 +18,7 @@ NOBODY = Address("", 0)  # the source of a channel that holds no packets
 HOST_CHARACTERS = 255  # of a sender's name; the DNS allows no more
 LARGEST_NUMBER = 1e11  # of any number in an event; as seconds since 1970 it is a date that Python can print
 FORMS: dict[str, str | list[str]] = {key: form["type"] for key, form in EVENT_SCHEMA["properties"].items()}
+KINDS: dict[str, Any] = {"string": str, "integer": int, "number": int | float, "array": list, "null": type(None)}
 # What an event of a type says at least.
 NEEDED = {
     "onset": ("sensor", "id", "onset"),
@@ -89,10 +90,10 @@ class _Reading:
             if message.log_time > LATEST_NS:
                 place = len(self.packets) + 1
                 raise _Wrong(f"packet {place}: expected a time up to {LATEST_NS} ns, found {message.log_time}")
-            budget.keep(ITEM_COSTS + len(data))
+            budget.spend(ITEM_COSTS + len(data))
             self.packets.append(Packet(message.log_time, source, data))
         elif topic == EVENTS:
-            budget.keep(ITEM_COSTS + EVENT_COSTS * len(data))
+            budget.spend(ITEM_COSTS + EVENT_COSTS * len(data))
             self.events.append(_event(data, len(self.events) + 1))
 
 
@@ -111,26 +112,18 @@ def _event(line: bytes, number: int) -> Mapping[str, Any]:
     needed = ("type", *NEEDED.get(str(event.get("type")), ()))
     for key, form in FORMS.items():
         if (key in event or key in needed) and not _right(form, event.get(key)):
-            raise _Wrong(f"event {number}: expected {key} to be of the type {form}, found {_brief(event.get(key))}")
+            raise _Wrong(f"event {number}: expected {key} to be of the type {form}, found {quoted(event.get(key))}")
     return event
 
 
 def _right(form: str | list[str], value: object) -> bool:
     if isinstance(form, list):
         return any(_right(one, value) for one in form)
-    if form == "null":
-        return value is None
-    if form == "string":
-        return isinstance(value, str)
-    if form == "array":
-        return isinstance(value, list) and all(isinstance(item, str) for item in value)
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if isinstance(value, list):
+        return form == "array" and all(isinstance(item, str) for item in value)
+    if isinstance(value, bool) or not isinstance(value, KINDS[form]):
         return False
-    return abs(value) <= LARGEST_NUMBER and (form == "number" or isinstance(value, int))  # so NaN is none
-
-
-def _brief(value: object) -> str:
-    return repr(value)[:40]
+    return not isinstance(value, int | float) or abs(value) <= LARGEST_NUMBER  # so NaN is none
 
 
 def _source(text: str) -> Address:
