@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from gestured.simulator import kinematics
 from gestured.simulator.gestures import DOWN, LEFT, RIGHT, UP
 from gestured.simulator.kinematics import Array, ellipse, grid, polyline, stroke_progress, turned, turning, wander
+from gestured.simulator.kinematics import arc as along_arc
 from gestured.simulator.occasion import Maker, Occasion, named
 from gestured.simulator.people import Press
 
@@ -107,7 +107,7 @@ def arc(occasion: Occasion) -> list[Press]:
     length = abs(bend) * occasion.small * rng.uniform(0.16, 0.4)
     move = float(np.clip(0.55 * (length / 50.0) ** 0.4 / occasion.rate, 0.25, 2.0))
     t = grid(move + rng.choice([0.0, 0.2]))
-    x, y = kinematics.arc(stroke_progress(t / move, rng), length, rng.uniform(-math.pi, math.pi), bend)
+    x, y = along_arc(stroke_progress(t / move, rng), length, rng.uniform(-math.pi, math.pi), bend)
     return drawn(occasion, t, x, y)
 
 
