@@ -18,8 +18,7 @@ from gestured.bridge.protocols import PROTOCOLS, looks_like
 from gestured.bridge.readings import MOST_TAXELS, Reading, Unwrapped, signed
 from gestured.client.program import Commands
 from gestured.client.sensor import Form, connected, sent_after_refusal
-from gestured.client.values import rows_by_columns
-from gestured.core.address import is_sensor
+from gestured.client.values import rows_by_columns, sensor_name
 from gestured.core.frames import Frame
 
 KEPT = 8  # frames that are sent where more have come at once: the newest
@@ -43,7 +42,7 @@ def add(commands: Commands) -> None:
     )
     parser.add_argument("device", metavar="DEVICE", help="such as /dev/ttyUSB0, or a link in /dev/serial/by-id")
     parser.add_argument("--protocol", required=True, choices=tuple(PROTOCOLS), help="what the sensor speaks")
-    parser.add_argument("--sensor", required=True, metavar="NAME", help="its name for the daemon")
+    parser.add_argument("--sensor", type=sensor_name, required=True, metavar="NAME", help="its name for the daemon")
     parser.add_argument("--baud", type=int, metavar="N", help="bits a second (default: as the protocol's sensors)")
     text = "rows and columns (default: 16x16 for flexitac and e256, else 9x9)"
     parser.add_argument("--grid", type=rows_by_columns, metavar="RxC", help=text)
@@ -67,8 +66,6 @@ class Serial:
     def __init__(self, args: argparse.Namespace, counts: Counts) -> None:
         """Raises BridgeError for what cannot be."""
         protocol = PROTOCOLS[args.protocol]
-        if not is_sensor(args.sensor):
-            raise BridgeError(f"--sensor {args.sensor}: expected letters, digits, _ and -, at most 64")
         if protocol.fixed and args.grid not in (None, protocol.grid):
             raise BridgeError(f"--grid: {args.protocol} sensors have {'x'.join(map(str, protocol.grid))} taxels")
         self._name, self._protocol = args.protocol, protocol

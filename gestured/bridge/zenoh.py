@@ -15,6 +15,7 @@ from gestured.bridge.daemon import NOTICE_S, follow
 from gestured.bridge.options import add_destination, add_filters, add_metrics, need, on_stop, subscriber
 from gestured.bridge.zenoh_session import ROUTER, Zenoh
 from gestured.client.program import Commands
+from gestured.client.values import sensor_name
 
 
 def add(commands: Commands) -> None:
@@ -30,7 +31,8 @@ def add(commands: Commands) -> None:
     parser.add_argument("--connect", action="append", metavar="ENDPOINT", help=text)
     text = "Zenoh's own configuration (JSON5): certificates, users, where peers may call us"
     parser.add_argument("--config", type=Path, metavar="FILE", help=text)
-    parser.add_argument("--site", metavar="NAME", help="name of this place in keys (default: the hostname)")
+    text = "name of this place in keys (default: the hostname)"
+    parser.add_argument("--site", type=sensor_name, metavar="NAME", help=text)
     add_filters(parser)
     parser.add_argument("--frames", action="store_true", help="also take frames from Zenoh to the daemon")
     add_destination(parser)

@@ -12,7 +12,6 @@ from gestured.bridge.counts import Counts
 from gestured.bridge.daemon import MOST_SENSORS, OLD_S, Daemon, Line
 from gestured.bridge.forward import Forward
 from gestured.bridge.options import FIRST_S, LONGEST_S, BridgeError, host_name
-from gestured.core.address import is_sensor
 
 ROUTER = "tcp/127.0.0.1:7447"  # where a router of this machine listens unless told otherwise
 CLIENT = '"client"'  # the mode of a session that calls a router; any other one may be called
@@ -31,8 +30,6 @@ class Zenoh:
 
         zenoh.init_log_from_env_or("off")  # what is wrong is said here, in one line
         self._site = args.site or host_name(None)
-        if not is_sensor(self._site):
-            raise BridgeError(f"--site {self._site}: expected letters, digits, _ and -, at most 64")
         self._config = _configuration(args)
         self._is_called = self._config.get_json("mode") != CLIENT  # nobody has to be there
         self._daemon = Daemon(args.sensors, args.gestures, counts)

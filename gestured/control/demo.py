@@ -23,6 +23,7 @@ from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json
 from gestured.client.sensor import Form, Sensor
 from gestured.client.subscriber import Subscriber
+from gestured.client.values import number
 from gestured.control.play import add_arguments, frames, takes
 from gestured.control.screen import Felt, Screen, in_colour
 from gestured.control.show import as_dict, block, in_words
@@ -49,7 +50,7 @@ def add(commands: Commands) -> None:
         epilog="examples:\n  gesturectl demo --seconds 20 --speed fast\n  gesturectl demo --json --kinds double_tap",
     )
     parser.add_argument("--model", default="cnn_lstm", help="a path, or a shipped one's name (default: cnn_lstm)")
-    parser.add_argument("--seconds", type=float, default=60.0, metavar="S", help="how long (default: 60)")
+    parser.add_argument("--seconds", type=number(5, 600), default=60.0, metavar="S", help="how long (default: 60)")
     add_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print outcomes and summary as JSON lines")
     parser.set_defaults(run=run)
@@ -57,8 +58,6 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show outcomes as they come, then the summary; Ctrl-C goes straight to the summary."""
-    if not 5.0 <= args.seconds <= 600.0:
-        raise GesturedError(f"--seconds {args.seconds:g}: expected 5 to 600")
     for signalled in (signal.SIGTERM, signal.SIGHUP):  # a closed terminal must not leave the daemon behind
         signal.signal(signalled, signal.default_int_handler)
     ((_, take),) = takes(args, args.seconds, first="circle_clockwise")

@@ -13,9 +13,9 @@ from gestured.client.control import Control
 from gestured.client.lines import Unreachable, read_ahead
 from gestured.client.program import Commands
 from gestured.client.say import say, say_json
+from gestured.client.values import number
 from gestured.control.address import add_sockets, connect, finish_after, finish_on_signals
 from gestured.core.address import Address
-from gestured.core.errors import GesturedError
 from gestured.record.tape_writer import Writer
 
 FLUSH_S = 1.0  # seconds of a recording that a crash or a power cut costs
@@ -33,8 +33,10 @@ def add(commands: Commands) -> None:
         epilog="examples:\n  gesturectl record drive.mcap --seconds 60\n  gesturectl record night.mcap --max-mib 2048",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="what to write; must not exist")
-    parser.add_argument("--seconds", type=float, metavar="S", help="end after so long (default: at Ctrl-C)")
-    parser.add_argument("--max-mib", type=int, default=1024, metavar="N", help="end at this size (default: 1024)")
+    text = "end after so long (default: at Ctrl-C)"
+    parser.add_argument("--seconds", type=number(0.001, 1e9), metavar="S", help=text)
+    most = number(1, 1 << 20, whole=True)
+    parser.add_argument("--max-mib", type=most, default=1024, metavar="N", help="end at this size (default: 1024)")
     add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
     parser.set_defaults(run=run)
@@ -42,10 +44,6 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record until the time is over, the file full, the daemon gone, or Ctrl-C; 1 where something was lost."""
-    if not 1 <= args.max_mib <= 1 << 20:
-        raise GesturedError(f"--max-mib {args.max_mib}: expected 1 to {1 << 20}")
-    if args.seconds is not None and not 0 < args.seconds < 1e9:
-        raise GesturedError(f"--seconds {args.seconds:g}: expected more than 0")
     with connect(args) as control:
         finish_on_signals(control)
         scene = control.ask("tap")

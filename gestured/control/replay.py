@@ -10,13 +10,12 @@ from typing import Any
 
 from gestured.client.program import Commands
 from gestured.client.say import say, say_drawn, say_json, tell
-from gestured.client.values import host_port
+from gestured.client.values import host_port, number, sensor_name
 from gestured.control.diff import Answer, Knew, Line, Recorded
 from gestured.control.labelled import Labelled
 from gestured.control.listen import readable
 from gestured.control.sending import send
 from gestured.core import messages
-from gestured.core.address import is_sensor
 from gestured.core.errors import GesturedError, RecordingError
 from gestured.core.scene import Scene
 from gestured.model.ladder import Ladder, ladder_for
@@ -46,7 +45,8 @@ def add(commands: Commands) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="what gesturectl record or flag wrote, or an .npz")
     parser.add_argument("--to", type=host_port, metavar="HOST:PORT", help="send it to the daemon that listens there")
     parser.add_argument("--diff", action="store_true", help="compare with the recorded events, or the labels")
-    parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="with --to: so many times as fast")
+    text = "with --to: so many times as fast"
+    parser.add_argument("--speed", type=number(0.001, 1000), default=1.0, metavar="X", help=text)
     parser.add_argument(
         "--model",
         metavar="MODEL",
@@ -55,7 +55,8 @@ def add(commands: Commands) -> None:
     parser.add_argument(
         "--provisional", action="store_true", help="without --to: also print what was said before the answers"
     )
-    parser.add_argument("--sensor", default="recording", metavar="NAME", help="the sensor's name, for an .npz")
+    text = "the sensor's name, for an .npz"
+    parser.add_argument("--sensor", type=sensor_name, default="recording", metavar="NAME", help=text)
     parser.add_argument("--json", action="store_true", help="print events, or differences, as JSON lines")
     parser.set_defaults(run=run)
 
@@ -75,18 +76,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> None:
-    if not 0 < args.speed <= 1000:
-        raise GesturedError(f"--speed {args.speed:g}: expected more than 0, at most 1000")
-    if not is_sensor(args.sensor):
-        raise GesturedError(f"--sensor {args.sensor!r}: expected 1 to 64 of A-Z a-z 0-9 _ -")
     if args.to is None and args.speed != 1:
         raise GesturedError("--speed is for a daemon: name it with --to HOST:PORT")
-    if args.to is not None and args.diff:
-        raise GesturedError("--diff compares a replay here, without --to; gesturectl listen prints what a daemon says")
-    if args.to is not None and args.provisional:
-        raise GesturedError("--provisional is for a replay here; listen --types provisional asks a daemon for them")
-    if args.to is not None and args.model is not None:
-        raise GesturedError("--model is for a replay here; the daemon of --to has its own")
+    for flag in ("diff", "provisional", "model"):
+        if args.to is not None and getattr(args, flag):
+            raise GesturedError(f"--{flag} is for a replay here, without --to; a daemon has its own")
 
 
 def _here(args: argparse.Namespace, source: Playable) -> int:

@@ -14,7 +14,7 @@ from gestured.client.holder import bind_failure
 from gestured.client.lines import Unreachable
 from gestured.client.program import Commands
 from gestured.client.say import say, shown, tell
-from gestured.client.values import host_port
+from gestured.client.values import host_port, number
 from gestured.control.address import add_sockets, connect, finish_after, finish_on_signals
 from gestured.control.proposal import LONGEST_ADDRESS, TRAJECTORY, Known, propose, split_address
 from gestured.control.sight import Seen, Sight
@@ -34,7 +34,8 @@ def add(commands: Commands) -> None:
         "with type tags and rates, and propose [addresses] and grid for them.",
         epilog="examples:\n  gesturectl sniff --seconds 3\n  gesturectl sniff --listen 0.0.0.0:9000",
     )
-    parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help="how long (default: 5)")
+    seconds = number(0.001, 86_400)
+    parser.add_argument("--seconds", type=seconds, default=5.0, metavar="S", help="how long (default: 5)")
     text = "listen at this UDP address itself; no daemon may have it"
     parser.add_argument("--listen", type=host_port, metavar="HOST:PORT", help=text)
     add_sockets(parser)
@@ -44,8 +45,6 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Look, and say what was there; exit status 1 where nothing came that looks like a frame."""
-    if not 0 < args.seconds <= 86_400:
-        raise GesturedError(f"--seconds {args.seconds:g}: expected more than 0, at most 86400")
     sight, known = Sight(), Known()
     try:
         if args.listen:

@@ -10,11 +10,12 @@ from typing import Any
 
 from gestured.client.program import Commands
 from gestured.client.say import say, say_json
+from gestured.client.values import number
 from gestured.control.diff import Recorded
 from gestured.control.labelled import Labelled
 from gestured.control.tuning import ENOUGH, Counts, Played, Tuned, tune
 from gestured.core import messages
-from gestured.core.errors import GesturedError, RecordingError
+from gestured.core.errors import RecordingError
 from gestured.core.points import USUAL
 from gestured.core.sensor import ABSENT_S
 from gestured.model.model import Model
@@ -41,27 +42,21 @@ def add(commands: Commands) -> None:
     )
     parser.add_argument("recordings", type=Path, nargs="+", metavar="FILE", help="an .npz with labels, or a tape")
     parser.add_argument("--model", default="cnn_lstm", metavar="MODEL", help="shipped, or a file (default: cnn_lstm)")
-    parser.add_argument("--wrong-costs", type=float, default=3.0, metavar="X",
-                        help="a wrong or a false event is as bad as X missed gestures (default: 3)")  # fmt: skip
-    parser.add_argument("--budget", type=float, metavar="PER_HOUR",
-                        help="how many false gestures an hour there may be at most")  # fmt: skip
+    text = "how many false gestures an hour there may be at most"
+    parser.add_argument("--budget", type=number(0.001, 100), metavar="PER_HOUR", help=text)
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Play all, count, propose."""
-    if not 0.1 <= args.wrong_costs <= 100:
-        raise GesturedError(f"--wrong-costs {args.wrong_costs:g}: expected 0.1 to 100")
-    if args.budget is not None and not 0.001 <= args.budget <= 100:
-        raise GesturedError(f"--budget {args.budget:g}: expected 0.001 to 100 false gestures an hour")
-    model = open_model(Path(args.model) if "/" in args.model or args.model.endswith(".onnx") else args.model)
+    model = open_model(args.model)
     played = Played()
     for path in args.recordings:
         play(path, model, played)
     if not played.performed and played.seconds < SHORTEST_S:
         raise RecordingError(f"{args.recordings[0]}: expected gestures, or a minute of something else")
-    tuned = tune(model, played, args.wrong_costs, args.budget)
+    tuned = tune(model, played, args.budget)
     if args.json:
         say_json(_figures(tuned))
     else:

@@ -19,6 +19,7 @@ from gestured.record.judge import NONE, Performed, Said, owners, verdicts
 THRESHOLDS = tuple(round(0.05 * k, 2) for k in range(1, 20))
 CANDIDATES = (*THRESHOLDS, 0.96, 0.97, 0.98, 0.99)  # that may be proposed
 ENOUGH = 20  # performances of a gesture before anything is proposed for it alone
+EACH = 3.0  # gestures that are missed, to which a wrong or a false one is equal
 GESTURES_AN_HOUR = 20  # assumed where nobody performed any, to hold what a model misses against what is false
 DOUBT = 0.05  # probability that hours show so few false ones although more come
 
@@ -65,9 +66,10 @@ class Counts:
     false: int
     unmeant: int  # of the false ones, those that were not said of a non-gesture which was performed
 
-    def cost(self, each: float) -> float:
-        """In gestures that are missed; a wrong or a false one costs as much as `each` of them."""
-        return (self.missed or 0.0) + each * (self.wrong + self.false)
+    @property
+    def cost(self) -> float:
+        """In gestures that are missed; a wrong or a false one costs as much as EACH of them."""
+        return (self.missed or 0.0) + EACH * (self.wrong + self.false)
 
 
 def counted(played: Played, least: float | Mapping[str, float], gesture: str | None = None) -> Counts:
@@ -116,7 +118,7 @@ def allowed(per_hour: float, hours: float) -> int | None:
         count += 1
 
 
-def proposed(rows: Sequence[Counts], each: float, now: float, most: int | None = None) -> Counts | None:
+def proposed(rows: Sequence[Counts], now: float, most: int | None = None) -> Counts | None:
     """The row that costs least, of those with at most `most` unmeant; of equal ones that nearest to what is set `now`.
 
     Where nobody knows what is missed it is the first with so few (their thresholds rise). None where there is none.
@@ -124,10 +126,10 @@ def proposed(rows: Sequence[Counts], each: float, now: float, most: int | None =
     few = [row for row in rows if most is None or row.unmeant <= most]
     if any(row.missed is None for row in few):
         return few[0] if most is not None else None
-    return min(few, key=lambda row: (row.cost(each), abs((row.threshold or now) - now)), default=None)
+    return min(few, key=lambda row: (row.cost, abs((row.threshold or now) - now)), default=None)
 
 
-def for_each(played: Played, each: float, now: float, *, no_more: bool = False) -> dict[str, Counts]:
+def for_each(played: Played, now: float, *, no_more: bool = False) -> dict[str, Counts]:
     """What is proposed for single gestures: those that were performed often enough.
 
     With `no_more`, none of them says more that nobody meant than at the threshold that is set `now`.
@@ -136,7 +138,7 @@ def for_each(played: Played, each: float, now: float, *, no_more: bool = False) 
     found = {}
     for name, count in sorted(performed.items()):
         most = counted(played, now, name).unmeant if no_more else None
-        best = proposed([counted(played, t, name) for t in CANDIDATES], each, now, most) if count >= ENOUGH else None
+        best = proposed([counted(played, t, name) for t in CANDIDATES], now, most) if count >= ENOUGH else None
         if best is not None:
             found[name] = best
     return found
@@ -167,7 +169,7 @@ class Tuned:
         return "recordings" if self.played.performed else "model" if self.points else None
 
 
-def tune(model: Model, played: Played, each: float, budget: float | None) -> Tuned:
+def tune(model: Model, played: Played, budget: float | None) -> Tuned:
     """Count what thresholds cost, and propose. Raises GesturedError for a budget that cannot be shown, or kept."""
     most = None if budget is None else allowed(budget, played.hours)
     if budget is not None and most is None:
@@ -178,16 +180,16 @@ def tune(model: Model, played: Played, each: float, budget: float | None) -> Tun
     alike = [estimated(played, t, share_missed(model.points, t)) for t in CANDIDATES]
     stored = {} if model.points is None else model.points.points
     points = {name: estimated(played, point.thresholds, point.missed) for name, point in stored.items()}
-    best, single = proposed(alike, each, model.threshold, most), dict[str, Counts]()
+    best, single = proposed(alike, model.threshold, most), dict[str, Counts]()
     if best is not None and best.threshold is not None and played.performed:
-        single = for_each(played, each, best.threshold, no_more=most is not None)
+        single = for_each(played, best.threshold, no_more=most is not None)
         together = counted(played, {name: single.get(name, best).threshold or 0.0 for name in model.gestures})
-        if together.cost(each) <= best.cost(each) and (most is None or together.unmeant <= most):
+        if together.cost <= best.cost and (most is None or together.unmeant <= most):
             best = replace(together, threshold=best.threshold)
         else:
             single = {}
     rows = (points.get(USUAL), *points.values(), best)  # of those that cost the same the first is taken
-    best = proposed([row for row in rows if row is not None], each, model.threshold, most)
+    best = proposed([row for row in rows if row is not None], model.threshold, most)
     if best is None and most is not None:
         left = {name: counted(played, CANDIDATES[-1], name).unmeant for name in model.gestures}
         raise GesturedError(

@@ -227,7 +227,7 @@ def test_nobody_who_listens_is_said_and_heals(bridge, line):
     [
         ("/dev/null", [], "/dev/null: is no serial device"),
         ("FILE", [], "is no serial device"),
-        ("/dev/null", ["--sensor", "a/b"], "--sensor a/b"),
+        ("/dev/null", ["--sensor", "a/b"], "argument --sensor: 'a/b'"),
         ("/dev/null", ["--protocol", "e256", "--grid", "8x8"], "16x16"),
         ("/dev/null", ["--grid", "1x1"], "ROWSxCOLUMNS"),
         ("/dev/null", ["--to", "nowhere.invalid:9000"], "cannot send to nowhere.invalid:9000"),

@@ -309,7 +309,7 @@ def test_a_router_that_is_not_there_is_asked_for_ever_more_seldom(monkeypatch):
     ("flags", "words"),
     [
         (["--connect", "rubbish"], "tcp/127.0.0.1:7447"),
-        (["--site", "a/b"], "--site a/b"),
+        (["--site", "a/b"], "argument --site: 'a/b'"),
         (["--config", "/none.json5"], "/none.json5"),
         (["--frames", "--to", "nowhere.invalid:9000"], "cannot send to nowhere.invalid:9000"),
     ],

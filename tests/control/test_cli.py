@@ -30,3 +30,23 @@ def test_a_command_that_asks_a_daemon_loads_no_simulator_and_no_model(words: lis
     code = "import sys; from gestured.control.cli import parser; parser(sys.argv[1:]); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True)
     assert [name for name in done.stdout.split() if name.startswith(HEAVY) and name not in LIGHT] == []
+
+
+@pytest.mark.parametrize(
+    ("command", "flag", "value"),
+    [
+        ("demo", "--seconds", "0"), ("demo", "--seconds", "nan"), ("demo", "--grid", "1x9"),
+        ("enrol", "--examples", "many"),
+        ("listen", "--types", "gestures"), ("listen", "--types", ""), ("listen", "--count", "one"),
+        ("record x.mcap", "--max-mib", "0"), ("record x.mcap", "--seconds", "-1"),
+        ("replay x.npz", "--sensor", "a/b"), ("replay x.npz", "--speed", "0"),
+        ("simulate", "--to", "nowhere"), ("simulate", "--to", "127.0.0.1:0"), ("simulate", "--sensor", "a/b"),
+        ("simulate", "--kinds", "semaphore"), ("simulate", "--seed", "-1"), ("simulate", "--rate", "4"),
+        ("simulate", "--rate", "nan"), ("simulate", "--blob", "int12"), ("simulate", "--everyday", "moon"),
+        ("sniff", "--seconds", "0"), ("tune x.npz", "--budget", "0"), ("tune x.npz", "--budget", "nan"),
+    ],
+)  # fmt: skip
+def test_a_value_that_cannot_be_is_named_with_its_flag(run, command: str, flag: str, value: str) -> None:
+    status, out, err = run(*command.split(), flag, value)
+    assert (status, out) == (2, "")
+    assert f"argument {flag}: " in err and value in err

@@ -115,9 +115,3 @@ def test_a_model_that_cannot_be_used_is_one_sentence(start, shallow):
     assert (status, out, err.count("\n")) == (1, "", 1)
     assert "none.onnx" in err
     assert os.listdir(shallow) == []
-
-
-@pytest.mark.parametrize("seconds", ["0", "nan", "1e9"])
-def test_a_time_that_cannot_be(run, seconds):
-    status, _, err = run("demo", "--seconds", seconds)
-    assert status == 1 and "--seconds" in err

@@ -123,12 +123,6 @@ def test_ctrl_c_and_a_reader_that_leaves_end_it_without_a_word(start, fake: Fake
         assert b"Traceback" not in process.stderr.read()
 
 
-@pytest.mark.parametrize("wrong", [("--types", "gestures"), ("--types", ""), ("--count", "one")])
-def test_wrong_usage(run, wrong) -> None:
-    status, _, err = run("listen", *wrong)
-    assert status == 2 and wrong[0] in err
-
-
 def test_a_gesture_that_the_daemon_does_not_know_is_said(listen) -> None:
     status, _, err = listen([], "--gesture", "swipeleft")
     assert "no gesture of this daemon: swipeleft (one_tap)" in err

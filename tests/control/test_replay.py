@@ -141,10 +141,9 @@ def test_where_nobody_listens_is_one_sentence(replay, wrongly: Path) -> None:
     ("flags", "words"),
     [
         (("--speed", "2"), "--to HOST:PORT"),
-        (("--to", "127.0.0.1:1", "--diff"), "--diff compares a replay here"),
-        (("--to", "127.0.0.1:1", "--model", "lstm"), "the daemon of --to has its own"),
-        (("--to", "127.0.0.1:1", "--speed", "0"), "--speed 0"),
-        (("--sensor", "a/b"), "--sensor 'a/b'"),
+        (("--to", "127.0.0.1:1", "--diff"), "--diff is for a replay here"),
+        (("--to", "127.0.0.1:1", "--model", "lstm"), "--model is for a replay here"),
+        (("--to", "127.0.0.1:1", "--provisional"), "--provisional is for a replay here"),
     ],
 )
 def test_flags_that_do_not_go_together_are_one_sentence(replay, wrongly: Path, flags: tuple[str, ...], words) -> None:
@@ -184,5 +183,3 @@ def test_what_was_said_before_an_answer_is_on_the_tape_and_can_be_said_again(
         assert status == 0 and "3 recorded answers, 0 differences" in err
     _, out, _ = replay(path, "--model", model, "--provisional")
     assert "swipe_left?" in out and "confirmed: swipe_left, 0 ms before the finger left" in out
-    status, _, err = replay(path, "--provisional", "--to", "127.0.0.1:9")
-    assert status == 1 and "--provisional is for a replay here" in err

@@ -144,27 +144,6 @@ def test_a_daemon_that_goes_is_said_at_the_end_and_may_come_back(start):
     assert 0 < heard < sent - 1
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        ("--to", "nowhere"),
-        ("--to", "127.0.0.1:0"),
-        ("--sensor", "a/b"),
-        ("--kinds", "semaphore"),
-        ("--seed", "-1"),
-        ("--rate", "4"),
-        ("--rate", "nan"),
-        ("--grid", "1x9"),
-        ("--blob", "int12"),
-        ("--everyday", "moon"),
-    ],
-)
-def test_wrong_usage_names_the_flag_and_the_value(run, wrong):
-    status, out, err = run("simulate", *wrong)
-    assert (status, out) == (2, "")
-    assert wrong[0] in err and wrong[1] in err
-
-
 def test_a_day_has_kinds_of_its_own(run):
     status, out, err = run("simulate", "--everyday", "--kinds", "one_tap")
     assert (status, out) == (1, "")
