@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.timing import Row, ratio
 from gestured.client.sensor import Form
-from gestured.core import idle_pass
+from gestured.core import bank
 from gestured.core.frames import Frame
 from gestured.core.hub import Hub
 from gestured.core.scene import Scene
@@ -14,7 +14,7 @@ from gestured.record.replay import Mute
 
 SETTLE_S = 1.6  # s, after which each idle sensor is learned
 READS = 160  # reads whose cost is measured, after that
-NEVER = 1 << 30  # sensors, for `idle_pass.FEW`: so many never wait together, so each frame is taken by itself
+NEVER = 1 << 30  # sensors, for `FEW`: so many never wait together, so each frame is taken by itself
 
 
 def idle_frames() -> list[Row]:
@@ -40,7 +40,7 @@ def _costs(sensors: int, side: int, rate_hz: float, values: str) -> tuple[list[f
     base = rng.uniform(80, 160, (sensors, side, side))
     forms = [Form(f"s{n}", values) for n in range(sensors)]
     scene = Scene(("one_tap",), (side, side), clock="sensor", touches=False)
-    few = idle_pass.FEW
+    few = bank.FEW
     pair = [(Hub(scene, Mute(scene.gestures)), at, list[float]()) for at in (few, NEVER)]
     settle = round(SETTLE_S * rate_hz) + 1
     for k in range(settle + READS):
@@ -50,12 +50,12 @@ def _costs(sensors: int, side: int, rate_hz: float, values: str) -> tuple[list[f
             for form, one in zip(forms, noisy, strict=True)
         ]
         for hub, at, costs in pair:
-            idle_pass.FEW = at
+            bank.FEW = at
             start = time.process_time_ns()
             hub.receive(read, k / rate_hz)
             if k >= settle:
                 costs.append((time.process_time_ns() - start) / sensors / 1e3)
-    idle_pass.FEW = few
+    bank.FEW = few
     parts = [np.array(costs).reshape(8, -1) for _, _, costs in pair]
     together, alone = (np.median(part, axis=1).tolist() for part in parts)
     return together, alone

@@ -68,16 +68,16 @@ class Cutter:
         """`travel`: taxel pitches that a finger may move and still be where it was."""
         self._conditioner = conditioner
         self._travel = travel
-        self._kept: deque[Kept] = deque()
+        self.kept: deque[Kept] = deque()
         self._made: Made | None = None
         self._before = UNDISTURBED  # what went on before the contact that goes on, or before the last one
         self._settled = -math.inf  # s, the last frame of the second from which the idle sensor was learned
-        self._shown = b""  # raw counts of the last frame
-        self._new = 0.0  # s, since when the frames show just these counts
+        self.shown = b""  # raw counts of the last frame
+        self.new = 0.0  # s, since when the frames show just these counts
 
     def __len__(self) -> int:
         """How many frames are kept."""
-        return len(self._kept)
+        return len(self.kept)
 
     def settled(self, t: float) -> None:
         """The idle sensor has been watched until `t` s, and is known."""
@@ -85,24 +85,24 @@ class Cutter:
 
     def silent(self) -> None:
         """The stream paused: what follows was not seen to begin."""
-        self._kept.clear()
+        self.kept.clear()
         self._settled = -math.inf
 
     def clear(self) -> None:
         """The sensor restarted: what was kept is no part of what follows."""
-        self._kept.clear()
+        self.kept.clear()
 
     def keep(self, look: Look, lost: int, place: Place | None) -> None:
         """Take a frame. One that repeats the last is no news, unless the idle sensor repeats its frames, too."""
         t, shown = look.t, look.raw.tobytes()
-        if shown != self._shown or not self._conditioner.idle.lively:
-            self._new = t
-        self._shown = shown
-        self._kept.append(_new(Kept, (t, look.above, lost, place, self._new)))
+        if shown != self.shown or not self._conditioner.idle.lively:
+            self.new = t
+        self.shown = shown
+        self.kept.append(_new(Kept, (t, look.above, lost, place, self.new)))
 
     def trim(self, t: float) -> None:
         """Nothing is open at `t` s: keep what the next contact may need before its onset."""
-        kept = self._kept
+        kept = self.kept
         while kept[0].t < t - LEAD_S or len(kept) > LEAD_FRAMES:
             kept.popleft()
 
@@ -132,7 +132,7 @@ class Cutter:
         It is infinite where the finger's arrival was not seen. A sensor that sends nothing more has no last hole.
         """
         last, longest = self._settled, 0.0
-        for new in (*(kept.new for kept in self._kept), until):
+        for new in (*(kept.new for kept in self.kept), until):
             if new >= onset and new - last > longest:
                 if not HOLE_S < new - last <= CLEAR_S or not self._clear(onset, last, new, offset):
                     longest = new - last
@@ -141,9 +141,9 @@ class Cutter:
 
     def _clear(self, onset: float, begin: float, end: float, offset: float) -> bool:
         """Whether nothing hides in the hole from `begin` to `end` s of a contact."""
-        if any(begin < kept.t < end for kept in self._kept):
+        if any(begin < kept.t < end for kept in self.kept):
             return False  # the sensor repeated a frame, so the segment shows a finger at rest that may have moved
-        seen = [Sight(k.t, k.place) for k in self._kept if k.place is not None and onset <= k.t <= offset]
+        seen = [Sight(k.t, k.place) for k in self.kept if k.place is not None and onset <= k.t <= offset]
         before, after = [one for one in seen if one.t <= begin], [one for one in seen if one.t >= end]
         return clear(before, after, self._travel)
 
@@ -160,7 +160,7 @@ class Cutter:
 
     def _segment(self, onset: float, offset: float) -> tuple[Segment, NDArray[np.float64]]:
         """The segment of all that is kept, and (T, N) counts above the baseline before bad taxels are bridged."""
-        kept, conditioner = list(self._kept), self._conditioner
+        kept, conditioner = list(self.kept), self._conditioner
         times = np.array([frame.t for frame in kept])
         stack = np.array([frame.above for frame in kept])
         first = int(np.searchsorted(times, onset))

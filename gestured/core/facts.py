@@ -19,9 +19,9 @@ class Decided(NamedTuple):
 
 
 class Arrived(NamedTuple):
-    """What became of the frames of a sensor that were found waiting together."""
+    """What became of the frames of sensors that were found waiting together; the counts are those of each of them."""
 
-    sensor: str
+    sensors: tuple[str, ...]
     taken: int
     lost: int  # frames missing before these: by the sensor's counter, or as this machine had no room for packets
     duplicates: int

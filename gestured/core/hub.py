@@ -11,23 +11,20 @@ raised, since a daemon in a vehicle that dies of one sensor's odd frame helps no
 import math
 from collections.abc import Collection, Iterable, Sequence
 
-from gestured.core import idle_pass
+from gestured.core import bank
 from gestured.core.beside.reading import Reading, View
 from gestured.core.classifier import Classifier
 from gestured.core.events import Gate
-from gestured.core.facts import Arrived, Changed, Dropped, Fact, Fault
-from gestured.core.idle_pass import Waiting
+from gestured.core.facts import Changed, Dropped, Fact, Fault
 from gestured.core.listening import Gates, Listening
 from gestured.core.owner import Source
 from gestured.core.scene import Scene
 from gestured.core.sensor import Sensor
-from gestured.core.wire import FEW, Arrival, Decoder
+from gestured.core.wire import Arrival, Block, Decoder
 
 FORGET_S = 60.0  # a sensor that is silent for this long gives its place to one that sends
 REMEMBERED = 4096  # sensors that gave up their place, of which the last sequence and id are remembered
 HOSTS = 1024  # hosts of which it is remembered whether they may send
-
-_new = tuple.__new__  # Arrived(...) takes twice the time
 
 
 class Hub:
@@ -41,7 +38,9 @@ class Hub:
         """
         self._sensors: dict[str, Sensor] = {}
         self._numbers: dict[str, tuple[int, int]] = {}  # sequence and id that sensors which are not there have used
+        self._banks = bank.Banks()
         self._missed = 0  # times that this machine had no room for a packet
+        self._seen = 0  # what `_missed` was when packets were read last
         self._told: dict[str, int] = {}  # by sensor: what `_missed` was when that sensor was last told of it
         self._owners: frozenset[Source] = frozenset()
         self._asked: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
@@ -73,43 +72,55 @@ class Hub:
     def receive(self, packets: Sequence[tuple[bytes, Source]], now: float) -> list[Fact]:
         """Take packets that were found waiting at `now`, each with its source."""
         facts = [] if now < self.gates.due else self._lapse(now)
-        waiting = self._read(packets, now, facts)
-        if len(waiting) >= idle_pass.FEW:
-            as_before = (one for name, one in waiting.items() if self._told[name] == self._missed)
-            idle_pass.passes(as_before, now, facts)
-        for name, one in waiting.items():
-            sensor, arrivals = one.sensor, one.arrivals
-            if one.taken == len(arrivals):
-                facts.append(_new(Arrived, (name, one.taken, 0, 0, 0, 0)))
-                continue
-            if one.stamps is None:
-                if name in self._waits:
-                    sensor.elapse(now, facts)
-                one.stamps = sensor.stamp(arrivals, now, missed=self._told[name] != self._missed)
-                self._told[name] = self._missed
-            due = sensor.receive(arrivals, one.stamps, now, facts, taken=one.taken)
+        if self._seen != self._missed:  # how many packets each sensor has missed is seen by their frames alone
+            self._out(now, facts)
+            self._seen = self._missed
+        together = len(packets) >= bank.FEW
+        waited: list[Sensor] = []
+        for name, arrivals in self._read(packets, now, facts, together=together).items():
+            sensor = self._sensors[name]
+            if name in self._waits:
+                sensor.elapse(now, facts)
+            due = sensor.receive(arrivals, now, facts, missed=self._told[name] != self._missed)
+            self._told[name] = self._missed
             if due < math.inf:
                 self._waits[name], self._due = sensor, min(self._due, due)
             if sensor.shown is not None:
                 self.asks[name] = sensor
             if (self._asked is None or self._asked) and sensor.looks:
                 self.looks[name] = sensor
+            waited.append(sensor)
+        if together and len(waited) + len(self._banks.homes) >= bank.FEW:
+            for sensor in waited:
+                sensor.move(self._banks.enter, now, facts)
         return facts
 
-    def _read(self, packets: Sequence[tuple[bytes, Source]], now: float, facts: list[Fact]) -> dict[str, Waiting]:
-        """The frames of packets, by the names of the sensors that they may feed."""
-        waiting: dict[str, Waiting] = {}
-        together = self._together(packets, facts) if len(packets) >= FEW else {}
-        for n, (packet, source) in enumerate(packets):
-            try:
-                if self._scene.allow and not self._may_send(source[0]):
-                    facts.append(Dropped("not_allowed", source))
-                elif n in together:
-                    self._admit(together[n], source, now, waiting, facts)
-                else:
-                    self._decode(packet, source, now, waiting, facts)
-            except Exception as error:  # the packets before and after this one are good
-                facts.append(Fault(None, error))
+    def _read(
+        self, packets: Sequence[tuple[bytes, Source]], now: float, facts: list[Fact], *, together: bool
+    ) -> dict[str, list[Arrival]]:
+        """The frames of packets, by the names of the sensors that they may feed, without those that banks take."""
+        if self._scene.allow:
+            facts += [Dropped("not_allowed", source) for _, source in packets if not self._may_send(source[0])]
+            packets = [packet for packet in packets if self._may_send(packet[1][0])]
+        found: dict[int, list[Arrival]] = {}
+        blocks = self._together(packets, facts) if together else []
+        alone = set(range(len(packets)))
+        for block in blocks:
+            alone.difference_update(block.packets)
+        for n in sorted(alone):
+            found[n] = self._decode(*packets[n], facts)
+        if blocks:
+            others = {arrival.sensor for arrivals in found.values() for arrival in arrivals}
+            left = self._banks.take(blocks, [source for _, source in packets], others, now, facts)
+            found |= {n: [block.arrival(place)] for n, (block, place) in left.items()}
+        waiting: dict[str, list[Arrival]] = {}
+        for n in sorted(found) if blocks else found:
+            for arrival in found[n]:
+                try:
+                    if self._admits(arrival.sensor, packets[n][1], now, facts):
+                        waiting.setdefault(arrival.sensor, []).append(arrival)
+                except Exception as error:  # the packets before and after this one are good
+                    facts.append(Fault(None, error))
         return waiting
 
     def wait(self, now: float) -> list[Fact]:
@@ -152,18 +163,20 @@ class Hub:
         facts = [] if now < self.gates.due else self._lapse(now)
         facts += self.wait(now)
         sensors = self._sensors.values()
+        self._banks.show()
         self._owners = frozenset(sensor.owner.source for sensor in sensors if now - sensor.owner.heard <= FORGET_S)
         for sensor in sensors:
             sensor.review(now, facts)
             if not sensor.silent and sensor.stale(now):
                 facts.append(Changed(sensor.name, "silent", sensor.owner.source))
+                self._leave(sensor, now, facts)
                 sensor.end(now, facts)
         return facts
 
     def flush(self, now: float) -> list[Fact]:
         """No packet will come after `now`: open contacts are answered or cancelled."""
         facts: list[Fact] = []
-        for sensor in self._sensors.values():
+        for sensor in self._out(now, facts):
             sensor.end(now, facts)
         return facts
 
@@ -174,6 +187,7 @@ class Hub:
     def restart(self, sensors: Sequence[str], now: float) -> list[Fact]:
         """Learn these sensors anew; their open contacts are cancelled. KeyError for one that is not there."""
         facts: list[Fact] = []
+        self._out(now, facts)
         for name in sensors:
             self._sensors[name].restart(now, facts)
         return facts
@@ -182,7 +196,7 @@ class Hub:
         """Go on in another scene; what was learned of a sensor stays where it holds. ValueError as for a new hub."""
         facts: list[Fact] = []
         self._set(scene, classifier)
-        for sensor in self._sensors.values():
+        for sensor in self._out(now, facts):
             sensor.change(scene, classifier, now, facts)
             sensor.follow(facts, asked=self._follows(sensor.name))
         return facts
@@ -268,6 +282,8 @@ class Hub:
     def view(self, name: str, now: float, *, raw: bool) -> tuple[View, Reading] | None:
         """A sensor as it is felt now, and what is known of it; None where it was not heard."""
         sensor = self._sensors.get(name)
+        if sensor is not None:
+            self._leave(sensor, now, [])
         found = None if sensor is None else sensor.view(raw=raw)
         return None if sensor is None or found is None else (found, sensor.reading(now))
 
@@ -283,7 +299,7 @@ class Hub:
 
     def _shut(self, now: float) -> list[Fact]:
         facts: list[Fact] = []
-        for sensor in self._sensors.values():
+        for sensor in self._out(now, facts):
             sensor.shut(self.gates.of(sensor.name), now, facts)
         return facts
 
@@ -297,22 +313,23 @@ class Hub:
         self._allowed: dict[str, bool] = {}  # by host
         self._full_until = -math.inf  # s; before that no stranger has been silent for long enough to lose its place
 
-    def _together(self, packets: Sequence[tuple[bytes, Source]], facts: list[Fact]) -> dict[int, Arrival]:
+    def _together(self, packets: Sequence[tuple[bytes, Source]], facts: list[Fact]) -> list[Block]:
         """The frames of packets that can be read together; after a bug each is read by itself."""
         try:
             return self._decoder.together([packet for packet, _ in packets])
         except Exception as error:
             facts.append(Fault(None, error))
-            return {}
+            return []
 
-    def _decode(
-        self, packet: bytes, source: Source, now: float, waiting: dict[str, Waiting], facts: list[Fact]
-    ) -> None:
-        arrivals, errors = self._decoder.decode(packet, source)
-        for error in errors:
-            facts.append(Dropped(error.reason, source, text=str(error)))
-        for arrival in arrivals:
-            self._admit(arrival, source, now, waiting, facts)
+    def _decode(self, packet: bytes, source: Source, facts: list[Fact]) -> list[Arrival]:
+        try:
+            arrivals, errors = self._decoder.decode(packet, source)
+        except Exception as error:  # the packets before and after this one are good
+            facts.append(Fault(None, error))
+            return []
+        for wrong in errors:
+            facts.append(Dropped(wrong.reason, source, text=str(wrong)))
+        return arrivals
 
     def _may_send(self, host: str) -> bool:
         known = self._allowed.get(host)
@@ -322,22 +339,28 @@ class Hub:
             known = self._allowed[host] = self._scene.may_send(host)
         return known
 
-    def _admit(
-        self, arrival: Arrival, source: Source, now: float, waiting: dict[str, Waiting], facts: list[Fact]
-    ) -> None:
-        """Let a frame wait for its turn, if the `source` that has sent it may feed its sensor."""
-        name = arrival.sensor
+    def _admits(self, name: str, source: Source, now: float, facts: list[Fact]) -> bool:
+        """Whether a `source` that has sent a frame may feed that sensor, which then is out of its bank."""
         sensor = self._sensors.get(name) or self._new(name, source, now, facts)
         if sensor is None:
-            return
+            return False
+        self._leave(sensor, now, facts)
         if not sensor.owner.admits(source, now, self._scene.stale_s):
             facts.append(Dropped("second_source", source))
-            return
+            return False
         sensor.silent = False
-        if name in waiting:
-            waiting[name].arrivals.append(arrival)
-        else:
-            waiting[name] = Waiting(sensor, arrival)
+        return True
+
+    def _out(self, now: float, facts: list[Fact]) -> list[Sensor]:
+        """All sensors, none of which is in a bank any more."""
+        for name in tuple(self._banks.homes):
+            self._leave(self._sensors[name], now, facts)
+        return list(self._sensors.values())
+
+    def _leave(self, sensor: Sensor, now: float, facts: list[Fact]) -> None:
+        """Have a sensor out of its bank, if it is in one; a bug in that is added to `facts`."""
+        if sensor.name in self._banks.homes:
+            sensor.move(self._banks.leave, now, facts)
 
     def _new(self, name: str, source: Source, now: float, facts: list[Fact]) -> Sensor | None:
         """A sensor that was not heard before, or None where there is no place for it."""
@@ -363,6 +386,7 @@ class Hub:
             return False
         if now <= self._full_until:
             return True
+        self._banks.show()
         strangers = [sensor for sensor in self._sensors.values() if sensor.name not in named]
         if len(strangers) < self._scene.max_sensors - len(named):
             return False
@@ -370,6 +394,7 @@ class Hub:
         if longest is None or now - longest.owner.heard <= FORGET_S:
             self._full_until = now if longest is None else longest.owner.heard + FORGET_S
             return True
+        self._leave(longest, now, [])
         self._forget(longest)
         return False
 

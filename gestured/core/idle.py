@@ -4,7 +4,6 @@ That is learned from a second in which nothing moved, then followed while the se
 """
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -103,19 +102,11 @@ class Idle:
             return False
         jumps = np.abs(raw - self.compared)
         jumps = jumps[jumps > 0]
-        moved = jumps.size > 0
-        return self.glanced(t, raw, moved=moved, loud=moved and bool(QUIETER * median(jumps) >= self.learned))
-
-    def glanced(self, t: float, raw: Array, *, moved: bool, loud: bool) -> bool:
-        """Count a glance at `t` s at (N,) counts, in which some taxel `moved`, and taxels moved as when it was learned.
-
-        Whether too many glances were quieter by now; then what was learned is in doubt.
-        """
         self.glance, self.compared = t + GLANCE_S, raw
-        if loud:
+        if jumps.size and QUIETER * median(jumps) >= self.learned:
             self.quieter = 0
-        elif moved or self.lively:
-            self.quieter += GLANCE if moved else GLANCE_REPEATED
+        elif jumps.size or self.lively:
+            self.quieter += GLANCE if jumps.size else GLANCE_REPEATED
         if self.doubtful:
             self.doubt()
         return self.doubtful
@@ -183,16 +174,17 @@ class Idle:
         self.level = float(median(sigma))
 
 
-def mistaken(idles: Sequence[Idle], t: Array, raw: Array) -> list[bool]:
-    """What `Idle.mistaken` says of each of n sensors, none of which is in doubt, by (n, N) counts at (n,) s."""
-    compared = np.concatenate([idle.compared for idle in idles]).reshape(raw.shape)
-    jumps = np.sort(np.abs(raw - compared), axis=1)
+def glances(changes: Array, learned: Array, lively: Array, quieter: Array) -> Array:
+    """What a glance adds to `quieter` of each of n sensors (n,), whose (N,) counts have changed so much since the last.
+
+    It is what `Idle.mistaken` finds of one.
+    """
+    jumps = np.sort(np.abs(changes), axis=1)
     moved = np.count_nonzero(jumps, axis=1)  # the taxels that did not move are sorted before them
     first, rows = jumps.shape[1] - moved, np.arange(len(jumps))
     usual = (jumps[rows, first + (moved - 1) // 2] + jumps[rows, (first + moved // 2) % jumps.shape[1]]) / 2
-    loud = (moved > 0) & (QUIETER * usual >= [idle.learned for idle in idles])
-    found = zip(idles, t.tolist(), raw, (moved > 0).tolist(), loud.tolist(), strict=True)
-    return [idle.glanced(now, shown.copy(), moved=some, loud=as_loud) for idle, now, shown, some, as_loud in found]
+    loud = (moved > 0) & (QUIETER * usual >= learned)
+    return np.where(loud, -quieter, np.where(moved > 0, GLANCE, np.where(lively, GLANCE_REPEATED, 0)))
 
 
 def seen(above: Array, sigma: Array) -> Array:

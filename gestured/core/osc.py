@@ -70,13 +70,11 @@ def timetag(data: bytes, at: int, end: int) -> float | None:
     return float((seconds - _NTP_EPOCH) % 2**32 + fraction * 2**-32)
 
 
-def timetags(rows: NDArray[np.uint8]) -> list[float | None]:
-    """What `timetag` gives of each of (n, 8) bytes."""
+def timetags(rows: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """What `timetag` gives of each of (n, 8) bytes, (n,) s; NaN for "immediately"."""
     seconds, fraction = rows.view(">u4").astype(np.int64).T
-    found: list[float | None] = ((seconds - _NTP_EPOCH) % 2**32 + fraction * 2.0**-32).tolist()
-    for n in ((seconds == 0) & (fraction == 1)).nonzero()[0].tolist():
-        found[n] = None
-    return found
+    found = ((seconds - _NTP_EPOCH) & 0xFFFFFFFF) + fraction * 2.0**-32
+    return np.where((seconds == 0) & (fraction == 1), np.nan, found)
 
 
 class Place(NamedTuple):
@@ -125,14 +123,17 @@ class Layouts:
 
     def find(self, data: bytes) -> Layout | None:
         """The layout of a packet, None where it is not known; what a blob's size says is not looked at."""
-        begin = data[BUNDLED if data.startswith(_BUNDLE) else ALONE]
-        layout = self._known.get(begin) or self._known.get(_key(begin))
-        if layout is None or layout.length != len(data):
-            return None
-        for place in layout.places:
+        layout = self.guess(data)
+        for place in () if layout is None else layout.places:
             if not data.startswith(place[1], place[0]):
                 return None
         return layout
+
+    def guess(self, data: bytes) -> Layout | None:
+        """The layout that a packet has if its heads are those of the layout; None where it has none that is known."""
+        begin = data[BUNDLED if data.startswith(_BUNDLE) else ALONE]
+        layout = self._known.get(begin) or self._known.get(_key(begin))
+        return layout if layout is not None and layout.length == len(data) else None
 
     def read(self, data: bytes, bundled: bool) -> list[Message] | None:
         """The messages of a packet, None where its layout is not known."""

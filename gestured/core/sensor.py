@@ -21,7 +21,7 @@ from gestured.core.front_end import Cut, Ended, Found, FrontEnd, Opened, Shown
 from gestured.core.listening import INHIBITED, Listening
 from gestured.core.owner import Owner, Source
 from gestured.core.scene import Scene
-from gestured.core.stamping import Stamp, Stamper
+from gestured.core.stamping import Stamper
 from gestured.core.where import where
 from gestured.core.wire import Arrival
 
@@ -58,7 +58,7 @@ class Sensor:
         self.front_end = _front_end(name, scene)
         self._scene, self._decision = scene, Decision(scene, name)
         self._zones, self._listening = scene.setup(name).zones, Listening(scene.arming_of(name))
-        self._stamper = Stamper(scene.clock_of(name))
+        self.stamper = Stamper(scene.clock_of(name))
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # last; no scores where it failed
         self._placed: tuple[Segment, Where] | None = None  # where the last one that was shown was
         self.shown: Shown | None = None  # what `ask` is to ask about
@@ -67,7 +67,7 @@ class Sensor:
         # Whether looks for provisional events wait until `look`; and where nobody asks for these, the model's runs for
         # answers until `ask`, or until the answer is due.
         self._later = False
-        self._habits, self._vitals = Habits(*self.front_end.sent), Vitals()
+        self.habits, self.vitals = Habits(*self.front_end.sent), Vitals()
         self._square = self.front_end.rows == self.front_end.columns  # then idle frames say nothing of its habits
         self._fresh = True  # no frame was used since it came or restarted
         self._open: int | None = None  # id of the contact that was not released yet
@@ -96,7 +96,7 @@ class Sensor:
         if self._fingers.asked and self.front_end.touched and not self._listening.silences(front_end.segmenter.onset):
             told += self._fingers.see(front_end)
         if not self._square or ((look := front_end.look) is not None and look.burst):
-            self._habits.see(front_end)
+            self.habits.see(front_end)
         return told
 
     @property
@@ -121,7 +121,7 @@ class Sensor:
 
     def reset(self) -> list[Told]:
         """The sensor restarted: cancel what is open, learn the idle sensor anew."""
-        self._habits.clear()
+        self.habits.clear()
         return self._tell(self.front_end.reset())
 
     def lapse(self, t: float) -> list[Told]:
@@ -139,7 +139,7 @@ class Sensor:
 
     def _gate(self, t: float) -> Gate:
         """What the sensor listens to since `t` s, on the hub's clock."""
-        when = self._stamper.when
+        when = self.stamper.when
         return self._listening.told(self.name, when(t), when(self._listening.armed_until))
 
     def _tell(self, found: Sequence[Found]) -> list[Told]:
@@ -151,7 +151,7 @@ class Sensor:
                 if self._foresight.asked or not self._later:
                     self.ask()
                 continue
-            self._habits.hear(one)
+            self.habits.hear(one)
             if isinstance(one, Opened):
                 self.segments += 1
                 self._foresight.begin(self.segments)
@@ -280,48 +280,30 @@ class Sensor:
 
     @property
     def calm(self) -> bool:
-        """Whether an idle frame may be taken in an idle pass; see `FrontEnd.calm`."""
-        waits = self._listening.armed or self._foresight.wanted is not None
+        """Whether an idle frame says nothing but that the sensor is idle; see `FrontEnd.calm`."""
+        waits = self._listening.armed or self._foresight.wanted is not None or self.habits.falling
         return self.front_end.calm and not waits and not self._scene.frames
 
-    def stamp(self, arrivals: Sequence[Arrival], now: float, *, missed: bool = False) -> list[Stamp] | Exception:
-        """The stamps of frames that were found waiting at `now`, or the bug on which that failed.
+    def move(self, to: Callable[["Sensor"], None], now: float, facts: list[Fact]) -> None:
+        """Have what is known of the sensor moved into a bank, or out of it; a bug in that is added to `facts`."""
+        try:
+            to(self)
+        except Exception as error:
+            self._recover(error, self.stamper.at(now), facts)
+
+    def receive(self, arrivals: Sequence[Arrival], now: float, facts: list[Fact], *, missed: bool = False) -> float:
+        """Take frames that were found waiting at `now`; gives `arrives` as it is then.
 
         `missed`: this machine may have had no room for others.
         """
         try:
-            stamps = self._stamper.stamp(arrivals, now, missed=missed)
+            stamps = self.stamper.stamp(arrivals, now, missed=missed)
+            self.vitals.arrived(now, len(arrivals), missed=missed)
         except Exception as error:
-            return error
-        self._vitals.arrived(now, len(arrivals), missed=missed)
-        return stamps
-
-    def passed(self, now: float, facts: list[Fact]) -> None:
-        """Show `Habits` a frame that an idle pass has taken at `now`: it learns from idle frames, too."""
-        if not self._square:
-            try:
-                self._habits.see(self.front_end)
-            except Exception as error:
-                self._recover(error, self._stamper.at(now), facts)
-
-    def receive(
-        self,
-        arrivals: Sequence[Arrival],
-        stamps: list[Stamp] | Exception,
-        now: float,
-        facts: list[Fact],
-        *,
-        taken: int = 0,
-    ) -> float:
-        """Take frames that were found waiting at `now`, with what `stamp` gave of them; gives `arrives` as it is then.
-
-        The first `taken` of them are done: idle passes have taken them.
-        """
-        if isinstance(stamps, Exception):
-            self._recover(stamps, self._stamper.at(now), facts)
+            self._recover(error, self.stamper.at(now), facts)
             return self.arrives
-        lost = duplicates = late = implausible = 0
-        for arrival, stamp in zip(arrivals[taken:], stamps[taken:], strict=True):
+        taken = lost = duplicates = late = implausible = 0
+        for arrival, stamp in zip(arrivals, stamps, strict=True):
             if stamp.dropped:
                 duplicates += stamp.dropped == "duplicate"
                 late += stamp.dropped == "late"
@@ -347,14 +329,14 @@ class Sensor:
             self._run(self.give_up, now, facts)
         if lost:
             self._lost, self._lost_at = self._lost + lost, now
-        facts.append(_new(Arrived, (self.name, taken, lost, duplicates, late, implausible)))
+        facts.append(_new(Arrived, ((self.name,), taken, lost, duplicates, late, implausible)))
         return math.inf if self._open is None else self.arrives
 
     @property
     def arrives(self) -> float:
         """When `elapse` will find something unless a frame comes before; infinite where nothing waits."""
         due = None if self._open is None else self.due  # nothing waits where there is no contact
-        return math.inf if due is None else self._stamper.when(due)
+        return math.inf if due is None else self.stamper.when(due)
 
     def elapse(self, now: float, facts: list[Fact]) -> None:
         """No frame has come until `now`: a contact may be over."""
@@ -363,12 +345,12 @@ class Sensor:
     def end(self, now: float, facts: list[Fact]) -> None:
         """The sensor has nothing more to say: what is open is answered or cancelled."""
         self.silent = True
-        self._vitals.silent()
+        self.vitals.silent()
         self._run(self.flush, now, facts)
 
     def restart(self, now: float, facts: list[Fact]) -> None:
         """Learn the sensor anew; a contact that is open is cancelled."""
-        self._vitals.restart()
+        self.vitals.restart()
         self._fresh = True
         self._run(lambda _: self.reset(), now, facts)
 
@@ -380,12 +362,12 @@ class Sensor:
         alike = (old.sent, old.mounting, old.timing) == (new.sent, new.mounting, new.timing)
         if another_clock or not alike or scene.waits_for_double_tap != before.waits_for_double_tap:
             self._run(lambda _: self.reset(), now, facts)
-            self.front_end, self._habits = new, Habits(*new.sent)
+            self.front_end, self.habits = new, Habits(*new.sent)
             self._square = new.rows == new.columns
         if another_clock:
-            self._stamper = Stamper(scene.clock_of(self.name))
+            self.stamper = Stamper(scene.clock_of(self.name))
         if self._listening.change(scene.arming_of(self.name), another_clock=another_clock):
-            facts.append(self._gate(self._stamper.at(now)))
+            facts.append(self._gate(self.stamper.at(now)))
         self.classifier, self._decision, self._asked = classifier, Decision(scene, self.name), None
         self._placed = None
         self._zones = scene.setup(self.name).zones
@@ -402,9 +384,9 @@ class Sensor:
         if armed_until is not None and armed_until > -math.inf:
             self._listening.arm(armed_until)
         if closed != self._listening.closed:
-            self._run(lambda t: self.gate(closed, t, self._stamper.past(now)), now, facts)
+            self._run(lambda t: self.gate(closed, t, self.stamper.past(now)), now, facts)
         elif armed_until is not None and self._listening.arming is not None:
-            facts.append(self._gate(self._stamper.at(now)))
+            facts.append(self._gate(self.stamper.at(now)))
 
     def foresee(self, *, asked: bool, later: bool = False) -> None:
         """Say of contacts from now on, or no longer, what they will most probably be.
@@ -435,7 +417,7 @@ class Sensor:
 
     def review(self, now: float, facts: list[Fact]) -> None:
         """Look at what need not be looked at with each frame; called with each tick."""
-        self._vitals.review(self.front_end)
+        self.vitals.review(self.front_end)
         if self._listening.armed:
             self._run(self.lapse, now, facts)
 
@@ -445,16 +427,16 @@ class Sensor:
 
     def condition(self, now: float) -> tuple[str, str]:
         """How the sensor is, and why; see `Reading`."""
-        if self._vitals.intermittent and now - self.owner.heard <= ABSENT_S:
+        if self.vitals.intermittent and now - self.owner.heard <= ABSENT_S:
             return "intermittent", ""
         if self.stale(now):
             return "stale", ""
-        return self._vitals.condition(self.front_end, inverted=self._habits.inverted)
+        return self.vitals.condition(self.front_end, inverted=self.habits.inverted)
 
     def listens(self, now: float) -> Gate | None:
         """What gates and arming say at `now`; None of a sensor that always listens."""
         always = not self._listening.closed and self._listening.arming is None
-        return None if always else self._gate(self._stamper.at(now))
+        return None if always else self._gate(self.stamper.at(now))
 
     def reading(self, now: float) -> Reading:
         """All that is known of the sensor."""
@@ -465,20 +447,20 @@ class Sensor:
             self._scene.grid_of(self.name),
             reason=reason,
             interval_s=front_end.interval_s,
-            jitter_s=self._vitals.jitter_s,
+            jitter_s=self.vitals.jitter_s,
             bad_taxels=front_end.bad_taxels,
             noise=front_end.noise,
             source=self.owner.source,
             heard=self.owner.heard,
             lost=self._lost,
             lost_at=self._lost_at,
-            exchanged=self._habits.exchanged,
-            gate=self._gate(self._stamper.at(now)),
+            exchanged=self.habits.exchanged,
+            gate=self._gate(self.stamper.at(now)),
             touched=front_end.touched,
             contact=self._open,
             sequence=self.sequence,
             segments=self.segments,
-            first=self._vitals.first,
+            first=self.vitals.first,
             baseline=front_end.baseline if front_end.ready else None,
         )
 
@@ -487,7 +469,7 @@ class Sensor:
         return view_of(self.front_end, raw=raw)
 
     def _run(self, act: Callable[[float], list[Told]], now: float, facts: list[Fact]) -> None:
-        t = self._stamper.at(now)
+        t = self.stamper.at(now)
         try:
             self._add(act(t), now, facts)
         except Exception as error:

@@ -42,29 +42,29 @@ class Stamper:
     LEAP = 10_000  # a counter that jumps further has lost nothing, it began anew: ten seconds at 1000 Hz
 
     def __init__(self, clock: Literal["arrival", "sensor"] = "arrival") -> None:
-        self._by_tag = clock == "sensor"
-        self._intervals: deque[float] = deque(maxlen=self.RECENT)
-        self._last: float | None = None  # s, the last stamp
-        self._arrived = 0.0  # s, the arrival of the frame that was stamped last
-        self._tag: float | None = None  # s, the time tag of that frame
-        self._ahead = 0.0  # s, how far that frame was put beyond its tag, which earlier frames had, too
-        self._counter: int | None = None  # of the newest frame
-        self._late: tuple[int, int] = (0, 0)  # counter of the last late frame, and how many came in a row
+        self.by_tag = clock == "sensor"
+        self.intervals: deque[float] = deque(maxlen=self.RECENT)
+        self.last: float | None = None  # s, the last stamp
+        self.arrived = 0.0  # s, the arrival of the frame that was stamped last
+        self.tag: float | None = None  # s, the time tag of that frame
+        self.ahead = 0.0  # s, how far that frame was put beyond its tag, which earlier frames had, too
+        self.counter: int | None = None  # of the newest frame
+        self.late: tuple[int, int] = (0, 0)  # counter of the last late frame, and how many came in a row
 
     def at(self, arrived: float) -> float:
         """The stream's time when frames that `arrived` then (s) were felt: the last stamp plus what passed since."""
-        return arrived if self._last is None else self._last + max(0.0, arrived - self._arrived)
+        return arrived if self.last is None else self.last + max(0.0, arrived - self.arrived)
 
     def past(self, arrived: float) -> float:
         """The stream's time up to which what was felt has come before `arrived` (s).
 
         A sensor's own clock is known by its frames alone, and may have stood still since the last one.
         """
-        return self._last if self._by_tag and self._last is not None else self.at(arrived)
+        return self.last if self.by_tag and self.last is not None else self.at(arrived)
 
     def when(self, t: float) -> float:
         """The arrival time in s at which the stream's time is `t` s; the inverse of `at`."""
-        return t if self._last is None else self._arrived + (t - self._last)
+        return t if self.last is None else self.arrived + (t - self.last)
 
     def stamp(self, arrivals: Sequence[Arrival], arrived: float, *, missed: bool = False) -> list[Stamp]:
         """One stamp for each of this sensor's frames that were waiting when they `arrived`, in s.
@@ -74,18 +74,18 @@ class Stamper:
         """
         if len(arrivals) == 1 and not missed:
             return [self._alone(arrivals[0], arrived)]
-        if self._by_tag and not missed and len({arrival.timetag for arrival in arrivals}) == len(arrivals):
+        if self.by_tag and not missed and len({arrival.timetag for arrival in arrivals}) == len(arrivals):
             return [self._alone(arrival, arrived) for arrival in arrivals]
-        before, usual = self._last, self._typical() if missed else math.nan
+        before, usual = self.last, self._typical() if missed else math.nan
         stamps: list[Stamp] = []
         run: list[tuple[int, int]] = []  # frames with one time: index, periods since the frame before
         for i, arrival in enumerate(arrivals):
-            pause = 0.0 if run else arrived - self._arrived
+            pause = 0.0 if run else arrived - self.arrived
             steps, dropped, restarted = self._count(arrival.counter, pause)
             stamps.append(Stamp(math.nan, max(0, steps - 1), dropped, restarted, False))
             if dropped:
                 continue
-            if self._by_tag and run and arrival.timetag != arrivals[run[-1][0]].timetag:
+            if self.by_tag and run and arrival.timetag != arrivals[run[-1][0]].timetag:
                 self._place(arrivals, stamps, run, arrived)
                 run = []
             run.append((i, steps))
@@ -99,42 +99,42 @@ class Stamper:
         """The stamp of a frame that shares its time with no other: the same as by `_place`, with fewer steps."""
         steps, dropped, restarted = ONE
         _, _, counter, tag, _ = arrival
-        before = self._counter
+        before = self.counter
         if counter is not None and before is not None and counter - before == 1:  # nearly all frames come in turn
-            self._counter, self._late = counter, (0, 0)
+            self.counter, self.late = counter, (0, 0)
         elif counter is not None or before is not None:
-            steps, dropped, restarted = self._count(counter, arrived - self._arrived)
+            steps, dropped, restarted = self._count(counter, arrived - self.arrived)
             if dropped:
                 return Stamp(math.nan, 0, dropped, False, False)
-        t, last, implausible = arrived, self._last, self._by_tag and tag is None
+        t, last, implausible = arrived, self.last, self.by_tag and tag is None
         if last is not None:
-            if self._by_tag:
+            if self.by_tag:
                 step, implausible = self._step(last, tag, arrived)
                 t = last + step
             if t > last:
-                self._intervals.append((t - last) / steps)
+                self.intervals.append((t - last) / steps)
             if t < last + self.MIN_STEP_S:
                 t = last + self.MIN_STEP_S
-        self._last, self._arrived, self._tag = t, arrived, tag
+        self.last, self.arrived, self.tag = t, arrived, tag
         return _new(Stamp, (t, steps - 1, "", restarted, implausible))
 
     def _count(self, counter: int | None, pause: float) -> Counted:
         """(periods since the frame before, why it is dropped, whether the sensor restarted)."""
-        before, self._counter = self._counter, counter
+        before, self.counter = self.counter, counter
         if counter is None or before is None:
             return ONE
         step = (counter - before + 2**31) % 2**32 - 2**31  # an int32 that wraps
         if 0 < step <= self.LEAP:
-            self._late = (0, 0)
+            self.late = (0, 0)
             return step, "", False
         if step == 0:
             return 0, "duplicate", False
-        late, streak = self._late
+        late, streak = self.late
         streak = streak + 1 if streak and counter == late + 1 else 1
         if -step <= self.REORDER and step < 0 and pause <= self.REORDER_S and streak < self.STREAK:
-            self._counter, self._late = before, (counter, streak)
+            self.counter, self.late = before, (counter, streak)
             return 0, "late", False
-        self._late = (0, 0)
+        self.late = (0, 0)
         return 1, "", True
 
     def _place(
@@ -144,19 +144,19 @@ class Stamper:
         tag = arrivals[run[-1][0]].timetag
         total = sum(steps for _, steps in run)
         implausible = False
-        if self._last is None:
+        if self.last is None:
             end, spacing = arrived, self._typical()
-            implausible = self._by_tag and tag is None
+            implausible = self.by_tag and tag is None
         else:
             end = arrived
-            if self._by_tag:
-                step, implausible = self._step(self._last, tag, arrived)
-                end = self._last + step
-            share = (end - self._last) / total
+            if self.by_tag:
+                step, implausible = self._step(self.last, tag, arrived)
+                end = self.last + step
+            share = (end - self.last) / total
             spacing = min(self._typical(), share) if len(run) > 1 else share
             if share > 0:
-                self._intervals.append(share)
-        last = self._last
+                self.intervals.append(share)
+        last = self.last
         for i, steps in run:
             total -= steps
             t = end - total * spacing
@@ -164,22 +164,20 @@ class Stamper:
                 t = last + self.MIN_STEP_S
             last = t
             stamps[i] = Stamp(t, stamps[i].lost, "", stamps[i].restarted, implausible)
-        self._last, self._arrived, self._tag = last, arrived, tag
+        self.last, self.arrived, self.tag = last, arrived, tag
 
     def _step(self, last: float, tag: float | None, arrived: float) -> tuple[float, bool]:
         """Seconds since the `last` stamp by the time tag, or else by the arrival; and whether the tag is impossible."""
-        step = tag - self._tag if tag is not None and self._tag is not None else 0.0
+        step = tag - self.tag if tag is not None and self.tag is not None else 0.0
         if 0 < step <= self.MAX_STEP_S and last + step <= arrived + self.AHEAD_S:
-            ahead = (
-                self._ahead if self._ahead <= self.REORDER_S else 0.0
-            )  # a clock that stood for longer lost that time
-            self._ahead = max(ahead - step, 0.0)
+            ahead = self.ahead if self.ahead <= self.REORDER_S else 0.0  # a clock that stood for longer lost that time
+            self.ahead = max(ahead - step, 0.0)
             return max(step - ahead, 0.0), False
-        waited = arrived - self._arrived
+        waited = arrived - self.arrived
         # A coarse clock shows one time for several frames; what they were put beyond it is no step of the clock.
-        self._ahead = self._ahead + waited if tag is not None and tag == self._tag else 0.0
-        return waited, tag is None or self._tag is not None
+        self.ahead = self.ahead + waited if tag is not None and tag == self.tag else 0.0
+        return waited, tag is None or self.tag is not None
 
     def _typical(self) -> float:
         """Seconds between two frames: the median, since a late frame must not count."""
-        return sorted(self._intervals)[len(self._intervals) // 2] if self._intervals else self.PERIOD_S
+        return sorted(self.intervals)[len(self.intervals) // 2] if self.intervals else self.PERIOD_S

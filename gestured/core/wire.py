@@ -84,6 +84,28 @@ class Arrival(NamedTuple):
     touches: tuple[Touch, ...]
 
 
+class Block(NamedTuple):
+    """The frames of n packets that are laid out alike."""
+
+    packets: list[int]  # their places among all that were found waiting
+    sensors: list[str]
+    values: NDArray[np.float32] | NDArray[np.float64]  # (n, R, C) counts, as in `Arrival`
+    counters: NDArray[np.int64] | None
+    tags: NDArray[np.float64] | None  # s since the Unix epoch; NaN for "immediately"
+
+    def only(self, places: NDArray[np.intp]) -> "Block":
+        """Those frames of it that stand in these places."""
+        packets, sensors = ([each[n] for n in places.tolist()] for each in (self.packets, self.sensors))
+        counters = None if self.counters is None else self.counters[places]
+        return Block(packets, sensors, self.values[places], counters, None if self.tags is None else self.tags[places])
+
+    def arrival(self, n: int) -> Arrival:
+        """One of them by itself."""
+        counter = None if self.counters is None else int(self.counters[n])
+        tag = None if self.tags is None or math.isnan(self.tags[n]) else float(self.tags[n])
+        return Arrival(self.sensors[n], self.values[n], counter, tag, ())
+
+
 class _Route(NamedTuple):
     """What an address with these type tags means."""
 
@@ -99,7 +121,9 @@ class _Meaning(NamedTuple):
     route: _Route
     place: Place  # of the frame's message
     dtype: np.dtype[Any]  # of the frame's values as they are sent
-    form: int  # the same for packets whose frames stand in the same place, of the same type and grid
+    heads: bytes  # of all messages
+    at: tuple[slice, ...]  # where these stand in the packet
+    form: int  # the same for packets whose messages stand in the same places, with frames of the same type and grid
 
 
 class Decoder:
@@ -147,25 +171,21 @@ class Decoder:
                 errors.append(error)
         return (self._join(found, source) if touched else arrivals), errors
 
-    def together(self, packets: Sequence[bytes]) -> dict[int, Arrival]:
-        """The frames of packets that are laid out alike and as some before them, by the packet's index.
+    def together(self, packets: Sequence[bytes]) -> list[Block]:
+        """The frames of packets that are laid out alike and as some before them.
 
-        They are what `decode` gives of each packet, at half the price. A packet that is missing here is for `decode`:
-        it is laid out in another way than its neighbours, or its frame is not finite.
+        They are what `decode` gives of each packet, at a fraction of the price. A packet that is in no block is for
+        `decode`: it is laid out in another way than its neighbours, or its frame is not finite.
         """
         alike: dict[int, list[tuple[int, _Meaning]]] = {}
-        for i, packet in enumerate(packets):
-            layout = self._layouts.find(packet)
+        for i, layout in enumerate(map(self._layouts.guess, packets)):
             if layout is not None:
-                if layout.meaning is None:
-                    layout.meaning = self._meaning(layout)
-                if layout.meaning:
-                    alike.setdefault(layout.meaning.form, []).append((i, layout.meaning))
-        found: dict[int, Arrival] = {}
-        for members in alike.values():
-            if len(members) >= FEW:
-                found |= _frames([packets[i] for i, _ in members], members)
-        return found
+                meaning: _Meaning | Literal[False] = layout.meaning
+                if meaning is None:
+                    meaning = layout.meaning = self._meaning(layout)
+                if meaning:
+                    alike.setdefault(meaning.form, []).append((i, meaning))
+        return [_block(packets, members) for members in alike.values() if len(members) >= FEW]
 
     def _meaning(self, layout: Layout) -> _Meaning | Literal[False]:
         """What packets of a layout hold; False where each of them has to be read by itself."""
@@ -179,10 +199,13 @@ class Decoder:
         dtype = place.dtype if place.dtype is not None else _BLOBS.get(place.length / (rows * columns))
         if dtype is None or any(other.blob for other in layout.places if other is not place):
             return False
-        form = layout.length, place.run, place.length, place.blob, dtype.kind, route.grid, route.counted
+        at = tuple(slice(one.start, one.start + len(one.head)) for one in layout.places)
+        bounds = tuple((one.start, one.stop) for one in at)
+        form = layout.length, bounds, place.run, place.length, place.blob, dtype.kind, route.grid, route.counted
         if len(self._forms) >= _MAX_ROUTES:
             self._forms.clear()
-        return _Meaning(route, place, dtype, self._forms.setdefault(form, next(self._numbers)))
+        heads = b"".join(one.head for one in layout.places)
+        return _Meaning(route, place, dtype, heads, at, self._forms.setdefault(form, next(self._numbers)))
 
     def _learn(self, address: str, types: str) -> _Route:
         if len(self._routes) >= _MAX_ROUTES:
@@ -270,30 +293,29 @@ def _frame(message: Message, route: _Route) -> Arrival:
     return _new(Arrival, (route.sensor, values.reshape(rows, columns), counter, message.timetag, ()))
 
 
-def _frames(packets: list[bytes], members: list[tuple[int, _Meaning]]) -> dict[int, Arrival]:
-    """The finite frames of packets whose `form` is the same, by index."""
-    _, (route, place, dtype, _) = members[0]
+def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Block:
+    """The finite frames of packets whose `form` is the same."""
+    _, (route, place, dtype, _, at, _) = members[0]
     assert route.grid is not None
     taxels, end = math.prod(route.grid), place.run + (place.length if place.blob else place.length * dtype.itemsize)
-    block = np.frombuffer(b"".join(packets), np.uint8).reshape(len(packets), -1)
+    block = np.frombuffer(b"".join([packets[i] for i, _ in members]), np.uint8).reshape(len(members), -1)
     raw = block[:, place.run : end].view(dtype)
     values: NDArray[Any] = raw[:, -taxels:].astype(np.float64 if dtype.kind == "i" else np.float32)
-    good = np.isfinite(values).all(axis=1)
-    counters: list[int | None] = [None] * len(packets)
-    tags: list[float | None] = [None] * len(packets)
+    heads = np.frombuffer(b"".join([meaning.heads for _, meaning in members]), np.uint8).reshape(len(members), -1)
+    good = np.isfinite(values).all(axis=1) & (np.hstack([block[:, one] for one in at]) == heads).all(axis=1)
+    counters = tags = None
     if place.blob:
         good &= block[:, place.run - 4 : place.run].view(">u4")[:, 0] == place.length
     if route.counted:
         first = raw if place.unpack is None else block[:, place.scalars : place.scalars + 4].view(">i4")
-        counters = first[:, 0].tolist()
+        counters = first[:, 0].astype(np.int64)
     if place.start:  # alone, a message begins at 0
         tags = osc.timetags(block[:, 8:16])
-    rows = zip(members, values.reshape(-1, *route.grid), counters, tags, good.tolist(), strict=True)
-    return {
-        i: _new(Arrival, (meaning.route.sensor, frame, counter, tag, ()))
-        for (i, meaning), frame, counter, tag, finite in rows
-        if finite
-    }
+    found = Block(
+        [i for i, _ in members], [meaning.route.sensor for _, meaning in members],
+        values.reshape(-1, *route.grid), counters, tags,
+    )  # fmt: skip
+    return found if good.all() else found.only(good.nonzero()[0])
 
 
 def _touches(args: tuple[Argument, ...]) -> tuple[Touch, ...]:

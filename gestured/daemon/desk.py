@@ -1,7 +1,7 @@
 """What becomes of the hub's facts: events go to every sink, other facts are counted, logged and compared."""
 
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -102,13 +102,13 @@ class Desk:
                 self.bug(what, error)
 
     def _count(self, arrived: Arrived) -> None:
-        label = self._metrics.sensor_label(arrived.sensor)
-        counts = (arrived.taken, arrived.lost, arrived.duplicates, arrived.late)
-        for result, count in zip(("ok", "lost", "duplicate", "late"), counts, strict=True):
-            if count:
-                self._metrics.frames.add(label, result, count=count)
-        if arrived.implausible:
-            self._metrics.implausible.add(count=arrived.implausible)
+        sensors, taken, lost, duplicates, late, implausible = arrived
+        for label, number in Counter(map(self._metrics.sensor_label, sensors)).items():
+            for result, count in (("ok", taken), ("lost", lost), ("duplicate", duplicates), ("late", late)):
+                if count:
+                    self._metrics.frames.add(label, result, count=number * count)
+        if implausible:
+            self._metrics.implausible.add(count=implausible)
 
     def _changed(self, change: Changed) -> None:
         if change.what == "new":

@@ -68,7 +68,7 @@ class Views:
     def see(self, facts: Sequence[Fact]) -> None:
         """Take note of which sensors sent something."""
         if self._looks:
-            arrived = {fact.sensor for fact in facts if isinstance(fact, Arrived)}
+            arrived = {name for fact in facts if isinstance(fact, Arrived) for name in fact.sensors}
             self._expect({name for look in self._looks.values() for name in look.sensors & arrived})
 
     def publish(self, event: Event, epoch: float, *, test: bool = False) -> None:

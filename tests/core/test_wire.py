@@ -290,7 +290,8 @@ def test_packets_that_are_read_together_say_what_each_says_alone() -> None:
         usual = int(rng.integers(6))  # most packets of a read have one form
         forms = [usual if rng.random() < 0.8 else int(rng.integers(6)) for _ in range(rng.integers(1, 40))]
         packets = [_any_packet(rng, name, grids[name], form) for form in forms for name in rng.choice(list(grids), 1)]
-        together = both.together(packets)
+        blocks = both.together(packets)
+        together = {n: block.arrival(place) for block in blocks for place, n in enumerate(block.packets)}
         shared += len(together)
         for n, packet in enumerate(packets):
             arrivals, errors = alone.decode(packet)

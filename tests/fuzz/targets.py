@@ -46,8 +46,9 @@ def decoder(data: bytes) -> None:
     assert all(_plain(*other) == _plain(arrivals, errors) for other in others), "depends on what came before"
     unseen = Decoder(Addresses(), lambda name: (9, 9) if name == BIG else (2, 2), keep_touches=False)
     alone = [unseen.decode(data) for _ in range(FEW)]  # from the second one on by its layout
-    for n, arrival in unseen.together([data] * FEW).items():
-        assert _plain([arrival], []) == _plain(*alone[n]), "read with others it says something else"
+    for block in unseen.together([data] * FEW):
+        for place, n in enumerate(block.packets):
+            assert _plain([block.arrival(place)], []) == _plain(*alone[n]), "read with others it says something else"
     for arrival in arrivals:
         assert arrival.values.shape == ((9, 9) if arrival.sensor == BIG else (2, 2))
         assert np.isfinite(arrival.values).all()

@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -53,8 +54,8 @@ def play(tape: Tape, model: Ladder) -> list[Line]:
             match fact:
                 case Arrived():
                     implausible += fact.implausible
-                    for result in ("taken", "lost", "duplicates", "late"):
-                        frames[f"{fact.sensor} {COUNTED[result]}"] += getattr(fact, result)
+                    for sensor, result in product(fact.sensors, ("taken", "lost", "duplicates", "late")):
+                        frames[f"{sensor} {COUNTED[result]}"] += getattr(fact, result)
                 case Dropped():
                     dropped[fact.reason] += 1
                 case Fault():

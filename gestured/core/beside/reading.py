@@ -72,14 +72,14 @@ class Vitals:
         self.interval_s = 0.0  # from frame to frame, as of the last tick; 0 before it is known
         self.first: NDArray[np.float64] | None = None  # (N,) counts
         self._quietest = np.inf  # counts: the least noise so far
-        self._last: float | None = None
+        self.last: float | None = None  # s, when frames came last
         self._began = 0.0  # s, the first frame after the last silence
         self._stretches = 0  # stretches in a row that were shorter than SHORT_S
 
     @property
     def intermittent(self) -> bool:
         """Whether the sensor falls silent again and again, after a few seconds each time."""
-        return self._stretches >= STRETCHES and (self._last is None or self._last - self._began < SHORT_S)
+        return self._stretches >= STRETCHES and (self.last is None or self.last - self._began < SHORT_S)
 
     def arrived(self, now: float, frames: int, *, missed: bool) -> None:
         """`frames` came together at `now` s. Interarrival jitter as RTP has it.
@@ -89,11 +89,11 @@ class Vitals:
         """
         if missed:
             self._stretches = 0
-        if self._last is not None and self.interval_s > 0:
-            self.jitter_s += (abs(now - self._last - frames * self.interval_s) - self.jitter_s) * WEIGHT
-        if self._last is None:
+        if self.last is not None and self.interval_s > 0:
+            self.jitter_s += (abs(now - self.last - frames * self.interval_s) - self.jitter_s) * WEIGHT
+        if self.last is None:
             self._began = now
-        self._last = now
+        self.last = now
 
     def review(self, front_end: FrontEnd) -> None:
         """Keep the first baseline, the least noise and the interval. Beside the way of a frame, with each tick."""
@@ -105,9 +105,9 @@ class Vitals:
 
     def silent(self) -> None:
         """The sensor has fallen silent: the next interval says nothing of its jitter."""
-        if self._last is not None:
-            self._stretches = self._stretches + 1 if self._last - self._began < SHORT_S else 0
-        self._last = None
+        if self.last is not None:
+            self._stretches = self._stretches + 1 if self.last - self._began < SHORT_S else 0
+        self.last = None
 
     def restart(self) -> None:
         """Forget the first baseline and the least noise: the sensor is learned anew."""

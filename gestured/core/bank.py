@@ -1,0 +1,297 @@
+"""Calm sensors as rows of arrays: the idle frames of all of them that wait together are taken together.
+
+Nearly all frames of many sensors are idle, and a call of numpy costs more than the 81 numbers that it is for. So what
+is known of a sensor that nobody touches moves into a row of a bank, and moves back into the sensor's own objects before
+anything else than an idle frame in its turn is looked at. A bank does with such a frame what `Sensor.receive` does, to
+the last bit: `matmul` of a stack of grids gives what `dot` gives of each, and exponentials are `math`'s.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import repeat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gestured.core.activity import SURPRISE, USUAL_AT_MOST, Activity
+from gestured.core.beside.reading import WEIGHT as JITTER_SHARE
+from gestured.core.conditioning import Look, weigh
+from gestured.core.cutter import LEAD_FRAMES, LEAD_S, Kept
+from gestured.core.facts import Arrived, Fact, Fault
+from gestured.core.front_end import FrontEnd
+from gestured.core.idle import BASELINE_TAU_S, GLANCE_S, GLANCES, NOISE_TAU_S, REVIEW_S, UNSEEN_S, glances, seen
+from gestured.core.owner import Source
+from gestured.core.quantiles import median
+from gestured.core.sensor import Sensor
+from gestured.core.stamping import Stamper
+from gestured.core.taxels import NOISY
+from gestured.core.timing import SHARE
+from gestured.core.wire import Block
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+FEW = 5  # frames from which on taking them together costs less than one by one
+FIRST_ROWS = 16  # rows of a new bank
+RECENT = 1 << (Stamper.RECENT - 1).bit_length()  # frames of which times are kept, at least; a multiple of any depth
+KNOWN = 20  # numbers that are known of each sensor, as `Bank.enter` puts them
+BY_TAG = 3  # the place of one of them
+COUNTS, SIGMA, WEIGHT, COMPARED, SENT = range(5)  # of each taxel: `Idle`, `Conditioner`; the last frame as it was sent
+
+
+class Banks:
+    """The calm sensors of a hub: a bank for each kind of them."""
+
+    def __init__(self) -> None:
+        self._banks: dict[tuple[int, ...], Bank] = {}
+        self.homes: dict[str, tuple[int, ...]] = {}  # by sensor: in which of them it is
+
+    def enter(self, sensor: Sensor) -> None:
+        """Move what is known of a sensor into a bank, if it is calm and its last frame came in its turn."""
+        if not sensor.calm:
+            return
+        front, stamper, owner = sensor.front_end, sensor.stamper, sensor.owner
+        times = {stamper.last, front.pace.last, front.conditioner.idle.followed}
+        arrived = {stamper.arrived, sensor.vitals.last, owner.heard, owner.own}
+        if owner.steady and len(times) == len(arrived) == 1 and not stamper.ahead:
+            frames = min(LEAD_S / front.pace.interval_s, LEAD_FRAMES) + 1
+            kind = (*front.kind, 1 << math.ceil(math.log2(frames)))
+            bank = self._banks.get(kind) or self._banks.setdefault(kind, Bank(front, kind[-1]))
+            bank.enter(sensor)
+            self.homes[sensor.name] = kind
+
+    def leave(self, sensor: Sensor) -> None:
+        """Move what is known of a sensor that is in a bank back into its objects."""
+        kind = self.homes.pop(sensor.name)
+        if len(self._banks[kind]) == 1:
+            self._banks.pop(kind).leave(sensor.name)  # an empty bank would keep its memory
+        else:
+            self._banks[kind].leave(sensor.name)
+
+    def show(self) -> None:
+        """Put what readings tell, and when sensors were heard, into their objects; they stay where they are."""
+        for bank in self._banks.values():
+            bank.show()
+
+    def take(
+        self, blocks: Sequence[Block], sources: Sequence[Source], others: set[str], now: float, facts: list[Fact]
+    ) -> dict[int, tuple[Block, int]]:
+        """Take the idle frames of sensors that are in banks; what is left, by packet: its block and place in it.
+
+        `sources` are those of all packets. `others`: sensors of other packets, which must not be overtaken.
+        """
+        left: dict[int, tuple[Block, int]] = {}
+        names: set[str] = set()
+        for block in blocks:
+            others = others.union(names.intersection(block.sensors))
+            names.update(block.sensors)
+        for block in blocks:
+            waits = np.full(len(block.packets), True)
+            for bank in self._banks.values():
+                try:
+                    for taken in bank.take(block, sources, others, now):
+                        facts.append(Arrived(tuple([block.sensors[n] for n in taken]), 1, 0, 0, 0, 0))
+                        waits[taken] = False
+                except Exception as error:  # a bug: what was not taken until then is taken one by one
+                    facts.append(Fault(None, error))
+            left |= {block.packets[n]: (block, n) for n in waits.nonzero()[0].tolist()}
+        return left
+
+
+class Bank:
+    """Calm sensors of one kind: of one grid and mounting, and of about one rate."""
+
+    def __init__(self, front: FrontEnd, depth: int) -> None:
+        """For sensors whose front ends are like this one, of whose last frames `depth` can be kept."""
+        self._front, self._activity = front, Activity(front.rows, front.columns)  # for what is the same of all
+        taxels = front.rows * front.columns
+        self._sensors: dict[str, Sensor] = {}
+        self._rows: dict[str, int] = {}
+        self._owners: dict[str, Source] = {}
+        self._free = list(range(FIRST_ROWS))
+        self._known = np.zeros((FIRST_ROWS, KNOWN))
+        self._taxels = np.zeros((FIRST_ROWS, 5, taxels))
+        self._above = np.zeros((FIRST_ROWS, depth, taxels))  # of the last frames, of which the cutter keeps some
+        self._when = np.zeros((FIRST_ROWS, max(depth, RECENT), 3))  # s of each: time, `Kept.new`, interval
+
+    def __len__(self) -> int:
+        """How many sensors are in it."""
+        return len(self._rows)
+
+    def enter(self, sensor: Sensor) -> None:
+        """Move what is known of a sensor into a row."""
+        front, stamper, vitals = sensor.front_end, sensor.stamper, sensor.vitals
+        idle, activity = front.conditioner.idle, front.conditioner.activity
+        if not self._free:
+            self._free = list(range(len(self._known), 2 * len(self._known)))
+            for name in ("_known", "_taxels", "_above", "_when"):
+                table = getattr(self, name)
+                setattr(self, name, np.concatenate([table, np.zeros_like(table)]))
+        row = self._free[-1]
+        self._known[row] = (
+            stamper.last, stamper.arrived, math.nan if stamper.tag is None else stamper.tag, stamper.by_tag,
+            math.nan if stamper.counter is None else stamper.counter,
+            front.pace.interval_s, vitals.interval_s, vitals.jitter_s,
+            idle.glance, idle.learned, idle.quieter, idle.lively, idle.reviewed, idle.step, idle.level,
+            activity.usual, activity.scale, 0.0, front.cutter.new, 0,  # activity and number of frames taken here
+        )  # fmt: skip
+        assert front.shown is not None
+        self._taxels[row] = idle.counts, idle.sigma, front.conditioner.weight, idle.compared, front.shown.reshape(-1)
+        self._when[row] = -math.inf
+        self._sensors[sensor.name], self._owners[sensor.name] = sensor, sensor.owner.source
+        self._rows[sensor.name] = self._free.pop()
+
+    def leave(self, name: str) -> None:
+        """Move what is known of a sensor back into its objects."""
+        row, sensor = self._rows.pop(name), self._sensors.pop(name)
+        del self._owners[name]
+        self._free.append(row)
+        (last, arrived, tag, _, counter, interval, _, jitter, glance, _, quieter, _, reviewed, _, level,
+         usual, scale, active, new, count) = self._known[row].tolist()  # fmt: skip
+        if not count:
+            return
+        front, stamper, vitals, owner = sensor.front_end, sensor.stamper, sensor.vitals, sensor.owner
+        conditioner, cutter = front.conditioner, front.cutter
+        idle, activity = conditioner.idle, conditioner.activity
+        owner.heard = owner.own = vitals.last = stamper.arrived = arrived
+        stamper.last = front.pace.last = idle.followed = last
+        stamper.tag = None if math.isnan(tag) else tag
+        if not math.isnan(counter):
+            stamper.counter, stamper.late = int(counter), (0, 0)
+        front.pace.interval_s, vitals.jitter_s = interval, jitter
+        idle.glance, idle.quieter, idle.reviewed, idle.level = glance, int(quieter), reviewed, level
+        activity.usual, activity.scale = usual, scale
+        idle.counts, idle.sigma, conditioner.weight, idle.compared, sent = self._taxels[row].copy()
+        when, above = (np.roll(ring[row], -int(count), axis=0) for ring in (self._when, self._above))  # oldest first
+        stamper.intervals.extend(step for _, _, step in when.tolist() if step > 0)
+        for higher, (t, since, _) in zip(above, when[-len(above) :].tolist(), strict=True):
+            if t > -math.inf:
+                cutter.kept.append(Kept(t, higher, 0, None, since))
+        cutter.trim(last)
+        front.shown = sent.reshape(front.sent)
+        raw = self._mounted(front.shown[np.newaxis])[0]
+        cutter.shown, cutter.new = raw.tobytes(), new
+        front.look = Look(last, raw, above[-1], active, False, False, False)
+        sensor.habits.see(front)  # it learns from the last idle frame before a contact
+
+    def show(self) -> None:
+        """Put what readings tell, and when sensors were heard, into their objects."""
+        rows = list(self._rows.values())
+        known = self._known[rows][:, [0, 1, 5, 7, 14]].tolist()
+        for sensor, counts, (last, heard, interval, jitter, level) in zip(
+            self._sensors.values(), self._taxels[rows, COUNTS], known, strict=True
+        ):
+            sensor.owner.heard = sensor.owner.own = sensor.stamper.arrived = heard
+            sensor.stamper.last = last
+            sensor.vitals.interval_s = sensor.front_end.pace.interval_s = interval
+            sensor.vitals.jitter_s = jitter
+            sensor.front_end.conditioner.idle.level, sensor.front_end.conditioner.idle.counts = level, counts
+        self._known[:, 6] = self._known[:, 5]
+
+    def take(self, block: Block, sources: Sequence[Source], others: set[str], now: float) -> Iterator[list[int]]:
+        """Take those frames of a block that are idle; their places in it, those of frames taken together at a time."""
+        if block.values.shape[1:] != self._front.sent:
+            return
+        owners = map(self._owners.get, block.sensors)
+        mine = np.array([sources[n] == owner for n, owner in zip(block.packets, owners, strict=True)])
+        if others:
+            mine &= [name not in others for name in block.sensors]
+        rows = np.fromiter(map(self._rows.get, block.sensors, repeat(-1)), np.intp, len(block.packets))
+        frames = np.bincount(rows[mine], minlength=len(self._known))
+        if frames.max() > 1:  # of a sensor without a clock; they share their time
+            mine &= (frames[rows] == 1) | (self._known[rows, BY_TAG] > 0)
+        left, first = mine.nonzero()[0], np.empty(len(self._known), np.intp)
+        while len(left) >= FEW:
+            first.fill(-1)
+            first[rows[left[::-1]]] = left[::-1]  # each row's first frame, since the last that is put there stays
+            turn = first[first >= 0]
+            if len(turn) < FEW:
+                return
+            taken = turn[self._take(block, turn, rows[turn], frames, now)]
+            yield taken.tolist()
+            frames.fill(0)  # they have come with the first ones
+            gone_on = np.isin(np.arange(len(first)), rows[taken])
+            left = left[gone_on[rows[left]] & (first[rows[left]] != left)]
+
+    def _take(
+        self, block: Block, places: NDArray[np.intp], rows: NDArray[np.intp], frames: NDArray[np.intp], now: float
+    ) -> Mask:
+        """Take a frame of each of n rows where it is idle and came in its turn; (n,) whether it was and did."""
+        taken: Mask
+        front, known = self._front, self._known[rows]
+        (last, arrived, tag, by_tag, counter, interval, paced, jitter, glance, learned, quieter, lively, reviewed, step,
+         level, usual, scale, active, new, count) = known.T  # fmt: skip
+        if block.tags is None:
+            t, taken, tag[:] = np.full(len(rows), now), by_tag == 0, math.nan
+        else:
+            tags = block.tags[places]
+            since = tags - tag
+            good = (since > 0) & (since <= Stamper.MAX_STEP_S) & (last + since <= now + Stamper.AHEAD_S)
+            t, taken, tag[:] = np.where(by_tag, last + since, now), good | (by_tag == 0), tags
+        if block.counters is None:
+            taken &= np.isnan(counter)
+        else:
+            counter += 1
+            taken &= counter == block.counters[places]
+        since = t - last
+        taken &= (t >= last + Stamper.MIN_STEP_S) & (np.maximum(since, now - arrived) <= front.timing.stale_s)
+        depth, recent = self._above.shape[1], self._when.shape[1]
+        taken &= self._when[rows, ((count - depth) % recent).astype(np.intp), 0] < t - LEAD_S  # else there is no room
+        sent = block.values[places].astype(np.float64).reshape(len(rows), -1)
+        raw = sent if front.as_sent else self._mounted(sent.reshape(-1, *front.sent))
+
+        glanced = (taken & (t >= glance)).nonzero()[0]
+        if glanced.size:
+            changes = raw[glanced] - self._taxels[rows[glanced], COMPARED]
+            quieter[glanced] += glances(changes, learned[glanced], lively[glanced], quieter[glanced])
+            glance[glanced] = t[glanced] + GLANCE_S
+            taken &= quieter < GLANCES  # else the sensor was learned from what was no idle one
+        counts = self._taxels[rows, COUNTS]
+        above = raw - counts
+        active[:], lowest = self._activity.measure_all(above * self._taxels[rows, WEIGHT])
+        taken &= (active < front.segmenter.on) & (lowest >= -front.conditioner.deep)
+        ago = np.minimum(-since, 0.0)
+        usual += (np.minimum(active, SURPRISE * self._activity.typical) * scale - usual) * _shares(ago, NOISE_TAU_S)
+        counts += above * _shares(ago, BASELINE_TAU_S)[:, np.newaxis]
+        due = (taken & (t - reviewed >= REVIEW_S)).nonzero()[0]
+        if due.size:
+            sigma = self._taxels[rows[due], SIGMA]
+            unseen = np.maximum(reviewed[due], t[due] - UNSEEN_S) - t[due]
+            sigma += (seen(above[due], sigma) - sigma) * _shares(unseen, NOISE_TAU_S)[:, np.newaxis]
+            sigma = np.maximum(sigma, step[due, np.newaxis] / 2)
+            level[due], reviewed[due] = median(sigma.T), t[due]
+            scale[due] = np.minimum(np.maximum(usual[due] / self._activity.typical, 1.0), USUAL_AT_MOST)
+            taken[due] = np.all(sigma <= NOISY * level[due, np.newaxis], axis=1)  # else some taxels are bad
+            weight = weigh(sigma, level[due, np.newaxis], scale[due, np.newaxis])
+
+        expected = frames[rows] * paced
+        jitter += np.where(expected > 0, (np.abs(now - arrived - expected) - jitter) * JITTER_SHARE, 0.0)
+        interval += (since - interval) * SHARE
+        news = (sent.view(np.int64) != self._taxels[rows, SENT].view(np.int64)).any(axis=1) | (lively == 0)
+        np.copyto(new, t, where=news)
+        last[:], arrived[:] = t, now
+        # From here on sensors change: all of what was found above, of those whose frames are taken.
+        if glanced.size:
+            glanced = glanced[taken[glanced]]
+            self._taxels[rows[glanced], COMPARED] = raw[glanced]
+        if due.size:
+            fine = taken[due]
+            due = rows[due[fine]]
+            self._taxels[due, SIGMA], self._taxels[due, WEIGHT] = sigma[fine], weight[fine]
+        keep = slice(None) if taken.all() else taken
+        rows, slot = rows[keep], count[keep].astype(np.intp)
+        self._above[rows, slot % depth] = above[keep]
+        self._when[rows, slot % recent] = np.array((t, new, since)).T[keep]
+        self._taxels[rows, COUNTS], self._taxels[rows, SENT] = counts[keep], sent[keep]
+        count += 1
+        self._known[rows] = known[keep]
+        return taken
+
+    def _mounted(self, values: NDArray[np.generic]) -> Array:
+        """(n, R, C) counts as they were sent -> (n, N) as a person in front of the sensor sees them."""
+        return self._front.mounting.frame(values).astype(np.float64).reshape(len(values), -1)
+
+
+def _shares(ago: Array, tau: float) -> Array:
+    """(n,) shares of a difference that a follower with time constant `tau` s takes up in (n,) times `-ago` s."""
+    return -np.array(list(map(math.expm1, (ago / tau).tolist())))
