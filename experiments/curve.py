@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from gestured.lab.adapt.adaptation import settled
 from gestured.lab.adapt.judging import Answers, Interval, Shares
-from gestured.lab.adapt.learning import Course, opinions
+from gestured.lab.adapt.learning import Course, opinions, simulate
 from gestured.lab.adapt.material import Own, own_recordings
-from gestured.lab.adapt.takes import simulate
 from gestured.lab.cli import CACHE
 from gestured.lab.evaluate import without
 from gestured.lab.nets import Judged

@@ -47,7 +47,7 @@ def _forest_calibration(chances: NDArray[np.float64], labels: NDArray[np.int64])
     known = labels < len(GESTURES)
     best: tuple[float, dict[str, Any]] | None = None
     for temperature in np.geomspace(0.2, 2.0, 24):
-        calibration = {"temperature": float(temperature), "unknown_scale": 1.0, "unknown_offset": 0.0}
+        calibration = {"temperature": float(temperature)}
         scores, _ = forest_outputs(chances, len(GESTURES), calibration)
         loss = -float(np.log(np.maximum(scores[known, labels[known]], 1e-9)).mean())
         if best is None or loss < best[0]:

@@ -1,7 +1,6 @@
 """A random forest as an ONNX graph, and the same in numpy.
 
-A forest's classes are 0 .. G-1 for the gestures, the others for none. Its outputs are calibrated: a temperature over
-the gestures, a logistic curve over what they leave.
+A forest's classes are 0 .. G-1 for the gestures, the others for none. Its scores are calibrated by a temperature.
 """
 
 import math
@@ -25,15 +24,13 @@ LEAST_CHANCE = 1e-3  # a forest's probabilities are not trusted below this, nor 
 def forest_outputs(probabilities: NDArray[Any], gestures: int, calibration: Mapping[str, Any]) -> Answers:
     """(B, classes) probabilities of a forest -> calibrated scores (B, G) and unknown (B,), as in the file.
 
-    scores = softmax(log p / `temperature`) over the gestures; unknown = sigmoid(`unknown_scale` * logit(none)
-    + `unknown_offset`), none being what the gestures leave. Without these keys: 1, 1 and 0.
+    scores = softmax(log p / `temperature`) over the gestures; unknown is what the gestures leave.
     """
-    temperature, scale, offset = _calibration(calibration)
+    temperature = _temperature(calibration)
     named = np.asarray(probabilities, np.float64)[:, :gestures]
     logits = np.log(np.maximum(named, LEAST_CHANCE)) / temperature
     powers = np.exp(logits - logits.max(axis=1, keepdims=True))
-    none = np.clip(1.0 - named.sum(axis=1), LEAST_CHANCE, 1.0 - LEAST_CHANCE)
-    unknown = 1.0 / (1.0 + np.exp(-(scale * np.log(none / (1.0 - none)) + offset)))
+    unknown = np.clip(1.0 - named.sum(axis=1), LEAST_CHANCE, 1.0 - LEAST_CHANCE)
     scores = powers / powers.sum(axis=1, keepdims=True)
     return scores.astype(np.float32), unknown.astype(np.float32)
 
@@ -45,10 +42,8 @@ def forest_graph(forest: RandomForestClassifier, gestures: int, calibration: Map
     and a third of a second (173,000 nodes), and this is walked as exactly. The file holds the tables in the smallest
     types that they fit into; what comes before the walk does not depend on the input, and is done once, at opening.
     """
-    temperature, scale, offset = _calibration(calibration)
-    tables = _flatten(forest)
     constants = {
-        **tables,
+        **_flatten(forest),
         "gesture_start": np.array([0], np.int64),
         "gesture_end": np.array([gestures], np.int64),
         "axis_one": np.array([1], np.int64),
@@ -60,9 +55,7 @@ def forest_graph(forest: RandomForestClassifier, gestures: int, calibration: Map
         "least": np.float32(LEAST_CHANCE),
         "most": np.float32(1.0 - LEAST_CHANCE),
         "one": np.float32(1.0),
-        "temperature": np.float32(temperature),
-        "scale": np.float32(scale),
-        "offset": np.float32(offset),
+        "temperature": np.float32(_temperature(calibration)),
     }
     nodes: list[onnx.NodeProto] = []
 
@@ -102,13 +95,7 @@ def forest_graph(forest: RandomForestClassifier, gestures: int, calibration: Map
     add("Softmax", ["logits"], "scores", axis=1)
     add("ReduceSum", ["named", "axis_one"], "named_sum", keepdims=0)
     add("Sub", ["one", "named_sum"], "none_all")
-    add("Clip", ["none_all", "least", "most"], "none")
-    add("Sub", ["one", "none"], "some")
-    add("Div", ["none", "some"], "odds")
-    add("Log", ["odds"], "logit")
-    add("Mul", ["logit", "scale"], "scaled")
-    add("Add", ["scaled", "offset"], "moved")
-    add("Sigmoid", ["moved"], "unknown")
+    add("Clip", ["none_all", "least", "most"], "unknown")
     floats = TensorProto.FLOAT
     graph = helper.make_graph(
         nodes,
@@ -143,15 +130,11 @@ def rounded_down(exact: NDArray[np.float64]) -> NDArray[np.float32]:
     return np.where(rounded > exact, np.nextafter(rounded, np.float32(-np.inf)), rounded)
 
 
-def _calibration(calibration: Mapping[str, Any]) -> tuple[float, float, float]:
-    values = (
-        float(calibration.get("temperature", 1.0)),
-        float(calibration.get("unknown_scale", 1.0)),
-        float(calibration.get("unknown_offset", 0.0)),
-    )
-    if not all(map(math.isfinite, values)) or values[0] <= 0:
-        raise ModelError(f"calibration: expected finite numbers and a temperature above 0, found {values}")
-    return values
+def _temperature(calibration: Mapping[str, Any]) -> float:
+    found = float(calibration.get("temperature", 1.0))
+    if not (math.isfinite(found) and found > 0):
+        raise ModelError(f"calibration: expected a temperature above 0, found {found}")
+    return found
 
 
 def _flatten(forest: RandomForestClassifier) -> dict[str, NDArray[Any]]:

@@ -32,7 +32,7 @@ CARD: dict[str, Any] = {
     "version": "1.2.0",
     "gestures": GESTURES,
     "window": WINDOW,
-    "calibration": {"temperature": 1.7, "unknown_scale": 0.8, "unknown_offset": -0.3},
+    "calibration": {"temperature": 1.7},
     "training_data": hashlib.sha256(b"data").hexdigest(),
     "quantiles": {"duration_s": [0.1, 0.4, 1.2]},
 }

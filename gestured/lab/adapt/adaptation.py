@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from torch import nn
 
 from gestured.lab.adapt.judging import Answers, Shares
-from gestured.lab.adapt.learning import Course, between, classes_of, learned, opinions
+from gestured.lab.adapt.learning import Course, Simulated, between, classes_of, learned, opinions
 from gestured.lab.adapt.material import Groups, Own, held_out
-from gestured.lab.adapt.refitting import refitted
-from gestured.lab.adapt.takes import Simulated
 from gestured.lab.adapt.weights import Base
+from gestured.lab.decide import refitted
 from gestured.lab.foretold import Foretold
 from gestured.lab.nets import Decision, Judged
 from gestured.lab.samples import Samples

@@ -15,9 +15,8 @@ from gestured.client.say import say, say_json
 from gestured.core.errors import GesturedError
 from gestured.lab.adapt.adaptation import Adapted, adapt
 from gestured.lab.adapt.judging import Shares
-from gestured.lab.adapt.learning import Course
+from gestured.lab.adapt.learning import Course, simulate
 from gestured.lab.adapt.material import Own, own_recordings
-from gestured.lab.adapt.takes import simulate
 from gestured.lab.adapt.weights import Base, base_of
 from gestured.lab.decide import calibration_of
 from gestured.lab.export import Facts, export_net

@@ -37,10 +37,6 @@ class Answers:
             np.concatenate([samples.people, missed]),
         )
 
-    def take(self, chosen: NDArray[np.bool_]) -> "Answers":
-        """Some of the rows."""
-        return Answers(self.known[chosen], self.right[chosen], self.confidence[chosen], self.unit[chosen])
-
     def where(self, chosen: NDArray[np.bool_], other: "Answers") -> "Answers":
         """The same rows, the chosen ones answered by the other."""
         return Answers(

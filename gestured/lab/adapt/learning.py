@@ -8,6 +8,7 @@ what either knows better than any single step count does (Wortsman et al. 2022, 
 import copy
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -15,13 +16,16 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from gestured.lab.augment import symmetry_table
+from gestured.lab.dataset import OTHER_TRIALS, simulated
 from gestured.lab.fit import CLASSES, FitConfig, Shown, optimiser_of, step, targets
 from gestured.lab.nets import Judged, Opinion
 from gestured.lab.progress import progress
 from gestured.lab.samples import Samples, join
 from gestured.lab.verifier import Evidence
-from gestured.simulator import GESTURES
+from gestured.simulator import GESTURES, NONE
 
+PEOPLE = 6  # of the nominal simulated set, whom no training has met
+SEED = 31  # of all that is simulated here
 OTHER = len(CLASSES)  # a non-gesture of a kind that has no class
 
 
@@ -36,13 +40,36 @@ class Course:
     fit: FitConfig = FitConfig()  # settings of a step that are those of training
 
 
+@dataclass(frozen=True)
+class Simulated:
+    """Simulated takes of people whom no training has met."""
+
+    teach: Samples
+    check: Samples  # to fit the decision
+    early: Samples  # for the thresholds of provisional events, together with `check`
+    nominal: Samples  # to judge
+    missed: NDArray[np.int64]  # people of the nominal gestures that were never cut out
+
+
+def simulate(cache: Path, jobs: int) -> Simulated:
+    """A few thousand takes, from a seed; cut once, then from the cache."""
+    teach = simulated(cache, "wide", SEED, 4_000, jobs)
+    check = simulated(cache, "wide", SEED + 1, 1_500, jobs)
+    early = simulated(cache, "wide", SEED + 2, 12_000, jobs)
+    performed = 90 * PEOPLE
+    others = len(OTHER_TRIALS) // 34 * PEOPLE
+    nominal = join([simulated(cache, "cohort", SEED, performed, jobs), simulated(cache, "others", SEED, others, jobs)])
+    lost = max(performed - int((nominal.labels != NONE).sum()), 0)
+    return Simulated(teach, check, early, nominal, np.full(lost, nominal.people[0]))
+
+
 def classes_of(samples: Samples) -> NDArray[np.int64]:
     """(G,) class of each sample, `OTHER` for a non-gesture of a kind that has none."""
     found = targets(samples)
     return np.where(found < 0, OTHER, found)
 
 
-def learned(start: Judged, simulated: Samples, own: Samples, course: Course, title: str) -> Judged:
+def learned(start: Judged, takes: Samples, own: Samples, course: Course, title: str) -> Judged:
     """Go on from `start`; the decision stays as it was."""
     judged = copy.deepcopy(start)
     nets: list[Opinion] = [judged.net, judged.trajectory]
@@ -52,10 +79,10 @@ def learned(start: Judged, simulated: Samples, own: Samples, course: Course, tit
     generator = torch.Generator().manual_seed(config.seed)
     torch.manual_seed(config.seed)  # dropout, so that the same recordings give the same model
     table = torch.cat([symmetry_table(CLASSES), torch.full((8, 1), OTHER)], 1)
-    both = join([simulated, own])
+    both = join([takes, own])
     classes, shown = classes_of(both), Shown(both, config.unfinished)
     judged.train()
-    for index in progress(_batches(both, classes, len(simulated), course, rng), course.steps, title):
+    for index in progress(_batches(both, classes, len(takes), course, rng), course.steps, title):
         x, lengths, symmetry = shown.batch(index, rng, generator)
         y = table[symmetry][torch.from_numpy(classes[index])]
         loss = torch.stack([_loss(net(x, lengths), y, config.smoothing) for net in nets]).sum()
@@ -77,14 +104,14 @@ def opinions(judged: Judged, samples: Samples) -> Evidence:
 
 
 def _batches(
-    both: Samples, classes: NDArray[np.int64], simulated: int, course: Course, rng: np.random.Generator
+    both: Samples, classes: NDArray[np.int64], taken: int, course: Course, rng: np.random.Generator
 ) -> Iterator[NDArray[np.int64]]:
     """`steps` batches of samples of similar length: little is padded. Rare classes of the own ones count more."""
-    own, batch = len(both) - simulated, course.fit.batch
+    own, batch = len(both) - taken, course.fit.batch
     share = min(course.own_share, course.repeats * own / (course.steps * batch))
-    weight = np.full(len(both), (1 - share) / simulated)
-    rarity = 1 / np.sqrt(np.bincount(classes[simulated:], minlength=OTHER + 1))[classes[simulated:]]
-    weight[simulated:] = share * rarity / rarity.sum()
+    weight = np.full(len(both), (1 - share) / taken)
+    rarity = 1 / np.sqrt(np.bincount(classes[taken:], minlength=OTHER + 1))[classes[taken:]]
+    weight[taken:] = share * rarity / rarity.sum()
     weight /= weight.sum()
     lengths = both.lengths()
     for start in range(0, course.steps, 20):

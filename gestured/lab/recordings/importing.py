@@ -33,18 +33,6 @@ LARGEST_COUNT = 1e30  # of any number; sums and differences of such counts still
 
 
 @dataclass(frozen=True, slots=True)
-class LeftOut:
-    """A line that is no frame."""
-
-    file: Path
-    line: int
-    reason: str  # the field, and what was expected
-
-    def __str__(self) -> str:
-        return f"{self.file}: line {self.line} is left out: {self.reason}"
-
-
-@dataclass(frozen=True, slots=True)
 class Csv:
     """What a CSV file does not say itself.
 
@@ -65,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out.exists():
         raise GesturedError(f"--out: {args.out} is there already; expected a new file")
     parts: list[Recordings] = []
-    left: list[LeftOut] = []
+    left: list[str] = []
     refused: list[str] = []
     rows, columns = args.grid
     form = Csv(rows, columns, args.time_unit, args.label, args.participant, args.consent or "")
@@ -76,9 +64,9 @@ def run(args: argparse.Namespace) -> int:
             refused.append(str(error))
             continue
         parts.append(recordings)
-        left += gone
+        left += [f"{path}: line {line} is left out: {reason}" for line, reason in gone]
     more = [f"and {len(left) - LEFT_OUT_SHOWN} lines more"] if len(left) > LEFT_OUT_SHOWN else []
-    for line in [*refused, *map(str, left[:LEFT_OUT_SHOWN]), *more]:
+    for line in [*refused, *left[:LEFT_OUT_SHOWN], *more]:
         say(line, to=sys.stderr if args.json else sys.stdout)
     if not parts:
         raise GesturedError("nothing could be imported, so nothing was written")
@@ -91,12 +79,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def read_csv(path: Path, form: Csv) -> tuple[Recordings, list[LeftOut]]:
-    """One recording; RecordingError where the file does not hold one."""
+def read_csv(path: Path, form: Csv) -> tuple[Recordings, list[tuple[int, str]]]:
+    """One recording, and each line that was left out with its reason; RecordingError where the file holds none."""
     times: list[float] = []
     values = array("d")
     last: list[float] = []
-    left: list[LeftOut] = []
+    left: list[tuple[int, str]] = []
     for number, text in _lines(path):
         cells = text.split(",")
         if number == 1 and _number(cells[0]) is None:
@@ -109,15 +97,17 @@ def read_csv(path: Path, form: Csv) -> tuple[Recordings, list[LeftOut]]:
             if times and t <= times[-1]:
                 raise ValueError(f"time: expected later than {times[-1]:.6f} s, found {t:.6f} s")
         except ValueError as error:
-            _leave(left, LeftOut(path, number, str(error)))
+            left.append((number, str(error)))
+            if len(left) > BAD_LINES:
+                break
             continue
         if len(values) + len(counts) > NUMBERS:
             raise RecordingError(f"{path}: line {number}: expected at most {NUMBERS} numbers in a file; split it")
         times.append(t)
         values.extend(counts)
         last = counts
-    if len(times) < 2 or len(left) > len(times):
-        first = f"; {left[0].reason} (line {left[0].line})" if left else ""
+    if len(times) < 2 or len(left) > min(len(times), BAD_LINES):
+        first = f"; {left[0][1]} (line {left[0][0]})" if left else ""
         raise RecordingError(f"{path}: expected frames, found {len(times)} and {len(left)} lines that are none{first}")
     frames = compact(np.frombuffer(values).reshape(-1, form.rows, form.columns))
     return _marked(frames, np.array(times), path, form), left
@@ -140,15 +130,6 @@ def _marked(frames: NDArray[np.generic], times: NDArray[np.float64], path: Path,
     if contact is None:
         raise RecordingError(f"{path}: frames: expected one {form.label} with untouched frames before or after it")
     return replace(whole, onsets=np.array(contact[:1]), releases=np.array(contact[1:]))
-
-
-def _leave(left: list[LeftOut], line: LeftOut) -> None:
-    """Leave a line out. RecordingError where so many are bad that nobody needs a list of them."""
-    if len(left) >= BAD_LINES:
-        raise RecordingError(
-            f"{line.file}: expected frames, found more than {BAD_LINES} lines that are none; {line.reason}"
-        )
-    left.append(line)
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:

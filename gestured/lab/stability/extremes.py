@@ -4,14 +4,121 @@ The path is given streams of a finger that swipes to the right. Every warning co
 """
 
 import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
 
 from gestured.core.classifier import Classifier
 from gestured.core.events import Gesture
-from gestured.lab.stability.path import events, fault, labels
-from gestured.lab.stability.streams import Case, streams
+from gestured.lab.stability.path import (
+    FINITE,
+    IDLE_LEVEL,
+    NOISE,
+    SIGNAL,
+    Array,
+    Series,
+    events,
+    fault,
+    finger,
+    labels,
+    swipes,
+)
 from gestured.lab.table import Table, Value
 
 FOUND = "swipe_right"  # what all swipes of `swipes` are
+LEAST_GRID = 3  # on 2 x 2 taxels a swipe is two taps
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A stream, and the times (s) of the swipes of which each must be found; `alone`: and nothing else."""
+
+    family: str
+    stream: Series
+    swipes: tuple[float, ...] = ()
+    alone: bool = False
+
+
+def streams(quick: bool) -> Iterator[Case]:
+    """Streams for the whole path."""
+    base, at = swipes(2)
+    few = 9 if quick else 1
+    for power in (*range(-30, 31, 15 if quick else 5), -3, -2, -1, 1, 2, 3):
+        for kind in (np.float32, np.float64):
+            yield Case(
+                "scale 1e-30 to 1e30", Series(base.times, (base.frames * 10.0**power).astype(kind)), at, alone=True
+            )
+    clipped = Series(base.times, np.rint(np.maximum(swipes(2, noise=0.0, level=0.0)[0].frames, 0.0)))
+    for power in range(-6, 7, 3):
+        yield Case("scale of a sensor without noise", Series(base.times, clipped.frames * 10.0**power), at, alone=True)
+    for offset in (1.0, 1e2, 1e4):
+        for kind in (np.float32, np.float64):
+            shifted = (base.frames + offset * SIGNAL).astype(kind)
+            yield Case("offset up to 1e4 times the signal", Series(base.times, shifted), at, alone=True)
+    for offset in (1e5, 1e6, 1e7):
+        yield Case("offset up to 1e7: finite", Series(base.times, (base.frames + offset * SIGNAL).astype(np.float32)))
+    for shape in ((2, 2), (9, 9), (64, 64)):
+        for value in FINITE:
+            yield Case(
+                "constant signals: nothing", Series(np.arange(60) / 15, np.full((60, *shape), value)), alone=True
+            )
+    yield Case("one frame: nothing", Series(base.times[:1], base.frames[:1]), alone=True)
+    touched = (base.times % 3.7 >= 1.5) & (base.times % 3.7 <= 2.0)
+    for taxel in range(0, 81, few):
+        frames = base.frames.copy().reshape(-1, 81)
+        frames[touched, taxel] += SIGNAL
+        yield Case("one active taxel", Series(base.times, frames.reshape(base.frames.shape)))
+    for value in (4095.0, 65535.0, FINITE[0]):
+        yield Case("all saturated, all equal", _with(base, touched, value))
+    for value in (1.0, 1e3, 1e30):
+        signs = np.where(np.indices(base.frames.shape).sum(axis=0) % 2, value, -value)
+        yield Case("alternating extremes", Series(base.times, signs))
+        yield Case("alternating extremes", Series(base.times, np.where(touched[:, None, None], signs, base.frames)))
+    for count in (1, 2, 3, 10, 100, 1000, *(() if quick else (10_000,))):
+        yield Case("touched for 1 to 10,000 frames at 1000 Hz", _held(count))
+    for rate in (5.0, 10.0, 30.0, 100.0, 250.0, *(() if quick else (1000.0,))):
+        yield Case("5 to 1000 Hz", *swipes(2, rate=rate), alone=True)
+    for shape in ((2, 2), (3, 3), (5, 9), (9, 9), (27, 15), (64, 64)):
+        stream, when = swipes(2, shape=shape)
+        yield Case("2 x 2 to 64 x 64", stream, when if min(shape) >= LEAST_GRID else ())
+    for frames in (base.frames * 1e-315, (base.frames * 1e-42).astype(np.float32)):  # below the least normal number
+        yield Case("denormals", Series(base.times, frames))
+    yield Case("-0.0 for 0", Series(base.times, np.where(clipped.frames == 0, -0.0, clipped.frames)), at, alone=True)
+    for place in range(0, 81, few):
+        for value in (np.nan, np.inf, -np.inf):
+            for moment in (0.5, 1.2, 1.8):
+                frames = base.frames.copy()
+                frames[int(moment * 15)].reshape(-1)[place] = value
+                yield Case("NaN, infinity at each position", Series(base.times, frames), at, alone=True)
+    yield from _steps_and_spikes()
+
+
+def _steps_and_spikes() -> Iterator[Case]:
+    long, at = swipes(5)
+    for step, bounded_s in ((1e3, 13.0), (1e-3, 3.0)):
+        frames = long.frames.copy()
+        frames[int(1.85 * 15) :] *= step
+        after = tuple(t for t in at if t > 1.85 + bounded_s)
+        yield Case("gain step of 1000 in mid-gesture, 13 s later", Series(long.times, frames), after)
+    for size in (1e6, 1e12, -1e12, 1e30):
+        for moment in (0.5, 1.2, 1.8):
+            for taxels in (1, 81):
+                frames = long.frames.copy()
+                frames[int(moment * 15)].reshape(-1)[:taxels] = size
+                after = tuple(t for t in at if t > moment + 8.0)
+                yield Case("one spike of 1e6 to 1e30, 8 s later", Series(long.times, frames), after)
+
+
+def _with(base: Series, touched: Array, value: float) -> Series:
+    return Series(base.times, np.where(touched[:, None, None], value, base.frames))
+
+
+def _held(count: int) -> Series:
+    times = np.arange(1500 + count + 1000) / 1000
+    frames = IDLE_LEVEL + NOISE * np.random.default_rng(count).standard_normal((len(times), 9, 9))
+    frames[1500 : 1500 + count] += finger(4, 4, 9, 9, 1.0)
+    return Series(times, frames)
 
 
 def swipes_found(case: Case, classifier: Classifier) -> tuple[int, str]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from gestured.lab.adapt.takes import Simulated
+from gestured.lab.adapt.learning import Simulated
 from gestured.lab.adapt.weights import untrained
 from gestured.lab.dataset import from_take
 from gestured.lab.export import Facts, export_net
