@@ -1,6 +1,5 @@
 """The bridges' own socket of a real daemon: each closes and opens gates in its own name, and can do nothing else."""
 
-import asyncio
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -61,31 +60,23 @@ def test_a_bridge_closes_its_own_gate_and_it_stays_closed_when_the_bridge_is_gon
     assert "a bridge has changed what is closed" in daemon.stderr()
 
 
-def test_what_is_closed_at_a_start_counts_from_the_next_one_on(daemon: Daemon, tmp_path: Path) -> None:
-    config = tmp_path / "gestured.toml"
-    config.write_text(config.read_text().replace('"seat"', '"door"'))
-    with Control(Path(daemon.ready["control"])) as operator:
-        assert operator.ask("reload")["awaiting_restart"] == ["gates"]
-        assert operator.ask("status")["gates"] == ["seat"]
-
-
-def test_a_sign_of_life_for_one_sensor_looks_at_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_sign_of_life_for_one_sensor_looks_at_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     """A bridge repeats what is closed for each sensor by itself, every ten seconds, and there may be a thousand."""
     hub = Hub(Scene(GESTURES, (9, 9), {"arm": Setup(), "seat": Setup()}), Sure())
     monkeypatch.setattr(hub, "readings", None)
     keeper = Gatekeeper(hub, SimpleNamespace(take=list))  # type: ignore[arg-type]
-    reply = asyncio.run(keeper.keep_closed(None, "car", "car", 30.0, "arm"))  # type: ignore[arg-type]
+    reply = await keeper.keep_closed(None, "car", "car", 30.0, "arm")  # type: ignore[arg-type]
     assert reply == {"gate": "car", "sensors": {"arm": ["car"]}} and hub.gates.of("seat") == {}
 
 
-def test_only_what_is_closed_still_is_overdue_since_its_first_sensor(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_only_what_is_closed_still_is_overdue_since_its_first_sensor(monkeypatch: pytest.MonkeyPatch) -> None:
     hub = Hub(Scene(GESTURES, (9, 9), {"arm": Setup(), "seat": Setup()}), Sure())
     keeper = Gatekeeper(hub, SimpleNamespace(take=list))  # type: ignore[arg-type]
     monkeypatch.setattr(gatekeeper, "time", SimpleNamespace(monotonic=lambda: 100.0))
     for sensor, seconds in (("arm", 1.0), ("seat", 20.0)):
-        asyncio.run(keeper.keep_closed(None, "car", "car", seconds, sensor))  # type: ignore[arg-type]
+        await keeper.keep_closed(None, "car", "car", seconds, sensor)  # type: ignore[arg-type]
     assert keeper.overdue(150.0) == {"car": 49.0}
-    asyncio.run(keeper.inhibit(None, "car", None, 10.0))  # type: ignore[arg-type]  # an operator: for ten seconds
+    await keeper.inhibit(None, "car", None, 10.0)  # type: ignore[arg-type]  # an operator: for ten seconds
     hub.tick(111.0)
     assert hub.gates.named == set() and keeper.overdue(150.0) == {}
 
@@ -102,13 +93,13 @@ def test_bridges_cannot_use_up_the_gates_of_an_operator(daemon: Daemon, bridge: 
     bridge.ask("inhibit", bridge="car", gate="car-8", seconds=60)
 
 
-def test_what_has_opened_by_itself_is_no_gate_that_a_bridge_keeps_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_what_has_opened_by_itself_is_no_gate_that_a_bridge_keeps_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     hub = Hub(Scene(GESTURES, (9, 9), {"arm": Setup()}), Sure())
     keeper = Gatekeeper(hub, SimpleNamespace(take=list))  # type: ignore[arg-type]
     monkeypatch.setattr(gatekeeper, "time", SimpleNamespace(monotonic=lambda: 100.0))
     for k in range(2 * gatekeeper.BRIDGES_GATES):
-        asyncio.run(keeper.keep_closed(None, "car", f"car-{k}", 30.0, "arm"))  # type: ignore[arg-type]
-        asyncio.run(keeper.inhibit(None, f"car-{k}", None, 1.0))  # type: ignore[arg-type]  # an operator
+        await keeper.keep_closed(None, "car", f"car-{k}", 30.0, "arm")  # type: ignore[arg-type]
+        await keeper.inhibit(None, f"car-{k}", None, 1.0)  # type: ignore[arg-type]  # an operator
         hub.tick(102.0)
 
 

@@ -99,94 +99,80 @@ async def heard(sock: socket.socket, last: bytes) -> bytes:
     return received
 
 
-def test_a_client_that_reads_nothing_for_long_is_cut_off(listener, monkeypatch) -> None:
-    async def main() -> None:
-        metrics = Metrics()
-        server = serve(listener, metrics, hello=b"hello\n")
-        with connect(listener), connect(listener) as idle:
-            await turn()
-            stalled = min(server._clients, key=lambda client: client.sock.fileno())  # who came first
-            while stalled.blocked_since is None:
-                stalled.send(b"x" * 1000 + b"\n")
-            server.tick()
-            assert server.count == 2
-            monkeypatch.setattr(clients, "STALLED_S", -1.0)
-            server.tick()
-            assert server.count == 1 and metrics.evicted.values == {("stalled",): 1}
-            assert idle.recv(100) == b"hello\n"
-            await server.close(0.1)
-            assert server.count == 0 and idle.recv(100) == b""
-
-    asyncio.run(main())
+async def test_a_client_that_reads_nothing_for_long_is_cut_off(listener, monkeypatch) -> None:
+    metrics = Metrics()
+    server = serve(listener, metrics, hello=b"hello\n")
+    with connect(listener), connect(listener) as idle:
+        await turn()
+        stalled = min(server._clients, key=lambda client: client.sock.fileno())  # who came first
+        while stalled.blocked_since is None:
+            stalled.send(b"x" * 1000 + b"\n")
+        server.tick()
+        assert server.count == 2
+        monkeypatch.setattr(clients, "STALLED_S", -1.0)
+        server.tick()
+        assert server.count == 1 and metrics.evicted.values == {("stalled",): 1}
+        assert idle.recv(100) == b"hello\n"
+        await server.close(0.1)
+        assert server.count == 0 and idle.recv(100) == b""
 
 
-def test_the_backlog_is_bounded_and_drops_the_oldest(listener) -> None:
-    async def main() -> None:
-        metrics = Metrics()
-        server = serve(listener, metrics)
-        with connect(listener) as sock:
-            await turn()
-            (client,) = server._clients
-            client.subscription = Subscription()
-            for i in range(5000):
-                client.send(b"%06d" % i + b"." * 493 + b"\n")
-                assert client.backlog <= one_client.BACKLOG_BYTES + 500
-            lines = (await heard(sock, b"004999")).split(b"\n")[:-1]
-            numbers = [int(line[:6]) for line in lines if not line.startswith(b"{")]
-            lost = [json.loads(line)["count"] for line in lines if line.startswith(b"{")]
-            assert numbers == sorted(numbers) and numbers[-1] == 4999
-            assert len(numbers) + sum(lost) == 5000 and sum(lost) == metrics.lost_lines.total()
-            await server.close(0)
-
-    asyncio.run(main())
+async def test_the_backlog_is_bounded_and_drops_the_oldest(listener) -> None:
+    metrics = Metrics()
+    server = serve(listener, metrics)
+    with connect(listener) as sock:
+        await turn()
+        (client,) = server._clients
+        client.subscription = Subscription()
+        for i in range(5000):
+            client.send(b"%06d" % i + b"." * 493 + b"\n")
+            assert client.backlog <= one_client.BACKLOG_BYTES + 500
+        lines = (await heard(sock, b"004999")).split(b"\n")[:-1]
+        numbers = [int(line[:6]) for line in lines if not line.startswith(b"{")]
+        lost = [json.loads(line)["count"] for line in lines if line.startswith(b"{")]
+        assert numbers == sorted(numbers) and numbers[-1] == 4999
+        assert len(numbers) + sum(lost) == 5000 and sum(lost) == metrics.lost_lines.total()
+        await server.close(0)
 
 
-def test_more_clients_than_there_is_room_for_are_told_so(listener, monkeypatch) -> None:
+async def test_more_clients_than_there_is_room_for_are_told_so(listener, monkeypatch) -> None:
     monkeypatch.setattr(clients, "CLIENTS", 2)
-
-    async def main() -> None:
-        metrics = Metrics()
-        server = serve(listener, metrics, hello=b"hello\n")
-        with connect(listener) as a, connect(listener) as b, connect(listener) as c:
-            await turn()
-            assert (a.recv(99), b.recv(99)) == (b"hello\n", b"hello\n")
-            assert json.loads(c.recv(99))["type"] == "error" and c.recv(99) == b""
-            assert server.count == 2 and metrics.evicted.values == {("too_many",): 1}
-            await server.close(0)
-
-    asyncio.run(main())
+    metrics = Metrics()
+    server = serve(listener, metrics, hello=b"hello\n")
+    with connect(listener) as a, connect(listener) as b, connect(listener) as c:
+        await turn()
+        assert (a.recv(99), b.recv(99)) == (b"hello\n", b"hello\n")
+        assert json.loads(c.recv(99))["type"] == "error" and c.recv(99) == b""
+        assert server.count == 2 and metrics.evicted.values == {("too_many",): 1}
+        await server.close(0)
 
 
-def test_an_event_is_encoded_once_for_all(listener, monkeypatch) -> None:
+async def test_an_event_is_encoded_once_for_all(listener, monkeypatch) -> None:
     calls = []
     encode = messages.to_json
     monkeypatch.setattr(
         messages, "to_json", lambda event, *rest, **more: calls.append(event) or encode(event, *rest, **more)
     )
-
-    async def main() -> None:
-        server = serve(listener)
-        socks = [connect(listener) for _ in range(10)]
-        await turn()
-        server.publish(Onset("arm", 1, 2.0), 0.0)
-        assert calls == []  # nobody wants it
-        for sock in socks[:6]:
-            sock.send(b'{"subscribe":{"types":["onset"]}}\n')
-        socks[6].send(b'{"subscribe":{"types":["onset","gesture"]}}\n')
-        await turn()
-        server.publish(Onset("arm", 1, 2.0), 10.0)
-        assert len(calls) == 1
-        assert {sock.recv(999) for sock in socks[:7]} == {b'{"type":"onset","sensor":"arm","id":1,"onset":12.0}\n'}
-        for sock in socks:
-            sock.close()
-        await turn()
-        assert server.count == 0
-        await server.close(0)
-
-    asyncio.run(main())
+    server = serve(listener)
+    socks = [connect(listener) for _ in range(10)]
+    await turn()
+    server.publish(Onset("arm", 1, 2.0), 0.0)
+    assert calls == []  # nobody wants it
+    for sock in socks[:6]:
+        sock.send(b'{"subscribe":{"types":["onset"]}}\n')
+    socks[6].send(b'{"subscribe":{"types":["onset","gesture"]}}\n')
+    await turn()
+    server.publish(Onset("arm", 1, 2.0), 10.0)
+    assert len(calls) == 1
+    assert {sock.recv(999) for sock in socks[:7]} == {b'{"type":"onset","sensor":"arm","id":1,"onset":12.0}\n'}
+    for sock in socks:
+        sock.close()
+    await turn()
+    assert server.count == 0
+    await server.close(0)
 
 
-def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> None:
+async def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> None:
     turn_of: list[int] = []  # in which turn of the loop each line was looked at
     now = 0
 
@@ -195,52 +181,43 @@ def test_rubbish_is_answered_a_little_at_a_time(listener, monkeypatch) -> None:
         raise ProtocolError("subscription", "rubbish")
 
     monkeypatch.setattr(one_client, "parse_subscription", parse)
-
-    async def main() -> None:
-        nonlocal now
-        server = serve(listener)
-        socks = [connect(listener) for _ in range(40)]
-        for sock in socks:
-            sock.send(b"x\n" * 500)
-        for seconds in range(1, 4):
-            looked_at = -1
-            while len(turn_of) != looked_at:  # until all have had their share of this second
-                looked_at = len(turn_of)
-                for _ in range(10):
-                    now += 1
-                    await asyncio.sleep(0)
-            assert 40 < len(turn_of) <= 40 * one_client.TURNS * seconds
-            server.tick()
-        assert max(map(turn_of.count, set(turn_of))) <= clients.LINES
-        for sock in socks:
-            sock.close()
-        await server.close(0)
-
-    asyncio.run(main())
+    server = serve(listener)
+    socks = [connect(listener) for _ in range(40)]
+    for sock in socks:
+        sock.send(b"x\n" * 500)
+    for seconds in range(1, 4):
+        looked_at = -1
+        while len(turn_of) != looked_at:  # until all have had their share of this second
+            looked_at = len(turn_of)
+            for _ in range(10):
+                now += 1
+                await asyncio.sleep(0)
+        assert 40 < len(turn_of) <= 40 * one_client.TURNS * seconds
+        server.tick()
+    assert max(map(turn_of.count, set(turn_of))) <= clients.LINES
+    for sock in socks:
+        sock.close()
+    await server.close(0)
 
 
 @pytest.mark.parametrize("rubbish", [b"?\n" * 400, b"[" * 1000])
-def test_who_sends_nothing_but_rubbish_for_long_is_cut_off(listener, monkeypatch, rubbish: bytes) -> None:
+async def test_who_sends_nothing_but_rubbish_for_long_is_cut_off(listener, monkeypatch, rubbish: bytes) -> None:
     monkeypatch.setattr(one_client, "RUBBISH", 50)
-
-    async def main() -> None:
-        metrics = Metrics()
-        server = serve(listener, metrics)
-        with connect(listener) as rude, connect(listener) as clumsy:
-            while server.count < 2:
-                await asyncio.sleep(0)
-            lines = b"?\n" * 20 + b'{"subscribe":{}}\n'
-            while not metrics.evicted.values:
-                with suppress(BlockingIOError):
-                    rude.send(rubbish)
-                with suppress(BlockingIOError):
-                    clumsy.send(lines)
-                await turn()
-                server.tick()
-            assert server.count == 1 and metrics.evicted.values == {("rubbish",): 1}
-            with suppress(ConnectionResetError):
-                while rude.recv(1 << 16):
-                    pass
-            await server.close(0)
-
-    asyncio.run(main())
+    metrics = Metrics()
+    server = serve(listener, metrics)
+    with connect(listener) as rude, connect(listener) as clumsy:
+        while server.count < 2:
+            await asyncio.sleep(0)
+        lines = b"?\n" * 20 + b'{"subscribe":{}}\n'
+        while not metrics.evicted.values:
+            with suppress(BlockingIOError):
+                rude.send(rubbish)
+            with suppress(BlockingIOError):
+                clumsy.send(lines)
+            await turn()
+            server.tick()
+        assert server.count == 1 and metrics.evicted.values == {("rubbish",): 1}
+        with suppress(ConnectionResetError):
+            while rude.recv(1 << 16):
+                pass
+        await server.close(0)

@@ -173,9 +173,11 @@ def test_a_reload_names_what_only_a_restart_changes_until_it_is_as_before(start,
             ("flight_recorder = 4", ["flight_recorder"]),
             ("flight_recorder = 4\ntap_gap_s = 0.4", ["flight_recorder"]),
             ("tap_gap_s = 0.4", []),
+            ("tap_gap_s = 0.4\n[gates]\nstart = ['door']", ["gates"]),
         ):
             config.write_text(text)
             assert control.ask("reload")["awaiting_restart"] == named
+        assert control.ask("status")["gates"] == []
 
 
 def test_the_flight_recorder_gives_what_it_held(daemon: Daemon, start) -> None:

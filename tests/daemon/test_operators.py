@@ -74,88 +74,74 @@ async def answer(reader: asyncio.StreamReader) -> dict[str, Any]:
     return json.loads(await reader.readline())
 
 
-def test_between_two_requests_the_loop_turns_whoever_asks(tmp_path: Path) -> None:
-    async def main() -> None:
-        async with open_desk(tmp_path) as (desk, path):
-            clients = [await asyncio.open_unix_connection(path) for _ in range(5)]
-            for _, writer in clients:
-                writer.write(b'{"verb":"ask"}\n' * 100 + b'{"verb":"?"}\n' * 100)
-            for reader, writer in clients:
-                assert [(await answer(reader))["ok"] for _ in range(200)] == [True] * 100 + [False] * 100
-                writer.close()
-            assert len(desk.asked) == 500 and len(set(desk.asked)) == 500
-
-    asyncio.run(main())
+async def test_between_two_requests_the_loop_turns_whoever_asks(tmp_path: Path) -> None:
+    async with open_desk(tmp_path) as (desk, path):
+        clients = [await asyncio.open_unix_connection(path) for _ in range(5)]
+        for _, writer in clients:
+            writer.write(b'{"verb":"ask"}\n' * 100 + b'{"verb":"?"}\n' * 100)
+        for reader, writer in clients:
+            assert [(await answer(reader))["ok"] for _ in range(200)] == [True] * 100 + [False] * 100
+            writer.close()
+        assert len(desk.asked) == 500 and len(set(desk.asked)) == 500
 
 
-def test_a_stream_is_made_as_it_is_read_in_small_pieces_and_one_at_a_time(tmp_path: Path) -> None:
-    async def main() -> None:
-        async with open_desk(tmp_path) as (desk, path):
-            reader, writer = await asyncio.open_unix_connection(path)
-            other, asking = await asyncio.open_unix_connection(path)
-            writer.write(b'{"verb":"stream"}\n' * 2)
-            made = -1
-            while len(desk.made) != made:  # until nothing more is made, because nobody reads
-                made = len(desk.made)
-                for _ in range(20):
-                    asking.write(b'{"verb":"ask"}\n')
-                    await answer(other)
-            assert 0 < made < LINES / 2
-            asking.write(b'{"verb":"stream"}\n')
-            assert "somebody else" in (await answer(other))["reason"]
-            for _ in range(2):
-                assert await answer(reader) == {"ok": True}
-                assert await reader.readexactly(LINES * len(LINE)) == LINE * LINES
-            assert len(desk.made) == 2 * LINES
-            most = control.TURN_BYTES // len(LINE) + 1
-            assert max(map(desk.made.count, set(desk.made[:LINES]))) <= most
-            for each in (writer, asking):
-                each.close()
-
-    asyncio.run(main())
+async def test_a_stream_is_made_as_it_is_read_in_small_pieces_and_one_at_a_time(tmp_path: Path) -> None:
+    async with open_desk(tmp_path) as (desk, path):
+        reader, writer = await asyncio.open_unix_connection(path)
+        other, asking = await asyncio.open_unix_connection(path)
+        writer.write(b'{"verb":"stream"}\n' * 2)
+        made = -1
+        while len(desk.made) != made:  # until nothing more is made, because nobody reads
+            made = len(desk.made)
+            for _ in range(20):
+                asking.write(b'{"verb":"ask"}\n')
+                await answer(other)
+        assert 0 < made < LINES / 2
+        asking.write(b'{"verb":"stream"}\n')
+        assert "somebody else" in (await answer(other))["reason"]
+        for _ in range(2):
+            assert await answer(reader) == {"ok": True}
+            assert await reader.readexactly(LINES * len(LINE)) == LINE * LINES
+        assert len(desk.made) == 2 * LINES
+        most = control.TURN_BYTES // len(LINE) + 1
+        assert max(map(desk.made.count, set(desk.made[:LINES]))) <= most
+        for each in (writer, asking):
+            each.close()
 
 
-def test_who_asks_nothing_for_long_gives_his_place_to_others_but_a_tap_stays(tmp_path: Path, monkeypatch) -> None:
+async def test_who_asks_nothing_for_long_gives_his_place_to_others_but_a_tap_stays(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(control, "IDLE_S", 0.01)
-
-    async def main() -> None:
-        async with open_desk(tmp_path) as (_, path):
-            tap, tapping = await asyncio.open_unix_connection(path)
-            tapping.write(b'{"verb":"tap"}\n')
-            await answer(tap)
-            for sent in (b"", b'{"verb"'):
-                idle, writer = await asyncio.open_unix_connection(path)
-                writer.write(sent)
-                assert "nothing was asked" in (await answer(idle))["reason"] and await idle.read() == b""
-                writer.close()
-            tapping.write(b'{"verb":"ask"}\n')
-            assert await answer(tap) == {"ok": True}
-            tapping.close()
-
-    asyncio.run(main())
+    async with open_desk(tmp_path) as (_, path):
+        tap, tapping = await asyncio.open_unix_connection(path)
+        tapping.write(b'{"verb":"tap"}\n')
+        await answer(tap)
+        for sent in (b"", b'{"verb"'):
+            idle, writer = await asyncio.open_unix_connection(path)
+            writer.write(sent)
+            assert "nothing was asked" in (await answer(idle))["reason"] and await idle.read() == b""
+            writer.close()
+        tapping.write(b'{"verb":"ask"}\n')
+        assert await answer(tap) == {"ok": True}
+        tapping.close()
 
 
-def test_who_does_not_read_an_answer_is_hung_up_on(tmp_path: Path, monkeypatch) -> None:
+async def test_who_does_not_read_an_answer_is_hung_up_on(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(control, "UNREAD_S", 0.01)
-
-    async def main() -> None:
-        async with open_desk(tmp_path) as (_, path):
-            reader, writer = await asyncio.open_unix_connection(path, limit=1)  # it reads next to nothing by itself
-            writer.write(b'{"verb":"stream"}\n')
-            other, asking = await asyncio.open_unix_connection(path, limit=2000)
-            said: dict[str, Any] = {"ok": False, "reason": "somebody else"}
-            while not said["ok"]:
-                assert "somebody else" in said["reason"]
-                asking.write(b'{"verb":"stream"}\n')
-                said = await answer(other)
-            with pytest.raises(ConnectionResetError):
-                while await reader.read(LINES):
-                    pass
-                raise ConnectionResetError
-            for each in (writer, asking):
-                each.close()
-
-    asyncio.run(main())
+    async with open_desk(tmp_path) as (_, path):
+        reader, writer = await asyncio.open_unix_connection(path, limit=1)  # it reads next to nothing by itself
+        writer.write(b'{"verb":"stream"}\n')
+        other, asking = await asyncio.open_unix_connection(path, limit=2000)
+        said: dict[str, Any] = {"ok": False, "reason": "somebody else"}
+        while not said["ok"]:
+            assert "somebody else" in said["reason"]
+            asking.write(b'{"verb":"stream"}\n')
+            said = await answer(other)
+        with pytest.raises(ConnectionResetError):
+            while await reader.read(LINES):
+                pass
+            raise ConnectionResetError
+        for each in (writer, asking):
+            each.close()
 
 
 def test_members_of_the_group_cannot_take_all_places(start) -> None:
@@ -225,26 +211,22 @@ def test_a_crowd_that_asks_for_the_flight_recorder_without_end_costs_no_event_an
         assert peak_bytes(daemon) - before < 32 << 20
 
 
-def test_who_comes_while_the_daemon_ends_is_asked_nothing(tmp_path: Path) -> None:
+async def test_who_comes_while_the_daemon_ends_is_asked_nothing(tmp_path: Path) -> None:
     """What a verb looks at may be closed already."""
-
-    async def come() -> list[int]:
-        desk = Desk()
-        with socket.socket(socket.AF_UNIX) as sock:
-            sock.bind(str(tmp_path / "c"))
-            sock.listen()
-            server = ControlServer(sock, desk.verbs)
-            await server.start()
-            server.close()
-            ours, theirs = socket.socketpair()
-            with theirs:
-                reader, writer = await asyncio.open_unix_connection(sock=ours)  # it was taken a moment before
-                theirs.sendall(b'{"verb":"ask"}\n')
-                theirs.shutdown(socket.SHUT_WR)
-                await server._serve(reader, writer)
-        return desk.asked
-
-    assert asyncio.run(come()) == []
+    desk = Desk()
+    with socket.socket(socket.AF_UNIX) as sock:
+        sock.bind(str(tmp_path / "c"))
+        sock.listen()
+        server = ControlServer(sock, desk.verbs)
+        await server.start()
+        server.close()
+        ours, theirs = socket.socketpair()
+        with theirs:
+            reader, writer = await asyncio.open_unix_connection(sock=ours)  # it was taken a moment before
+            theirs.sendall(b'{"verb":"ask"}\n')
+            theirs.shutdown(socket.SHUT_WR)
+            await server._serve(reader, writer)
+    assert desk.asked == []
 
 
 @pytest.mark.parametrize("asked", [b'{"verb":"stream"}\n', b'{"verb":"?"}\n' * 50, b'{"verb":"ask"}\n' * 50])
@@ -273,27 +255,23 @@ def test_who_leaves_while_he_is_answered_is_no_bug(tmp_path: Path, asked: bytes)
         assert runner.run(main()) == []
 
 
-def test_what_has_begun_when_the_daemon_ends_does_not_go_on(tmp_path: Path) -> None:
+async def test_what_has_begun_when_the_daemon_ends_does_not_go_on(tmp_path: Path) -> None:
     """A reload would open anew what the end has closed."""
     done: list[str] = []
+    begun, over = asyncio.Event(), asyncio.Event()
 
-    async def main() -> None:
-        begun, over = asyncio.Event(), asyncio.Event()
+    async def reload(connection: Connection) -> Reply:
+        begun.set()
+        await over.wait()
+        done.append("reloaded")
+        return {}
 
-        async def reload(connection: Connection) -> Reply:
-            begun.set()
-            await over.wait()
-            done.append("reloaded")
-            return {}
-
-        async with open_desk(tmp_path) as (desk, path):
-            desk.verbs["reload"] = Verb(reload, slow=True)
-            _, writer = await asyncio.open_unix_connection(path)
-            writer.write(b'{"verb":"reload"}\n')
-            await begun.wait()
-        over.set()
-        writer.close()
-        await asyncio.gather(*asyncio.all_tasks() - {asyncio.current_task()}, return_exceptions=True)
-
-    asyncio.run(main())
+    async with open_desk(tmp_path) as (desk, path):
+        desk.verbs["reload"] = Verb(reload, slow=True)
+        _, writer = await asyncio.open_unix_connection(path)
+        writer.write(b'{"verb":"reload"}\n')
+        await begun.wait()
+    over.set()
+    writer.close()
+    await asyncio.gather(*asyncio.all_tasks() - {asyncio.current_task()}, return_exceptions=True)
     assert done == []

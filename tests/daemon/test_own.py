@@ -374,7 +374,7 @@ def followed(model: Path) -> tuple[OwnGestures, Ladder]:
     return OwnGestures(lambda: None), ladder_for(model)
 
 
-def test_what_is_forgotten_during_a_reload_does_not_come_back(
+async def test_what_is_forgotten_during_a_reload_does_not_come_back(
     followed: tuple[OwnGestures, Ladder], tmp_path: Path, example: Example
 ) -> None:
     own, ladder = followed
@@ -392,17 +392,14 @@ def test_what_is_forgotten_during_a_reload_does_not_come_back(
             own.follow(ladder, *found)
         await forgetting
 
-    async def reload_twice() -> None:
-        asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(1))
-        await forget_while(one)
-        assert own.gestures.keys() == {"cut"} == own_file.load(one).gestures.keys()
-        await forget_while(other)  # which the reload names: it is the one that slash is forgotten in
-        assert own.gestures.keys() == {"wave"} == own_file.load(other).gestures.keys()
-
-    asyncio.run(reload_twice())
+    asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(1))
+    await forget_while(one)
+    assert own.gestures.keys() == {"cut"} == own_file.load(one).gestures.keys()
+    await forget_while(other)  # which the reload names: it is the one that slash is forgotten in
+    assert own.gestures.keys() == {"wave"} == own_file.load(other).gestures.keys()
 
 
-def test_a_model_looks_at_each_example_once_and_not_in_the_loop(
+async def test_a_model_looks_at_each_example_once_and_not_in_the_loop(
     followed: tuple[OwnGestures, Ladder], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own, ladder = followed
@@ -415,20 +412,16 @@ def test_a_model_looks_at_each_example_once_and_not_in_the_loop(
     own.follow(ladder, *own.read(path, ladder))
     assert len(looked) == len(examples)
     for name in ("g0", "g1"):
-        asyncio.run(own.forget(name))
+        await own.forget(name)
     own.follow(ladder, *own.read(path, ladder))
     assert len(looked) == len(examples)
     own_file.write(path, {"new": (dataclasses.replace(examples[0]),)}, "")
-
-    async def reload() -> None:
-        own.follow(ladder, *await asyncio.to_thread(own.read, path, ladder))
-
-    asyncio.run(reload())
+    own.follow(ladder, *await asyncio.to_thread(own.read, path, ladder))
     assert len(looked) == len(examples) + 1
     assert looked[-1] is not threading.main_thread()
 
 
-def test_a_fallback_that_comes_to_answer_looks_at_the_examples_beside_the_loop(
+async def test_a_fallback_that_comes_to_answer_looks_at_the_examples_beside_the_loop(
     model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, example: Example
 ) -> None:
     below = tiny_model.make(tmp_path / "below.onnx", version="2", own=tiny_model.own())
@@ -437,12 +430,8 @@ def test_a_fallback_that_comes_to_answer_looks_at_the_examples_beside_the_loop(
     own.follow(ladder, *own.read(tmp_path / "own.json", ladder))
     assert ladder.classify(example.segment()).own is not None
     monkeypatch.setattr(ladder.model, "classify", None)  # it fails from now on
-
-    async def fall() -> None:
-        first = ladder.classify(example.segment())
-        assert (first.model, first.own) == ("below", None)
-        while ladder.own.made(ladder.model) is None:
-            await asyncio.sleep(0.01)
-        assert ladder.classify(example.segment()).own is not None
-
-    asyncio.run(fall())
+    first = ladder.classify(example.segment())
+    assert (first.model, first.own) == ("below", None)
+    while ladder.own.made(ladder.model) is None:
+        await asyncio.sleep(0.01)
+    assert ladder.classify(example.segment()).own is not None

@@ -126,67 +126,60 @@ def test_a_bug_in_the_decoder_costs_one_packet(parts: Parts, monkeypatch) -> Non
 
 
 @pytest.mark.parametrize(("apart", "taken"), [(0.067, 5), (0.0, 1)])
-def test_packets_that_come_thick_are_taken_together_and_no_others_wait(
+async def test_packets_that_come_thick_are_taken_together_and_no_others_wait(
     parts: Parts, monkeypatch: pytest.MonkeyPatch, apart: float, taken: int
 ) -> None:
     metrics = parts.metrics
     hand, rests, now = Hand(), [], 0.0
 
-    async def main() -> None:
-        nonlocal now
-        loop = asyncio.get_running_loop()
-        monkeypatch.setattr(
-            loop, "call_later", lambda _, listen: rests.append(listen) or asyncio.Handle(listen, (), loop)
-        )
-        with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
-            receiver = Receiver(sock, now, parts.hub, parts.desk, parts.taps, lambda: now)
-            sender.connect(sock.getsockname())
-            for k in range(5):
-                now += apart
-                sender.send(harness.floats("/a/pressure", hand.frame(), k))
-                await turn()
-            assert metrics.frames.values == {("a", "ok"): taken} and len(rests) == (taken < 5)
-            for listen in rests:
-                listen()
-            await turn()
-            assert metrics.frames.values == {("a", "ok"): 5}
-            receiver.close()
-
     async def turn() -> None:
         for _ in range(3):
             await asyncio.sleep(0)
 
-    asyncio.run(main())
+    loop = asyncio.get_running_loop()
+    monkeypatch.setattr(loop, "call_later", lambda _, listen: rests.append(listen) or asyncio.Handle(listen, (), loop))
+    with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
+        receiver = Receiver(sock, now, parts.hub, parts.desk, parts.taps, lambda: now)
+        sender.connect(sock.getsockname())
+        for k in range(5):
+            now += apart
+            sender.send(harness.floats("/a/pressure", hand.frame(), k))
+            await turn()
+        assert metrics.frames.values == {("a", "ok"): taken} and len(rests) == (taken < 5)
+        for listen in rests:
+            listen()
+        await turn()
+        assert metrics.frames.values == {("a", "ok"): 5}
+        receiver.close()
 
 
-def test_what_waits_since_the_socket_was_bound_keeps_its_times(parts: Parts, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_what_waits_since_the_socket_was_bound_keeps_its_times(
+    parts: Parts, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A start takes a while; a sensor is learned from the frames that came meanwhile, too."""
     served: list[float] = []
     receive = parts.hub.receive
     monkeypatch.setattr(parts.hub, "receive", lambda packets, now: served.append(now) or receive(packets, now))
 
-    async def main() -> float:
-        with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
-            empty = time.monotonic()
-            sender.connect(sock.getsockname())
-            moments = []
-            for k in range(2):
-                time.sleep(0.1)  # the sensor's pace
-                moments.append(time.monotonic())
-                sender.send(harness.floats("/a/pressure", Hand().frame(), k))
-                moments.append(time.monotonic())
-            receiver = Receiver(sock, empty, parts.hub, parts.desk, parts.taps)
-            while parts.metrics.frames.values != {("a", "ok"): 2}:
-                receiver.read()
-            receiver.close()
-            return moments[2] - moments[1]
-
-    apart = asyncio.run(main())
+    with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
+        empty = time.monotonic()
+        sender.connect(sock.getsockname())
+        moments = []
+        for k in range(2):
+            time.sleep(0.1)  # the sensor's pace
+            moments.append(time.monotonic())
+            sender.send(harness.floats("/a/pressure", Hand().frame(), k))
+            moments.append(time.monotonic())
+        receiver = Receiver(sock, empty, parts.hub, parts.desk, parts.taps)
+        while parts.metrics.frames.values != {("a", "ok"): 2}:
+            receiver.read()
+        receiver.close()
+    apart = moments[2] - moments[1]
     assert len(served) == 2 and served[1] - served[0] >= apart - 1e-4  # s, by which the two clocks may drift
 
 
 @pytest.mark.parametrize("call", range(8))
-def test_wherever_in_a_read_a_stall_begins_no_frame_moves(
+async def test_wherever_in_a_read_a_stall_begins_no_frame_moves(
     parts: Parts, monkeypatch: pytest.MonkeyPatch, call: int
 ) -> None:
     """Both clocks leap by ten seconds at one of the looks at them, and a packet arrives just before that."""
@@ -194,29 +187,25 @@ def test_wherever_in_a_read_a_stall_begins_no_frame_moves(
     receive = parts.hub.receive
     monkeypatch.setattr(parts.hub, "receive", lambda packets, now: served.append(now) or receive(packets, now))
 
-    async def main() -> None:
-        nonlocal calls
-        with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
-            sender.connect(sock.getsockname())
+    with bind_udp(Address("127.0.0.1", 0)) as sock, socket.socket(type=socket.SOCK_DGRAM) as sender:
+        sender.connect(sock.getsockname())
 
-            def look(clock: Callable[[], float]) -> float:
-                nonlocal calls, leap, sent
-                if calls == call:
-                    sent = time.monotonic()
-                    sender.send(harness.floats("/a/pressure", Hand().frame(), 0))
-                    leap = 10.0
-                calls += 1
-                return clock() + leap
+        def look(clock: Callable[[], float]) -> float:
+            nonlocal calls, leap, sent
+            if calls == call:
+                sent = time.monotonic()
+                sender.send(harness.floats("/a/pressure", Hand().frame(), 0))
+                leap = 10.0
+            calls += 1
+            return clock() + leap
 
-            receiver = Receiver(sock, time.monotonic(), parts.hub, parts.desk, parts.taps, lambda: look(time.monotonic))
-            calls = 0
-            clocks = {name: getattr(time, name) for name in ("monotonic", "thread_time")}
-            monkeypatch.setattr(udp, "time", SimpleNamespace(**clocks, time=lambda: look(time.time)))
-            while not served:
-                receiver.read()
-            receiver.close()
-
-    asyncio.run(main())
+        receiver = Receiver(sock, time.monotonic(), parts.hub, parts.desk, parts.taps, lambda: look(time.monotonic))
+        calls = 0
+        clocks = {name: getattr(time, name) for name in ("monotonic", "thread_time")}
+        monkeypatch.setattr(udp, "time", SimpleNamespace(**clocks, time=lambda: look(time.time)))
+        while not served:
+            receiver.read()
+        receiver.close()
     assert served[0] - sent < 5.0
 
 

@@ -76,19 +76,6 @@ def test_many_frames_in_one_packet_and_lost_ones_by_the_counter(shared: Daemon) 
     assert shared.metric("gestured_frames_total", sensor="packed", result="lost") in (0.0, 1.0)
 
 
-def test_subscriptions_filter_by_type_sensor_and_gesture(shared: Daemon) -> None:
-    only_left = shared.client().subscribe(gestures=["swipe_left"], sensors=["one", "two"])
-    only_two = shared.client().subscribe("gesture", "onset", sensors=["two"])
-    everything = shared.client()
-    for name in ("one", "two"):
-        Sensor(shared, name).begin().perform("left", "right", "left")
-        everything.events("gesture", name, 3)
-    found = [only_left.line() for _ in range(4)]
-    assert [(e["sensor"], e["gesture"]) for e in found] == [(s, "swipe_left") for s in "one one two two".split()]
-    kinds = [(e["type"], e["sensor"]) for e in (only_two.line() for _ in range(6))]
-    assert kinds == [("onset", "two"), ("gesture", "two")] * 3
-
-
 @pytest.mark.parametrize(
     ("line", "said"),
     [

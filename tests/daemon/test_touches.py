@@ -1,6 +1,5 @@
 """Touch events of a real daemon: who follows which finger, and what a slow client gets of it."""
 
-import asyncio
 import json
 import signal
 import socket
@@ -83,44 +82,38 @@ def test_whatever_ends_a_contact_ends_its_fingers_first(start, tmp_path: Path, w
         assert phases(upto(client, "release"))[-3:] == ["up", "cancelled", "release"]
 
 
-def test_moves_that_wait_for_a_slow_client_are_one_and_displace_nothing(listener) -> None:  # noqa: F811
-    async def main() -> None:
-        server = serve(listener)
-        with connect(listener) as sock:
-            sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-            await turn()
-            (client,) = server._clients
-            server.subscribe(client, FOLLOWS)
-            server.publish(replace(MOVE, phase="down", dx=0.0), 0.0)
-            while client.blocked_since is None:
-                client.send(b'{"type":"status"}\n')
-            lines = client.backlog
-            for k in range(10_000):
-                server.publish(replace(MOVE, t=10.0 + k, x=round(0.5 + 0.00001 * k, 5)), 0.0)
-            assert client.backlog == lines < BACKLOG_BYTES  # nothing more waits
-            server.publish(replace(MOVE, touch=1, phase="down", dx=0.0), 0.0)
-            server.publish(replace(MOVE, phase="up", x=0.6, dx=0.0), 0.0)
-            found = [json.loads(line) for line in (await heard(sock, b'"up"')).splitlines()]
-            told = [one for one in found if one["type"] == "touch"]
-            assert [(one["touch"], one["phase"]) for one in told] == [(0, "down"), (1, "down"), (0, "up")]
-            assert told[-1]["dx"] == 10.0 and not any(one["type"] == "lost" for one in found)  # all that it moved
-            await server.close(0)
-
-    asyncio.run(main())
+async def test_moves_that_wait_for_a_slow_client_are_one_and_displace_nothing(listener) -> None:  # noqa: F811
+    server = serve(listener)
+    with connect(listener) as sock:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        await turn()
+        (client,) = server._clients
+        server.subscribe(client, FOLLOWS)
+        server.publish(replace(MOVE, phase="down", dx=0.0), 0.0)
+        while client.blocked_since is None:
+            client.send(b'{"type":"status"}\n')
+        lines = client.backlog
+        for k in range(10_000):
+            server.publish(replace(MOVE, t=10.0 + k, x=round(0.5 + 0.00001 * k, 5)), 0.0)
+        assert client.backlog == lines < BACKLOG_BYTES  # nothing more waits
+        server.publish(replace(MOVE, touch=1, phase="down", dx=0.0), 0.0)
+        server.publish(replace(MOVE, phase="up", x=0.6, dx=0.0), 0.0)
+        found = [json.loads(line) for line in (await heard(sock, b'"up"')).splitlines()]
+        told = [one for one in found if one["type"] == "touch"]
+        assert [(one["touch"], one["phase"]) for one in told] == [(0, "down"), (1, "down"), (0, "up")]
+        assert told[-1]["dx"] == 10.0 and not any(one["type"] == "lost" for one in found)  # all that it moved
+        await server.close(0)
 
 
-def test_a_client_that_goes_is_followed_no_more(listener) -> None:  # noqa: F811
-    async def main() -> None:
-        server = serve(listener)
-        with connect(listener) as sock:
-            await turn()
-            (client,) = server._clients
-            server.subscribe(client, FOLLOWS)
-            server.publish(replace(MOVE, phase="down"), 0.0)
-            server.remove(client)
-            server.publish(MOVE, 0.0)
-            server.publish(replace(MOVE, phase="up"), 0.0)
-            assert sock.recv(1 << 16).count(b"\n") == 1
-            await server.close(0)
-
-    asyncio.run(main())
+async def test_a_client_that_goes_is_followed_no_more(listener) -> None:  # noqa: F811
+    server = serve(listener)
+    with connect(listener) as sock:
+        await turn()
+        (client,) = server._clients
+        server.subscribe(client, FOLLOWS)
+        server.publish(replace(MOVE, phase="down"), 0.0)
+        server.remove(client)
+        server.publish(MOVE, 0.0)
+        server.publish(replace(MOVE, phase="up"), 0.0)
+        assert sock.recv(1 << 16).count(b"\n") == 1
+        await server.close(0)

@@ -157,23 +157,18 @@ class Follower:
         return True
 
 
-def test_who_does_not_read_is_shown_the_newest_when_he_does(model) -> None:
+async def test_who_does_not_read_is_shown_the_newest_when_he_does(model) -> None:
     parts = Parts(model)
-
-    async def main() -> tuple[Follower, Follower]:
-        quick, slow = Follower(), Follower()
-        t = parts.feed("arm", Hand().idle(2.0), 90.0)
-        for follower in (quick, slow):
-            parts.views.follow(follower, ["arm"], raw=False)
-        for n in range(6):
-            slow.unread = views.UNREAD_BYTES + 1 if 0 < n < 5 else 0
-            while len(quick.seen) == n:
-                await asyncio.sleep(0)
-            t = parts.feed("arm", [Hand().frame()], t)
-        quick.closed = slow.closed = True
-        return quick, slow
-
-    quick, slow = asyncio.run(main())
+    quick, slow = Follower(), Follower()
+    t = parts.feed("arm", Hand().idle(2.0), 90.0)
+    for follower in (quick, slow):
+        parts.views.follow(follower, ["arm"], raw=False)
+    for n in range(6):
+        slow.unread = views.UNREAD_BYTES + 1 if 0 < n < 5 else 0
+        while len(quick.seen) == n:
+            await asyncio.sleep(0)
+        t = parts.feed("arm", [Hand().frame()], t)
+    quick.closed = slow.closed = True
     assert len(set(quick.seen)) == 6 and slow.seen == [quick.seen[0], quick.seen[5]]
 
 

@@ -44,25 +44,20 @@ class Fault:
         return [(start, start + self.stall_s) for start in starts]
 
 
-def _taxels(frames: Frames, rng: np.random.Generator, count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    at = rng.choice(frames.shape[1] * frames.shape[2], count, replace=False)
-    return at // frames.shape[2], at % frames.shape[2]
+def _taxels(count: int, becomes: int | None) -> Change:
+    """Some taxels, each from a moment on while they run, show one value, or (None) all at once anything at all."""
 
+    def change(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+        at = rng.choice(frames.shape[1] * frames.shape[2], count, replace=False)
+        for row, column in zip(at // frames.shape[2], at % frames.shape[2], strict=True):
+            if becomes is None:
+                later = times > times[0] + LEAD_S
+                frames[later, row, column] = rng.integers(0, 4096, later.sum())
+            else:
+                frames[times > times[0] + LEAD_S + rng.uniform(0, 10), row, column] = becomes
+        return frames, times, counts
 
-def _stuck(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
-    """Two taxels rise to the top of the range while they run, and stay."""
-    rows, columns = _taxels(frames, rng, 2)
-    for row, column in zip(rows, columns, strict=True):
-        frames[times > times[0] + LEAD_S + rng.uniform(0, 10), row, column] = 4095
-    return frames, times, counts
-
-
-def _dead(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
-    """Four taxels fall to 0, and stay."""
-    rows, columns = _taxels(frames, rng, 4)
-    for row, column in zip(rows, columns, strict=True):
-        frames[times > times[0] + LEAD_S + rng.uniform(0, 10), row, column] = 0
-    return frames, times, counts
+    return change
 
 
 def _dead_line(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
@@ -82,15 +77,6 @@ def _saturated(frames: Frames, times: Times, counts: Counts, rng: np.random.Gene
     return np.minimum(frames, top.astype(frames.dtype)), times, counts
 
 
-def _noisy(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
-    """Two taxels show anything at all."""
-    rows, columns = _taxels(frames, rng, 2)
-    later = times > times[0] + LEAD_S
-    for row, column in zip(rows, columns, strict=True):
-        frames[later, row, column] = rng.integers(0, 4096, later.sum())
-    return frames, times, counts
-
-
 def _frozen(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
     """For a second in ten it sends the same frame again and again."""
     for begin in np.arange(times[0] + LEAD_S, times[-1], EVERY_S):
@@ -100,18 +86,15 @@ def _frozen(frames: Frames, times: Times, counts: Counts, rng: np.random.Generat
     return frames, times, counts
 
 
-def _garbage(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
-    """One frame in a hundred is anything at all."""
-    hit = (rng.random(len(frames)) < 0.01) & (times > times[0] + LEAD_S)
-    frames[hit] = rng.integers(0, 4096, (hit.sum(), *frames.shape[1:]))
-    return frames, times, counts
+def _one_in_a_hundred(*, flash: bool) -> Change:
+    """One frame in a hundred is all at the top of the range, or else anything at all."""
 
+    def change(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+        hit = (rng.random(len(frames)) < 0.01) & (times > times[0] + LEAD_S)
+        frames[hit] = 4095 if flash else rng.integers(0, 4096, (hit.sum(), *frames.shape[1:]))
+        return frames, times, counts
 
-def _flashes(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
-    """One frame in a hundred is all at the top of the range."""
-    hit = (rng.random(len(frames)) < 0.01) & (times > times[0] + LEAD_S)
-    frames[hit] = 4095
-    return frames, times, counts
+    return change
 
 
 def _spikes(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
@@ -129,24 +112,20 @@ def _drift(frames: Frames, times: Times, counts: Counts, rng: np.random.Generato
     return frames, times + 0.95 * (np.cos(phase) - np.cos(2 * np.pi * times / 30 + phase)), counts
 
 
-def _silence(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
-    """For a second and a half in ten it sends nothing."""
-    heard = np.ones(len(times), bool)
-    for begin in np.arange(times[0] + LEAD_S, times[-1], EVERY_S):
-        start = begin + rng.uniform(0, 8)
-        heard &= (times < start) | (times >= start + 1.5)
-    return frames[heard], times[heard], counts[heard]
+def _away(seconds: float, *, restarts: bool) -> Change:
+    """Every ten seconds it sends nothing for so long; where it restarts then, its counter begins at 0."""
 
+    def change(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
+        heard = np.ones(len(times), bool)
+        for begin in np.arange(times[0] + LEAD_S, times[-1], EVERY_S):
+            start = begin + rng.uniform(0, 8)
+            heard &= (times < start) | (times >= start + seconds)
+            if restarts:
+                later = np.flatnonzero(times >= start + seconds)
+                counts[later] = np.arange(len(later))
+        return frames[heard], times[heard], counts[heard]
 
-def _restart(frames: Frames, times: Times, counts: Counts, rng: np.random.Generator) -> Stream:
-    """Every ten seconds it starts again: 0.3 s of nothing, and its counter begins at 0."""
-    heard = np.ones(len(times), bool)
-    for begin in np.arange(times[0] + LEAD_S, times[-1], EVERY_S):
-        start = begin + rng.uniform(0, 8)
-        heard &= (times < start) | (times >= start + 0.3)
-        later = np.flatnonzero(times >= start + 0.3)
-        counts[later] = np.arange(len(later))
-    return frames[heard], times[heard], counts[heard]
+    return change
 
 
 FAULTS: dict[str, Fault] = {
@@ -166,16 +145,16 @@ FAULTS: dict[str, Fault] = {
     "the daemon stalls for 1 s": Fault(stall_s=1.0),
     "5 % corrupted": Fault(Impairment(corrupt=0.05)),
     "5 % cut short": Fault(Impairment(cut=0.05)),
-    "silence of 1.5 s": Fault(sensor=_silence),
-    "sensor restarts": Fault(sensor=_restart),
+    "silence of 1.5 s": Fault(sensor=_away(1.5, restarts=False)),
+    "sensor restarts": Fault(sensor=_away(0.3, restarts=True)),
     "rate drifts by 20 %": Fault(sensor=_drift),
     "frozen for 1 s": Fault(sensor=_frozen),
-    "2 taxels stuck": Fault(sensor=_stuck),
-    "4 taxels dead": Fault(sensor=_dead),
+    "2 taxels stuck": Fault(sensor=_taxels(2, 4095)),
+    "4 taxels dead": Fault(sensor=_taxels(4, 0)),
     "a row or column dead": Fault(sensor=_dead_line),
-    "2 taxels noisy": Fault(sensor=_noisy),
+    "2 taxels noisy": Fault(sensor=_taxels(2, None)),
     "saturated at a third": Fault(sensor=_saturated),
-    "1 % garbage frames": Fault(sensor=_garbage),
-    "1 % flashes": Fault(sensor=_flashes),
+    "1 % garbage frames": Fault(sensor=_one_in_a_hundred(flash=False)),
+    "1 % flashes": Fault(sensor=_one_in_a_hundred(flash=True)),
     "a spike of 1e30": Fault(sensor=_spikes),
 }

@@ -117,22 +117,6 @@ def test_without_another_model_what_fails_is_cancelled_and_said(start, model: Pa
     assert daemon.get("/readyz")[0] == 200
 
 
-@pytest.mark.hostile
-def test_a_model_that_failed_is_tried_again(start, model: Path, tmp_path: Path) -> None:
-    bad = bad_models.failing(model, tmp_path / "bad.onnx")
-    daemon = start("--fallback", model, "--clock", "sensor", model=bad)
-    client = daemon.client().subscribe("gesture", "unknown", "status")
-    sensor = Sensor(daemon, "arm").begin()
-    press(sensor)
-    seen = client.until(lambda line: line["type"] != "status")
-    while seen[-1]["degraded"]:  # it is put aside for half a minute
-        sensor.send(sensor.hand.idle(0.2))  # after a silence nobody knows what a finger did before the first frame
-        sensor.perform("left")
-        seen += client.until(lambda line: line["type"] == "gesture")
-        client.until(lambda line: line["type"] == "status")
-    assert seen[-1]["model"] == "bad"
-
-
 def test_a_model_that_hangs_is_ended_and_hands_over_to_the_next(start, model: Path, tmp_path: Path) -> None:
     bad = bad_models.hanging(model, tmp_path / "bad.onnx")
     daemon = start("--fallback", model, "--clock", "sensor", "--metrics", "127.0.0.1:0", model=bad)

@@ -24,7 +24,7 @@ def test_each_fault_has_a_promise_a_test_and_a_metric(row: str) -> None:
     assert names
     for file, name, slow in names:
         found = [node for node in ast.parse((TESTS / file).read_text()).body if getattr(node, "name", "") == name]
-        assert isinstance(found[0], ast.FunctionDef), name
+        assert isinstance(found[0], ast.FunctionDef | ast.AsyncFunctionDef), name
         assert bool(slow) == any("mark.hostile" in ast.unparse(mark) for mark in found[0].decorator_list), name
     for metric in re.findall(r"`(gestured_\w+)`", metrics):
         assert metric in METRICS
