@@ -22,9 +22,9 @@ SETTINGS: dict[str, Any] = {
 }  # fmt: skip
 SCENE: dict[str, Any] = {"settings": SETTINGS, "gestures": ["one_tap"], "model": {"rows": 9, "columns": 9}}
 ONSET = {"type": "onset", "sensor": "arm", "id": 1, "onset": 5.0}
-TAP = {"type": "gesture", "sensor": "arm", "id": 1, "gesture": "one_tap", "confidence": 0.9, "onset": 5.0,
-       "offset": 5.2, "decided": 5.3}  # fmt: skip
-
+TAP = {"type": "gesture", "sensor": "arm", "id": 1, "gesture": "one_tap", "confidence": 0.9, "sequence": 1,
+       "onset": 5.0, "offset": 5.2, "decided": 5.3, "frames": 3, "lost": 0, "model": "m", "degraded": False,
+       "scores": {}}  # fmt: skip
 GATE = {"type": "gate", "sensor": "arm", "armed": None, "closed": ["door"], "until": None, "since": 0.5}
 
 
@@ -150,25 +150,16 @@ def test_records_that_lie_about_their_sizes_end_what_is_read(tmp_path: Path, ins
     assert mib < 64 and not found.whole and len(found.packets) == 1
 
 
+# What else a line may not be, tests/test_fields.py says of those that a client reads.
 WRONG = {
     "no object": [1],
     "no JSON": b"{",
     "nested": b'{"type":"status","x":' + b"[" * 100_000,
     "no type": {"sensor": "arm"},
-    "type": {"type": 5},
-    "sensor": ONSET | {"sensor": ["arm"]},
     "no sensor": {k: v for k, v in ONSET.items() if k != "sensor"},
-    "id": ONSET | {"id": "1"},
-    "onset": ONSET | {"onset": "now"},
     "not finite": ONSET | {"onset": float("nan")},
     "in no year": TAP | {"onset": 1e300},
-    "no onset": {k: v for k, v in TAP.items() if k != "onset"},
-    "no gesture": {k: v for k, v in TAP.items() if k != "gesture"},
-    "gesture": TAP | {"gesture": None},
-    "confidence": TAP | {"confidence": True},
-    "no reason": {"type": "cancelled", "sensor": "arm", "id": 1},
-    "large": ONSET | {"onset": 10**400},
-    "until": GATE | {"until": 10**400},
+    "large": GATE | {"until": 10**400},
 }
 
 
@@ -176,7 +167,7 @@ WRONG = {
 def test_what_is_no_event_is_named(tmp_path: Path, kind: str) -> None:
     assert refused("mcap", events(tmp_path / "good.mcap", ONSET, TAP | {"more": [1]}, {"type": "new"})) == ""
     path = events(tmp_path / "a.mcap", ONSET, WRONG[kind])
-    assert f"{path}: event 2: expected" in refused("mcap", path)
+    assert f"{path}: event 2: " in refused("mcap", path)
 
 
 def test_gates_of_tens_of_thousands_of_sensors_take_no_longer_than_their_lines(tmp_path: Path) -> None:

@@ -4,31 +4,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from gestured.client.fields import wrong_field
 from gestured.core.address import Address
 from gestured.core.errors import RecordingError
-from gestured.core.messages import json_object, quoted
+from gestured.core.messages import json_object
 from gestured.record.files import open_regular
 from gestured.record.mcap import Budget, CutOff, Damaged, TooLarge, records
-from gestured.record.tape import EVENT_SCHEMA, EVENTS, PACKETS, SCENE, Packet, Tape
+from gestured.record.tape import EVENTS, PACKETS, SCENE, Packet, Tape
 
 ITEM_COSTS = 250  # bytes of memory for a packet or an event, besides what it holds
 EVENT_COSTS = 24  # bytes of memory for a byte of JSON, where it is all empty lists
 LATEST_NS = 1 << 62  # of a packet, since 1970: a day in 2116, which a clock here can wait for
 NOBODY = Address("", 0)  # the source of a channel that holds no packets
 HOST_CHARACTERS = 255  # of a sender's name; the DNS allows no more
-LARGEST_NUMBER = 1e11  # of any number in an event; as seconds since 1970 it is a date that Python can print
-FORMS: dict[str, str | list[str]] = {key: form["type"] for key, form in EVENT_SCHEMA["properties"].items()}
-KINDS: dict[str, Any] = {"string": str, "integer": int, "number": int | float, "array": list, "null": type(None)}
-# What an event of a type says at least.
-NEEDED = {
-    "onset": ("sensor", "id", "onset"),
-    "provisional": ("sensor", "id", "gesture", "confidence", "onset", "decided"),
-    "gesture": ("sensor", "id", "gesture", "confidence", "onset", "offset"),
-    "unknown": ("sensor", "id", "confidence", "onset", "offset"),
-    "cancelled": ("sensor", "id", "reason"),
-    "release": ("sensor", "id"),
-    "gate": ("sensor", "closed", "since"),
-}
 
 
 def read(path: str | Path) -> Tape:
@@ -105,25 +93,12 @@ def _scene(metadata: Mapping[str, str]) -> Mapping[str, Any]:
 
 
 def _event(line: bytes, number: int) -> Mapping[str, Any]:
-    """A line of the event stream, held against what is asked of events later; what it says besides is left alone."""
+    """A line of the event stream, as sound as one that a daemon sends."""
     event = json_object(line)
-    if event is None:
-        raise _Wrong(f"event {number}: expected a JSON object")
-    needed = ("type", *NEEDED.get(str(event.get("type")), ()))
-    for key, form in FORMS.items():
-        if (key in event or key in needed) and not _right(form, event.get(key)):
-            raise _Wrong(f"event {number}: expected {key} to be of the type {form}, found {quoted(event.get(key))}")
+    wrong = "expected a JSON object" if event is None else wrong_field(event)
+    if event is None or wrong is not None:
+        raise _Wrong(f"event {number}: {wrong}")
     return event
-
-
-def _right(form: str | list[str], value: object) -> bool:
-    if isinstance(form, list):
-        return any(_right(one, value) for one in form)
-    if isinstance(value, list):
-        return form == "array" and all(isinstance(item, str) for item in value)
-    if isinstance(value, bool) or not isinstance(value, KINDS[form]):
-        return False
-    return not isinstance(value, int | float) or abs(value) <= LARGEST_NUMBER  # so NaN is none
 
 
 def _source(text: str) -> Address:
