@@ -1,17 +1,24 @@
 """The consumers of docs/connect.md and docs/fleet.md, but for the addresses; what gesturectl doctor says of bridges."""
 
 import os
+import socket
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from gestured.control.cli import main
+from tests.bridge import test_zenoh
 from tests.bridge.conftest import emit
 from tests.bridge.test_mqtt import begin
+from tests.bridge.test_serial import Out
+from tests.bridge.test_zenoh import site
 from tests.control.conftest import ROOT
 from tests.daemon.harness import Daemon
 from tests.documents.blocks import blocks
+
+__all__ = ["site"]  # a fixture
 
 
 def consumer(phrase: str) -> str:
@@ -52,47 +59,29 @@ def test_one_subscriber_hears_several_daemons(model: Path, tmp_path: Path):
 
 
 def test_the_mqtt_consumer(bridge, broker, daemon: Daemon):
-    pytest.importorskip("paho.mqtt.client", reason="the bridge to MQTT needs the extra [mqtt]")
     at = broker()
     begin(bridge, at, daemon).ready()
     code = consumer("paho.mqtt").replace("192.168.7.2", "127.0.0.1").replace("1883", str(at.port))
     assert heard(code, daemon) == {"armrest swipe_left\n"}
 
 
-def test_the_zenoh_consumer(bridge, daemon: Daemon):
-    pytest.importorskip("zenoh", reason="the bridge to Zenoh needs the extra [zenoh]")
-    from tests.bridge import test_zenoh
-
-    site = test_zenoh.Site()
-    try:
-        test_zenoh.begin(bridge, site, daemon).ready()
-        code = consumer("declare_subscriber").replace("tcp/192.168.7.2:7447", site.endpoint)
-        assert heard(code, daemon) == {"armrest swipe_left\n"}
-    finally:
-        site.close()
+def test_the_zenoh_consumer(bridge, site, daemon: Daemon):
+    test_zenoh.begin(bridge, site, daemon).ready()
+    code = consumer("declare_subscriber").replace("tcp/192.168.7.2:7447", site.endpoint)
+    assert heard(code, daemon) == {"armrest swipe_left\n"}
 
 
-def test_the_zenoh_sender(bridge, fake, udp):
-    pytest.importorskip("zenoh", reason="the bridge to Zenoh needs the extra [zenoh]")
-    from tests.bridge import test_zenoh
-    from tests.bridge.test_serial import Out
-
-    site = test_zenoh.Site()
-    try:
-        to = f"127.0.0.1:{udp.getsockname()[1]}"
-        process = bridge(
-            "zenoh", "--connect", site.endpoint, "--site", "car7", "--socket", fake.path, "--frames", "--to", to
-        )
-        fake.accept()
-        process.ready()
-        code = consumer("declare_publisher").replace("tcp/192.168.7.2:7447", site.endpoint)
-        with subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}) as sender:
-            out = Out(udp)
-            first, second = out.next(), out.next()
-            sender.kill()
-        assert (first.values == 20.0).all() and second.counter == first.counter + 1
-    finally:
-        site.close()
+def test_the_zenoh_sender(bridge, site, fake, udp):
+    to = f"127.0.0.1:{udp.getsockname()[1]}"
+    process = test_zenoh.begin(bridge, site, fake, "--frames", "--to", to)
+    fake.accept()
+    process.ready()
+    code = consumer("declare_publisher").replace("tcp/192.168.7.2:7447", site.endpoint).replace("car7", "car")
+    with subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}) as sender:
+        out = Out(udp)
+        first, second = out.next(), out.next()
+        sender.kill()
+    assert (first.values == 20.0).all() and second.counter == first.counter + 1
 
 
 SYSTEMCTL = """#!/bin/sh
@@ -112,21 +101,19 @@ END
 """
 
 
-def test_doctor_says_how_bridges_are(tmp_path: Path):
+def test_doctor_says_how_bridges_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
     program = tmp_path / "systemctl"
     program.write_text(SYSTEMCTL)
     program.chmod(0o755)
-    command = [sys.executable, "-m", "gestured.control", "doctor", "--control", str(tmp_path / "none.ctl")]
-    environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
-    said = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=60).stdout
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    main(["doctor", "--control", str(tmp_path / "none.ctl")])
+    said = capsys.readouterr().out
     assert "ok      gestured-bridge@house.service is connected: daemon is there" in said
     assert "warn    gestured-bridge@car.service is waiting: broker 192.168.7.2:1883 is not there" in said
     assert "bad     gestured-serial@glove.service is failed\n        -> journalctl --unit gestured-serial@glove" in said
 
 
 def test_systemd_is_told_how_a_bridge_is(bridge, broker, daemon: Daemon, tmp_path: Path):
-    import socket
-
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
         systemd.bind(str(tmp_path / "notify"))
         systemd.settimeout(30)
