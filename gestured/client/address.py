@@ -1,13 +1,17 @@
-"""Where the Unix sockets of a daemon are, unless a setting names them."""
+"""Where the Unix sockets of a daemon are, unless a setting names them; and why an address cannot be had."""
 
+import errno
 import os
+import socket
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 
+from gestured.core.address import Address
 from gestured.core.errors import SettingsError
 
 SYSTEM = Path("/run/gestured/events.sock")  # of the installed service, and of root
+UNIX_SOCKETS = Path("/proc/net/unix")
+LISTENS = "00010000"  # the flag of a listening socket there
 
 
 def default_socket(environ: Mapping[str, str]) -> Path:
@@ -55,15 +59,22 @@ def find_control(environ: Mapping[str, str]) -> Path:
     return control_beside(find_socket(environ))
 
 
-def find_all_controls(environ: Mapping[str, str]) -> list[Path]:
-    """The control sockets of all daemons that are found: of the session, and the installed service's instances."""
-    session = environ.get("XDG_RUNTIME_DIR")
-    folders = [SYSTEM.parent.parent, *([Path(session)] if session else [])]
-    found = {path for folder in folders for path in folder.glob(f"{SYSTEM.parent.name}*/{SYSTEM.stem}.ctl")}
-    with suppress(SettingsError):  # no socket can be meant
-        if os.path.exists(meant := find_control(environ)):
-            found.add(meant)
-    return sorted(found)
+def running() -> list[Path]:
+    """The control sockets of all daemons of this machine, by the kernel's table of Unix sockets."""
+    try:
+        rows = [row.split(maxsplit=7) for row in UNIX_SOCKETS.read_text("utf-8", "replace").splitlines()]
+    except OSError:
+        return []
+    listening = {Path(row[7]) for row in rows if len(row) == 8 and row[3] == LISTENS}
+    return sorted(path for path in listening if path.suffix == ".ctl" and path.with_suffix(".sock") in listening)
+
+
+def bind_failure(error: OSError, address: Address, kind: int) -> str:
+    """Why an address of this kind of socket cannot be bound, and where it is taken, what shows by whom."""
+    reason = error.strerror or str(error)
+    flags = "-ulpn" if kind == socket.SOCK_DGRAM else "-tlpn"
+    taken = error.errno == errno.EADDRINUSE
+    return f"{reason}: sudo ss {flags} 'sport = :{address.port}' shows by whom" if taken else reason
 
 
 def setting(environ: Mapping[str, str], key: str) -> str | None:

@@ -12,8 +12,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 import gestured
+from gestured.client.address import bind_failure, running
 from gestured.client.control import Control
-from gestured.client.holder import bind_failure
 from gestured.client.lines import JOIN, Forbidden, Refused, Unreachable
 from gestured.client.peer import Stranger
 from gestured.client.program import Commands
@@ -30,8 +30,6 @@ RELEASED = 1_750_000_000  # s since the epoch; a clock before that is wrong
 BRIDGES = ("gestured-bridge@*", "gestured-serial@*")  # units of systemd
 SYSTEMD_S = 5.0  # for its answer, which takes milliseconds
 LOOK_S = 1.5  # how long packets are looked at where the daemon drops some: 22 frames of a usual sensor
-UNIX_SOCKETS = Path("/proc/net/unix")
-LISTENS = "00010000"  # the flag of a listening socket there
 
 
 def add(commands: Commands) -> None:
@@ -75,7 +73,7 @@ def examine(path: Path) -> Iterator[Finding]:
         yield Finding("bad", str(error), JOIN)
         return
     except (Unreachable, Refused, Stranger) as error:
-        others = running(UNIX_SOCKETS) if isinstance(error, Unreachable) else []
+        others = running() if isinstance(error, Unreachable) else []
         if others and path not in others:
             yield _elsewhere(path, others)
             return
@@ -88,16 +86,6 @@ def examine(path: Path) -> Iterator[Finding]:
         return
     yield _permissions(path)
     yield from examine_status(status, proposed)
-
-
-def running(table: Path) -> list[Path]:
-    """The control sockets of all daemons of this machine, by the kernel's table of Unix sockets."""
-    try:
-        rows = [row.split(maxsplit=7) for row in table.read_text("utf-8", "replace").splitlines()]
-    except OSError:
-        return []
-    listening = {Path(row[7]) for row in rows if len(row) == 8 and row[3] == LISTENS}
-    return sorted(path for path in listening if path.suffix == ".ctl" and path.with_suffix(".sock") in listening)
 
 
 def _elsewhere(path: Path, others: list[Path]) -> Finding:
@@ -178,10 +166,7 @@ def _port(address: Address) -> Finding:
         try:
             probe.bind(address)
         except OSError as error:
-            remedy = (
-                f"sudo ss -ulpn 'sport = :{address.port}' shows whose it is. systemd holds it for the service: good; "
-                "else end that program, or choose another --listen"
-            )
+            remedy = "systemd holds it for the service: good; else end that program, or choose another --listen"
             return Finding("warn", f"{where}: {bind_failure(error, address, socket.SOCK_DGRAM)}", remedy)
     return Finding("ok", f"{where} is free")
 

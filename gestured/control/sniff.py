@@ -9,8 +9,8 @@ import sys
 import time
 from collections.abc import Iterator
 
+from gestured.client.address import bind_failure
 from gestured.client.control import Control
-from gestured.client.holder import bind_failure
 from gestured.client.lines import Unreachable
 from gestured.client.program import Commands
 from gestured.client.say import say, shown, tell

@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from gestured.client.address import SYSTEM, find_all_controls
+from gestured.client.address import SYSTEM, control_beside, running
 from gestured.client.control import Control
 from gestured.client.lines import Unreachable
 from gestured.client.program import Commands
@@ -63,9 +63,10 @@ def run(args: argparse.Namespace) -> int:
 
 def all_of_them(args: argparse.Namespace) -> int:
     """Print a line for each daemon; 1 where one is not ready, does not answer, or there is none."""
-    paths = find_all_controls(os.environ)
+    installed = control_beside(SYSTEM)  # which has a network of its own, and so is not in the kernel's table of ours
+    paths = sorted({*running(), *([installed] if os.path.exists(installed) else [])})
     if not paths:
-        raise Unreachable(f"no daemon is found: none has a socket below {SYSTEM.parent.parent} or in the session")
+        raise Unreachable("no daemon runs on this machine")
     bad = 0
     if not args.json:
         say("control socket                       state        sensors    frames/s  gestures   dropped  load")

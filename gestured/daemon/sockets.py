@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from gestured.client.holder import bind_failure
+from gestured.client.address import bind_failure
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gestured.control import doctor
+from gestured.client import address
 from gestured.control.cli import main
 from gestured.control.doctor import _buffer, _clock, _permissions, _port
 from gestured.control.findings import BUFFER_BYTES
@@ -147,7 +147,7 @@ def test_doctor_finds_what_is_wrong_and_says_what_to_do(ctl, daemon: Daemon) -> 
 
 
 def test_doctor_without_any_daemon_asks_whether_it_runs(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "UNIX_SOCKETS", tmp_path / "table")  # else what is said depends on this machine
+    monkeypatch.setattr(address, "UNIX_SOCKETS", tmp_path / "table")  # else what is said depends on this machine
     status, out, _ = run("doctor", "--control", tmp_path / "none.ctl")
     assert status == 1 and "no daemon on" in out and "does it run? systemctl status gestured" in out
 

@@ -1,4 +1,4 @@
-"""gesturectl status --all: each daemon that is found, a line each."""
+"""gesturectl status --all: each daemon that runs, a line each."""
 
 import json
 from pathlib import Path
@@ -6,45 +6,27 @@ from pathlib import Path
 import pytest
 
 from gestured.client import address
-from tests.daemon import tiny_model
+from gestured.control import status as status_command
 from tests.daemon.harness import Daemon
 
 
-@pytest.fixture
-def session(tmp_path: Path) -> dict[str, str]:
-    """The environment of a session with a folder of its own."""
-    return {"XDG_RUNTIME_DIR": str(tmp_path)}
+def test_each_daemon_that_runs_is_shown_wherever_its_socket_is(run, serve) -> None:
+    daemons: list[Daemon] = [serve(), serve()]
+    status, out, _ = run("status", "--all", "--json")
+    found = {line["control"]: line["pid"] for line in map(json.loads, out.splitlines()) if "pid" in line}
+    assert {daemon.ready["control"]: daemon.process.pid for daemon in daemons}.items() <= found.items()
+    (line,) = [line for line in run("status", "--all")[1].splitlines() if line.startswith(daemons[0].ready["control"])]
+    assert line.split()[1] == "no_data"
 
 
-def test_each_daemon_is_shown_and_one_that_hangs_or_is_gone_too(run, session, tmp_path: Path):
-    model = tiny_model.make(tmp_path / "tiny.onnx")
-    daemons = []
-    try:
-        for name in ("gestured", "gestured-left", "gestured-right"):
-            folder = tmp_path / name
-            folder.mkdir()
-            daemons.append(Daemon.start(folder, model))
-        status, out, err = run("status", "--all", "--json", env=session)
-        found = {json.loads(line)["control"]: json.loads(line) for line in out.splitlines()}
-        mine = {path: found[path] for path in found if path.startswith(str(tmp_path))}
-        assert {Path(path).parent.name for path in mine} == {"gestured", "gestured-left", "gestured-right"}
-        assert {each["pid"] for each in mine.values()} == {daemon.process.pid for daemon in daemons}
-        daemons[1].process.kill()
-        daemons[1].process.wait()
-        status, out, err = run("status", "--all", env=session)
-        assert status == 1
-        (gone,) = [line for line in out.splitlines() if "gestured-left" in line]
-        assert "no daemon on" in gone
-        assert [line.split()[1] for line in out.splitlines() if "gestured-right" in line] != []
-    finally:
-        for daemon in daemons:
-            daemon.stop()
-
-
-def test_none_at_all_is_said(run, session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(address, "SYSTEM", tmp_path / "run" / "gestured" / "events.sock")
-    assert address.find_all_controls(session) == []
-    for name in ("gestured", "gestured-left"):
-        (tmp_path / "run" / name).mkdir(parents=True)
-        (tmp_path / "run" / name / "events.ctl").touch()
-    assert [path.parent.name for path in address.find_all_controls(session)] == ["gestured", "gestured-left"]
+def test_one_that_does_not_answer_and_none_at_all_are_said(
+    run, fake_control, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = tmp_path / "table"
+    monkeypatch.setattr(address, "UNIX_SOCKETS", table)
+    monkeypatch.setattr(status_command, "SYSTEM", tmp_path / "events.sock")
+    status, out, err = run("status", "--all")
+    assert (status, out) == (1, "") and "no daemon runs" in err
+    installed = fake_control("mad").rename(tmp_path / "events.ctl")
+    status, out, _ = run("status", "--all")
+    assert status == 1 and f"{installed} " in out and "status: mad" in out

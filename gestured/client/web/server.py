@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from gestured.client.holder import bind_failure
+from gestured.client.address import bind_failure
 from gestured.client.web.door import Door, at_home
 from gestured.client.web.outbox import Outbox
 from gestured.core.address import Address
