@@ -7,7 +7,7 @@ was expected. pydantic-settings would do the merging for 105 ms more at every st
 
 import errno
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, get_args, get_origin
 
 from pydantic import ValidationError
@@ -57,28 +57,32 @@ def _from_file(path: str) -> dict[str, Any]:
     return found
 
 
-def _from_environment(environ: Mapping[str, str]) -> dict[str, str]:
-    """Keys and values of the variables that are set and not empty; one that is nearly a key is an error."""
-    found = {
-        name.removeprefix(ENVIRONMENT).lower(): value
-        for name, value in environ.items()
-        if name.startswith(ENVIRONMENT) and value
-    }
-    for key in found:
-        name = ENVIRONMENT + key.upper()
-        if key not in KEYS and not _platforms(name, found[key]) and (near := _near(key)):
-            raise SettingsError(f"{name} = {found[key]!r} (environment): unknown key, did you mean {near}?")
-    return {key: value for key, value in found.items() if key in KEYS}
+def _from_environment(environ: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
+    """Values by key of the variables that are set and not empty, and names of those that are no settings.
+
+    What a container platform sets by itself is passed over. Raises SettingsError for one that is nearly a setting.
+    """
+    found: dict[str, str] = {}
+    strange: list[str] = []
+    for name, value in environ.items():
+        key = name.removeprefix(ENVIRONMENT).lower()
+        if not name.startswith(ENVIRONMENT) or not value:
+            continue
+        if key in KEYS:
+            found[key] = value
+        elif _platforms(name, value):
+            continue
+        elif near := _near(key, KEYS):
+            variable = ENVIRONMENT + near.upper()
+            raise SettingsError(f"{name} = {value!r} (environment): unknown key, did you mean {variable}?")
+        else:
+            strange.append(name)
+    return found, strange
 
 
 def strange_variables(environ: Mapping[str, str]) -> list[str]:
     """The variables `GESTURED_*` that are no settings, and that no container platform sets by itself."""
-    return [
-        name
-        for name, value in environ.items()
-        if name.startswith(ENVIRONMENT) and value
-        if name.removeprefix(ENVIRONMENT).lower() not in KEYS and not _platforms(name, value)
-    ]
+    return _from_environment(environ)[1]
 
 
 def _platforms(name: str, value: str) -> bool:
@@ -86,19 +90,11 @@ def _platforms(name: str, value: str) -> bool:
     return bool(SERVICE.fullmatch(name) or (PORT.fullmatch(name) and "://" in value))
 
 
-def _near(key: str) -> str | None:
-    """The variable whose key is nearest to this one; None where none is near."""
+def _near(key: str, known: Sequence[str]) -> str | None:
+    """The known key that is nearest to this one; None where none is near."""
     import difflib
 
-    near = difflib.get_close_matches(key, KEYS, 1)
-    return ENVIRONMENT + near[0].upper() if near else None
-
-
-def _unknown(key: str, known: tuple[str, ...]) -> str:
-    import difflib
-
-    near = difflib.get_close_matches(key, known, 1)
-    return f"unknown key, did you mean {near[0]}?" if near else f"unknown key, expected one of {', '.join(known)}"
+    return next(iter(difflib.get_close_matches(key, known, 1)), None)
 
 
 def _keys_at(place: tuple[Any, ...]) -> tuple[str, ...]:
@@ -121,7 +117,10 @@ def _explain(problem: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     if problem["type"] == "missing":
         return f"{key} ({source}): is missing"
     if problem["type"] == "extra_forbidden":
-        said = _unknown(str(place[-1]), _keys_at(place))
+        known = _keys_at(place)
+        near = _near(str(place[-1]), known)
+        hint = f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
+        said = f"unknown key, {hint}"
     elif problem["type"] == "model_type":
         said = f"expected a table [{key}]"
     else:
@@ -134,7 +133,7 @@ def load_settings(flags: Mapping[str, Any], environ: Mapping[str, str]) -> tuple
 
     Returns the settings and where each key that was set came from. Raises SettingsError.
     """
-    environment = _from_environment(environ)
+    environment, _ = _from_environment(environ)
     path = flags.get("config") or environment.pop("config", None)
     environment.pop("config", None)
     file = _from_file(path) if path else {}
