@@ -20,7 +20,7 @@ from gestured.daemon.exposition import exposition
 from gestured.daemon.metrics import NAMED_SENSORS, Metrics
 from gestured.daemon.service import Service
 from gestured.daemon.settings import Settings
-from gestured.daemon.shift import LAST, LEAST_GESTURES, Shift, measured
+from gestured.daemon.shift import LAST, LEAST_GESTURES, Shift
 from gestured.daemon.status import sensor, status
 from gestured.model.features import MEASURES
 from tests.daemon.harness import Hand
@@ -239,43 +239,6 @@ def test_metadata_that_say_nothing_give_no_verdict(quantiles: dict[str, Any]) ->
     for _ in range(LAST):
         shift.add({"strength": 1.0, "duration_s": 1.0, "area": 1.0})
     assert shift.shares() == {} and shift.count == 0
-
-
-def test_what_is_measured_is_what_the_lab_measures_of_its_training_data() -> None:
-    lab = pytest.importorskip("gestured.lab.quantiles", reason="needs the lab's packages")
-    from gestured.lab.samples import WINDOW, Samples
-
-    rng = np.random.default_rng(3)
-    segments = []
-    for _ in range(40):
-        length = int(rng.integers(3, 30))
-        frames = np.zeros((length + 4, 9, 9), np.float32)
-        y, x = np.mgrid[:9, :9]
-        for n in range(length):
-            frames[n + 2] = rng.uniform(20, 90) * np.exp(-((y - 4) ** 2 + (x - 8 * n / length) ** 2) / 2)
-        segments.append(Segment(frames, np.arange(length + 4) / 15, 2, length + 1, 1.5))
-    seen = [measured(segment, WINDOW) for segment in segments]
-    assert {"strength", *MEASURES} == set(seen[0])
-    windows = [WINDOW.apply(segment).astype(np.float16) for segment in segments]
-    offsets = np.cumsum([0, *map(len, windows)], dtype=np.int64)
-    labels, people = np.array(["one_tap"] * len(windows)), np.zeros(len(windows), np.int64)
-    strength = np.array([s["strength"] for s in seen])
-    ends = np.array([len(w) - 1 for w in windows], np.int64)
-    samples = Samples(
-        np.concatenate(windows),
-        offsets,
-        labels,
-        labels,
-        people,
-        strength,
-        people,
-        ends,
-        np.zeros((len(windows), 1), np.float32),
-    )
-    ours = lab.quantiles(samples)
-    for name in ("strength", *MEASURES):
-        expected = np.quantile([s[name] for s in seen], lab.QUANTILES)
-        assert ours[name] == pytest.approx(expected, rel=0.02, abs=2e-3), name
 
 
 def test_what_looks_on_cannot_prevent_an_answer(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:

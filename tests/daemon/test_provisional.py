@@ -11,6 +11,10 @@ from pythonosc.osc_message import OscMessage
 
 import gestured
 from gestured.client.control import Control
+from gestured.core.address import Address
+from gestured.core.events import Gesture, Provisional
+from gestured.daemon.metrics import Metrics
+from gestured.daemon.sinks import OscSink
 from tests.daemon import tiny_model
 from tests.daemon.harness import Client, Daemon, Hand, Sensor
 from tests.hostile.grammar import TYPES, violations
@@ -146,54 +150,42 @@ def test_a_made_up_gesture_is_said_before_too(daemon: Daemon) -> None:
         assert plain.line()["provisional"] is None
 
 
-def published_to(out: socket.socket) -> tuple[str, ...]:
-    return "--clock", "sensor", "--publish", f"osc://127.0.0.1:{out.getsockname()[1]}"
+def test_over_osc(start: Callable[..., Daemon], early: Path, udp: socket.socket) -> None:
+    to = f"osc://127.0.0.1:{udp.getsockname()[1]}"
+    daemon = start("--clock", "sensor", "--publish", to, "--publish-provisional", "true", model=early)
 
+    def heard(last: str) -> list[tuple[str, str, list[Any]]]:
+        """What is published of the sensor, with its types and arguments, until that."""
+        found: list[tuple[str, str, list[Any]]] = []
+        while not found or found[-1][0] != last:
+            message = OscMessage(udp.recv(9999))
+            if message.address not in ("/gestured/status", "/gestured/arm/where"):
+                types = message.dgram[message.dgram.index(b",") :].split(b"\0")[0].decode()
+                found.append((message.address.removeprefix("/gestured/arm/"), types, message.params))
+        return found
 
-def heard(out: socket.socket, last: str) -> list[tuple[str, str, list[Any]]]:
-    """What is published of the sensor, with its types and arguments, until that."""
-    found: list[tuple[str, str, list[Any]]] = []
-    while not found or found[-1][0] != last:
-        message = OscMessage(out.recv(9999))
-        if message.address != "/gestured/status":
-            types = message.dgram[message.dgram.index(b",") :].split(b"\0")[0].decode()
-            found.append((message.address.removeprefix("/gestured/arm/"), types, message.params))
-    return found
-
-
-@pytest.mark.parametrize("taps", ["true", "false"])
-def test_over_osc(start: Callable[..., Daemon], early: Path, udp: socket.socket, taps: str) -> None:
-    daemon = start(*published_to(udp), "--publish-provisional", "true", "--provisional-taps", taps, model=early)
     found: list[tuple[str, str, list[Any]]] = []
     sensor = Sensor(daemon, "arm").begin()
     hand = sensor.hand
     for begin in ([hand.swipe("left")], [hand.tap(), hand.idle(0.2), hand.tap()]):
         sensor.send(*begin)
-        found += heard(udp, "provisional")
+        found += heard("provisional")
         sensor.send(hand.idle(1.0))
-        found += heard(udp, "gesture")
-    found = [one for one in found if one[0] != "where"]
-    before = [("provisional", "one_tap"), ("revoked", "one_tap")] if taps == "true" else [("provisional", "double_tap")]
-    assert [(what, params[0]) for what, _, params in found] == [
-        ("provisional", "swipe_left"), ("gesture", "swipe_left"), *before, ("gesture", "double_tap"),
+        found += heard("gesture")
+    assert [(what, types, params[0]) for what, types, params in found] == [
+        ("provisional", ",sfi", "swipe_left"), ("gesture", ",sfidd", "swipe_left"),
+        ("provisional", ",sfi", "one_tap"), ("revoked", ",si", "one_tap"), ("gesture", ",sfidd", "double_tap"),
     ]  # fmt: skip
-    assert {what: types for what, types, _ in found}["provisional"] == ",sfi"
-    assert found[0][2][2] == 1 and 0.9 <= found[0][2][1] <= 1
-    if taps == "true":
-        assert found[3][1:] == (",si", ["one_tap", 2]) and found[2][2][2] == 2
+    assert [found[n][2][-1] for n in (0, 2, 3)] == [1, 2, 2] and 0.9 <= found[0][2][1] <= 1
 
 
-def test_without_the_setting_osc_says_only_what_it_said_before(
-    start: Callable[..., Daemon], early: Path, udp: socket.socket
-) -> None:
-    daemon = start(*published_to(udp), model=early)
-    client = daemon.client().subscribe(*ALL)
-    two_taps(Sensor(daemon, "arm").begin())
-    assert "one_tap?" in said(client, "arm")
-    addresses = set()
-    while "/gestured/arm/gesture" not in addresses:
-        addresses.add(OscMessage(udp.recv(9999)).address)
-    assert addresses <= {"/gestured/arm/gesture", "/gestured/status"}
+def test_without_the_setting_osc_says_only_what_it_said_before(udp: socket.socket) -> None:
+    for wanted, first in ((False, "gesture"), (True, "provisional")):
+        sink = OscSink(Address(*udp.getsockname()), Metrics(), provisional=wanted)
+        sink.publish(Provisional("arm", 1, "one_tap", 0.9, 0.0, 0.1), 0.0)
+        sink.publish(Gesture("arm", 1, "double_tap", 0.9, 1, 0.0, 1.0, 2.0, 3, 0, "tiny", False, {}, "revoked"), 0.0)
+        sink.close()
+        assert OscMessage(udp.recv(9999)).address == f"/gestured/arm/{first}"
 
 
 def test_in_a_process_of_ones_own(early: Path) -> None:

@@ -9,10 +9,13 @@ import pytest
 from pythonosc.osc_bundle import OscBundle
 
 from gestured.core.address import Address
+from gestured.core.errors import SettingsError
 from gestured.core.events import Status, Touch
+from gestured.daemon.asked import open_ladder
 from gestured.daemon.metrics import Metrics
 from gestured.daemon.tuio import TuioSink
 from tests.daemon.harness import Daemon, Sensor
+from tests.daemon.parts import settings_of
 
 pythontuio = pytest.importorskip("pythontuio")
 
@@ -85,7 +88,9 @@ def test_each_frame_says_whose_it_is_who_is_alive_and_its_number(udp: socket.soc
     assert [sent()[1:] for _ in "12"] == [[["alive"], ["fseq", 3]], [["alive"], ["fseq", 7]]]
 
 
-def test_it_needs_touch_events(tmp_path: Path, model: Path) -> None:
-    daemon = Daemon(tmp_path, "--model", model, "--listen", "127.0.0.1:0", "--publish", "tuio://127.0.0.1:3333")
-    assert daemon.wait() == 2
-    assert "publish = tuio://127.0.0.1:3333: it tells where fingers are, expected `touch = true`" in daemon.stderr()
+def test_it_needs_touch_events(model: Path) -> None:
+    settings, _ = settings_of("--model", model, "--publish", "tuio://127.0.0.1:3333")
+    with pytest.raises(
+        SettingsError, match="publish = tuio://127.0.0.1:3333: it tells where fingers are, expected `touch"
+    ):
+        open_ladder(settings)
