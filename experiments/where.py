@@ -150,7 +150,7 @@ def places(take: Take, segment: Segment) -> Iterator[tuple[list[tuple[float, flo
     """Of each touched frame where the fingers truly were, and where they are found."""
     for k in range(segment.first, segment.last + 1):
         true = [at for finger in take.fingers if (at := finger.at(float(segment.times[k]) - take.behind_s))]
-        found = spots(segment.frames[k].astype(np.float64), segment.noise)
+        found = spots(segment.frames[k].astype(np.float64).ravel(), segment.frames.shape[1:], segment.noise)
         if len(true) == len(take.fingers):
             yield true, [(one.row, one.column) for one in found]
 
@@ -224,12 +224,12 @@ def real(folder: Path, count: int) -> Table:
     apart: dict[bool, list[float]] = {True: [], False: []}
     for k in rng.choice(touched, min(count, len(touched)), replace=False):
         frame = frames[k].astype(np.float64)
-        fine = spots(frame, 1.0)
+        fine = spots(frame.ravel(), frame.shape, 1.0)
         top = int(rng.integers(max(0, math.ceil(fine[0].row) - 14), min(12, math.floor(fine[0].row)) + 1))
         window = frame[top : top + 15]
         if len(fine) != 1 or window.max() < frame.max():
             continue
-        (coarse, *_) = spots(share @ window @ share.T, 1.0)
+        (coarse, *_) = spots((share @ window @ share.T).ravel(), (9, 9), 1.0)
         true = ((fine[0].row - top + 0.5) * 0.6 - 0.5, (fine[0].column + 0.5) * 0.6 - 0.5)
         border = min(*true, 8 - true[0], 8 - true[1]) < 1
         apart[border].append(math.dist(true, (coarse.row, coarse.column)))

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Taxels = NDArray[np.int64]
 
 REACH = 2  # taxels on each side of a peak that a fit looks at
-WIDTHS = (0.5, 0.7, 1.0, 1.4)  # pitches, one standard deviation: fingertips on taxels of 4 to 8 mm, blurred
+WIDTHS = (0.7, 1.0)  # pitches, one standard deviation: fingertips on taxels of 4 to 8 mm; more widths place no better
 STEP, STEPS = 0.25, 3  # pitches from one offset of the table to the next, and how many on each side of the peak
 BASE = 0.5  # variance of the flat base in units of a taxel's noise: crosstalk and a palm lift what is around a finger
 SIDE = 2 * STEPS + 1
@@ -38,61 +39,81 @@ class Spot(NamedTuple):
     area: int  # taxels above half of that
 
 
-def spots(frame: Array, noise: float) -> list[Spot]:
-    """The fingers in (R, C) counts above the baseline, the strongest first: one, or two that can be told apart."""
-    peaks = _peaks(frame, noise)
-    if len(peaks) == 1:
-        (first, reach), level = peaks[0], frame.item(peaks[0][0]) / 2
-        return [_new(Spot, (*_place(frame, first, reach), 2 * level, (frame > level).tobytes().count(1)))]
-    (row, column), (down, across) = (divmod(peak, frame.shape[1]) for peak, _ in peaks)
-    rows, columns = np.indices(frame.shape)  # below: less far from the first peak than half-way
-    nearer = rows * (down - row) + columns * (across - column) < (down**2 + across**2 - row**2 - column**2) / 2
-    found: list[Spot] = []
-    for (peak, reach), own in zip(peaks, (nearer, ~nearer), strict=True):
-        level = frame.item(peak)
-        area = int(np.count_nonzero((frame > level / 2) & own))
-        found.append(_new(Spot, (*_place(frame, peak, reach), level, area)))
-    return found
+class Peak(NamedTuple):
+    """The strongest taxel of a finger, and which taxels are looked at because it is."""
+
+    taxel: int  # as all taxels here, counted row by row
+    row: float
+    column: float
+    last_row: float  # of the grid
+    last_column: float
+    beside: Taxels  # itself and those next to it
+    others: Taxels  # all but these
+    around: Taxels  # (n,) those of its fit
+    table: Array  # (n, W * SIDE * SIDE) their weights
 
 
-def places(frame: Array, noise: float) -> list[tuple[float, float]]:
+class Pair(NamedTuple):
+    """The peaks of two fingers."""
+
+    between: Taxels  # along the line between them
+    nearer: NDArray[np.bool_]  # (R * C,) whether a taxel is less far from the first than from the second
+
+
+def spots(frame: Array, shape: tuple[int, int], noise: float) -> list[Spot]:
+    """The fingers in a frame of R x C taxels, the strongest first: one, or two that can be told apart.
+
+    `frame`: (R * C,) counts above the baseline, row by row.
+    """
+    first, second = _peaks(frame, shape, noise)
+    level = frame.item(first.taxel)
+    strong = frame > level / 2
+    if second is None:
+        return [_new(Spot, (*_place(frame, first), level, int(np.count_nonzero(strong))))]
+    nearer, other = _pair(shape, first.taxel, second.taxel).nearer, frame.item(second.taxel)
+    one = Spot(*_place(frame, first), level, int(np.count_nonzero(strong & nearer)))
+    return [one, Spot(*_place(frame, second), other, int(np.count_nonzero((frame > other / 2) & ~nearer)))]
+
+
+def places(frame: Array, shape: tuple[int, int], noise: float) -> list[tuple[float, float]]:
     """The row and the column of each of the `spots` of a frame."""
-    return [_place(frame, peak, reach) for peak, reach in _peaks(frame, noise)]
+    return [_place(frame, peak) for peak in _peaks(frame, shape, noise) if peak is not None]
 
 
-def _peaks(frame: Array, noise: float) -> tuple[tuple[int, int], ...]:
-    """The strongest taxel of each finger, and how far a fit looks around it."""
-    first = int(frame.argmax())
-    second = int((frame * _elsewhere(frame.shape, first)).argmax())
-    peak = frame.item(second)
-    if peak < SECOND * frame.item(first) or peak < NOISE * noise or not _parted(frame, first, second):
-        return ((first, REACH),)
-    (row, column), (down, across) = divmod(first, frame.shape[1]), divmod(second, frame.shape[1])
-    reach = 1 if max(abs(down - row), abs(across - column)) <= APART else REACH
-    return (first, reach), (second, reach)
+def _peaks(frame: Array, shape: tuple[int, int], noise: float) -> tuple[Peak, Peak | None]:
+    """The peak of each finger."""
+    first = _peak(shape, int(frame.argmax()), REACH)
+    others = frame[first.others]
+    if not others.size:
+        return first, None
+    at = int(others.argmax())
+    level = others.item(at)
+    if level < SECOND * frame.item(first.taxel) or level < NOISE * noise:
+        return first, None
+    second = _peak(shape, first.others.item(at), REACH)
+    between = _pair(shape, first.taxel, second.taxel).between
+    if level < frame[second.beside].max() or frame[between].min() > VALLEY * level:
+        return first, None  # it is no peak, or no valley lies between it and the first
+    if max(abs(second.row - first.row), abs(second.column - first.column)) > APART:
+        return first, second
+    return _peak(shape, first.taxel, 1), _peak(shape, second.taxel, 1)
 
 
-def _parted(frame: Array, first: int, second: int) -> bool:
-    """Whether the second taxel is a peak, and a valley lies between it and the first."""
-    peak, (beside, between) = frame.item(second), _ways(frame.shape, first, second)
-    return peak >= frame.take(beside).max() and bool((frame.take(between) <= VALLEY * peak).any())
-
-
-def _place(frame: Array, peak: int, reach: int) -> tuple[float, float]:
-    """The row and the column of the finger whose strongest taxel is `peak`."""
-    row, column, last_row, last_column, around, table = _around(frame.shape, peak, reach)
-    fits = table.dot(frame.take(around))
-    best, at = int(fits.argmax()), fits.item
+def _place(frame: Array, peak: Peak) -> tuple[float, float]:
+    """The row and the column of the finger with this peak."""
+    _, row, column, last_row, last_column, _, _, around, table = peak
+    fits = frame[around].dot(table)
+    best, fit = int(fits.argmax()), fits.item
     down, across, one_down, one_across = _OFFSETS[best]
     # A parabola through the best fit's neighbours; at the edge of the table these are the best fit itself.
-    top, above, below = at(best), at(best - one_down), at(best + one_down)
-    left, right = at(best - one_across), at(best + one_across)
+    top, above, below = fit(best), fit(best - one_down), fit(best + one_down)
+    left, right = fit(best - one_across), fit(best + one_across)
     bend, turn = above - 2 * top + below, left - 2 * top + right
-    down_to = row + (down + (0.5 * (above - below) / bend if bend < 0 else 0.0)) * STEP
-    across_to = column + (across + (0.5 * (left - right) / turn if turn < 0 else 0.0)) * STEP
-    if not (0.0 <= down_to <= last_row and 0.0 <= across_to <= last_column):  # beyond the outermost taxels
-        down_to, across_to = min(max(down_to, 0.0), last_row), min(max(across_to, 0.0), last_column)
-    return down_to, across_to
+    row += (down + (0.5 * (above - below) / bend if bend < 0 else 0.0)) * STEP
+    column += (across + (0.5 * (left - right) / turn if turn < 0 else 0.0)) * STEP
+    if not (0.0 <= row <= last_row and 0.0 <= column <= last_column):  # beyond the outermost taxels
+        row, column = min(max(row, 0.0), last_row), min(max(column, 0.0), last_column)
+    return row, column
 
 
 def _offset(best: int) -> tuple[int, int, int, int]:
@@ -105,42 +126,34 @@ _OFFSETS = [_offset(best) for best in range(len(WIDTHS) * SIDE**2)]
 
 
 @lru_cache(PEAKS)
-def _elsewhere(shape: tuple[int, int], peak: int) -> Array:
-    """(R, C) 0 at a peak and the taxels beside it, 1 elsewhere."""
-    found = np.ones(shape)
-    row, column = divmod(peak, shape[1])
-    found[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = 0.0
-    return found
-
-
-@lru_cache(PEAKS)
-def _ways(shape: tuple[int, int], first: int, second: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The taxels beside the second of two, and those along the line between both."""
-    taxels, (row, column), (down, across) = _taxels(shape), divmod(first, shape[1]), divmod(second, shape[1])
-    steps = 2 * max(abs(down - row), abs(across - column))
-    shares = [k * (1.0 / steps) for k in range(1, steps)]
-    between = [taxels[round(row + s * (down - row)), round(column + s * (across - column))] for s in shares]
-    return taxels[max(down - 1, 0) : down + 2, max(across - 1, 0) : across + 2].ravel(), np.array(between, np.int64)
-
-
-@lru_cache(PEAKS)
-def _around(shape: tuple[int, int], peak: int, reach: int) -> tuple[int, int, float, float, NDArray[np.int64], Array]:
-    """A peak's row and column, the last of each, the taxels that a fit looks at, row by row, and the table for them."""
-    (row, column), (rows, columns) = divmod(peak, shape[1]), shape
+def _peak(shape: tuple[int, int], taxel: int, reach: int) -> Peak:
+    """A peak at a taxel, for a fit of those that are there within `reach` of it."""
+    (row, column), (rows, columns) = divmod(taxel, shape[1]), shape
     above, below = min(reach, row), min(reach, rows - 1 - row)
     left, right = min(reach, column), min(reach, columns - 1 - column)
-    around = _taxels(shape)[row - above : row + below + 1, column - left : column + right + 1].ravel()
-    return row, column, rows - 1.0, columns - 1.0, around, _table(above, below, left, right)
+    taxels = np.arange(rows * columns).reshape(shape)
+    around = taxels[row - above : row + below + 1, column - left : column + right + 1].ravel()
+    beside = taxels[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2].ravel()
+    table = _table(above, below, left, right)
+    others = np.delete(taxels.ravel(), beside)
+    return Peak(taxel, row, column, rows - 1.0, columns - 1.0, beside, others, around, table)
 
 
-def _taxels(shape: tuple[int, int]) -> NDArray[np.int64]:
-    """(R, C) the number of each taxel, row by row."""
-    return np.arange(shape[0] * shape[1]).reshape(shape)
+@lru_cache(PEAKS)
+def _pair(shape: tuple[int, int], first: int, second: int) -> Pair:
+    """Two taxels as peaks."""
+    (row, column), (down, across), columns = divmod(first, shape[1]), divmod(second, shape[1]), shape[1]
+    steps = 2 * max(abs(down - row), abs(across - column))
+    shares = [k * (1.0 / steps) for k in range(1, steps)]
+    between = [round(row + s * (down - row)) * columns + round(column + s * (across - column)) for s in shares]
+    rows, across_to = np.indices(shape)
+    nearer = (rows - row) ** 2 + (across_to - column) ** 2 < (rows - down) ** 2 + (across_to - across) ** 2
+    return Pair(np.array(between, np.int64), nearer.ravel())
 
 
 @lru_cache(TABLES)
 def _table(above: int, below: int, left: int, right: int) -> Array:
-    """(W * SIDE * SIDE, n) weights: their product with the n taxels around a peak is greatest for the best fit.
+    """(n, W * SIDE * SIDE) weights: the product of the n taxels around a peak with them is greatest for the best fit.
 
     For a spot s of unit height, noise that is white and a base of variance `BASE`, with K the inverse of their joint
     covariance, the residual of the best height is least where s K z / sqrt(s K s) is greatest (z: the taxels).
@@ -151,4 +164,5 @@ def _table(above: int, below: int, left: int, right: int) -> Array:
     width, down, across = (axis.ravel()[:, None] for axis in np.meshgrid(WIDTHS, at, at, indexing="ij"))
     shapes = np.exp(-((y - down) ** 2 + (x - across) ** 2) / (2 * width**2))
     weights = shapes @ inverse
-    return np.asarray(weights / np.sqrt((weights * shapes).sum(axis=1, keepdims=True)))
+    weights /= np.sqrt((weights * shapes).sum(axis=1, keepdims=True))
+    return np.ascontiguousarray(weights.T)  # a product with it is faster than one with its transpose

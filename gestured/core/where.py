@@ -23,6 +23,7 @@ MOST = 100  # frames of a segment that are looked at, evenly spread: a finger is
 SEEN = 0.3  # of the segment's peak: a frame as strong as that says where the finger is
 BOTH = 0.5  # of the segment's peak: such frames say whether there are two fingers, in more than half of them
 SHAKE = 4.0  # pitches by which a place of a peak as high as the noise is uncertain; less with a higher peak
+FINE = 1e4  # parts of a sensor's side to which places are told; `round` to four digits takes twice the time
 UNDER = 1.0  # pitches from the way within which a bad taxel counts as under it
 MOST_ZONES = 64  # of one sensor: each is held against each other one, and a tape may come from anybody
 
@@ -84,16 +85,17 @@ def _zone(name: str, told: Any) -> Zone:
 def where(segment: Segment, zones: Mapping[str, Zone]) -> Where:
     """Where a segment was, and in which of the sensor's zones. Any segment has an answer, whatever its taxels show."""
     touched = segment.frames[segment.first : segment.last + 1]
+    rows, columns = touched.shape[1:]
     peaks = touched.max(axis=(1, 2)).astype(np.float64)
     top = float(peaks.max())
     seen = np.flatnonzero(peaks >= SEEN * top) if top > 0 else np.arange(len(touched))
     if len(seen) > MOST:
         seen = seen[np.rint(np.linspace(0, len(seen) - 1, MOST)).astype(int)]
-    found = [places(frame, segment.noise) for frame in touched[seen].astype(np.float64)]
+    frames = touched[seen].astype(np.float64).reshape(len(seen), -1)
+    found = [places(frame, (rows, columns), segment.noise) for frame in frames]
     two = [len(fingers) == 2 for fingers, peak in zip(found, peaks[seen].tolist(), strict=True) if peak >= BOTH * top]
     contacts = 2 if 2 * sum(two) > len(two) else 1
     path = [middle(fingers[:contacts]) for fingers in found if len(fingers) >= contacts]
-    rows, columns = touched.shape[1:]
     snr = top / max(segment.noise, SMALLEST)
     way = _way(path, RESTS + SHAKE / max(snr, 1.0))
     start, end = (Place(*fractions(rows, columns, row, column)) for row, column in (path[0], path[-1]))
@@ -117,12 +119,7 @@ def middle(fingers: Sequence[tuple[float, float]]) -> tuple[float, float]:
 
 def fractions(rows: int, columns: int, row: float, column: float) -> tuple[float, float]:
     """A row and a column of a grid as fractions of it, to the right and upward."""
-    return finely(column / (columns - 1)), finely(1.0 - row / (rows - 1))
-
-
-def finely(fraction: float) -> float:
-    """A fraction to four digits: what `round` with two arguments takes twice the time for."""
-    return round(fraction * 1e4) / 1e4
+    return round(column / (columns - 1) * FINE) / FINE, round((1.0 - row / (rows - 1)) * FINE) / FINE
 
 
 def _way(path: Sequence[tuple[float, float]], rests: float) -> float:

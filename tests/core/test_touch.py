@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import FrozenInstanceError
 from itertools import pairwise
 from typing import Any
 
@@ -41,10 +42,10 @@ def sensor(*, asked: bool = True, zones: dict[str, Any] | None = None, grid: tup
 
 
 class Hand:
-    """Fingers on a sensor of 15 Hz, or of another rate."""
+    """Fingers on a sensor of 15 Hz, or of another rate, whose counts are in another unit."""
 
-    def __init__(self, subject: Sensor, rate_hz: float = 15.0) -> None:
-        self.subject, self.rate_hz, self.t = subject, rate_hz, 0.0
+    def __init__(self, subject: Sensor, rate_hz: float = 15.0, unit: float = 1.0) -> None:
+        self.subject, self.rate_hz, self.unit, self.t = subject, rate_hz, unit, 0.0
         self.grid, self.width = subject.front_end.sent, 0.8  # of a finger, in pitches
         self._random = np.random.default_rng(0)
         self.told: list[Event] = []
@@ -57,7 +58,7 @@ class Hand:
             self.t += 1 / self.rate_hz
             values = 300 + self._random.normal(0, 2, self.grid)
             values += drawn(*path(k / count), grid=self.grid, width=self.width, peak=peak)
-            self.told += events_of(self.subject.push(Frame(self.t, values)))
+            self.told += events_of(self.subject.push(Frame(self.t, self.unit * values)))
         return [one for one in self.told[before:] if isinstance(one, Touch)]
 
     def rests(self, seconds: float) -> list[Touch]:
@@ -103,6 +104,16 @@ def test_a_swipe_comes_down_moves_and_is_up_before_its_answer() -> None:
     moves = [one for one in hand.told if isinstance(one, Touch)]
     assert moves[0].x == pytest.approx(1 / 8, abs=0.05) and moves[-1].x == pytest.approx(7 / 8, abs=0.12)
     assert all(abs(one.y - 0.5) < 0.05 and one.pressure > 300 and 1 <= one.area <= 9 for one in moves)
+    with pytest.raises(FrozenInstanceError):
+        moves[-1].x = 0.0  # type: ignore[misc]  # whoever else is told it would see that
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_pressure_is_told_in_a_few_digits_whatever_the_sensor_counts_in(unit: float) -> None:
+    hand = Hand(sensor(), unit=unit)
+    for told, known in zip(hand.does(0.5, line(1, 7)), Hand(sensor()).does(0.5, line(1, 7)), strict=True):
+        assert told.pressure / unit == pytest.approx(known.pressure, abs=0.02)  # a hundredth of the noise
+        assert len(str(told.pressure)) <= 11
 
 
 DEEDS: dict[str, tuple[float, Path]] = {  # seconds, and where fingers are meanwhile

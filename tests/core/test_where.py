@@ -18,7 +18,8 @@ from gestured.core.frames import Segment
 from gestured.core.mounting import Mounting
 from gestured.core.scene import Scene, Setup
 from gestured.core.sensor import Sensor
-from gestured.core.spots import spots
+from gestured.core.spots import Spot
+from gestured.core.spots import spots as spots_in
 from gestured.core.where import where as where_in
 from tests.core.test_sensor import SWIPE, TAP, Fake, says
 from tests.scenario import frames
@@ -26,6 +27,11 @@ from tests.scenario import frames
 Array = NDArray[np.float64]
 Path = list[tuple[float, float]]
 where = partial(where_in, zones={})
+
+
+def spots(frame: Array, noise: float = 2.0) -> list[Spot]:
+    """The fingers of an (R, C) frame."""
+    return spots_in(frame.ravel(), frame.shape, noise)
 
 
 def drawn(
@@ -52,7 +58,7 @@ def test_a_finger_is_found_to_a_fraction_of_a_taxel_at_the_border_too(
 ) -> None:
     row, column = down * (grid[0] - 1), across * (grid[1] - 1)
     frame = drawn((row, column), grid=grid, width=width) + np.random.default_rng(seed).normal(0, 2, grid)
-    (spot,) = spots(frame, 2.0)
+    (spot,) = spots(frame)
     assert math.dist((spot.row, spot.column), (row, column)) < 0.4  # the worst is a corner, of which a quarter is seen
     assert spot.peak == frame.max()
     assert spot.area == np.count_nonzero(frame > spot.peak / 2)
@@ -62,7 +68,7 @@ def test_the_border_pulls_no_place_inwards() -> None:
     """A centroid of the same taxels is off by more than a third of a pitch there."""
     rng = np.random.default_rng(0)
     places = [(rng.uniform(0, 0.5), rng.uniform(1, 7), rng.uniform(0.6, 1.2)) for _ in range(200)]
-    off = [spots(drawn((row, column), width=width), 2.0)[0].row - row for row, column, width in places]
+    off = [spots(drawn((row, column), width=width))[0].row - row for row, column, width in places]
     assert abs(np.median(off)) < 0.03 and np.percentile(np.abs(off), 95) < 0.2
 
 
@@ -72,7 +78,7 @@ def test_two_fingers_that_are_far_enough_apart_are_two(apart: float, angle: floa
     places = sorted([(4 + step[0], 4 + step[1]), (4 - step[0], 4 - step[1])])
     frame = drawn(*places, width=width) + np.random.default_rng(seed).normal(0, 2, (9, 9))
     assume(apart >= 3.4 * width)  # nearer, broad fingers are one hill
-    one, other = ((spot.row, spot.column) for spot in spots(frame, 2.0))
+    one, other = ((spot.row, spot.column) for spot in spots(frame))
     assert min(max(math.dist(one, a), math.dist(other, b)) for a, b in (places, places[::-1])) < 0.6
 
 

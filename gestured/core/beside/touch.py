@@ -9,15 +9,17 @@ finger that was learned and moves on comes down again.
 import math
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gestured.core.events import Place, Touch
+from gestured.core.frames import SMALLEST
 from gestured.core.front_end import FrontEnd
 from gestured.core.spots import Spot, spots
-from gestured.core.where import Zone, digits, finely, fractions, zone_at
+from gestured.core.where import FINE, Zone, fractions, zone_at
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -30,6 +32,9 @@ CHANGE = 0.35  # of a taxel's level: a taxel that changes by less trembles, and 
 RESTLESS = 8.0  # noise units: a taxel that changes by less than that lies still, too
 LEFT = 0.9  # of the level at which a finger lay: where its taxel shows less, the finger has left that place
 BESIDE = 3.0  # taxel pitches: a touch that begins so near to a place that a finger has left is that finger
+
+# A touch event before it is told: one is made of each frame, and a frozen dataclass takes six times as long to make.
+_Draft: Any = make_dataclass("_Draft", Touch.__slots__, slots=True)
 
 
 class Lying:
@@ -116,6 +121,9 @@ class Fingers:
         self._looked = -math.inf  # s, the last frame that was looked at
         self._lying: Lying | None = None  # since the contact was given up
         self._baseline: Array | None = None  # (N,) counts, as it was before anything of the contact was learned
+        self._fine = (
+            1.0  # parts of a count to which pressure is told, a power of ten: a hundredth of the noise, or less
+        )
 
     def end(self, baseline: Array | None = None) -> list[Touch]:
         """The contact is over: `up` for each finger that was told of. The (N,) `baseline` shows which were learned."""
@@ -134,18 +142,21 @@ class Fingers:
         phase, lying = segmenter.phase, self._lying
         if self._baseline is None:
             self._baseline, self._shape = front_end.baseline, (front_end.rows, front_end.columns)
+            self._fine = 10.0 ** max(2 - math.floor(math.log10(max(front_end.noise, SMALLEST))), 0)
         if lying is None and not phase.pending:
             self._lying = lying = Lying(look.t, self._shape)
         if look.t - self._looked < EACH_S:
             return []
         self._looked = look.t
-        taxels, noise = front_end.conditioner.taxels, front_end.noise
-        frame = taxels.bridge(look.above[None])[0] if taxels.count else look.above.reshape(self._shape)
+        conditioner = front_end.conditioner
+        taxels, noise = conditioner.taxels, conditioner.idle.level
+        frame = taxels.bridge(look.above[None]).ravel() if taxels.count else look.above
         if lying is None:
-            return self._follow([] if phase.let_go else spots(frame, noise), look.t)
+            return self._follow([] if phase.let_go else spots(frame, self._shape, noise), look.t)
+        frame = frame.reshape(self._shape)
         quiet = look.activity < segmenter.levels(look.t)[1]
         felt = lying.moving(frame, look.t, (segmenter.off if self._fingers else segmenter.on) * noise)
-        told = self._follow([] if quiet or felt is None else spots(felt, noise), look.t)
+        told = self._follow([] if quiet or felt is None else spots(felt.ravel(), self._shape, noise), look.t)
         lie = lying.learn([one.spot for one in self._fingers], frame, noise)
         for one in [one for one in self._fingers if one.spot in lie]:
             self._fingers.remove(one)
@@ -183,10 +194,12 @@ class Fingers:
             number, phase, dx, dy, zone = self._count, "down", 0.0, 0.0, zone_at(self.zones, Place(x, y))
             self._count += 1
         else:
-            number, dx, dy, zone = last.touch, finely(x - last.x), finely(y - last.y), last.zone
-        one.told = told = Touch(
-            self._sensor, self._id, number, phase, one.t, x, y, dx, dy, digits(peak), area, zone, reason
-        )
+            dx, dy = round((x - last.x) * FINE) / FINE, round((y - last.y) * FINE) / FINE
+            number, zone = last.touch, last.zone
+        pressure = round(peak * self._fine) / self._fine
+        told: Touch = _Draft(self._sensor, self._id, number, phase, one.t, x, y, dx, dy, pressure, area, zone, reason)
+        told.__class__ = Touch
+        one.told = told
         return told
 
 
