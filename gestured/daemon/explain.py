@@ -114,15 +114,16 @@ def _output(settings: Settings, ladder: Ladder) -> Said:
 def _answers(settings: Settings, ladder: Ladder) -> Said:
     """What is computed, how long an answer takes, and what is said before it."""
     timing, metadata = Timing(tap_gap_s=settings.tap_gap_s), ladder.model.metadata
+    rate_hz = metadata.window.rate_hz
 
     def felt(wait_s: float) -> str:
         """From the last touched frame to the answer, in words: the wait begins with the first quiet frame."""
-        return f"{1 / metadata.rate_hz + wait_s:.2g} s"
+        return f"{1 / rate_hz + wait_s:.2g} s"
 
     yield COMPUTES, "decode, check, stamp; subtract the baseline, compare with the noise; no smoothing, no inference"
     made = "its frames as a window" if metadata.features is None else "touch-pattern features"
     yield COMPUTES, f"after a contact: {made}, one inference"
-    answered = f"at {metadata.rate_hz:g} Hz a contact is answered {felt(timing.release_s)} after its last touched frame"
+    answered = f"at {rate_hz:g} Hz a contact is answered {felt(timing.release_s)} after its last touched frame"
     if DOUBLE_TAP in gestures_in_use(ladder, settings.gestures):
         yield COMPUTES, f"{answered}, a tap {felt(timing.tap_gap_s)} after it, since a second one may come"
     else:

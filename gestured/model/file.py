@@ -66,6 +66,21 @@ def check_alone(data: bytes) -> None:
         raise ValueError("keeps data in another file, expected everything in this one")
 
 
+def packed(values: NDArray[np.floating[Any]]) -> str:
+    """Numbers as base64 of little-endian float32, without their shape."""
+    return base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()
+
+
+def unpacked(text: object) -> NDArray[np.float32]:
+    """(n,) what `packed` wrote. Raises TypeError or ValueError for anything else, or what is not finite."""
+    if not isinstance(text, str):
+        raise TypeError("expected base64")
+    values = np.frombuffer(base64.b64decode(text, validate=True), "<f4").astype(np.float32)
+    if not np.isfinite(values).all():
+        raise ValueError("expected finite numbers")
+    return values
+
+
 @dataclass(frozen=True, eq=False)
 class SelfTest:
     """An input, and the outputs that the trained model gave for it."""
@@ -75,12 +90,11 @@ class SelfTest:
     unknown: NDArray[np.float32]  # (B,)
 
     def to_json(self) -> str:
-        """Input values as base64 of little-endian float32, outputs as plain numbers."""
-        values = base64.b64encode(np.ascontiguousarray(self.values, "<f4").tobytes()).decode()
+        """Input values as `packed` writes them, outputs as plain numbers."""
         return json.dumps(
             {
                 "shape": list(self.values.shape),
-                "values": values,
+                "values": packed(self.values),
                 "scores": [[round(float(v), 7) for v in row] for row in self.scores],
                 "unknown": [round(float(v), 7) for v in self.unknown],
             }
@@ -90,8 +104,7 @@ class SelfTest:
     def from_json(cls, stored: Mapping[str, Any]) -> "SelfTest":
         """The self-test that `to_json` wrote, parsed; ValueError says what was expected."""
         try:
-            flat = np.frombuffer(base64.b64decode(stored["values"], validate=True), "<f4")
-            values = flat.reshape(stored["shape"]).astype(np.float32)
+            values = unpacked(stored["values"]).reshape(stored["shape"])
             scores, unknown = (np.asarray(stored[key], np.float32) for key in ("scores", "unknown"))
         except (KeyError, TypeError, ValueError, OverflowError):
             raise ValueError("expected a shape, its values as base64 float32, and lists: scores, unknown") from None
@@ -99,6 +112,6 @@ class SelfTest:
         same = batch == scores.shape[:1] == unknown.shape
         if values.ndim not in (2, 4) or not values.size or scores.ndim != 2 or not same:
             raise ValueError("expected values (B, T, R, C) or (B, F), scores (B, G) and unknown (B,)")
-        if not all(np.isfinite(array).all() for array in (values, scores, unknown)):
+        if not all(np.isfinite(array).all() for array in (scores, unknown)):
             raise ValueError("a value is not finite")
         return cls(values, scores, unknown)

@@ -16,7 +16,7 @@ from gestured.core.window import Window
 from gestured.model.context import NAMES as CONTEXT
 from gestured.model.features import feature_names
 from gestured.model.file import SelfTest
-from gestured.model.points import certainty, operating_points
+from gestured.model.points import certainty, number, operating_points
 from gestured.model.prototypes import Space
 
 MAX_TEXT = 2 << 20  # characters of one value; the longest is the self-test, some thousands
@@ -40,9 +40,6 @@ class Metadata:
     gestures: tuple[str, ...]
     kind: str
     version: str
-    rows: int
-    columns: int
-    rate_hz: float
     window: Window
     features: tuple[str, ...] | None  # names, where the model takes features instead of frames
     context: tuple[str, ...] | None  # names of what surrounds a segment that the model takes in, too
@@ -87,18 +84,16 @@ class Metadata:
         _check_grid(properties, window)
         gestures = told("gestures", partial(_names, 2, 64))
         calibration = told("calibration", _object)
+        threshold = calibration.get("threshold", USUAL_THRESHOLD)
         return cls(
             gestures=gestures,
             kind=properties["kind"],
             version=properties["version"],
-            rows=window.rows,
-            columns=window.columns,
-            rate_hz=window.rate_hz,
             window=window,
             features=perhaps("features", partial(_features, window)),
             context=perhaps("context", _context),
             calibration=calibration,
-            threshold=_threshold(calibration),
+            threshold=told("calibration", lambda _: number("threshold", threshold, 1.0)),
             training_data=properties["training_data"],
             quantiles=told("quantiles", _object),
             self_test=told("self_test", lambda text: SelfTest.from_json(_object(text))),
@@ -175,11 +170,3 @@ def _json(text: str, kind: type) -> Any:
     if not isinstance(value, kind):
         raise ValueError(f"expected a JSON {'list' if kind is list else 'object'}")
     return value
-
-
-def _threshold(calibration: Mapping[str, Any]) -> float:
-    """The confidence of the calibration from which an answer is published."""
-    value = calibration.get("threshold", USUAL_THRESHOLD)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
-        raise ValueError(f"metadata 'calibration': threshold: expected a number from 0 to 1, found {value!r}")
-    return float(value)

@@ -41,8 +41,8 @@ class Model:
         self.properties = self._session.properties()
         self.metadata = Metadata.parse(self.properties, sealed=self.sealed)
         self.gestures = self.metadata.gestures
-        self.rows = self.metadata.rows
-        self.columns = self.metadata.columns
+        self.rows = self.metadata.window.rows
+        self.columns = self.metadata.window.columns
         self.threshold = self.metadata.threshold
         self.points = self.metadata.points
         self.certainty = self.metadata.provisional
@@ -63,7 +63,7 @@ class Model:
             usable = len(window) > 0 and all(np.isfinite(a).all() for a in (segment.frames, signed))
             beside = context(segment, signed, self.metadata.window) if usable and self._beside else None
             if usable and self._input == "features":
-                window = touch_pattern(window, self.metadata.rate_hz)
+                window = touch_pattern(window, self.metadata.window.rate_hz)
                 usable = bool(np.isfinite(window).all())
         if not usable:
             count = len(self.gestures)

@@ -32,7 +32,7 @@ def certainty(found: Mapping[str, Any], gestures: Collection[str]) -> Certainty:
         raise ValueError(f"in_a_row: expected a whole number from 1 to {MOST_IN_A_ROW}, found {_brief(row)}")
     if not isinstance(begins, list) or begins[:1] != [0]:
         raise ValueError(f"elapsed_s: expected a list of seconds, the first 0, found {_brief(begins)}")
-    elapsed_s = tuple(_number("elapsed_s", value, MOST_S) for value in begins)
+    elapsed_s = tuple(number("elapsed_s", value, MOST_S) for value in begins)
     _require_rising("elapsed_s", elapsed_s)
     if not isinstance(own, dict) or not set(own) <= set(gestures):
         raise ValueError(f"gestures: expected an object of the model's own gestures, found {_brief(own)}")
@@ -50,9 +50,9 @@ def _point(key: str, found: Any, gestures: Collection[str]) -> Point:
     thresholds = found["thresholds"]
     _require_keys(f"{key}: thresholds: ", thresholds, gestures)
     return Point(
-        thresholds={name: _number(f"{key}: thresholds: {name}", thresholds[name], 1.0) for name in gestures},
+        thresholds={name: number(f"{key}: thresholds: {name}", thresholds[name], 1.0) for name in gestures},
         provisional=_confidence(f"{key}: provisional", found["provisional"]),
-        **{name: _number(f"{key}: {name}", found[name], most) for name, most in COSTS.items()},
+        **{name: number(f"{key}: {name}", found[name], most) for name, most in COSTS.items()},
     )
 
 
@@ -62,7 +62,7 @@ def _curve(found: Any) -> tuple[tuple[float, float, float], ...]:
         raise ValueError(
             f"curve: expected 1 to {MOST_ROWS} rows of threshold, missed and false an hour, found {_brief(found)}"
         )
-    rows = tuple((_number("curve", a, 1.0), _number("curve", b, 1.0), _number("curve", c, MOST)) for a, b, c in found)
+    rows = tuple((number("curve", a, 1.0), number("curve", b, 1.0), number("curve", c, MOST)) for a, b, c in found)
     _require_rising("curve", [threshold for threshold, _, _ in rows])
     return rows
 
@@ -75,10 +75,11 @@ def _needed(key: str, found: Any, length: int) -> Needed:
 
 def _confidence(key: str, found: Any) -> float | None:
     """A confidence; None is never."""
-    return None if found is None else _number(key, found, 1.0)
+    return None if found is None else number(key, found, 1.0)
 
 
-def _number(key: str, found: Any, most: float) -> float:
+def number(key: str, found: Any, most: float) -> float:
+    """A number from 0 to `most`; ValueError for anything else."""
     if isinstance(found, bool) or not isinstance(found, int | float) or not 0 <= found <= most:
         raise ValueError(f"{key}: expected a number from 0 to {most:g}, found {_brief(found)}")
     return float(found)

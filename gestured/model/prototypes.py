@@ -5,7 +5,6 @@ many people (`Space`, a model's metadata `own`). A prototype is the mean of its 
 mean where they are few. How near a segment is to it is a likelihood ratio: that gesture against any movement at all.
 """
 
-import base64
 import json
 import math
 from collections.abc import Mapping
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from gestured.core.classifier import NEAR, Match
 from gestured.core.own import EXAMPLES
+from gestured.model.file import packed, unpacked
 
 DIMENSIONS = 512  # of a space or an embedding, at most
 SUREST = 40.0  # log odds that a confidence tells: beyond them it is 0 or 1 in any case, and `exp` would overflow
@@ -55,10 +55,10 @@ class Space:
         """The space as JSON, for a model's metadata."""
         return json.dumps(
             {
-                "mean": _packed(self.mean),
-                "directions": _packed(self.directions),
-                "between": _packed(self.between),
-                "built_in": _packed(self.built_in),
+                "mean": packed(self.mean),
+                "directions": packed(self.directions),
+                "between": packed(self.between),
+                "built_in": packed(self.built_in),
                 "thresholds": [round(value, 4) for value in self.thresholds],
                 "slope": round(self.slope, 4),
                 "margin": round(self.margin, 4),
@@ -69,12 +69,12 @@ class Space:
     def from_json(cls, told: Mapping[str, Any], gestures: int) -> "Space":
         """The space that `to_json` wrote, of a model with so many gestures; ValueError says what was expected."""
         try:
-            mean, between = _unpacked(told["mean"]), _unpacked(told["between"])
+            mean, between = _values(told, "mean"), _values(told, "between")
             inner, outer = len(between), len(mean)
             if not (0 < inner <= DIMENSIONS and 0 < outer <= DIMENSIONS):
                 raise ValueError
-            directions = _unpacked(told["directions"]).reshape(inner, outer)
-            built_in = _unpacked(told["built_in"]).reshape(2, gestures, inner)
+            directions = _values(told, "directions").reshape(inner, outer)
+            built_in = _values(told, "built_in").reshape(2, gestures, inner)
             thresholds = tuple(float(value) for value in told["thresholds"])
             slope, margin = float(told["slope"]), float(told["margin"])
         except (KeyError, TypeError, ValueError, OverflowError):
@@ -132,17 +132,8 @@ def _ratio(place: Array, mean: Array, variance: Array, between: Array) -> Array:
     return np.asarray(0.5 * terms.sum(axis=-1))
 
 
-def _packed(values: Array) -> str:
-    return base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()
-
-
-def _unpacked(text: object) -> Array:
-    if not isinstance(text, str):
-        raise TypeError("expected base64")
-    values = np.frombuffer(base64.b64decode(text, validate=True), "<f4").astype(np.float64)
-    if not np.isfinite(values).all():
-        raise ValueError("expected finite numbers")
-    return values
+def _values(told: Mapping[str, Any], key: str) -> Array:
+    return unpacked(told[key]).astype(np.float64)
 
 
 def clashes(prototypes: Mapping[str, Prototype], examples: Mapping[str, Array]) -> list[tuple[str, str]]:

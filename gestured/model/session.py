@@ -59,7 +59,7 @@ class Session:
         if self.outputs not in (["scores", "unknown"], ["scores", "unknown", "embedding"]):
             raise ValueError(f"has outputs {self.outputs}, expected 'scores', 'unknown' and perhaps 'embedding'")
         count = len(metadata.gestures)
-        own: tuple[int, ...] = (metadata.rows, metadata.columns)
+        own: tuple[int, ...] = (metadata.window.rows, metadata.window.columns)
         if metadata.features is not None:
             own = (len(metadata.features),)
         free = 1 if takes == "features" else 2  # the dimensions that must be open: B, or B and T

@@ -57,9 +57,9 @@ def day(seed: int, place: Place, seconds: float, sensor: SimulatedSensor | None 
     plan = planned(seed, place, seconds, sensor, wake)
     everything = sorted([*plan.life, *((at, made) for at, made, _ in plan.meant)], key=lambda one: one[0])
     take = plan.of.sensor.record(everything, seconds, plan.of.rng)
-    alone = [_truth(start, one) for start, one in plan.life if _like_a_tap(start, one, everything, plan.of.sensor)]
+    alone = [Act.of(one, start) for start, one in plan.life if _like_a_tap(start, one, everything, plan.of.sensor)]
     contacts = sum(_touches(one) for _, one in plan.life)
-    meant = tuple((_truth(at, one), lay) for at, one, lay in plan.meant)
+    meant = tuple((Act.of(one, at), lay) for at, one, lay in plan.meant)
     return Day(place.name, plan.of.person.seed, take, contacts, meant, tuple(alone))
 
 
@@ -215,10 +215,6 @@ def _touches(one: Performance) -> int:
     for start, end in sorted((float(press.t[0]), float(press.t[-1])) for press in one.contacts):
         count, until = count + (start > until), max(until, end)
     return count
-
-
-def _truth(start: float, one: Performance) -> Act:
-    return Act(one.label, one.kind, start, start + one.duration_s, one.speed, one.inclination, one.participant)
 
 
 def _like_a_tap(start: float, one: Performance, everything: list[Happening], sensor: SimulatedSensor) -> bool:

@@ -53,13 +53,12 @@ def disturb(
     rng: np.random.Generator,
 ) -> None:
     """Adds interference to the signal in place: what was performed, and this sensor's own bursts."""
-    todo = list(artefacts)
-    for start in rng.uniform(0.0, times[-1], int(rng.poisson(sensor.bursts_per_minute * times[-1] / 60.0))):
+    todo, dt, end = list(artefacts), 1.0 / sensor.rate_hz, float(times[-1])
+    for start in rng.uniform(0.0, end, int(rng.poisson(sensor.bursts_per_minute * end / 60.0))):
         form = str(rng.choice(["all", "row", "column", "taxel", "taxels"]))
         todo.append((float(start), Artefact(0.0, float(rng.uniform(0.01, 0.15)), form, float(rng.normal(0.0, 0.4)))))
-    dt = 1.0 / sensor.rate_hz
     if sensor.line_bursts_per_minute > 0.0:
-        for start in rng.uniform(0.0, times[-1], int(rng.poisson(sensor.line_bursts_per_minute * times[-1] / 60.0))):
+        for start in rng.uniform(0.0, end, int(rng.poisson(sensor.line_bursts_per_minute * end / 60.0))):
             form = str(rng.choice(["row", "column"]))
             todo.append((float(start), Artefact(0.0, 1e-3, form, float(rng.normal(0.0, 0.6)))))
     for start, artefact in todo:

@@ -32,6 +32,11 @@ class Act:
     inclination: int
     participant: int
 
+    @classmethod
+    def of(cls, one: Performance, start: float) -> "Act":
+        """A performance that began at `start` s."""
+        return cls(one.label, one.kind, start, start + one.duration_s, one.speed, one.inclination, one.participant)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Take:
@@ -95,17 +100,6 @@ class SimulatedSensor(Nature):
         disturb(self, signal, times, [(start, a) for start, p in todo for a in p.artefacts], rng)
         frames = digitise(self, signal)
         order, arrival = transmit(self, times, rng)
-        events = tuple(
-            Act(p.label, p.kind, start, start + p.duration_s, p.speed, p.inclination, p.participant)
-            for start, p in todo
-        )
-        return Take(
-            frames[order],
-            arrival,
-            times[order],
-            order,
-            fingers.touches[order],
-            fingers.ids[order],
-            events,
-            self,
-        )
+        events = tuple(Act.of(performance, start) for start, performance in todo)
+        touches, ids = fingers.touches[order], fingers.ids[order]
+        return Take(frames[order], arrival, times[order], order, touches, ids, events, self)

@@ -25,10 +25,7 @@ def relax(field: Array, dt_s: float, amplitudes: Sequence[float], taus_s: Sequen
     if not len(amplitudes) and hysteresis <= 0.0:
         return field
     lag = Lag(field.shape[1:], dt_s, amplitudes, taus_s, hysteresis)
-    out = np.empty_like(field)
-    for k, p in enumerate(field):
-        out[k] = lag.answer(p)
-    return out
+    return np.stack([lag.answer(p) for p in field])
 
 
 class Lag:
