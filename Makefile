@@ -180,11 +180,12 @@ build/tools/.tools: deploy/locks/build.txt
 	$(call install,.venv-dev,the lab,-e '.[dev$(,)lab]')
 	@touch $@
 
-# One person's builds of ROS 2 from PyPI, for tests alone; there are some for Python 3.11 to 3.14 on x86_64.
-.venv-ros/.ros: pyproject.toml
+# The CMake files of PyPI's ROS 2 name the Python of the machine that built them.
+.venv-ros/.ros: pyproject.toml tests/deploy/ros/requirements.txt
 	$(call venv,.venv-ros)
-	$(call install,.venv-ros,ROS 2,-e . colcon-bash colcon-package-selection colcon-ros ros-jazzy-rclpy \
-		ros-jazzy-rmw-fastrtps-cpp ros-jazzy-sensor-msgs ros-jazzy-std-msgs ros-jazzy-std-srvs)
+	$(call install,.venv-ros,ROS 2,-e . -r tests/deploy/ros/requirements.txt)
+	@grep -rl --include=*.cmake /opt/python/cp .venv-ros/share | xargs -r sed -i \
+		"s|/opt/python/cp[0-9]*-cp[0-9]*|$$(.venv-ros/bin/python -c 'import sys; print(sys.base_prefix)')|g"
 	@touch $@
 
 .venv-dev/.fuzz: .venv-dev/.dev

@@ -23,8 +23,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gestured
-from deploy.ros2.gestured_ros2.frames import values_of
-from deploy.ros2.gestured_ros2.names import sensor_of, token
+from deploy.ros2.gestured_ros2.gestured_ros2.frames import values_of
+from deploy.ros2.gestured_ros2.gestured_ros2.names import sensor_of, token
 from gestured.client.control import Control
 from gestured.core.wire import Addresses, Decoder
 from tests.bridge.conftest import wait
@@ -32,7 +32,9 @@ from tests.daemon.harness import DEADLINE_S, Daemon, Hand, Sensor
 from tests.sockets import GESTURE, HELLO, FakeDaemon
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGE = ROOT / "deploy" / "ros2"
+ROS2 = ROOT / "deploy" / "ros2"
+PACKAGE = ROS2 / "gestured_ros2"
+PACKAGES = ["gestured_ros2", "gestured_msgs"]
 PYTHON = ROOT / ".venv-ros" / "bin" / "python"
 NAMES = ["armrest", "armrest-1", "armrest_1", "1st", "_a", "a__b", "a_", "x", "xarmrest_2d1", "-", "9", "__", "A-" * 32]
 names = st.sampled_from(NAMES) | st.text("abxX019_-25df", min_size=1, max_size=64)
@@ -62,6 +64,25 @@ def image(values: Any, **changed: object) -> dict[str, Any]:
     return fields | {"data": values.astype("<f4").tobytes().hex()} | changed
 
 
+PLACE = {"x": 0.25, "y": 0.5}
+WHERE = {
+    "start": PLACE,
+    "end": PLACE | {"x": 1.0},
+    "way": 0.75,
+    "pressure": 212.5,
+    "snr": 31.5,
+    "contacts": 1,
+    "bridged": 2,
+}
+PLACED = GESTURE | {"where": WHERE | {"zone": None}, "provisional": "confirmed", "own": True}
+PROVISIONAL = {
+    "type": "provisional",
+    **{name: GESTURE[name] for name in ("sensor", "id", "gesture", "confidence", "onset")},
+}
+PROVISIONAL["decided"] = 1000.25
+TOUCH = {"type": "touch", "sensor": "armrest", "id": 4, "touch": 1, "phase": "up", "t": 1000.25, "x": 0.5, "y": 0.0}
+TOUCH |= {"dx": -0.125, "dy": 0.0, "pressure": 80.5, "area": 3, "zone": "volume", "reason": "learned"}
+STATUS = {"type": "status", "state": "ok", "sensors": {"armrest": "stale"}, "model": "cnn_lstm", "time": 1000.0}
 FRAME = np.arange(81.0).reshape(9, 9)
 WRONG = {
     "encoding": image(FRAME, encoding="64FC1"),
@@ -89,15 +110,25 @@ def test_what_is_no_frame_is_refused_with_what_was_expected(wrong: str):
 
 
 def test_the_package_says_everywhere_what_it_is():
-    described = ElementTree.parse(PACKAGE / "package.xml").getroot()
+    versions = {ElementTree.parse(ROS2 / name / "package.xml").findtext("version") for name in PACKAGES}
     (version,) = re.findall('version="(.*)"', (PACKAGE / "setup.py").read_text())
-    assert described.findtext("version") == version == gestured.__version__
+    assert versions | {version} == {gestured.__version__}
     launch = ElementTree.parse(PACKAGE / "launch" / "gestured.launch.xml").getroot()
-    declared = set(re.findall(r'self\._texts?\("(\w+)"', (PACKAGE / "gestured_ros2" / "node.py").read_text()))
+    declared = set(
+        re.findall(r'(?:_texts?|declare_parameter)\("(\w+)"', (PACKAGE / "gestured_ros2" / "node.py").read_text())
+    )
     assert {each.get("name") for each in launch.iter("arg")} == declared
     assert {each.get("name"): each.get("value") for each in launch.iter("param")} == {
         name: f"$(var {name})" for name in declared
     }
+
+
+@pytest.mark.parametrize("name", ["gesture", "provisional", "touch", "status", "where", "place"])
+def test_a_message_has_the_fields_of_its_event(name: str):
+    schema = json.loads((ROOT / "docs" / "events.schema.json").read_text())["$defs"][name]["properties"]
+    lines = (ROS2 / "gestured_msgs" / "msg" / f"{name.capitalize()}.msg").read_text().splitlines()
+    fields = {line.split()[1] for line in lines if not line.startswith("#")}
+    assert fields - {"instance", "states"} == set(schema) - {"type", "scores", "gates"}
 
 
 class Process:
@@ -152,7 +183,8 @@ class Ros:
 
     def peer(self) -> Process:
         """The other side, once it is there."""
-        self.processes.append(Process(self.folder, f"exec {PYTHON} {ROOT}/tests/deploy/ros/peer.py"))
+        command = f"{self._setup} && exec {PYTHON} {ROOT}/tests/deploy/ros/peer.py"
+        self.processes.append(Process(self.folder, command))
         assert self.processes[-1].line() == {"ready": True}
         return self.processes[-1]
 
@@ -161,17 +193,23 @@ class Ros:
         return "/".join((self.space, "gestured", *parts))
 
 
-@pytest.fixture(scope="module")
-def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A workspace in which colcon has built the package."""
+@pytest.fixture(scope="module", params=[PACKAGES[:1]], ids=["without messages"])
+def workspace(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace in which colcon has built these packages."""
     if not PYTHON.exists():
         pytest.skip("ROS 2 is not in .venv-ros: `make ros` installs it")
+    if request.param == PACKAGES and not (shutil.which("cmake") and shutil.which("g++")):
+        pytest.skip("cmake and g++ are not installed")
     folder = tmp_path_factory.mktemp("workspace")
-    shutil.copytree(PACKAGE, folder / "src" / "gestured_ros2")
-    command = [PYTHON, "-m", "colcon", "build", "--packages-select", "gestured_ros2"]
-    environment = {"PATH": f"{PYTHON.parent}:/usr/bin:/bin", "HOME": str(folder)}
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100)
-    assert done.returncode == 0, done.stderr
+    shutil.copytree(ROS2, folder / "src" / "gestured")
+    command = [PYTHON, "-m", "colcon", "build", "--packages-select", *request.param]
+    environment = {
+        "PATH": f"{PYTHON.parent}:/usr/bin:/bin",
+        "HOME": str(folder),
+        "AMENT_PREFIX_PATH": PYTHON.parents[1],
+    }
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stdout + done.stderr
     for file in ("local_setup.bash", "gestured_ros2/share/gestured_ros2/launch/gestured.launch.xml"):
         assert (folder / "install" / file).exists()
     return folder
@@ -257,6 +295,38 @@ def test_who_comes_late_is_told_the_status_and_that_the_daemon_went_and_returned
     assert line["data"] == GESTURE | {"instance": "b"}
 
 
+def same(told: dict[str, Any], event: dict[str, Any]) -> None:
+    """Each field of a message is that of an event; null, and what is left out, are empty, 0 or false."""
+    for name, value in told.items():
+        match value, event.get(name):
+            case {"sec": seconds, "nanosec": nanoseconds}, expected:
+                assert seconds + 1e-9 * nanoseconds == expected, name
+            case {}, expected:
+                same(value, expected)
+            case _, expected:
+                assert value == (type(value)() if expected is None else expected), name
+
+
+@pytest.mark.timeout(900)  # a message is thirty files in C and C++
+@pytest.mark.parametrize("workspace", [PACKAGES], ids=["with messages"], indirect=True)
+def test_events_come_as_messages_of_their_own(ros: Ros, fake: FakeDaemon):
+    node, peer = ros.node(socket=fake.path, types=["gesture", "touch"], messages=True), ros.peer()
+    fake.accept()
+    peer.say(listen=ros.topic("status"), message="Status", latched=True)
+    fake.say(STATUS)
+    told = heard(peer, lambda line: line["data"]["state"] == "ok")
+    same(told[-1]["data"], STATUS | {"sensors": ["armrest"], "states": ["stale"], "instance": "a"})
+    for kind in ("gesture", "provisional", "touch"):
+        peer.say(listen=ros.topic("armrest", kind), message=kind.capitalize(), latched=False)
+    left = {event["type"]: event | {"instance": "a"} for event in (PLACED, PROVISIONAL, TOUCH)}
+    while left:  # each listener is found in its own time
+        fake.say(PLACED | {"id": -1}, PLACED, PROVISIONAL, TOUCH, STATUS)
+        line = peer.line()
+        if event := left.pop(line["topic"].rsplit("/")[-1], None):
+            same(line["data"], event)
+    assert "a gesture of the daemon is passed over: id -1: expected uint64" in node.errors.read_text()
+
+
 def taken(daemon: Daemon, before: int) -> bool:
     """Whether the daemon has looked at more frames than before."""
     return daemon.frames() > before
@@ -326,6 +396,7 @@ def test_a_gate_that_cannot_be_closed_is_told(ros: Ros, serve, tmp_path: Path):
     [
         ({"types": ["gestur"]}, "gestur"),
         ({"types": "gesture"}, "types"),
+        ({"messages": True}, "parameter messages: the package gestured_msgs is not there"),
         ({"frames": ["arm rest"]}, "parameter frames: 'arm rest': expected letters, digits, _ and -"),
         ({"frames": ["armrest"], "to": "9000"}, "parameter to: '9000': expected HOST:PORT"),
         ({"gates": "/nowhere.sock", "gate": "my gate"}, "parameter gate: 'my gate': expected letters"),

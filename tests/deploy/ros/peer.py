@@ -1,11 +1,13 @@
 """A node on the other side, run by ROS 2's Python: commands on standard input, and on standard output what it hears.
 
-{"listen": TOPIC, "latched": false}            each message of the topic: {"topic": TOPIC, "data": its JSON}
+{"listen": TOPIC, "latched": false}              each message of the topic: {"topic": TOPIC, "data": its JSON}
+{"listen": TOPIC, ..., "message": "Gesture"}     the same of gestured_msgs: {"topic": TOPIC, "data": its fields}
 {"image": TOPIC, "height": 9, ..., "data": hex}  publishes an image once somebody listens
-{"call": SERVICE, "data": true}                {"call": SERVICE, "success": true, "message": "..."}
-{"invalid": [NAMES]}                           {"invalid": those that ROS does not take as topics}
+{"call": SERVICE, "data": true}                  {"call": SERVICE, "success": true, "message": "..."}
+{"invalid": [NAMES]}                             {"invalid": those that ROS does not take as topics}
 """
 
+import importlib
 import json
 import sys
 import threading
@@ -51,11 +53,13 @@ class Peer(Node):  # type: ignore[misc]  # what rclpy brings has no types
         match command:
             case {"listen": topic, "latched": latched}:
                 durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+                name = command.get("message")
+                kind = getattr(importlib.import_module("gestured_msgs.msg"), name) if name else String
 
                 def hear(message: Any) -> None:
-                    say(topic=topic, data=json.loads(message.data))
+                    say(topic=topic, data=json.loads(message.data) if kind is String else plain(message))
 
-                self.create_subscription(String, topic, hear, QoSProfile(depth=100, durability=durability))
+                self.create_subscription(kind, topic, hear, QoSProfile(depth=100, durability=durability))
             case {"image": topic, **fields}:
                 if topic not in self._images:
                     self._images[topic] = self.create_publisher(Image, topic, 10)
@@ -78,6 +82,13 @@ class Peer(Node):  # type: ignore[misc]  # what rclpy brings has no types
             case {"invalid": names}:
                 say(invalid=[name for name in names if not taken(name)])
         return True
+
+
+def plain(value: Any) -> Any:
+    """A message as its fields."""
+    if not hasattr(value, "get_fields_and_field_types"):
+        return value
+    return {name: plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
 
 
 def taken(name: str) -> bool:

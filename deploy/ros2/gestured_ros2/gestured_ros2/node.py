@@ -31,6 +31,7 @@ from gestured.core.errors import GesturedError, SettingsError
 from gestured.core.frames import Frame
 
 from .frames import values_of
+from .messages import filled, own_messages
 from .names import token
 
 EVENTS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
@@ -51,20 +52,15 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
         super().__init__("gestured")
         self.fault: GesturedError | None = None  # why it has ended by itself
         self.ended = Future()  # done, once it shall end
-        path, gates, gate = (
-            self._text("socket", "/run/gestured/events.sock"),
-            self._text("gates"),
-            self._text("gate", "ros"),
-        )
-        self._types, sensors, gestures = (
-            self._texts("types", ["gesture"]),
-            self._texts("sensors"),
-            self._texts("gestures"),
-        )
-        counts = _Counts(self.get_logger())
-        self._gate = Gate(Path(gates), _sensor("gate", gate), counts) if gates else None
+        path, gates = self._text("socket", "/run/gestured/events.sock"), self._text("gates")
+        self._types = self._texts("types", ["gesture"])
+        sensors, gestures = self._texts("sensors"), self._texts("gestures")
+        self._counts = counts = _Counts(self.get_logger())
+        gate = _sensor("gate", self._text("gate", "ros"))
+        self._gate = Gate(Path(gates), gate, counts) if gates else None
         self._daemon = Daemon(sensors or None, gestures or None, counts)
-        self._status = self.create_publisher(String, "~/status", LATEST)
+        self._own = own_messages() if self.declare_parameter("messages", False).value else {}
+        self._status = self._publisher("status", "~/status", LATEST)
         self._topics: dict[tuple[str, str], Any] = {}  # sensor, type of event -> its publisher
         self._with_topics: set[str] = set()  # sensors
         self._take_frames(self._texts("frames"), _address("to", self._text("to", "127.0.0.1:9000")))
@@ -110,7 +106,7 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
             if "sensor" in line:
                 self._publish(line)
             elif line["type"] == "status":
-                self._status.publish(String(data=self._daemon.payload(line).decode()))
+                self._send(self._status, line)
                 if self._gate is not None:
                     self._gate.repeat(self._daemon.silent_by(self._gate.name))
             elif line["type"] == GONE:
@@ -123,8 +119,21 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
 
     def _say_gone(self) -> None:
         """What whoever comes late is told while no daemon is there."""
-        status = {"type": "status", "state": GONE, "sensors": {}, "time": time.time()}
-        self._status.publish(String(data=self._daemon.payload(status).decode()))
+        self._send(self._status, {"type": "status", "state": GONE, "sensors": {}, "time": time.time()})
+
+    def _publisher(self, kind: str, topic: str, qos: QoSProfile) -> Any:
+        return self.create_publisher(self._own.get(kind, String), topic, qos)
+
+    def _send(self, publisher: Any, event: Line) -> None:
+        """Publish an event as its topic's message."""
+        if publisher.msg_type is String:
+            publisher.publish(String(data=self._daemon.payload(event).decode()))
+            return
+        told = {**event, "states": [*event.get("sensors", {}).values()], "instance": self._daemon.hello.get("instance")}
+        try:
+            publisher.publish(filled(publisher.msg_type(), told))
+        except ValueError as error:
+            self._counts.wrong(f"a {event['type']} of the daemon is passed over: {error}")
 
     def _make_topics(self, sensor: str) -> None:
         if sensor in self._with_topics or len(self._with_topics) >= SENSORS:
@@ -132,7 +141,7 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
         self._with_topics.add(sensor)
         for kind in self._types:
             if kind != "status":
-                self._topics[sensor, kind] = self.create_publisher(String, f"~/{token(sensor)}/{kind}", EVENTS)
+                self._topics[sensor, kind] = self._publisher(kind, f"~/{token(sensor)}/{kind}", EVENTS)
         if self._gate is not None:
             self.create_service(SetBool, f"~/{token(sensor)}/listen", partial(self._listen, self._gate, sensor))
 
@@ -140,9 +149,9 @@ class Gestures(Node):  # type: ignore[misc]  # what rclpy brings has no types
         sensor, kind = event["sensor"], event["type"]
         self._make_topics(sensor)
         if (sensor, kind) not in self._topics and sensor in self._with_topics:  # an answer to a provisional event
-            self._topics[sensor, kind] = self.create_publisher(String, f"~/{token(sensor)}/{kind}", EVENTS)
+            self._topics[sensor, kind] = self._publisher(kind, f"~/{token(sensor)}/{kind}", EVENTS)
         if (sensor, kind) in self._topics:
-            self._topics[sensor, kind].publish(String(data=self._daemon.payload(event).decode()))
+            self._send(self._topics[sensor, kind], event)
 
     def _listen(self, gate: Gate, sensor: str, request: Any, response: Any) -> Any:
         """Open our gate of a sensor, or close it."""
