@@ -8,7 +8,7 @@ from deploy.generate import animation, completion, configuration, dashboard, man
 
 def install(share: Path) -> None:
     """Write man pages and completions below a `share` folder."""
-    for name, text in man.pages(programs.all_programs()).items():
+    for name, text in man.pages().items():
         put(share / "man" / f"man{name[-1]}" / name, text)
     for name, parser in programs.PARSERS.items():
         put(share / "bash-completion" / "completions" / name, completion.completion(parser(), "bash"))

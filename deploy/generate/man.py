@@ -1,12 +1,17 @@
 """Man pages in roff: gestured(8); gesturectl(1) and gestured-bridge(1) with all subcommands; gestured.toml(5)."""
 
-from collections.abc import Iterable, Iterator
+import argparse
 
 from deploy.generate import configuration
-from deploy.generate.programs import Option, Program
+from deploy.generate.programs import PARSERS, arguments, commands
 from gestured import __version__
 
-OTHERS = ("gestured(8)", "gesturectl(1)", "gestured-bridge(1)", "gestured.toml(5)")
+PROGRAMS = {  # name: section, summary
+    "gestured": (8, "tactile gesture recognition daemon"),
+    "gesturectl": (1, "operator's client of gestured"),
+    "gestured-bridge": (1, "gestured on other buses, and serial sensors"),
+}
+FILE = "TOML. Flags win over GESTURED_* variables, these over the file. An unknown key is an error."
 
 
 def escape(text: str) -> str:
@@ -15,71 +20,56 @@ def escape(text: str) -> str:
     return "\n".join("\\&" + line if line.startswith((".", "'")) else line for line in text.splitlines())
 
 
-def heading(name: str, section: int, summary: str) -> list[str]:
-    """Title and NAME."""
-    title = escape(name)
-    return [f'.TH {title.upper()} {section} "" "gestured {__version__}"', ".SH NAME", f"{title} \\- {escape(summary)}"]
-
-
-def verbatim(text: str) -> list[str]:
-    """Lines that are neither filled nor joined."""
-    return [".PP", ".nf", escape(text), ".fi"] if text.strip() else []
-
-
 def tagged(tag: str, text: str) -> list[str]:
     """A paragraph under a bold tag."""
     return [".TP", f"\\fB{escape(tag)}\\fR", escape(text)]
 
 
-def described(options: Iterable[Option]) -> Iterator[str]:
-    """The list of arguments."""
-    for option in options:
-        flags = ", ".join(option.flags)
-        yield from tagged(" ".join(filter(None, (flags, option.metavar))), option.help)
+def described(parser: argparse.ArgumentParser) -> list[str]:
+    """A program's arguments, and its examples as lines that are neither filled nor joined."""
+    words, lines = parser._get_formatter(), []  # argparse has no public way to ask
+    for action in arguments(parser):
+        lines += tagged(words._format_action_invocation(action), words._expand_help(action))
+    return [*lines, ".PP", ".nf", escape(parser.epilog), ".fi"] if parser.epilog else lines
 
 
-def synopsis(program: Program) -> str:
-    """How it is called, in one line."""
-    arguments = [option.metavar for option in program.options if not option.flags]
-    rest = ["COMMAND", "..."] if program.commands else arguments
-    return escape(" ".join([program.name, "[OPTION]...", *rest]))
+def synopsis(parser: argparse.ArgumentParser) -> str:
+    """How a program is called, in one line."""
+    words = parser._get_formatter()
+    names = [words._format_action_invocation(action) for action in arguments(parser) if not action.option_strings]
+    return escape(" ".join([parser.prog, "[OPTION]...", *(["COMMAND", "..."] if commands(parser) else names)]))
 
 
-def program_page(program: Program, section: int) -> str:
-    """The page of a program."""
-    lines = [*heading(program.name, section, program.summary), ".SH SYNOPSIS", synopsis(program)]
-    lines += [".SH DESCRIPTION", escape(program.text), ".SH OPTIONS", *described(program.options)]
-    if program.commands:
-        lines.append(".SH COMMANDS")
-    for command in program.commands:
-        lines += [f".SS {escape(command.name)}", escape(command.text), ".PP", synopsis(command)]
-        lines += [*described(command.options), *verbatim(command.examples)]
-    if program.examples:
-        lines += [".SH NOTES", *verbatim(program.examples)]
-    return finish(lines, program.name)
+def program(name: str) -> list[str]:
+    """The body of a program's page."""
+    parser = PARSERS[name]()
+    lines = [".SH SYNOPSIS", synopsis(parser), ".SH DESCRIPTION", escape(parser.description or "")]
+    lines += [".SH OPTIONS", *described(parser)]
+    for number, command in enumerate(commands(parser)):
+        lines += [".SH COMMANDS"] if number == 0 else []
+        lines += [f".SS {escape(command.prog)}", escape(command.description or ""), ".PP", synopsis(command)]
+        lines += described(command)
+    return lines
 
 
-def configuration_page() -> str:
-    """The page of the configuration file."""
-    lines = [*heading("gestured.toml", 5, "configuration of the gestured daemon"), ".SH DESCRIPTION"]
-    lines.append(escape("TOML. Flags win over GESTURED_* variables, these over the file. An unknown key is an error."))
+def file() -> list[str]:
+    """The body of the configuration file's page."""
+    lines = [".SH DESCRIPTION", escape(FILE)]
     for table, keys in configuration.tables().items():
-        lines += [".SH KEYS" if not table else f'.SH "TABLE {escape(table.upper())}"']
+        lines.append(f'.SH "TABLE {escape(table.upper())}"' if table else ".SH KEYS")
         for key in keys:
             lines += tagged(key.written, key.text)
-    return finish(lines, "gestured.toml")
+    return lines
 
 
-def finish(lines: list[str], name: str) -> str:
-    """Add the other pages."""
-    others = ", ".join(other for other in OTHERS if other.partition("(")[0] != name)
-    return "\n".join([*lines, ".SH SEE ALSO", escape(others)]) + "\n"
-
-
-def pages(programs: Iterable[Program]) -> dict[str, str]:
+def pages() -> dict[str, str]:
     """File name -> page."""
-    found = {"gestured.toml.5": configuration_page()}
-    for program in programs:
-        section = 8 if program.name == "gestured" else 1
-        found[f"{program.name}.{section}"] = program_page(program, section)
+    names = PROGRAMS | {"gestured.toml": (5, "configuration of the gestured daemon")}
+    found = {}
+    for name, (section, summary) in names.items():
+        head = f'.TH {escape(name).upper()} {section} "" "gestured {__version__}"'
+        others = ", ".join(f"{other}({number})" for other, (number, _) in names.items() if other != name)
+        body = program(name) if name in PROGRAMS else file()
+        lines = [head, ".SH NAME", f"{escape(name)} \\- {escape(summary)}", *body, ".SH SEE ALSO", escape(others)]
+        found[f"{name}.{section}"] = "\n".join(lines) + "\n"
     return found
