@@ -21,6 +21,7 @@ from tests.systemd.vehicle import Vehicle
 TOOLS = ROOT / "build" / "tools" / "bin"
 CONFIGURATION = "/etc/gestured/gestured.toml"
 OWN = "/var/lib/gestured/own-gestures.json"
+BEFORE = "9180e01"  # the first commit with `make deb`, which 0.2.0 had not yet; the next release's tag takes its place
 
 TEACH = """
 gesturectl simulate --to 127.0.0.1:9000 --sensor taught --kinds zigzag --seconds 40 --non-gestures 0 >/dev/null &
@@ -38,11 +39,11 @@ def needed(*programs: str) -> None:
             pytest.skip(f"{program} is not installed")
 
 
-def made(target: str, pattern: str) -> Path:
+def made(target: str, pattern: str, source: Path = ROOT) -> Path:
     """The newest file that a target of the Makefile puts into dist/."""
-    done = subprocess.run(["make", target], cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(["make", target], cwd=source, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
-    return max((ROOT / "dist").glob(pattern), key=lambda path: path.stat().st_mtime)
+    return max((source / "dist").glob(pattern), key=lambda path: path.stat().st_mtime)
 
 
 @pytest.fixture(scope="session")
@@ -93,16 +94,19 @@ def test_all_is_roots_and_bound_to_one_python(package: Path):
 
 
 @pytest.fixture(scope="session")
-def before(package: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same package as a version before: until there are two releases, an upgrade is from this one."""
+def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What an older version made of itself; it bears the number of the newest release, so it is given a smaller one."""
     folder = tmp_path_factory.mktemp("before")
-    subprocess.run(["dpkg-deb", "--raw-extract", package, folder / "content"], check=True)
-    control = folder / "content" / "DEBIAN" / "control"
+    source, content = folder / "source", folder / "content"
+    subprocess.run(["git", "clone", "--quiet", "--shared", "--no-checkout", ROOT, source], check=True)
+    if subprocess.run(["git", "-C", source, "checkout", "--quiet", BEFORE], capture_output=True).returncode != 0:
+        pytest.skip(f"this clone's history lacks {BEFORE}: git fetch --unshallow")
+    subprocess.run(["dpkg-deb", "--raw-extract", made("deb", "gestured_*.deb", source), content], check=True)
+    control = content / "DEBIAN" / "control"
     control.write_text(re.sub(r"^Version: .*$", "Version: 0.0.1", control.read_text(), flags=re.MULTILINE))
-    subprocess.run(
-        ["dpkg-deb", "-Znone", "--root-owner-group", "--build", "content", "before.deb"], cwd=folder, check=True
-    )
-    return folder / "before.deb"
+    package = folder / "before.deb"
+    subprocess.run(["dpkg-deb", "-Znone", "--root-owner-group", "--build", content, package], check=True)
+    return package
 
 
 @pytest.fixture(scope="session")
@@ -186,6 +190,7 @@ def test_a_package_from_installation_to_purge(box: Container, before: Path, pack
     assert vehicle.instance() != instance and left.instance() != instance_left
     held.append(box.run("systemctl", "show", "-P", "ActiveEnterTimestampMonotonic", "gestured-osc.socket").stdout)
     assert held[0] == held[1]  # what came meanwhile waited in it
+    assert box.run("stat", "--format=%G", vehicle.events).stdout == "gestured-events\n"  # the older one's had another
     assert vehicle.status()["model"]["active"] == "lstm" and "an operator's" in box.path(CONFIGURATION).read_text()
     assert "zigzag" in box.run("gesturectl", "gestures").stdout
     recognised(vehicle, "second")
