@@ -27,14 +27,10 @@ help:  ## this list
 	@echo "usage: make TARGET [NAME=VALUE ...]"
 	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 10
 
-# At a terminal the demo is a job of its own, so that Ctrl-C is for it and not for make.
-# A copy of gestured in the environment, as `pip install .` leaves one, would not show what is edited here.
+# At a terminal the demo is a job of its own, so that Ctrl-C is for it and not for make. It shows what is edited here, also
+# where `pip install .` has left a copy of gestured in the environment.
 demo: .venv/.runtime  ## recognise simulated gestures with the real daemon: SECONDS=20 MODEL=lstm SPEED=fast ARGS="--seed 7"
-	@.venv/bin/python -I -c 'import os, sys, gestured; \
-		sys.exit(not os.path.samefile(gestured.__path__[0], "gestured"))' 2>/dev/null || { \
-		echo "the environment holds a copy of gestured; it is linked to this folder again"; \
-		$(MAKE) -s --no-print-directory -B .venv/.runtime; }
-	@[ ! -t 0 ] || set -m; .venv/bin/gesturectl demo --seconds "$(SECONDS)" --model "$(MODEL)" $(if $(SPEED),--speed "$(SPEED)") $(ARGS)
+	@[ ! -t 0 ] || set -m; PYTHONPATH="$(CURDIR)" .venv/bin/gesturectl demo --seconds "$(SECONDS)" --model "$(MODEL)" $(if $(SPEED),--speed "$(SPEED)") $(ARGS)
 
 bridges: .venv/.bridges  ## what gestured-bridge needs for MQTT, Zenoh and serial sensors, into .venv
 	@.venv/bin/gestured-bridge --help
@@ -83,7 +79,6 @@ install:  ## into DESTDIR, below PREFIX=/usr, for PYTHON=/usr/bin/python3: progr
 	@rm -rf build/install && mkdir -p build  # the interpreter may be another one than the last time
 	$(call venv,build/install)
 	@deploy/install.sh build/install "$(DESTDIR)" "$(PREFIX)"
-	@deploy/installed.sh "$(DESTDIR)" "$(PREFIX)"
 
 uninstall:  ## remove what `make install` has put there; settings and account stay
 	@deploy/uninstall.sh "$(DESTDIR)" "$(PREFIX)"

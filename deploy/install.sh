@@ -60,7 +60,7 @@ fi
 rm -rf "${new:?}/bin"
 find "$new" -name __pycache__ -type d -prune -exec rm -rf {} +
 "$python" -m compileall -q -j 0 ${WHEELS:+--invalidation-mode unchecked-hash} -s "$new" -p "$lib" "$new"
-PYTHONPATH=${WHEELS:-$new} PYTHONDONTWRITEBYTECODE=1 "$venv/bin/python" -m deploy.generate install "$work/share"
+PYTHONPATH=${WHEELS:-$new} PYTHONDONTWRITEBYTECODE=1 PYTHON_COLORS=0 "$venv/bin/python" -m deploy.generate install "$work/share"
 if [ -e "$root$lib" ]; then mv "$root$lib" "$old"; fi
 mv "$new" "$root$lib"
 rm -rf "$old"
@@ -100,3 +100,13 @@ done
 keep deploy/gestured.toml /etc/gestured/gestured.toml
 keep systemd/gestured.default /etc/default/gestured
 mv "$work/installed" "$root$lib/installed"  # what `make uninstall` removes, beside the packages
+cat <<END
+installed${root:+ below $root}:
+  programs    $prefix/bin/gestured, gesturectl and gestured-bridge
+  packages    $lib
+  the rest    units, man pages, completions, C headers, documents: $lib/installed names each file
+  settings    /etc/gestured/gestured.toml and /etc/default/gestured (yours: they stay as they are)
+next${root:+, once it is in its place}:
+  sudo systemd-sysusers && sudo systemd-tmpfiles --create gestured.conf && sudo systemctl daemon-reload
+  sudo systemctl enable --now gestured.service
+END
