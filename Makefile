@@ -108,7 +108,7 @@ package-test: .venv-dev/.dev build/tools/.tools  ## the wheel and the .deb as a 
 	@.venv-dev/bin/python -m pytest -rs -s tests/systemd/package.py $(ARGS)
 
 lock: build/tools/.tools  ## the newest versions of what a package brings and is built with, with hashes, into deploy/locks
-	@echo 'build setuptools>=77 shtab>=1.9' | tr ' ' '\n' | $(LOCK) - --output-file deploy/locks/build.txt
+	@echo 'build hatchling>=1.27 shtab>=1.9' | tr ' ' '\n' | $(LOCK) - --output-file deploy/locks/build.txt
 	@$(LOCK) pyproject.toml --extra mqtt --extra zenoh --extra serial --output-file deploy/locks/runtime.txt
 
 site: .venv-dev/.dev  ## the documents as a searchable site in build/site/html
@@ -118,7 +118,7 @@ ros: .venv-dev/.dev .venv-ros/.ros  ## test deploy/ros2 with a real ROS 2 from P
 	@.venv-dev/bin/python -m pytest -rs tests/deploy/test_ros.py $(ARGS)
 
 clean:  ## remove the environments and what tools left behind
-	rm -rf .venv .venv-dev .venv-ros build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	rm -rf .venv .venv-dev .venv-ros build dist .pytest_cache .hypothesis .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # $(call venv,DIR): make the environment, or say in one sentence what is missing.

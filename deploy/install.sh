@@ -44,18 +44,15 @@ pip() {  # pip ARGUMENT...: install with the pip of VENV
     }
 }
 
-# The build leaves files beside its sources, so it gets a copy.
-mkdir "$work/source"
-cp -RP pyproject.toml README.md LICENSE NOTICE gestured models gestured_models "$work/source"
 rm -rf "$new" "$old"
 mkdir -p "$(dirname "$new")"
 if [ -n "${WHEELS-}" ]; then
     # shellcheck disable=SC2046,SC2086 # one argument for each wheel; a name of a wheel has no blanks
     pip --no-compile --target "$new" --no-index --no-deps --only-binary :all: $PLATFORM $(echo "$WHEELS"/*.whl)
-    pip --no-compile --target "$new" --no-index --no-deps --no-build-isolation "$work/source"
+    pip --no-compile --target "$new" --no-index --no-deps --no-build-isolation .
 else
     pip shtab  # makes the completions
-    pip --no-compile --target "$new" "$work/source[mqtt,zenoh,serial]"
+    pip --no-compile --target "$new" ".[mqtt,zenoh,serial]"
 fi
 rm -rf "${new:?}/bin"
 find "$new" -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,11 +1,9 @@
 """`python -m deploy.release build OUT` makes the wheel and the sdist; `... ready` says what keeps them from a release.
 
-It runs in the project's folder, with build and setuptools as deploy/locks/build.txt names them. It needs nothing else.
+It runs in the project's folder, with build and hatchling as deploy/locks/build.txt names them. It needs nothing else.
 """
 
-import gzip
 import hashlib
-import io
 import os
 import re
 import subprocess
@@ -16,7 +14,7 @@ import zipfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-BESIDE = {"LICENSE", "MANIFEST.in", "NOTICE", "README.md", "pyproject.toml"}  # what the sdist holds beside the packages
+BESIDE = {".gitignore", "LICENSE", "NOTICE", "README.md", "pyproject.toml"}  # what the sdist holds beside the packages
 
 
 def version(root: Path) -> str:
@@ -52,21 +50,6 @@ def run(command: Sequence[str | Path], environment: dict[str, str]) -> None:
         sys.exit(f"{done.stdout}{' '.join(map(str, command))} failed")
 
 
-def same_bytes(sdist: Path, epoch: int) -> None:
-    """Write an sdist anew without what the machine and the moment put into it: times, owners, an order of files."""
-    with tarfile.open(sdist) as before:
-        members = sorted(before.getmembers(), key=lambda member: member.name)
-        packed = io.BytesIO()
-        with tarfile.open(fileobj=packed, mode="w", format=tarfile.PAX_FORMAT) as after:
-            for member in members:
-                member.mtime, member.uid, member.gid, member.uname, member.gname = epoch, 0, 0, "", ""
-                member.mode = 0o755 if member.isdir() else 0o644
-                member.pax_headers = {}
-                after.addfile(member, before.extractfile(member) if member.isfile() else None)
-    with sdist.open("wb") as raw, gzip.GzipFile(filename="", mode="wb", fileobj=raw, mtime=epoch) as file:
-        file.write(packed.getvalue())
-
-
 def build(out: Path, epoch: int) -> list[Path]:
     """Build the sdist of what git knows, and the wheel of that sdist."""
     environment = {**os.environ, "SOURCE_DATE_EPOCH": str(epoch)}
@@ -76,7 +59,6 @@ def build(out: Path, epoch: int) -> list[Path]:
         call: list[str | Path] = [sys.executable, "-m", "build", "--no-isolation", "--outdir", out]
         run([*call, "--sdist", source], environment)
         (sdist,) = out.glob("*.tar.gz")
-        same_bytes(sdist, epoch)
         with tarfile.open(sdist) as archive:
             archive.extractall(folder, filter="data")
         (unpacked,) = Path(folder).glob("gestured-*")
@@ -86,22 +68,19 @@ def build(out: Path, epoch: int) -> list[Path]:
 
 
 def shipped(tracked: Iterable[str]) -> set[str]:
-    """The files of the packages, as the wheel names them, among the files that git knows."""
-    models = {
-        f"gestured_models/{name[7:]}" for name in tracked if re.fullmatch(r"models/[^/]+\.(py|md|onnx|json)", name)
-    }
-    return models | {name for name in tracked if name.startswith("gestured/")}
+    """The files of the packages among those that git knows."""
+    return {name for name in tracked if name.startswith(("gestured/", "models/"))}
 
 
 def strange(wheel: Path, sdist: Path, tracked: list[str]) -> list[str]:
     """What is missing in either, or has no business there."""
     ours = shipped(tracked)
     with zipfile.ZipFile(wheel) as archive:
-        in_wheel = {name for name in archive.namelist() if ".dist-info/" not in name}
-        licences = {name.rsplit("/", 1)[1] for name in archive.namelist() if "/licenses/" in name}
+        names = [re.sub("^gestured_models/", "models/", name) for name in archive.namelist()]
+    in_wheel = {name for name in names if ".dist-info/" not in name}
+    licences = {name.rsplit("/", 1)[1] for name in names if "/licenses/" in name}
     with tarfile.open(sdist) as tar:
-        in_sdist = {member.name.split("/", 1)[1] for member in tar.getmembers() if member.isfile()}
-    in_sdist = {name for name in in_sdist if not name.startswith("gestured.egg-info/")} - {"PKG-INFO", "setup.cfg"}
+        in_sdist = {member.name.split("/", 1)[1] for member in tar.getmembers() if member.isfile()} - {"PKG-INFO"}
     found = [f"{wheel.name}: {name}" for name in sorted(in_wheel ^ ours)]
     found += [f"{wheel.name}: no {name}" for name in sorted({"LICENSE", "NOTICE"} - licences)]
     return found + [f"{sdist.name}: {name}" for name in sorted(in_sdist ^ (ours | BESIDE))]
