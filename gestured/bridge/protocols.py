@@ -14,7 +14,7 @@ from collections import Counter
 
 import numpy as np
 
-from gestured.bridge.readings import FEWEST, LINE_BYTES, MOST_TAXELS, Protocol, Reading, reading_of
+from gestured.bridge.readings import FEWEST, MOST_TAXELS, Protocol, Reading, reading_of
 from gestured.bridge.slip import E256, OscSlip
 
 MOST_LINES = 0.75  # share of the lines that must have equally many numbers; some may be damaged
@@ -80,13 +80,8 @@ class Csv(Protocol):
 
     def push(self, data: bytes) -> list[Reading]:
         """A frame for each line that holds one."""
-        self._buffer += data
-        *lines, rest = bytes(self._buffer).split(b"\n")
-        self._buffer = bytearray(rest)
-        if len(rest) > LINE_BYTES:
-            self._pass(len(rest))
         found = []
-        for line in lines:
+        for line in self._ended(data, b"\n"):
             reading = reading_of(numbers(line), self.shape, np.dtype(float)) if self._begun else None
             self._begun = True
             if reading is not None:

@@ -70,6 +70,15 @@ class Protocol(ABC):
     def fits(data: bytes) -> str | None:
         """What these bytes look like, such as "csv with 81 numbers a line"; None where not like this protocol."""
 
+    def _ended(self, data: bytes, end: bytes) -> list[bytes]:
+        """What stands before each `end`; what has no end yet waits, unless it is longer than any packet or line."""
+        self._buffer += data
+        *whole, rest = bytes(self._buffer).split(end)
+        self._buffer = bytearray(rest)
+        if len(rest) > LINE_BYTES:
+            self._pass(len(rest))
+        return whole
+
     def _pass(self, count: int) -> None:
         """So many bytes at the front belong to no frame."""
         self.passed += count

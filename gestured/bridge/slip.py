@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gestured.bridge.readings import FEWEST, LINE_BYTES, Protocol, Reading, reading_of
+from gestured.bridge.readings import FEWEST, Protocol, Reading, reading_of
 from gestured.core.errors import ProtocolError
 from gestured.core.osc import Message, decode
 
@@ -20,22 +20,13 @@ class OscSlip(Protocol):
     def push(self, data: bytes) -> list[Reading]:
         """A frame for each packet that holds one."""
         found = []
-        for packet, raw in self._packets(data):
-            reading = self._frame(packet)
+        for packet in self._ended(data, SLIP_END):
+            reading = self._frame(slip_decoded(packet))
             if reading is None:
-                self.passed += raw
+                self.passed += len(packet)
             else:
                 found.append(reading)
         return found
-
-    def _packets(self, data: bytes) -> list[tuple[bytes, int]]:
-        """Each whole packet, and how many bytes it took."""
-        self._buffer += data
-        *whole, rest = bytes(self._buffer).split(SLIP_END)
-        self._buffer = bytearray(rest)
-        if len(rest) > LINE_BYTES:
-            self._pass(len(rest))
-        return [(slip_decoded(each), len(each)) for each in whole if each]
 
     def _frame(self, packet: bytes) -> Reading | None:
         for message in messages_of(packet):

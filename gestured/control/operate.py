@@ -9,8 +9,6 @@ from gestured.client.program import Commands, Parser
 from gestured.client.say import tell
 from gestured.control.address import add_sockets, connect
 
-Words = Callable[[dict[str, Any]], Iterable[str]]  # an answer of the daemon's for a person, in lines
-
 
 def add(commands: Commands) -> None:
     """Add the subcommands to gesturectl's command line."""
@@ -22,7 +20,7 @@ def add(commands: Commands) -> None:
         "and the exit status is 1. Settings that only a restart can change are named.",
         epilog="example:\n  gesturectl reload",
     )
-    _asks(parser, "reload", _reloaded)
+    _asks(parser, "reload")
     parser = commands.add_parser(
         "recalibrate",
         help="learn the idle sensor anew",
@@ -31,7 +29,7 @@ def add(commands: Commands) -> None:
         epilog="example:\n  gesturectl recalibrate --sensor armrest",
     )
     parser.add_argument("--sensor", metavar="NAME", help="only this sensor (default: all)")
-    _asks(parser, "recalibrate", _recalibrated, "sensor")
+    _asks(parser, "recalibrate", "sensor")
     parser = commands.add_parser(
         "emit",
         help="publish a marked test event",
@@ -42,7 +40,7 @@ def add(commands: Commands) -> None:
     )
     parser.add_argument("gesture", metavar="GESTURE", help="one of the gestures in use")
     parser.add_argument("--sensor", metavar="NAME", help="the sensor named in the event (default: test)")
-    _asks(parser, "emit", _emitted, "gesture", "sensor")
+    _asks(parser, "emit", "gesture", "sensor")
     _add_gates(commands)
     parser = commands.add_parser(
         "gestures",
@@ -50,7 +48,7 @@ def add(commands: Commands) -> None:
         description="List the model's gestures that are in use, and your own with how many examples each has.",
         epilog="example:\n  gesturectl gestures",
     )
-    _asks(parser, "gestures", _known)
+    _asks(parser, "gestures")
     parser = commands.add_parser(
         "forget",
         help="forget a gesture of your own",
@@ -59,7 +57,7 @@ def add(commands: Commands) -> None:
         epilog="example:\n  gesturectl forget knock",
     )
     parser.add_argument("name", metavar="NAME", help="the gesture's name")
-    _asks(parser, "forget", lambda answer: [f"forgot {answer['forgotten']}"], "name")
+    _asks(parser, "forget", "name")
 
 
 def _add_gates(commands: Commands) -> None:
@@ -85,21 +83,21 @@ def _add_gates(commands: Commands) -> None:
         parser.add_argument("--gate", required=True, metavar="NAME", help="the gate, by a name of your choice")
     text = "seconds after which the gate opens by itself (default: it does not)"
     inhibit.add_argument("--for", dest="seconds", type=float, metavar="S", help=text)
-    _asks(inhibit, "inhibit", _gates, "gate", "sensor", "seconds")
-    _asks(allow, "allow", _gates, "gate", "sensor")
+    _asks(inhibit, "inhibit", "gate", "sensor", "seconds")
+    _asks(allow, "allow", "gate", "sensor")
 
 
-def _asks(parser: Parser, verb: str, words: Words, *parameters: str) -> None:
+def _asks(parser: Parser, verb: str, *parameters: str) -> None:
     """Have a subcommand ask the daemon `verb`, with the values of these of its arguments, and print the answer."""
     add_sockets(parser)
     parser.add_argument("--json", action="store_true", help="print the daemon's answer")
-    parser.set_defaults(run=partial(_ask, verb, words, parameters))
+    parser.set_defaults(run=partial(_ask, verb, parameters))
 
 
-def _ask(verb: str, words: Words, parameters: tuple[str, ...], args: argparse.Namespace) -> int:
+def _ask(verb: str, parameters: tuple[str, ...], args: argparse.Namespace) -> int:
     with connect(args) as control:
         answer = control.ask(verb, **{name: getattr(args, name) for name in parameters})
-    tell(args.json, answer, *words(answer))
+    tell(args.json, answer, *WORDS[verb](answer))
     return 0
 
 
@@ -133,3 +131,15 @@ def _known(answer: dict[str, Any]) -> Iterable[str]:
     if not own["gestures"]:
         yield "none of your own"
     yield from (f"  {said}" for said in (own["fault"], own["gestures"] and own["off"], *own["doubtful"]) if said)
+
+
+# Verb -> what the daemon's answer says, in lines for a person.
+WORDS: dict[str, Callable[[dict[str, Any]], Iterable[str]]] = {
+    "reload": _reloaded,
+    "recalibrate": _recalibrated,
+    "emit": _emitted,
+    "inhibit": _gates,
+    "allow": _gates,
+    "gestures": _known,
+    "forget": lambda answer: [f"forgot {answer['forgotten']}"],
+}

@@ -129,7 +129,7 @@ def test_what_changes_anything_needs_the_header(view: Page, real: Daemon, arm: s
             assert status == 403 and "error" in json.loads(body)
     mine = {"Origin": f"http://{view.address}"}
     status, _, body = view.ask("/recalibrate", "POST", {"sensor": arm}, **mine)
-    assert status == 200 and f"{arm}: learned anew, leave" in json.loads(body)["done"]
+    assert status == 200 and f"learning {arm} anew" in json.loads(body)["done"]
     assert view.ask("/recalibrate", "POST", {"sensor": "nobody"}, **mine)[0] == 409
     assert view.ask("/else", "POST", {}, **mine)[0] == 404
     for sent in ([], {"sensor": 1}, {"note": "x" * BODY_BYTES}, b"[" * 4000):

@@ -14,6 +14,7 @@ from gestured.core.errors import GesturedError
 
 PAGE = Path(__file__).with_name("page")
 BROWSERS = 32  # streams at a time
+VERBS = {"/silence": "inhibit", "/hear": "allow", "/recalibrate": "recalibrate"}  # path -> what the daemon is asked
 
 
 class ViewServer(Server):
@@ -50,16 +51,11 @@ class _Handler(Handler):
         """Flag, recalibrate, silence or let be heard."""
         if not all(isinstance(value, str) for value in what.values()):
             return HTTPStatus.BAD_REQUEST, {"error": "expected a JSON object of texts"}
-        source = self.server.source
-        acts = {
-            "/flag": lambda: source.flag(what.get("note", "")),
-            "/silence": lambda: source.silence(what.get("sensor", "")),
-            "/hear": lambda: source.hear(what.get("sensor", "")),
-            "/recalibrate": lambda: source.recalibrate(what.get("sensor", "")),
-        }
-        if self.path not in acts:
-            return HTTPStatus.NOT_FOUND, {"error": f"expected one of {', '.join(acts)}"}
+        source, verb = self.server.source, VERBS.get(self.path)
+        if verb is None and self.path != "/flag":
+            return HTTPStatus.NOT_FOUND, {"error": f"expected one of /flag, {', '.join(VERBS)}"}
         try:
-            return HTTPStatus.OK, {"done": acts[self.path]()}
+            done = source.flag(what.get("note", "")) if verb is None else source.ask(verb, what.get("sensor", ""))
+            return HTTPStatus.OK, {"done": done}
         except (GesturedError, OSError) as error:
             return HTTPStatus.CONFLICT, {"error": str(error)}

@@ -12,6 +12,7 @@ from gestured.client.lines import Refused
 from gestured.client.web.outbox import Outbox
 from gestured.control.findings import examine_sensors
 from gestured.control.flag import flag, flag_path
+from gestured.control.operate import WORDS
 from gestured.core.errors import GesturedError
 
 GATE = "view"  # the page's own
@@ -68,24 +69,11 @@ class Source:
             self._open.remove(outbox)
             self._look_anew()
 
-    def recalibrate(self, sensor: str) -> str:
-        """Have the daemon learn a sensor anew; what was done, in words. Raises GesturedError."""
+    def ask(self, verb: str, sensor: str) -> str:
+        """Have the daemon recalibrate a sensor, or inhibit or allow it by GATE; what was done. Raises GesturedError."""
+        gate = {} if verb == "recalibrate" else {"gate": GATE}
         with Control(self._control) as control:
-            control.ask("recalibrate", sensor=sensor)
-        return f"{sensor}: learned anew, leave it untouched for a second"
-
-    def silence(self, sensor: str) -> str:
-        """Close the page's own gate of a sensor; what was done, in words. Raises GesturedError."""
-        return self._gate("inhibit", sensor)
-
-    def hear(self, sensor: str) -> str:
-        """Open it again; others may be closed."""
-        return self._gate("allow", sensor)
-
-    def _gate(self, verb: str, sensor: str) -> str:
-        with Control(self._control) as control:
-            closed = control.ask(verb, sensor=sensor, gate=GATE)["sensors"][sensor]
-        return f"{sensor}: silent, gates closed: {', '.join(closed)}" if closed else f"{sensor}: no gate is closed"
+            return "; ".join(WORDS[verb](control.ask(verb, sensor=sensor, **gate)))
 
     def flag(self, note: str) -> str:
         """Keep what the flight recorder holds as a recording; what was done, in words. Raises GesturedError."""
