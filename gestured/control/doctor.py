@@ -24,6 +24,7 @@ from gestured.control.proposal import propose
 from gestured.control.sight import Sight
 from gestured.control.sniff import overhear
 from gestured.core.address import Address
+from gestured.core.errors import GesturedError
 
 YEAR_S = 365 * 86_400
 RELEASED = 1_750_000_000  # s since the epoch; a clock before that is wrong
@@ -99,10 +100,10 @@ def _proposed(control: Control) -> list[str]:
     """What to set for what arrives now; nothing where all that arrives fits."""
     sight = Sight()
     try:
-        known = overhear(control, LOOK_S, sight)
-    except (Unreachable, Refused):
+        told = overhear(control, LOOK_S, sight)
+    except GesturedError:
         return []  # it has ended meanwhile, or cannot show its packets
-    lines = propose(sight.rows(), known)
+    lines = propose(sight.rows(), told)
     return lines if lines and lines[0].startswith(("[", "#")) else []
 
 

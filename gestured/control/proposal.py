@@ -2,9 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -14,38 +12,20 @@ from gestured.core.beside.habits import ALIKE, Habits, neighbours_alike
 from gestured.core.frames import Frame
 from gestured.core.front_end import FrontEnd
 from gestured.core.mounting import Mounting
+from gestured.core.scene import Scene
 
-USUAL = "/{sensor}/pressure"
 LONGEST_ADDRESS = 255  # characters of an address that is proposed
 TRAJECTORY = "/trajectory"
 STEP_S = 1e-6  # from frame to frame at the least, because some were read at one time
 
 Grid = tuple[int, int]
+DEFAULTS = Scene(("any",), (9, 9))
 
 
-@dataclass(frozen=True, slots=True)
-class Known:
-    """What is set so far: the defaults, or what a running daemon says."""
-
-    pressure: str = USUAL
-    grid: Grid = (9, 9)
-    sensors: Mapping[str, tuple[Grid | None, bool]] = field(default_factory=dict)  # grid, and whether it is inverted
-    told: bool = False  # by a daemon
-
-    @classmethod
-    def of(cls, scene: Mapping[str, Any]) -> "Known":
-        """Of a daemon's answer to `tap`."""
-        settings, model = scene["settings"], scene["model"]
-        sensors = {
-            name: (tuple(own["grid"]) if own.get("grid") else None, bool(own.get("invert")))
-            for name, own in settings["sensors"].items()
-        }
-        grid = tuple(settings["grid"] or (model["rows"], model["columns"]))
-        return cls(settings["addresses"]["pressure"], grid, sensors, True)
-
-
-def propose(rows: Sequence[Seen], known: Known = Known()) -> list[str]:  # noqa: B008  # it is frozen
+def propose(rows: Sequence[Seen], told: Scene | None = None) -> list[str]:
     """Lines for the configuration file, from what looks like frames: many numbers, or one blob, again and again.
+
+    `told` is the scene of the daemon that they reach; without one the defaults count.
 
     Anybody may have sent them. So there is nothing in these lines but numbers and names that were checked, whose
     characters mean nothing in TOML.
@@ -59,19 +39,19 @@ def propose(rows: Sequence[Seen], known: Known = Known()) -> list[str]:  # noqa:
             likeliest.setdefault(split, seen)
     if not patterns:
         return []
+    scene = told or DEFAULTS
     pressure, *others = [pattern for pattern, _ in patterns.most_common()]
-    lines = [] if pressure == known.pressure else ["[addresses]", f'pressure = "{pressure}"']
+    lines = [] if pressure == scene.addresses.pressure else ["[addresses]", f'pressure = "{pressure}"']
     for (pattern, name), seen in likeliest.items():
         if pattern == pressure:
-            lines += _sensor(name, seen, known)
-    lines = lines or [f"{'the settings of the daemon' if known.told else 'the defaults'} fit what arrives"]
+            lines += _sensor(name, seen, scene)
+    lines = lines or [f"{'the settings of the daemon' if told else 'the defaults'} fit what arrives"]
     return lines + [f"# {other} looks like frames, too; a daemon takes one pattern" for other in others]
 
 
-def _sensor(name: str, seen: Seen, known: Known) -> list[str]:
+def _sensor(name: str, seen: Seen, scene: Scene) -> list[str]:
     """What to set for one sensor; nothing where all fits."""
-    own, inverted = known.sensors.get(name, (None, False))
-    grid = own or known.grid
+    grid, inverted = scene.grid_of(name), scene.setup(name).mounting.invert
     keys = []
     if grid[0] * grid[1] not in seen.taxels():
         found = next((shape for n in seen.taxels() if (shape := _shape(seen, n)) is not None), None)

@@ -16,10 +16,12 @@ from gestured.client.program import Commands
 from gestured.client.say import say, shown, tell
 from gestured.client.values import host_port, number
 from gestured.control.address import add_sockets, connect, finish_after, finish_on_signals
-from gestured.control.proposal import LONGEST_ADDRESS, TRAJECTORY, Known, propose, split_address
+from gestured.control.proposal import LONGEST_ADDRESS, TRAJECTORY, propose, split_address
 from gestured.control.sight import Seen, Sight
 from gestured.core.address import Address
 from gestured.core.errors import GesturedError
+from gestured.core.scene import Scene
+from gestured.record.replay import maker
 
 SHOWN_CHARACTERS = 80  # characters of an address or of type tags
 NOT_TAKEN = {"d": "doubles", "h": "64-bit integers"}  # by type tag
@@ -45,7 +47,7 @@ def add(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Look, and say what was there; exit status 1 where nothing came that looks like a frame."""
-    sight, known = Sight(), Known()
+    sight, told = Sight(), None
     try:
         if args.listen:
             for t, source, packet in _listen(args.listen, args.seconds):
@@ -53,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         else:
             with connect(args) as control:
                 finish_on_signals(control)
-                known = overhear(control, args.seconds, sight)
+                told = overhear(control, args.seconds, sight)
     except KeyboardInterrupt:
         pass
     rows = sight.rows()
@@ -61,22 +63,22 @@ def run(args: argparse.Namespace) -> int:
         {"address": s.address, "types": s.types, "count": s.count, "rate_hz": round(s.rate_hz, 2),
          "sources": sorted(s.sources)} for s in rows
     ]  # fmt: skip
-    proposed = propose(rows, known)
+    proposed = propose(rows, told)
     summary = {"packets": sight.packets, "messages": found, "errors": sight.errors, "proposed": proposed}
     tell(args.json, summary, *lines(sight, proposed))
     return 0 if proposed else 1
 
 
-def overhear(control: Control, seconds: float, sight: Sight) -> Known:
-    """Have `sight` see for so long what reaches the daemon; what is set there. Raises Unreachable, Refused."""
-    known = Known.of(control.ask("tap"))
+def overhear(control: Control, seconds: float, sight: Sight) -> Scene:
+    """Have `sight` see for so long what reaches the daemon; what is set there. Raises GesturedError."""
+    scene = maker(control.ask("tap")).scene
     finish_after(control, seconds)
     for line in control.lines():
         if line["type"] == "packet":
             sight.packet(line["t_ns"] / 1e9, str(Address(*line["source"])), base64.b64decode(line["data"]))
     if not control.finished:
         raise Unreachable("the daemon closed the connection")
-    return known
+    return scene
 
 
 def lines(sight: Sight, proposed: list[str]) -> Iterator[str]:

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gestured.control.proposal import Known, propose
+from gestured.control.proposal import propose
 from gestured.control.sight import Sight
 from gestured.control.sniff import lines
+from gestured.core.scene import Scene, Setup
 from gestured.core.wire import Addresses, Decoder
 from gestured.daemon.merge import load_settings
 from tests import encoding
@@ -62,27 +63,19 @@ def test_both_mistakes_are_mended_at_once(tmp_path) -> None:
     """Rows and columns are exchanged, and counts fall."""
     frames = (frame.reshape(12, 6) for frame in swipes(6, 12, -1.0))
     sight = seen(floats("/arm/pressure", frame, n) for n, frame in enumerate(frames))
-    known = Known(grid=(12, 6), told=True)
-    assert valid(propose(sight.rows(), known), tmp_path) == {"arm": ((6, 12), True)}
+    assert valid(propose(sight.rows(), Scene(("any",), (12, 6))), tmp_path) == {"arm": ((6, 12), True)}
 
 
 def test_nothing_is_proposed_where_the_daemon_is_set_to_what_arrives() -> None:
     sight = seen(floats("/x/arm/y", frame, n) for n, frame in enumerate(swipes(27, 15)))
     assert propose(sight.rows())
-    known = Known(pressure="/x/{sensor}/y", grid=(9, 9), sensors={"arm": ((27, 15), False)}, told=True)
-    assert propose(sight.rows(), known) == ["the settings of the daemon fit what arrives"]
-    scene = {
-        "settings": {"grid": None, "addresses": {"pressure": "/x/{sensor}/y"},
-                     "sensors": {"arm": {"grid": [27, 15], "invert": False}, "lap": {"grid": None}}},
-        "model": {"rows": 9, "columns": 9},
-    }  # fmt: skip
-    assert Known.of(scene) == Known("/x/{sensor}/y", (9, 9), {"arm": ((27, 15), False), "lap": (None, False)}, True)
+    told = Scene(("any",), (9, 9), {"arm": Setup((27, 15))}, Addresses("/x/{sensor}/y"))
+    assert propose(sight.rows(), told) == ["the settings of the daemon fit what arrives"]
 
 
 def test_rows_and_columns_the_other_way_round(tmp_path) -> None:
     sight = seen(floats("/arm/pressure", frame, n) for n, frame in enumerate(swipes(12, 6)))
-    known = Known(sensors={"arm": ((6, 12), False)})
-    proposed = propose(sight.rows(), known)
+    proposed = propose(sight.rows(), Scene(("any",), (9, 9), {"arm": Setup((6, 12))}))
     assert valid(proposed, tmp_path) == {"arm": ((12, 6), False)} and "rows and columns" in "\n".join(proposed)
 
 
