@@ -9,7 +9,7 @@ import pytest
 from gestured.control.cli import main
 from tests.daemon import tiny_model
 from tests.daemon.harness import Daemon
-from tests.daemon.test_own import Performer, ask, ready
+from tests.daemon.test_own import Performer, ready
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def begun(start, daemon: Daemon, *flags: object, sensor: str = "armrest"):
     """`gesturectl enrol slash`, once the daemon waits for examples."""
     process = start("enrol", "slash", "--sensor", sensor, *flags, "--control", daemon.ready["control"])
     status = daemon.client().subscribe("status")
-    while ask(daemon, "gestures")["own"]["enrolling"] is None:
+    while daemon.ask("gestures")["own"]["enrolling"] is None:
         status.line()
     return process
 

@@ -145,6 +145,15 @@ class Daemon:
         """A new subscriber."""
         return Client(self.socket)
 
+    def control(self) -> Control:
+        """A connection to its control socket."""
+        return Control(Path(self.ready["control"]), patience_s=DEADLINE_S)
+
+    def ask(self, verb: str, **keys: object) -> dict[str, Any]:
+        """The answer to one request of an operator."""
+        with self.control() as control:
+            return control.ask(verb, **keys)
+
     def get(self, path: str) -> tuple[int, str]:
         """Status and body of an HTTP request."""
         try:
@@ -158,8 +167,7 @@ class Daemon:
 
         An event goes out before it is counted, and /metrics is answered beside the loop: a question to the loop first.
         """
-        with Control(Path(self.ready["control"]), patience_s=DEADLINE_S) as control:
-            control.ask("status")
+        self.ask("status")
         return self.sample(name, **labels)
 
     def sample(self, name: str, **labels: str) -> float:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from gestured.client.control import Control
 from tests.daemon.harness import DEADLINE_S, Daemon, Sensor
 
 # As systemd does: the sockets from descriptor 3 on, and LISTEN_PID set by the process itself after its fork.
@@ -89,8 +88,7 @@ def test_what_is_sent_while_it_is_stopped_is_the_next_starts(model: Path, tmp_pa
     sensor = Sensor(daemon, "arm").begin().perform("left")
     client.events("gesture", "arm")
     daemon.get("/metrics")
-    with Control(Path(daemon.ready["control"])) as control:
-        control.ask("reload")  # now every thread that it may have is there
+    daemon.ask("reload")  # now every thread that it may have is there
     daemon.signal(signal.SIGSTOP)
     os.waitid(os.P_PID, daemon.process.pid, os.WSTOPPED)
     sent = [sensor.packet(frame) for frame in sensor.hand.idle(3.0)]

@@ -30,11 +30,6 @@ def bridge(daemon: Daemon) -> Iterator[Control]:
         yield control
 
 
-def status(daemon: Daemon) -> dict[str, Any]:
-    with Control(Path(daemon.ready["control"])) as control:
-        return control.ask("status")
-
-
 def test_a_bridge_closes_its_own_gate_and_it_stays_closed_when_the_bridge_is_gone(daemon: Daemon) -> None:
     client = daemon.client().subscribe("gesture", "gate")
     assert client.hello["gates"] == {"armrest": {"armed": None, "closed": ["seat"], "until": None}}
@@ -48,12 +43,11 @@ def test_a_bridge_closes_its_own_gate_and_it_stays_closed_when_the_bridge_is_gon
         assert bridge.ask("allow", bridge="seat", gate="seat")["sensors"] == {"armrest": ["car-door"]}
         assert client.line()["closed"] == ["car-door"]
     sensor.perform("left", "up")
-    while not (late := status(daemon)["overdue"]):
+    while not (late := daemon.ask("status")["overdue"]):
         pass
-    assert list(late) == ["car-door"] and status(daemon)["sensors"]["armrest"]["closed"] == ["car-door"]
-    with Control(Path(daemon.ready["control"])) as operator:
-        operator.ask("allow", gate="car-door")
-    assert status(daemon)["overdue"] == {}
+    assert list(late) == ["car-door"] and daemon.ask("status")["sensors"]["armrest"]["closed"] == ["car-door"]
+    daemon.ask("allow", gate="car-door")
+    assert daemon.ask("status")["overdue"] == {}
     sensor.perform("down")
     told = [client.line(), client.line()]
     assert told[0]["closed"] == [] and told[1]["gesture"] == "swipe_down", "nothing was said in between"
@@ -87,8 +81,7 @@ def test_bridges_cannot_use_up_the_gates_of_an_operator(daemon: Daemon, bridge: 
     with pytest.raises(Refused, match="bridges have closed 8 gates already, the most that they can; allow one first"):
         bridge.ask("inhibit", bridge="car", gate="car-8", seconds=60)
     bridge.ask("inhibit", bridge="car", gate="car-7", seconds=60)
-    with Control(Path(daemon.ready["control"])) as operator:
-        assert "door" in operator.ask("inhibit", gate="door")["sensors"]["armrest"]
+    assert "door" in daemon.ask("inhibit", gate="door")["sensors"]["armrest"]
     bridge.ask("allow", bridge="car", gate="car-0")
     bridge.ask("inhibit", bridge="car", gate="car-8", seconds=60)
 

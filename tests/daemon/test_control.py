@@ -81,7 +81,7 @@ def test_a_stranger_is_refused_even_where_the_file_lets_him_in(start, nobody) ->
     ],
 )
 def test_a_bad_request_is_answered_and_the_connection_goes_on(daemon: Daemon, line: bytes, said: tuple[str]) -> None:
-    with Control(Path(daemon.ready["control"])) as control:
+    with daemon.control() as control:
         control.socket.sendall(line)
         answer = next(control.lines())
         assert answer["ok"] is False and all(word in answer["reason"] for word in said), answer
@@ -89,7 +89,7 @@ def test_a_bad_request_is_answered_and_the_connection_goes_on(daemon: Daemon, li
 
 
 def test_a_request_that_is_too_long_is_refused(daemon: Daemon) -> None:
-    with Control(Path(daemon.ready["control"])) as control, pytest.raises(Refused, match="4096"):
+    with daemon.control() as control, pytest.raises(Refused, match="4096"):
         control.ask("emit", gesture="x" * 100_000)
 
 
@@ -97,8 +97,7 @@ def test_status_says_how_the_daemon_is(daemon: Daemon) -> None:
     client = daemon.client()
     Sensor(daemon, "seen").begin().perform("left")
     client.events("gesture", "seen")
-    with Control(Path(daemon.ready["control"])) as control:
-        status = control.ask("status")
+    status = daemon.ask("status")
     assert status["model"]["active"] == "tiny" and status["model"]["rung"] == 0
     assert status["addresses"]["listen"] == daemon.ready["listen"]
     sensor = status["sensors"]["seen"]
@@ -112,8 +111,7 @@ def test_status_says_how_the_daemon_is(daemon: Daemon) -> None:
 def test_a_test_event_is_marked_on_every_output_and_keeps_the_numbers(start, udp: socket.socket) -> None:
     daemon = start("--clock", "sensor", "--publish", f"osc://127.0.0.1:{udp.getsockname()[1]}")
     client = daemon.client().subscribe("gesture", "onset", "release")
-    with Control(Path(daemon.ready["control"])) as control:
-        assert control.ask("emit", gesture="swipe_up", sensor="arm")["sequence"] == 1
+    assert daemon.ask("emit", gesture="swipe_up", sensor="arm")["sequence"] == 1
     assert [(e["type"], e["id"], e["test"]) for e in (client.line() for _ in range(3))] == [
         ("onset", 1, True), ("gesture", 1, True), ("release", 1, True),
     ]  # fmt: skip
@@ -128,8 +126,7 @@ def test_a_test_event_is_marked_on_every_output_and_keeps_the_numbers(start, udp
     Sensor(daemon, "arm").begin().perform("left")  # the sensor comes: its gestures are numbered on, unmarked
     (event,) = client.events("gesture", "arm")
     assert (event["gesture"], event["id"], event["sequence"]) == ("swipe_left", 2, 2) and "test" not in event
-    with Control(Path(daemon.ready["control"])) as control:
-        assert control.ask("emit", gesture="one_tap", sensor="arm")["sequence"] == 3
+    assert daemon.ask("emit", gesture="one_tap", sensor="arm")["sequence"] == 3
 
 
 def test_recalibration_is_refused_while_touched(start) -> None:
@@ -138,7 +135,7 @@ def test_recalibration_is_refused_while_touched(start) -> None:
     sensor = Sensor(daemon, "arm").begin()
     sensor.send([sensor.hand.frame(4.0) for _ in range(5)])
     client.events("onset", "arm")
-    with Control(Path(daemon.ready["control"])) as control:
+    with daemon.control() as control:
         with pytest.raises(Refused, match=r"touched: arm"):
             control.ask("recalibrate")
         with pytest.raises(Refused, match=r"arm is touched"):
@@ -153,7 +150,7 @@ def test_reload_says_what_was_wrong_and_keeps_the_old(start, model: Path, tmp_pa
     path = tmp_path / "mine.onnx"
     path.write_bytes(model.read_bytes())
     daemon = start("--clock", "sensor", model=path)
-    with Control(Path(daemon.ready["control"])) as control:
+    with daemon.control() as control:
         before = control.ask("status")["model"]["sha256"]
         path.write_bytes(model.read_bytes()[:2000])
         with pytest.raises(Refused, match=str(path)):
@@ -169,7 +166,7 @@ def test_a_reload_names_what_only_a_restart_changes_until_it_is_as_before(start,
     config = tmp_path / "gestured.toml"
     config.write_text("")
     daemon = start("--config", config)
-    with Control(Path(daemon.ready["control"])) as control:
+    with daemon.control() as control:
         for text, named in (
             ("tap_gap_s = 0.3", []),
             ("flight_recorder = 4", ["flight_recorder"]),
@@ -186,7 +183,7 @@ def test_the_flight_recorder_gives_what_it_held(daemon: Daemon, start) -> None:
     client = daemon.client()
     Sensor(daemon, "flown").begin().perform("left")
     client.events("gesture", "flown")
-    with Control(Path(daemon.ready["control"])) as control:
+    with daemon.control() as control:
         answer = control.ask("flight")
         lines = []
         for line in control.lines():
@@ -196,18 +193,18 @@ def test_the_flight_recorder_gives_what_it_held(daemon: Daemon, start) -> None:
     assert len(lines) == answer["lines"]
     assert sum(line["type"] == "packet" for line in lines) >= 2 * 15 + 7
     assert "swipe_left" in {line.get("gesture") for line in lines}
-    with Control(Path(start().ready["control"])) as control, pytest.raises(Refused, match="flight_recorder"):
+    with start().control() as control, pytest.raises(Refused, match="flight_recorder"):
         control.ask("flight")
 
 
 def test_a_tap_that_nobody_reads_loses_packets_is_told_and_holds_nobody_up(start) -> None:
     daemon = start("--clock", "sensor")
-    with Control(Path(daemon.ready["control"])) as control:
+    with daemon.control() as control:
         control.ask("tap")
         packet = os.urandom(30_000)
         with socket.socket(type=socket.SOCK_DGRAM) as sender:
             sender.connect(daemon.address)
-            with Control(Path(daemon.ready["control"])) as other:
+            with daemon.control() as other:
                 for _ in range(10):  # 12 MiB in all: more than is kept for a reader that sleeps
                     for _ in range(30):
                         sender.send(packet)
@@ -226,8 +223,7 @@ def test_a_sensor_of_the_file_that_was_never_heard_has_no_data(start, tmp_path: 
     status = daemon.client().subscribe("status").line()
     assert (status["state"], status["sensors"]) == ("no_data", {"door": "no_data"})
     assert daemon.metric("gestured_sensor_state", sensor="door", state="no_data") == 1
-    with Control(Path(daemon.ready["control"])) as control:
-        sensor = control.ask("status")["sensors"]["door"]
+    sensor = daemon.ask("status")["sensors"]["door"]
     assert (sensor["state"], sensor["grid"], sensor["rate_hz"]) == ("no_data", "5x5", 0.0)
 
 
@@ -243,8 +239,7 @@ def test_gestures_unlike_those_of_the_training_are_said_to_be(start, tmp_path: P
     assert daemon.metric("gestured_shift_ratio", quantity="duration_s") == 1.0
     assert daemon.metric("gestured_shift_ratio", quantity="area") == 0.0
     assert json.loads(daemon.get("/readyz")[1])["shift"] == ["duration_s"]
-    with Control(Path(daemon.ready["control"])) as control:
-        assert control.ask("status")["shift"]["unlike"] == ["duration_s"]
+    assert daemon.ask("status")["shift"]["unlike"] == ["duration_s"]
 
 
 words = st.sampled_from(["verb", "emit", "gesture", "status"])
@@ -276,7 +271,7 @@ DOCUMENT = (Path(__file__).resolve().parents[2] / "docs" / "control.md").read_te
 def test_the_table_of_verbs_in_the_documents(daemon: Daemon) -> None:
     rows = re.findall(r"^\| `(\w+)` \| (.*?) \|", DOCUMENT, re.MULTILINE)
     described = {verb: tuple(re.findall(r"`(\w+)`", keys)) for verb, keys in rows}
-    with Control(Path(daemon.ready["control"])) as control:
+    with daemon.control() as control:
         with pytest.raises(Refused) as unknown:
             control.ask("?")
         assert set(str(unknown.value).partition("expected one of ")[2].split(", ")) == set(described)

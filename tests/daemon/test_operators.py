@@ -164,7 +164,7 @@ def test_members_of_the_group_cannot_take_all_places(start) -> None:
 
 def test_one_tap_a_connection_and_what_is_repeated_is_logged_at_a_bounded_rate(start) -> None:
     daemon = start()
-    with Control(Path(daemon.ready["control"])) as operator:
+    with daemon.control() as operator:
         assert operator.ask("tap")["ok"]
         for _ in range(100):
             with pytest.raises(Refused, match="a tap already"):
@@ -196,13 +196,13 @@ def test_a_crowd_that_asks_for_the_flight_recorder_without_end_costs_no_event_an
     daemon = start("--clock", "sensor", "--flight-recorder", 16, "--metrics", "127.0.0.1:0")
     client = daemon.client()
     sensor = Sensor(daemon, "arm").begin()
-    with Control(Path(daemon.ready["control"])) as operator, ExitStack() as crowd:
+    with daemon.control() as operator, ExitStack() as crowd:
         while operator.ask("status")["flight_recorder"]["held_bytes"] < 8 << 20:  # tiny packets: the most lines
             for _ in range(500):
                 sensor.sock.send(b"x")
         before = peak_bytes(daemon)
         for _ in range(15):
-            rude = crowd.enter_context(Control(Path(daemon.ready["control"])))
+            rude = crowd.enter_context(daemon.control())
             rude.socket.sendall(b'{"verb":"flight"}\n' * 200)
         for _ in range(3):
             sensor.begin().perform("left")

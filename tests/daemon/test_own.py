@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from gestured.client.control import Control
 from gestured.client.lines import Refused
 from gestured.core.own import Example
 from gestured.daemon.own import OwnGestures
@@ -77,7 +76,7 @@ class Enrolment:
     """A client that enrols."""
 
     def __init__(self, daemon: Daemon, name: str, sensor: str = "armrest", examples: int = 2) -> None:
-        self.control = Control(Path(daemon.ready["control"]))
+        self.control = daemon.control()
         self.control.ask("enrol", name=name, sensor=sensor, examples=examples)
         self._lines = self.control.lines()
 
@@ -103,11 +102,6 @@ def enrol(daemon: Daemon, sensor: Performer, name: str = "slash", examples: int 
         assert enrolment.line()["kept"] is True
     assert enrolment.line() == {"enrolled": name, "examples": examples}
     enrolment.control.close()
-
-
-def ask(daemon: Daemon, verb: str, **parameters: object) -> dict[str, Any]:
-    with Control(Path(daemon.ready["control"])) as control:
-        return control.ask(verb, **parameters)
 
 
 def answer(client: Client, sensor: Performer, perform: Callable[[], object]) -> dict[str, Any]:
@@ -197,17 +191,17 @@ def test_one_enrolment_at_a_time_and_none_outlives_its_client(begin: Begin, tmp_
         Enrolment(daemon, "cut")
     with pytest.raises(Refused, match="a tap already"):
         first.control.ask("enrol", name="cut", sensor="armrest")
-    ask(daemon, "reload")
-    assert first.line()["given_up"] == "slash" and ask(daemon, "gestures")["own"]["enrolling"] is None
+    daemon.ask("reload")
+    assert first.line()["given_up"] == "slash" and daemon.ask("gestures")["own"]["enrolling"] is None
     first = Enrolment(daemon, "slash")
     sensor.slash()
     assert first.line()["kept"] is True
     first.control.close()
-    while ask(daemon, "gestures")["own"]["enrolling"] is not None:
+    while daemon.ask("gestures")["own"]["enrolling"] is not None:
         daemon.client().subscribe("status").until(lambda line: line["type"] == "status")
     assert not (tmp_path / "own-gestures.json").exists()
     enrol(daemon, sensor, "cut")
-    assert ask(daemon, "gestures")["own"]["gestures"] == {"cut": 2}
+    assert daemon.ask("gestures")["own"]["gestures"] == {"cut": 2}
 
 
 def test_the_file_is_private_and_outlives_the_daemon_until_it_is_forgotten(begin: Begin, tmp_path: Path) -> None:
@@ -217,19 +211,19 @@ def test_the_file_is_private_and_outlives_the_daemon_until_it_is_forgotten(begin
     path = tmp_path / "own-gestures.json"
     assert path.stat().st_mode & 0o777 == 0o600
     kept = json.loads(path.read_text())
-    assert kept["model"] == ask(daemon, "status")["model"]["sha256"]
+    assert kept["model"] == daemon.ask("status")["model"]["sha256"]
     assert len(kept["gestures"]["slash"]) == 2
     assert daemon.stop() == 0
     daemon = begin()
     sensor = ready(daemon)
     client = daemon.client().subscribe("gesture", "unknown", "cancelled")
     assert answer(client, sensor, sensor.slash)["gesture"] == "slash"
-    assert ask(daemon, "forget", name="slash")["forgotten"] == "slash"
+    assert daemon.ask("forget", name="slash")["forgotten"] == "slash"
     assert client.until(lambda line: line["type"] == "gestures")[-1]["gestures"] == list(tiny_model.GESTURES)
     assert answer(client, sensor, sensor.slash)["type"] == "unknown"
     assert json.loads(path.read_text())["gestures"] == {}
     with pytest.raises(Refused, match="'slash' is no gesture of your own"):
-        ask(daemon, "forget", name="slash")
+        daemon.ask("forget", name="slash")
 
 
 def test_of_two_daemons_with_one_file_the_first_writes_it(begin: Begin, tmp_path: Path) -> None:
@@ -242,16 +236,16 @@ def test_of_two_daemons_with_one_file_the_first_writes_it(begin: Begin, tmp_path
     assert answer(client, other, other.slash)["gesture"] == "slash"
     for verb, more in (("enrol", {"name": "cut", "sensor": "armrest"}), ("forget", {"name": "slash"})):
         with pytest.raises(Refused, match=rf"another gestured \(pid {first.process.pid}\) writes it"):
-            ask(second, verb, **more)
-    assert f"pid {first.process.pid}" in ask(second, "gestures")["own"]["fault"]
-    ask(first, "forget", name="slash")
+            second.ask(verb, **more)
+    assert f"pid {first.process.pid}" in second.ask("gestures")["own"]["fault"]
+    first.ask("forget", name="slash")
     assert first.stop() == 0
     enrolment = Enrolment(second, "cut", examples=1)
     other.backslash()
     assert enrolment.line()["kept"] is True
     assert enrolment.line()["enrolled"] == "cut"
     assert own_file.load(tmp_path / "own-gestures.json").gestures.keys() == {"cut"}
-    assert ask(second, "gestures")["own"] | {"file": ""} == {
+    assert second.ask("gestures")["own"] | {"file": ""} == {
         "file": "", "fault": None, "gestures": {"cut": 1}, "off": None, "doubtful": [], "enrolling": None,
     }  # fmt: skip
 
@@ -261,7 +255,7 @@ def test_a_broken_file_is_said_left_alone_and_the_models_gestures_go_on(begin: B
     path.write_text('{"format": 1, "gestures": {"slash": [{"shape": [3]}]}}')
     daemon = begin("--own-gestures", path)
     ready(daemon)  # which performs a swipe
-    fault = ask(daemon, "gestures")["own"]["fault"]
+    fault = daemon.ask("gestures")["own"]["fault"]
     assert str(path) in fault
     assert "gestures.slash[0]" in fault
     with pytest.raises(Refused, match="is no file of own gestures"):
@@ -282,7 +276,7 @@ def test_where_it_cannot_be_written_nothing_changes(begin: Begin, flags, env: di
     ready(daemon)
     with pytest.raises(Refused, match=words):
         Enrolment(daemon, "slash", examples=1)
-    assert ask(daemon, "gestures")["own"]["gestures"] == {}
+    assert daemon.ask("gestures")["own"]["gestures"] == {}
 
 
 def test_a_file_that_was_planted_names_no_gesture_of_the_model_twice(
@@ -291,10 +285,10 @@ def test_a_file_that_was_planted_names_no_gesture_of_the_model_twice(
     own_file.write(tmp_path / "own-gestures.json", {"swipe_left": (example,), "slash": (example,)}, "")
     daemon = begin()
     assert daemon.client().hello["gestures"] == [*tiny_model.GESTURES, "slash"]
-    own = ask(daemon, "gestures")["own"]
+    own = daemon.ask("gestures")["own"]
     assert own["gestures"] == {"slash": 1}
     assert "swipe_left is off, since tiny has a gesture of that name" in own["doubtful"]
-    assert ask(daemon, "forget", name="swipe_left")["forgotten"] == "swipe_left"
+    assert daemon.ask("forget", name="swipe_left")["forgotten"] == "swipe_left"
     assert own_file.load(tmp_path / "own-gestures.json").gestures.keys() == {"slash"}
 
 
@@ -306,14 +300,14 @@ def test_another_model_takes_the_examples_over_or_says_that_they_are_off(
     enrol(daemon, sensor)
     client = daemon.client().subscribe("gesture", "unknown", "cancelled")
     tiny_model.make(model, version="2")
-    ask(daemon, "reload")
-    assert ask(daemon, "gestures")["own"]["off"] == "tiny has no embedding"
+    daemon.ask("reload")
+    assert daemon.ask("gestures")["own"]["off"] == "tiny has no embedding"
     assert answer(client, sensor, sensor.slash)["type"] == "unknown"
     with pytest.raises(Refused, match="own gestures are off"):
         Enrolment(daemon, "cut")
     tiny_model.make(model, version="3", own=tiny_model.own())
-    ask(daemon, "reload")
-    own = ask(daemon, "status")["own"]
+    daemon.ask("reload")
+    own = daemon.ask("status")["own"]
     assert (own["off"], own["gestures"]) == (None, {"slash": 2})
     assert answer(client, sensor, sensor.slash)["gesture"] == "slash"
 
@@ -327,15 +321,15 @@ def test_thresholds_refractory_times_tests_and_filters_take_own_names(begin: Beg
     client = daemon.client().subscribe("gesture", "unknown", "cancelled", gestures=["slash"])
     assert answer(client, sensor, sensor.slash)["gesture"] == "slash"
     assert answer(client, sensor, sensor.slash)["reason"] == "refractory"
-    ask(daemon, "emit", gesture="slash")
+    daemon.ask("emit", gesture="slash")
     line = client.line()
     assert (line["gesture"], line["own"], line["test"]) == ("slash", True, True)
     config.write_text("[gestures.slash]\nthreshold = 1.0\n")
-    ask(daemon, "reload")
+    daemon.ask("reload")
     assert answer(client, sensor, sensor.slash)["type"] == "unknown"
     config.write_text("[gestures.swipe_lefft]\nthreshold = 1.0\n")
     with pytest.raises(Refused, match="swipe_lefft"):
-        ask(daemon, "reload")
+        daemon.ask("reload")
 
 
 def test_one_that_arms_is_heard_first_and_is_not_forgotten_while_it_does(begin: Begin, tmp_path: Path) -> None:
@@ -345,9 +339,9 @@ def test_one_that_arms_is_heard_first_and_is_not_forgotten_while_it_does(begin: 
     sensor = ready(daemon)
     config.write_text('[arming]\nby = "slash"\n')
     with pytest.raises(Refused, match="arming.by = 'slash': is no gesture in use, expected any of"):
-        ask(daemon, "reload")
+        daemon.ask("reload")
     enrol(daemon, sensor)
-    ask(daemon, "reload")
+    daemon.ask("reload")
     client = daemon.client().subscribe("gesture", "unknown")
     said = [
         answer(client, sensor, act)
@@ -355,10 +349,10 @@ def test_one_that_arms_is_heard_first_and_is_not_forgotten_while_it_does(begin: 
     ]
     assert [line.get("gesture", line.get("reason")) for line in said] == ["disarmed", "slash", "swipe_up"]
     with pytest.raises(Refused, match="'slash' is arming.by in the configuration; take it out there and reload first"):
-        ask(daemon, "forget", name="slash")
+        daemon.ask("forget", name="slash")
     config.write_text("")
-    ask(daemon, "reload")
-    ask(daemon, "forget", name="slash")
+    daemon.ask("reload")
+    daemon.ask("forget", name="slash")
 
 
 @pytest.fixture

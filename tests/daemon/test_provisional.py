@@ -10,7 +10,6 @@ import pytest
 from pythonosc.osc_message import OscMessage
 
 import gestured
-from gestured.client.control import Control
 from gestured.core.address import Address
 from gestured.core.events import Gesture, Provisional
 from gestured.daemon.metrics import Metrics
@@ -133,14 +132,13 @@ def test_it_is_counted(daemon: Daemon) -> None:
     said(client, "counted", 2)
     assert [new - old for new, old in zip(counts(), before, strict=True)] == [2, 1, 1]
     assert daemon.metric("gestured_provisional_lead_seconds_count") == lead + 1
-    with Control(daemon.socket.with_suffix(".ctl")) as control:
-        told = control.ask("status")["provisional"]
+    told = daemon.ask("status")["provisional"]
     assert [told[key] for key in ("given", "confirmed", "revoked")] == counts()
 
 
 def test_a_made_up_gesture_is_said_before_too(daemon: Daemon) -> None:
     client = daemon.client().subscribe(*ALL, sensors=["made_up"])
-    with Control(daemon.socket.with_suffix(".ctl")) as control:
+    with daemon.control() as control:
         control.ask("emit", gesture="swipe_left", sensor="made_up")
         lines = client.until(lambda line: line["type"] == "release")
         assert words(lines, "made_up") == ["onset", "swipe_left?", "swipe_left confirmed", "release"]

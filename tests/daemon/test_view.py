@@ -108,7 +108,7 @@ def test_who_follows_hears_the_state_and_every_event_once(shared: Daemon) -> Non
 def test_who_ends_following_has_heard_all_that_was_published(shared: Daemon) -> None:
     sensor = Sensor(shared, "followed_to_the_end").begin()
     client = shared.client().subscribe("gesture", sensors=[sensor.name])
-    with Control(Path(shared.ready["control"])) as control:
+    with shared.control() as control:
         control.ask("follow", sensors=[])
         sensor.perform("left")
         client.events("gesture", sensor.name)
@@ -175,8 +175,8 @@ async def test_who_does_not_read_is_shown_the_newest_when_he_does(model) -> None
 def test_a_tap_that_goes_without_a_word_leaves_no_traceback(shared: Daemon) -> None:
     """What it had not read makes the kernel say that the connection is broken; `shared` looks at the log in the end."""
     sensor = Sensor(shared, "tapped")
-    with Control(Path(shared.ready["control"])) as control:
-        tap = Control(Path(shared.ready["control"]))
+    with shared.control() as control:
+        tap = shared.control()
         tap.ask("tap")
         sensor.begin()
         while control.ask("status")["sensors"].get("tapped", {}).get("state") != "ok":

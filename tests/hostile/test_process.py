@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from gestured.client.control import Control
 from gestured.core.errors import ModelError
 from gestured.model.opening import open_model
 from tests.daemon.harness import Daemon, Sensor, counted, lines_of
@@ -158,7 +157,7 @@ def test_the_end_does_not_wait_for_a_model_that_is_being_opened(start, model: Pa
     daemon = start("--clock", "sensor", model=path)
     client = daemon.client()
     bad_models.endless(model, tmp_path / "bad.onnx").replace(path)
-    with Control(Path(daemon.ready["control"])) as control:
+    with daemon.control() as control:
         control.socket.sendall(b'{"verb":"reload"}\n')
         tried = trial_of(daemon)
         Sensor(daemon, "arm").begin().perform("left")

@@ -29,7 +29,6 @@ from gestured.model.shipped import shipped
 from gestured.record.arrays import read
 from gestured.simulator import GESTURES, Participant, Performance, generator, perform
 from tests.daemon.harness import Daemon
-from tests.daemon.test_own import ask
 from tests.documents.blocks import blocks
 from tests.lab.adapt.recorded import unknown_sensor
 from tests.sockets import free_address
@@ -232,9 +231,9 @@ def test_the_live_steps_lead_to_an_own_gesture(
 
         client, status = daemon.client().subscribe("gesture", "unknown"), daemon.client().subscribe("status")
         enrol = gesturectl(lines.next("gesturectl", "enrol"), *control)
-        while ask(daemon, "gestures")["own"]["enrolling"] is None:
+        while daemon.ask("gestures")["own"]["enrolling"] is None:
             status.line()
-        while ask(daemon, "gestures")["own"]["enrolling"] is not None:  # until three are kept
+        while daemon.ask("gestures")["own"]["enrolling"] is not None:  # until three are kept
             sensor.sends(sensor.textile.feels("knock"))
             client.until(lambda line: line["type"] in ("gesture", "unknown"))
         assert "enrolled knock with 3 examples" in ended(enrol)
