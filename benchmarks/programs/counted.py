@@ -13,8 +13,8 @@ from typing import Any
 
 from gestured.daemon.udp import Receiver
 
-count = 0
-read = Receiver.read
+count = found = 0
+read, receive = Receiver.read, Receiver._receive
 
 
 def traced(frame: FrameType, event: str, _: Any) -> Any:
@@ -29,17 +29,26 @@ def traced(frame: FrameType, event: str, _: Any) -> Any:
 
 def counted(receiver: Receiver) -> None:
     """In the place of `Receiver.read`: all that is done with packets is done in it."""
-    global count
-    count = 0
+    global count, found
+    count = found = 0
     sys.settrace(traced)
     try:
         read(receiver)
     finally:
         sys.settrace(None)
-        print(json.dumps([receiver._found, receiver._again is not None, count]), flush=True)
+        print(json.dumps([found, receiver._again is not None, count]), flush=True)
+
+
+def taken(receiver: Receiver) -> Any:
+    """In the place of `Receiver._receive`."""
+    global found
+    packets, full = receive(receiver)
+    found += len(packets)
+    return packets, full
 
 
 setattr(Receiver, "read", counted)  # noqa: B010
+setattr(Receiver, "_receive", taken)  # noqa: B010
 try:
     runpy.run_module("gestured.daemon", run_name="__main__", alter_sys=True)
 except SystemExit:

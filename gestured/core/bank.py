@@ -31,11 +31,10 @@ from gestured.core.wire import Block
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-FEW = 5  # frames from which on taking them together costs less than one by one
+FEW = 6  # frames from which on taking them together costs less than one by one
 FIRST_ROWS = 16  # rows of a new bank
 RECENT = 1 << (Stamper.RECENT - 1).bit_length()  # frames of which times are kept, at least; a multiple of any depth
-KNOWN = 20  # numbers that are known of each sensor, as `Bank.enter` puts them
-BY_TAG = 3  # the place of one of them
+KNOWN = 18  # numbers that are known of each sensor, as `Bank.enter` puts them
 COUNTS, SIGMA, WEIGHT, COMPARED, SENT = range(5)  # of each taxel: `Idle`, `Conditioner`; the last frame as it was sent
 
 
@@ -54,9 +53,9 @@ class Banks:
         times = {stamper.last, front.pace.last, front.conditioner.idle.followed}
         arrived = {stamper.arrived, sensor.vitals.last, owner.heard, owner.own}
         if owner.steady and len(times) == len(arrived) == 1 and not stamper.ahead:
-            frames = min(LEAD_S / front.pace.interval_s, LEAD_FRAMES) + 1
-            kind = (*front.kind, 1 << math.ceil(math.log2(frames)))
-            bank = self._banks.get(kind) or self._banks.setdefault(kind, Bank(front, kind[-1]))
+            frames = min(LEAD_S / front.pace.interval_s, LEAD_FRAMES)
+            kind = (*front.kind, stamper.by_tag, 2 << math.ceil(math.log2(frames)))
+            bank = self._banks.get(kind) or self._banks.setdefault(kind, Bank(front, *kind[-2:]))
             bank.enter(sensor)
             self.homes[sensor.name] = kind
 
@@ -99,10 +98,11 @@ class Banks:
 
 
 class Bank:
-    """Calm sensors of one kind: of one grid and mounting, and of about one rate."""
+    """Calm sensors of one kind: of one grid, mounting and clock, and of about one rate."""
 
-    def __init__(self, front: FrontEnd, depth: int) -> None:
+    def __init__(self, front: FrontEnd, by_tag: int, depth: int) -> None:
         """For sensors whose front ends are like this one, of whose last frames `depth` can be kept."""
+        self._by_tag, self._least_s = by_tag, max(LEAD_S / depth, Stamper.MIN_STEP_S)  # between two frames
         self._front, self._activity = front, Activity(front.rows, front.columns)  # for what is the same of all
         taxels = front.rows * front.columns
         self._sensors: dict[str, Sensor] = {}
@@ -129,9 +129,9 @@ class Bank:
                 setattr(self, name, np.concatenate([table, np.zeros_like(table)]))
         row = self._free[-1]
         self._known[row] = (
-            stamper.last, stamper.arrived, math.nan if stamper.tag is None else stamper.tag, stamper.by_tag,
+            stamper.last, stamper.arrived, math.nan if stamper.tag is None else stamper.tag,
             math.nan if stamper.counter is None else stamper.counter,
-            front.pace.interval_s, vitals.interval_s, vitals.jitter_s,
+            front.pace.interval_s, vitals.jitter_s,
             idle.glance, idle.learned, idle.quieter, idle.lively, idle.reviewed, idle.step, idle.level,
             activity.usual, activity.scale, 0.0, front.cutter.new, 0,  # activity and number of frames taken here
         )  # fmt: skip
@@ -146,7 +146,7 @@ class Bank:
         row, sensor = self._rows.pop(name), self._sensors.pop(name)
         del self._owners[name]
         self._free.append(row)
-        (last, arrived, tag, _, counter, interval, _, jitter, glance, _, quieter, _, reviewed, _, level,
+        (last, arrived, tag, counter, interval, jitter, glance, _, quieter, _, reviewed, _, level,
          usual, scale, active, new, count) = self._known[row].tolist()  # fmt: skip
         if not count:
             return
@@ -177,16 +177,14 @@ class Bank:
     def show(self) -> None:
         """Put what readings tell, and when sensors were heard, into their objects."""
         rows = list(self._rows.values())
-        known = self._known[rows][:, [0, 1, 5, 7, 14]].tolist()
+        known = self._known[rows][:, [0, 1, 4, 5, 12]].tolist()
         for sensor, counts, (last, heard, interval, jitter, level) in zip(
             self._sensors.values(), self._taxels[rows, COUNTS], known, strict=True
         ):
             sensor.owner.heard = sensor.owner.own = sensor.stamper.arrived = heard
             sensor.stamper.last = last
-            sensor.vitals.interval_s = sensor.front_end.pace.interval_s = interval
-            sensor.vitals.jitter_s = jitter
+            sensor.front_end.pace.interval_s, sensor.vitals.jitter_s = interval, jitter
             sensor.front_end.conditioner.idle.level, sensor.front_end.conditioner.idle.counts = level, counts
-        self._known[:, 6] = self._known[:, 5]
 
     def take(self, block: Block, sources: Sequence[Source], others: set[str], now: float) -> Iterator[list[int]]:
         """Take those frames of a block that are idle; their places in it, those of frames taken together at a time."""
@@ -198,9 +196,9 @@ class Bank:
             mine &= [name not in others for name in block.sensors]
         rows = np.fromiter(map(self._rows.get, block.sensors, repeat(-1)), np.intp, len(block.packets))
         frames = np.bincount(rows[mine], minlength=len(self._known))
-        if frames.max() > 1:  # of a sensor without a clock; they share their time
-            mine &= (frames[rows] == 1) | (self._known[rows, BY_TAG] > 0)
-        left, first = mine.nonzero()[0], np.empty(len(self._known), np.intp)
+        if not self._by_tag:
+            mine &= frames[rows] == 1  # several share their time
+        left, first = mine.nonzero()[0], np.empty(len(frames), np.intp)
         while len(left) >= FEW:
             first.fill(-1)
             first[rows[left[::-1]]] = left[::-1]  # each row's first frame, since the last that is put there stays
@@ -209,34 +207,32 @@ class Bank:
                 return
             taken = turn[self._take(block, turn, rows[turn], frames, now)]
             yield taken.tolist()
-            frames.fill(0)  # they have come with the first ones
-            gone_on = np.isin(np.arange(len(first)), rows[taken])
-            left = left[gone_on[rows[left]] & (first[rows[left]] != left)]
+            left = left[first[rows[left]] != left]
+            if len(left):
+                frames.fill(0)  # they have come with the first ones
+                first.fill(-1)
+                first[rows[taken]] = taken
+                left = left[first[rows[left]] >= 0]
 
     def _take(
         self, block: Block, places: NDArray[np.intp], rows: NDArray[np.intp], frames: NDArray[np.intp], now: float
     ) -> Mask:
-        """Take a frame of each of n rows where it is idle and came in its turn; (n,) whether it was and did."""
-        taken: Mask
-        front, known = self._front, self._known[rows]
-        (last, arrived, tag, by_tag, counter, interval, paced, jitter, glance, learned, quieter, lively, reviewed, step,
-         level, usual, scale, active, new, count) = known.T  # fmt: skip
-        if block.tags is None:
-            t, taken, tag[:] = np.full(len(rows), now), by_tag == 0, math.nan
-        else:
-            tags = block.tags[places]
+        """Take a frame of each of n rows where it is idle and came in its turn; (n,) whether it was and did.
+
+        `frames` tells by row how many came with it.
+        """
+        front, known, taken = self._front, self._known[rows], np.full(len(rows), not self._by_tag)
+        (last, arrived, tag, counter, interval, jitter, glance, learned, quieter, lively, reviewed, step, level,
+         usual, scale, active, new, count) = known.T  # fmt: skip
+        t, tags = np.full(len(rows), now), math.nan if block.tags is None else block.tags[places]
+        if self._by_tag:
             since = tags - tag
-            good = (since > 0) & (since <= Stamper.MAX_STEP_S) & (last + since <= now + Stamper.AHEAD_S)
-            t, taken, tag[:] = np.where(by_tag, last + since, now), good | (by_tag == 0), tags
-        if block.counters is None:
-            taken &= np.isnan(counter)
-        else:
-            counter += 1
-            taken &= counter == block.counters[places]
+            t = last + since
+            taken = (since > 0) & (since <= Stamper.MAX_STEP_S) & (t <= now + Stamper.AHEAD_S)
+        tag[:], counter[:] = tags, counter + 1
+        taken &= np.isnan(counter) if block.counters is None else counter == block.counters[places]
         since = t - last
-        taken &= (t >= last + Stamper.MIN_STEP_S) & (np.maximum(since, now - arrived) <= front.timing.stale_s)
-        depth, recent = self._above.shape[1], self._when.shape[1]
-        taken &= self._when[rows, ((count - depth) % recent).astype(np.intp), 0] < t - LEAD_S  # else there is no room
+        taken &= (since >= self._least_s) & (np.maximum(since, now - arrived) <= front.timing.stale_s)
         sent = block.values[places].astype(np.float64).reshape(len(rows), -1)
         raw = sent if front.as_sent else self._mounted(sent.reshape(-1, *front.sent))
 
@@ -264,8 +260,8 @@ class Bank:
             taken[due] = np.all(sigma <= NOISY * level[due, np.newaxis], axis=1)  # else some taxels are bad
             weight = weigh(sigma, level[due, np.newaxis], scale[due, np.newaxis])
 
-        expected = frames[rows] * paced
-        jitter += np.where(expected > 0, (np.abs(now - arrived - expected) - jitter) * JITTER_SHARE, 0.0)
+        came = frames[rows]
+        jitter += (np.abs(now - arrived - came * interval) - jitter) * (JITTER_SHARE * (came > 0))
         interval += (since - interval) * SHARE
         news = (sent.view(np.int64) != self._taxels[rows, SENT].view(np.int64)).any(axis=1) | (lively == 0)
         np.copyto(new, t, where=news)
@@ -280,8 +276,8 @@ class Bank:
             self._taxels[due, SIGMA], self._taxels[due, WEIGHT] = sigma[fine], weight[fine]
         keep = slice(None) if taken.all() else taken
         rows, slot = rows[keep], count[keep].astype(np.intp)
-        self._above[rows, slot % depth] = above[keep]
-        self._when[rows, slot % recent] = np.array((t, new, since)).T[keep]
+        self._above[rows, slot % self._above.shape[1]] = above[keep]
+        self._when[rows, slot % self._when.shape[1]] = np.array((t, new, since)).T[keep]
         self._taxels[rows, COUNTS], self._taxels[rows, SENT] = counts[keep], sent[keep]
         count += 1
         self._known[rows] = known[keep]

@@ -73,8 +73,9 @@ def timetag(data: bytes, at: int, end: int) -> float | None:
 def timetags(rows: NDArray[np.uint8]) -> NDArray[np.float64]:
     """What `timetag` gives of each of (n, 8) bytes, (n,) s; NaN for "immediately"."""
     seconds, fraction = rows.view(">u4").astype(np.int64).T
-    found = ((seconds - _NTP_EPOCH) & 0xFFFFFFFF) + fraction * 2.0**-32
-    return np.where((seconds == 0) & (fraction == 1), np.nan, found)
+    found: NDArray[np.float64] = ((seconds - _NTP_EPOCH) & 0xFFFFFFFF) + fraction * 2.0**-32
+    found[rows.view(">u8")[:, 0] == 1] = np.nan
+    return found
 
 
 class Place(NamedTuple):
@@ -123,17 +124,14 @@ class Layouts:
 
     def find(self, data: bytes) -> Layout | None:
         """The layout of a packet, None where it is not known; what a blob's size says is not looked at."""
-        layout = self.guess(data)
-        for place in () if layout is None else layout.places:
+        begin = data[BUNDLED if data.startswith(_BUNDLE) else ALONE]
+        layout = self._known.get(begin) or self._known.get(_key(begin))
+        if layout is None or layout.length != len(data):
+            return None
+        for place in layout.places:
             if not data.startswith(place[1], place[0]):
                 return None
         return layout
-
-    def guess(self, data: bytes) -> Layout | None:
-        """The layout that a packet has if its heads are those of the layout; None where it has none that is known."""
-        begin = data[BUNDLED if data.startswith(_BUNDLE) else ALONE]
-        layout = self._known.get(begin) or self._known.get(_key(begin))
-        return layout if layout is not None and layout.length == len(data) else None
 
     def read(self, data: bytes, bundled: bool) -> list[Message] | None:
         """The messages of a packet, None where its layout is not known."""

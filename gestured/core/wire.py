@@ -121,9 +121,7 @@ class _Meaning(NamedTuple):
     route: _Route
     place: Place  # of the frame's message
     dtype: np.dtype[Any]  # of the frame's values as they are sent
-    heads: bytes  # of all messages
-    at: tuple[slice, ...]  # where these stand in the packet
-    form: int  # the same for packets whose messages stand in the same places, with frames of the same type and grid
+    form: int  # the same for packets whose frames stand in the same place, of the same type and grid
 
 
 class Decoder:
@@ -178,7 +176,7 @@ class Decoder:
         `decode`: it is laid out in another way than its neighbours, or its frame is not finite.
         """
         alike: dict[int, list[tuple[int, _Meaning]]] = {}
-        for i, layout in enumerate(map(self._layouts.guess, packets)):
+        for i, layout in enumerate(map(self._layouts.find, packets)):
             if layout is not None:
                 meaning: _Meaning | Literal[False] = layout.meaning
                 if meaning is None:
@@ -199,13 +197,10 @@ class Decoder:
         dtype = place.dtype if place.dtype is not None else _BLOBS.get(place.length / (rows * columns))
         if dtype is None or any(other.blob for other in layout.places if other is not place):
             return False
-        at = tuple(slice(one.start, one.start + len(one.head)) for one in layout.places)
-        bounds = tuple((one.start, one.stop) for one in at)
-        form = layout.length, bounds, place.run, place.length, place.blob, dtype.kind, route.grid, route.counted
+        form = layout.length, place.run, place.length, place.blob, dtype.kind, route.grid, route.counted
         if len(self._forms) >= _MAX_ROUTES:
             self._forms.clear()
-        heads = b"".join(one.head for one in layout.places)
-        return _Meaning(route, place, dtype, heads, at, self._forms.setdefault(form, next(self._numbers)))
+        return _Meaning(route, place, dtype, self._forms.setdefault(form, next(self._numbers)))
 
     def _learn(self, address: str, types: str) -> _Route:
         if len(self._routes) >= _MAX_ROUTES:
@@ -295,14 +290,13 @@ def _frame(message: Message, route: _Route) -> Arrival:
 
 def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Block:
     """The finite frames of packets whose `form` is the same."""
-    _, (route, place, dtype, _, at, _) = members[0]
+    _, (route, place, dtype, _) = members[0]
     assert route.grid is not None
     taxels, end = math.prod(route.grid), place.run + (place.length if place.blob else place.length * dtype.itemsize)
     block = np.frombuffer(b"".join([packets[i] for i, _ in members]), np.uint8).reshape(len(members), -1)
     raw = block[:, place.run : end].view(dtype)
     values: NDArray[Any] = raw[:, -taxels:].astype(np.float64 if dtype.kind == "i" else np.float32)
-    heads = np.frombuffer(b"".join([meaning.heads for _, meaning in members]), np.uint8).reshape(len(members), -1)
-    good = np.isfinite(values).all(axis=1) & (np.hstack([block[:, one] for one in at]) == heads).all(axis=1)
+    good = np.isfinite(values).all(axis=1)
     counters = tags = None
     if place.blob:
         good &= block[:, place.run - 4 : place.run].view(">u4")[:, 0] == place.length

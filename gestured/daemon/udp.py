@@ -31,7 +31,6 @@ FLOOD_SLICE_S = 0.001  # of work on waiting packets in a flood, which fills the 
 TURN_S = 0.05  # the most work in one turn of a flood, where packets cost more than their senders' earlier ones
 DRAIN_S = 0.25  # for serving what still waits when the daemon ends
 PAUSE_S = 0.001  # between reads of packets that come thick, since waking for each is much of its price
-FEW = 8  # packets found by a read, up to which it is followed by a pause
 FULL_S = 0.25  # for which a stall explains that the kernel drops packets; if it lasts longer, it is a flood
 EARLY_S = 0.001  # by which we wake before a wait is over, since the loop's timers know whole milliseconds only
 REST = 2  # seconds that the loop has for everything else, for each second that is spent on provisional events
@@ -70,7 +69,6 @@ class Receiver:
         self._drops = 0  # packets that the kernel had dropped at the last look
         self._dropping = -FLOOD_S  # s, when the kernel began to drop packets
         self._looked = 0.0  # s, when we last looked whether something waits
-        self._found = 0  # packets that the last read found
         self._sparse = False  # whether the last ones came after a pause
         self._pause: asyncio.TimerHandle | None = None
         self._again: asyncio.Handle | None = None
@@ -92,7 +90,7 @@ class Receiver:
         pause_s = now - self._looked
         thick, self._sparse, self._looked = pause_s < PAUSE_S, pause_s >= SPARSE_S, now
         self.read()
-        if thick and self._found <= FEW:
+        if thick:
             self._loop.remove_reader(self._sock)
             self._pause = self._loop.call_later(PAUSE_S, self._listen)
 
@@ -117,7 +115,6 @@ class Receiver:
         now, wall = self._clocks()
         if abs(wall - self._wall) > STEP_S:
             found = [(packet, b"", source) for packet, _, source in found]
-        self._found = len(found)
         much = len(found) > 1 and sum(len(packet) for packet, _, _ in found) > GROUP_BYTES
         late = bool(found) and now - self._arrival(found[0][1], now) >= TOGETHER_S
         if found and (full or much or late or self._backlog or self._backlog.flooded(now)):
