@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from gestured import __version__
-from gestured.core import messages
 from gestured.core.address import Address, Grid
 from gestured.core.beside.reading import SILENT, Reading
 from gestured.daemon.metrics import Counter
@@ -20,14 +19,14 @@ HANG_S = 2.0  # the loop counts as hanging after so long without a beat
 def status(parts: Parts) -> dict[str, Any]:
     """The answer to `status`; durations in seconds, `time` and `started` in seconds since the Unix epoch."""
     now, metrics, ladder, shift = time.monotonic(), parts.metrics, parts.ladder, parts.desk.shift
-    readings = parts.readings()
+    epoch, readings = time.time() - now, parts.readings()
     states = {name: reading.state for name, reading in readings.items()}
     ready = _ready(parts, states)
     return {
         "version": __version__,
         "instance": parts.instance,
         "pid": os.getpid(),
-        "time": time.time(),
+        "time": now + epoch,
         "started": parts.started,
         "uptime_s": round(now - parts.begun, 1),
         "state": ready["state"],
@@ -45,7 +44,10 @@ def status(parts: Parts) -> dict[str, Any]:
             "gestures": list(parts.hub.scene.gestures),
         },
         "own": parts.own.report(),
-        "sensors": {name: sensor(name, reading, now, parts.settings) for name, reading in readings.items()},
+        "sensors": {
+            name: {**sensor(reading, now, epoch), "zones": _zones(parts.settings, name)}
+            for name, reading in readings.items()
+        },
         "gates": sorted(parts.hub.gates.of(None)),
         "overdue": {gate: round(seconds, 1) for gate, seconds in parts.gates.overdue(now).items()},
         "recent": list(parts.desk.recent),
@@ -100,10 +102,9 @@ def overall(states: Mapping[str, str], *, impaired: bool) -> str:
     return "degraded" if impaired else "ok"
 
 
-def sensor(name: str, reading: Reading, now: float, settings: Settings) -> dict[str, Any]:
-    """One sensor as the status shows it at `now`, in monotonic s."""
-    gates = () if reading.gate is None else (reading.gate,)
-    own = settings.sensors.get(name)
+def sensor(reading: Reading, now: float, epoch: float) -> dict[str, Any]:
+    """One sensor as the status shows it at `now`, in monotonic s; with `epoch`, they are s since the Unix epoch."""
+    gate = reading.gate
     shown = {
         "state": reading.state,
         "reason": reading.reason,
@@ -112,6 +113,9 @@ def sensor(name: str, reading: Reading, now: float, settings: Settings) -> dict[
         "bad_taxels": reading.bad_taxels,
         "drift": round(reading.drift, 4),
         "grid": str(Grid(*reading.grid)),
+        "armed": None if gate is None else gate.armed,
+        "closed": () if gate is None else gate.closed,
+        "until": None if gate is None or gate.until is None else gate.until + epoch,
     }
     if reading.source is not None:
         shown |= {
@@ -124,8 +128,13 @@ def sensor(name: str, reading: Reading, now: float, settings: Settings) -> dict[
             "touched": reading.touched,
             "gestures": reading.sequence,
         }
-    shown |= messages.listening(gates, time.time() - now).get(name, {})
-    return shown | {"zones": {} if own is None else {zone: one.at for zone, one in own.zones.items()}}
+    return shown
+
+
+def _zones(settings: Settings, name: str) -> dict[str, tuple[float, ...]]:
+    """Left, bottom, right and top edge of each zone of a sensor, in fractions of it."""
+    own = settings.sensors.get(name)
+    return {} if own is None else {zone: one.at for zone, one in own.zones.items()}
 
 
 def _ready(parts: Parts, states: Mapping[str, str]) -> dict[str, Any]:

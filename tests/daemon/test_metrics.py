@@ -19,7 +19,6 @@ from gestured.core.window import Window
 from gestured.daemon.exposition import exposition
 from gestured.daemon.metrics import NAMED_SENSORS, Metrics
 from gestured.daemon.service import Service
-from gestured.daemon.settings import Settings
 from gestured.daemon.shift import LAST, LEAST_GESTURES, Shift
 from gestured.daemon.status import sensor, status
 from gestured.model.features import MEASURES
@@ -64,7 +63,7 @@ def usual(model: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, An
 
 def shown(readings: dict[str, Reading]) -> dict[str, Any]:
     """Sensors as a status shows them."""
-    return {name: sensor(name, one, 0.0, Settings()) | {"closed": ()} for name, one in readings.items()}
+    return {name: sensor(one, 0.0, 0.0) for name, one in readings.items()}
 
 
 def test_there_are_at_most_200_series_whatever_arrives(usual: dict[str, Any]) -> None:
