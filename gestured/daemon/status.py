@@ -103,15 +103,18 @@ def overall(states: Mapping[str, str], *, impaired: bool) -> str:
 
 
 def sensor(reading: Reading, now: float, epoch: float) -> dict[str, Any]:
-    """One sensor as the status shows it at `now`, in monotonic s; with `epoch`, they are s since the Unix epoch."""
+    """One sensor as the status shows it at `now`, in monotonic s; with `epoch`, they are s since the Unix epoch.
+
+    Nothing but ages is rounded: that would cost more than all else, and /metrics has these figures from here.
+    """
     gate = reading.gate
     shown = {
         "state": reading.state,
         "reason": reading.reason,
-        "rate_hz": round(reading.rate_hz, 4),
-        "jitter_s": round(reading.jitter_s, 4),
+        "rate_hz": reading.rate_hz,
+        "jitter_s": reading.jitter_s,
         "bad_taxels": reading.bad_taxels,
-        "drift": round(reading.drift, 4),
+        "drift": reading.drift,
         "grid": str(Grid(*reading.grid)),
         "armed": None if gate is None else gate.armed,
         "closed": () if gate is None else gate.closed,
@@ -124,7 +127,7 @@ def sensor(reading: Reading, now: float, epoch: float) -> dict[str, Any]:
             "lost": reading.lost,
             "lost_s_ago": None if reading.lost_at is None else round(now - reading.lost_at, 1),
             "exchanged": reading.exchanged,
-            "noise": round(reading.noise, 4),
+            "noise": reading.noise,
             "touched": reading.touched,
             "gestures": reading.sequence,
         }
