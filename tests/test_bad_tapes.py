@@ -105,7 +105,7 @@ def test_the_sum_of_all_chunks_is_bounded(tmp_path: Path, number: int) -> None:
     assert "than a recording of its size does" in reason and mib < 300
 
 
-@pytest.mark.parametrize("small", [CHANNELS + message(1, 10**9, b""), message(2, 10**9, b'{"type":"status"}')])
+@pytest.mark.parametrize("small", [CHANNELS + message(1, 10**9, b""), message(2, 10**9, b'{"type":"new"}')])
 def test_what_is_kept_of_a_tape_is_bounded_too(tmp_path: Path, small: bytes) -> None:
     """Thirty bytes of a file are a few hundred of this program's."""
     inside = CHANNELS + small * ((4 << 20) // len(small))
