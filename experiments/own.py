@@ -13,10 +13,10 @@ import numpy as np
 from experiments.pages import add_document, tell
 from gestured.core.own import EXAMPLES
 from gestured.lab.cli import CACHE
-from gestured.lab.own.command import embedding_of
 from gestured.lab.own.learn import Seen, Trial, played_through
 from gestured.lab.own.play import played
 from gestured.lab.own.signs import JUDGED
+from gestured.lab.own.teach import embedding_of
 from gestured.lab.table import Table
 from gestured.model.prototypes import Space
 
@@ -62,13 +62,13 @@ def table(name: str, found: list[Figures]) -> Table:
 def main() -> None:
     """Print and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("model", type=Path, metavar="MODEL", help="that gestured-lab own has taught")
+    parser.add_argument("model", type=Path, metavar="MODEL", help="an .onnx file that learns own gestures")
     parser.add_argument("--cache", type=Path, default=CACHE, help="where finished steps are kept (%(default)s)")
     parser.add_argument("--people", type=int, default=JUDGES, help="who judge (%(default)s)")
     add_document(parser, "own")
     args = parser.parse_args()
     model = embedding_of(args.model)
-    assert model.space is not None, f"{args.model}: teach it first: gestured-lab own {args.model}"
+    assert model.space is not None, f"{args.model}: is of a version that could not learn them"
     seen = Seen.by(model, played(args.cache, args.people, judge=True))
     trials = (trial for trial in played_through(seen, model.space) if trial.kind in JUDGED)
     made = table(args.model.stem, figures(model.space, trials))

@@ -26,7 +26,6 @@ PROGRAMS = {
     "evaluate": "gestured.lab.commands",
     "adapt": "gestured.lab.adapt.command",
     "everyday": "gestured.lab.everyday.command",
-    "own": "gestured.lab.own.command",
     "stability": "gestured.lab.stability.command",
     "study": "gestured.lab.study.study",
     "collect": "gestured.lab.recordings.collect",
@@ -52,15 +51,12 @@ def parser() -> argparse.ArgumentParser:
         command.add_argument("--json", action="store_true", help="print the figures as JSON")
         return command
 
-    def add_work(command: argparse.ArgumentParser) -> None:
+    def add_data(command: argparse.ArgumentParser) -> None:
         command.add_argument(
             "--cache", type=Path, default=CACHE, help=f"where finished steps are kept (default: {CACHE})"
         )
         command.add_argument("--jobs", type=int, default=2, help="processes and threads (default: 2)")
         command.add_argument("--quick", action="store_true", help="a small run to try it; its models are worth nothing")
-
-    def add_data(command: argparse.ArgumentParser) -> None:
-        add_work(command)
         command.add_argument("--real", type=Path, metavar="FOLDER", help="folder of real recordings, as "
                              "docs/training.md has it (default: simulated people alone)")  # fmt: skip
 
@@ -137,10 +133,6 @@ def parser() -> argparse.ArgumentParser:
         "--seed", type=int, default=0, help="of splits and training: same seed, same numbers (default: 0)"
     )
     add_data(study)
-    own = add("own", "learn what a model needs for gestures of your own, and write it into its file",
-              "gestured-lab own models/cnn_lstm.onnx")  # fmt: skip
-    own.add_argument("models", type=Path, nargs="+", metavar="MODEL", help="an .onnx file that has an embedding")
-    add_work(own)
     add_recordings(add)
     return top
 

@@ -8,9 +8,8 @@ import torch
 from torch import Tensor
 
 from gestured.lab.augment import MIRROR, TURN, symmetry_table, turned, varied
-from gestured.lab.dataset import from_take
 from gestured.lab.fit import CLASSES
-from gestured.simulator import GESTURES, Participant, SimulatedSensor, generator, gesture_take
+from gestured.simulator import GESTURES
 from tests.lab.made import direction, direction_of, gestures
 
 TABLE = symmetry_table(CLASSES)
@@ -37,20 +36,6 @@ def test_a_turned_window_shows_what_the_table_calls_it(label: str, symmetry: int
     frames = gestures()[label]
     assert direction(frames) == direction_of(label)
     assert direction(turn(frames, symmetry)) == direction_of(after(label, symmetry))
-
-
-@pytest.mark.parametrize("label", ["swipe_up", "swipe_left", "circle_clockwise", "swipe_down_two_fingers"])
-def test_simulated_gestures_turn_as_made_ones_do(label: str) -> None:
-    seen = 0
-    for person in range(50, 56):
-        take = gesture_take(label, Participant(person), SimulatedSensor.nominal(day=person), generator(person, 5))
-        for frames, found, *_ in from_take(take):
-            if direction(frames) != direction_of(found):  # a person's hand can be too crooked for this eye
-                continue
-            seen += 1
-            for symmetry in SYMMETRIES:
-                assert direction(turn(frames, symmetry)) == direction_of(after(found, symmetry)), (person, symmetry)
-    assert seen >= 4
 
 
 def test_the_number_of_fingers_survives_every_symmetry() -> None:
@@ -107,14 +92,6 @@ def test_variation_takes_short_and_silent_windows(time: int) -> None:
         y = varied(x, torch.Generator().manual_seed(seed))
         assert bool(torch.isfinite(y).all())
         assert float(y[0].max()) == pytest.approx(1.0)
-
-
-def test_variation_does_not_change_its_input() -> None:
-    x = padded_batch()
-    kept = x.clone()
-    for seed in range(5):
-        varied(x, torch.Generator().manual_seed(seed))
-    assert torch.equal(x, kept)
 
 
 def test_variation_keeps_the_direction() -> None:

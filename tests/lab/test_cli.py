@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gestured.lab import progress
 from gestured.lab.cli import main, parser
 from gestured.model.opening import open_model
 from gestured.model.shipped import LADDER
@@ -74,7 +73,7 @@ def test_arguments_that_mean_nothing_are_usage_errors(line: str, capsys: pytest.
     ("line", "reason"),
     [
         *((f"{command} --jobs 0", "--jobs: expected 1 or more, found 0")
-          for command in ("train", "evaluate", "study", "own my.onnx")),
+          for command in ("train", "evaluate", "study")),
         *((f"{command} --real nowhere", "--real: nowhere is no folder") for command in ("train", "evaluate", "study")),
     ],
 )  # fmt: skip
@@ -119,14 +118,6 @@ def test_an_interrupted_run_says_that_nothing_finished_is_lost(
     monkeypatch.setattr(command, "run", interrupt)
     assert main(["everyday"]) == 130
     assert "what is finished is kept" in capsys.readouterr().err
-
-
-def test_progress_passes_everything_on_and_ends_with_all_of_it(capsys: pytest.CaptureFixture[str]) -> None:
-    assert list(progress.progress(iter("abc"), 3, "letters")) == ["a", "b", "c"]
-    out, err = capsys.readouterr()
-    assert out == ""  # standard output is for figures
-    assert err.splitlines()[-1].startswith("letters")
-    assert "3/3" in err
 
 
 @pytest.mark.slow

@@ -218,17 +218,6 @@ def test_forest_equals_scikit_learn(classes: int, trees: int, depth: int | None,
     assert model.classify(segment()).values.sum() == pytest.approx(1.0, abs=1e-5)
 
 
-def test_a_forests_file_takes_seven_bytes_a_node_and_two_a_share(tmp_path: Path) -> None:
-    sizes, nodes, shares = [], [], []
-    for trees in (40, 80):  # what both hold besides is left out by their difference
-        trained = forest(6, trees, 9)
-        export_forest(trained, tmp_path / "rf.onnx", Facts(**CARD), FEATURES)
-        sizes.append((tmp_path / "rf.onnx").stat().st_size)
-        nodes.append(sum(tree.tree_.node_count for tree in trained.estimators_))
-        shares.append(6 * sum(tree.get_n_leaves() for tree in trained.estimators_))
-    assert np.diff(sizes) <= 7 * np.diff(nodes) + 2 * np.diff(shares) + 40 * 8  # and where each tree begins
-
-
 def test_values_on_a_threshold_go_where_scikit_learn_sends_them(tmp_path: Path) -> None:
     trained = forest(5)
     export_forest(trained, tmp_path / "rf.onnx", Facts(**CARD), FEATURES)
@@ -248,12 +237,6 @@ def test_uncalibrated_outputs_are_the_forests_own() -> None:
     np.testing.assert_allclose(scores[0], [0.5, 1 / 6, 1 / 3], atol=1e-6)
     np.testing.assert_allclose(unknown, [0.4, 0.0, 1.0], atol=2e-3)
     np.testing.assert_allclose(scores.sum(axis=1), 1.0, atol=1e-6)
-
-
-def test_temperature_sharpens_and_flattens() -> None:
-    probabilities = np.array([[0.6, 0.3, 0.1]])
-    sharp, own, flat = (forest_outputs(probabilities, 3, {"temperature": t})[0][0, 0] for t in (0.5, 1.0, 2.0))
-    assert sharp > own > flat > 1 / 3
 
 
 def test_forest_that_does_not_fit_is_not_written(tmp_path: Path) -> None:

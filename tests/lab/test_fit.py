@@ -1,6 +1,5 @@
 """Training goes on where it stopped, comes out the same, and tells people apart."""
 
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,6 @@ from gestured.lab.checkpoints import save_nets
 from gestured.lab.dataset import OTHER_TRIALS, STREAMS, TRIALS
 from gestured.lab.fit import (
     CLASSES,
-    NETS,
     REAL_KINDS,
     FitConfig,
     balanced,
@@ -37,19 +35,6 @@ SMALL = FitConfig(epochs=3, batch=16, real_epochs=1, real_samples=32)
 @pytest.fixture(scope="module")
 def samples() -> Samples:
     return collect(s for i in range(60) for s in STREAMS["wide"](11, i))
-
-
-def steady(patch: pytest.MonkeyPatch) -> None:
-    """Nets without dropout, whose masks come from the process's own generator."""
-
-    def without(names: Iterable[str] = NETS) -> nn.ModuleDict:
-        nets = build(names)
-        for module in nets.modules():
-            if isinstance(module, nn.Dropout):
-                module.p = 0.0
-        return nets
-
-    patch.setattr(fit, "build", without)
 
 
 def weights(nets: nn.ModuleDict) -> dict[str, np.ndarray]:
@@ -88,16 +73,9 @@ def interrupted(samples: Samples, checkpoint: Path, after: int) -> nn.ModuleDict
 
 
 @pytest.mark.parametrize("after", [0, 1, 2])
-def test_a_killed_run_goes_on_as_if_nothing_had_been(
-    samples: Samples, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: int
-) -> None:
-    steady(monkeypatch)
-    whole = pretrain(samples, SMALL, tmp_path / "whole.npz")
-    alike(interrupted(samples, tmp_path / "parts.npz", after), whole)
-
-
-def test_a_killed_run_goes_on_with_the_same_dropout(samples: Samples, tmp_path: Path) -> None:
-    alike(interrupted(samples, tmp_path / "parts.npz", 1), pretrain(samples, SMALL, tmp_path / "whole.npz"))
+def test_a_killed_run_goes_on_as_if_nothing_had_been(samples: Samples, tmp_path: Path, after: int) -> None:
+    """With the same dropout, too."""
+    alike(interrupted(samples, tmp_path / "parts.npz", after), pretrain(samples, SMALL, tmp_path / "whole.npz"))
 
 
 def test_training_is_the_same_every_time(samples: Samples, tmp_path: Path) -> None:

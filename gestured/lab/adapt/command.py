@@ -21,7 +21,7 @@ from gestured.lab.adapt.weights import Base, base_of
 from gestured.lab.decide import calibration_of
 from gestured.lab.export import Facts, export_net
 from gestured.lab.fit import CLASSES
-from gestured.lab.own.command import PEOPLE, teach
+from gestured.lab.own.teach import PEOPLE, teach
 from gestured.lab.quantiles import answer_figures, quantiles
 from gestured.lab.recordings.origin import KEY, origins
 from gestured.lab.samples import WINDOW, Samples

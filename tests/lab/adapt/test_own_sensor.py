@@ -1,4 +1,4 @@
-"""docs/own-sensor.md: what it does with recordings runs, in its order; `test_own_sensor_live` runs the other steps."""
+"""docs/own-sensor.md: what it does with recordings runs, in its order."""
 
 import shlex
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 from gestured.control.cli import main as gesturectl
 from gestured.lab.adapt import command
 from gestured.lab.cli import main as lab
-from gestured.lab.own import command as own
+from gestured.lab.own import teach as own
 from gestured.model.opening import open_model
 from gestured.record.arrays import write
 from gestured.simulator import GESTURES

@@ -90,14 +90,6 @@ def test_the_seeds_of_a_cell_are_counted_as_one_figure() -> None:
     )
 
 
-def test_an_interval_is_over_people_and_not_over_gestures() -> None:
-    right = np.array([1, 1, 1, 1, 0, 0, 0, 0], bool)
-    share, low, high = interval(right, [0, 0, 0, 0, 1, 1, 1, 1])
-    assert (share, low, high) == pytest.approx((0.5, 0.0, 1.0), abs=0.01)
-    share, low, high = interval(right, [0, 1, 2, 3, 0, 1, 2, 3])
-    assert share == low == high == 0.5
-
-
 @pytest.mark.parametrize("count", [6, 10, 30])
 def test_an_interval_covers_the_truth_as_often_as_it_says_of_few_people_too(count: int) -> None:
     rng = np.random.default_rng(0)

@@ -1,13 +1,10 @@
-"""`gestured-lab own`: what a model needs to learn its user's own gestures, learned and written into its file."""
+"""What a model needs to learn its user's own gestures, learned and written into its file."""
 
-import argparse
 from pathlib import Path
 
 import onnx
 
-from gestured.client.say import tell
 from gestured.core.errors import ModelError
-from gestured.core.own import EXAMPLES
 from gestured.lab.manifest import NAME, measured, write_manifest
 from gestured.lab.own.learn import Seen, learn
 from gestured.lab.own.play import played
@@ -18,15 +15,6 @@ from gestured.record.files import PUBLIC, atomic_write
 
 PEOPLE = 20  # to learn from
 QUICK_PEOPLE = 3
-
-
-def run(args: argparse.Namespace) -> int:
-    """Learn it for each model, and write it into its file."""
-    for path in args.models:
-        space = teach(path, args.cache, QUICK_PEOPLE if args.quick else PEOPLE, args.jobs)
-        told = {"model": str(path), "examples": EXAMPLES, "directions": len(space.directions)}
-        tell(args.json, told, f"{path}: learned from {len(space.directions)} directions of its embedding, and written")
-    return 0
 
 
 def teach(path: Path, cache: Path, people: int, jobs: int) -> Space:
