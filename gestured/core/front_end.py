@@ -81,7 +81,7 @@ class FrontEnd:
         self.as_sent = self.mounting == Mounting()
         self.shown: NDArray[np.generic] | None = None  # (R, C) counts of the last frame that was taken, as it was sent
         self.look: Look | None = None  # what they show; None before the idle sensor is known
-        # Whether the idle sensor is known without doubt, no taxel is bad, and nobody touches it. Then `idle_pass` may
+        # Whether the idle sensor is known without doubt, no taxel is bad, and nobody touches it. Then a bank may
         # take its next frame together with those of other sensors of the same `kind`.
         self.calm = False
         self.kind = (rows, columns, *astuple(self.mounting))

@@ -92,7 +92,7 @@ class Hub:
             waited.append(sensor)
         if together and len(waited) + len(self._banks.homes) >= bank.FEW:
             for sensor in waited:
-                sensor.move(self._banks.enter, now, facts)
+                sensor.run(self._banks.enter, now, facts)
         return facts
 
     def _read(
@@ -104,10 +104,10 @@ class Hub:
             packets = [packet for packet in packets if self._may_send(packet[1][0])]
         found: dict[int, list[Arrival]] = {}
         blocks = self._together(packets, facts) if together else []
-        alone = set(range(len(packets)))
-        for block in blocks:
-            alone.difference_update(block.packets)
-        for n in sorted(alone):
+        alone: Collection[int] = range(len(packets))
+        if blocks:
+            alone = sorted(set(alone).difference(*(block.packets for block in blocks)))
+        for n in alone:
             found[n] = self._decode(*packets[n], facts)
         if blocks:
             others = {arrival.sensor for arrivals in found.values() for arrival in arrivals}
@@ -141,7 +141,7 @@ class Hub:
         while self.asks:
             sensor = self.asks.pop(next(iter(self.asks)))
             if sensor.shown is not None:
-                sensor.ask_later(now, facts)
+                sensor.run(Sensor.ask, now, facts)
                 break
         return facts
 
@@ -154,7 +154,7 @@ class Hub:
         while self.looks:
             sensor = self.looks.pop(next(iter(self.looks)))
             if sensor.looks:
-                sensor.look_later(now, facts)
+                sensor.run(Sensor.look, now, facts)
                 break
         return facts
 
@@ -360,7 +360,7 @@ class Hub:
     def _leave(self, sensor: Sensor, now: float, facts: list[Fact]) -> None:
         """Have a sensor out of its bank, if it is in one; a bug in that is added to `facts`."""
         if sensor.name in self._banks.homes:
-            sensor.move(self._banks.leave, now, facts)
+            sensor.run(self._banks.leave, now, facts)
 
     def _new(self, name: str, source: Source, now: float, facts: list[Fact]) -> Sensor | None:
         """A sensor that was not heard before, or None where there is no place for it."""

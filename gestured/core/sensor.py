@@ -284,10 +284,10 @@ class Sensor:
         waits = self._listening.armed or self._foresight.wanted is not None or self.habits.falling
         return self.front_end.calm and not waits and not self._scene.frames
 
-    def move(self, to: Callable[["Sensor"], None], now: float, facts: list[Fact]) -> None:
-        """Have what is known of the sensor moved into a bank, or out of it; a bug in that is added to `facts`."""
+    def run(self, act: Callable[["Sensor"], Sequence[Told] | None], now: float, facts: list[Fact]) -> None:
+        """Have something done with the sensor at `now` (s): what it tells, or a bug in it, is added to `facts`."""
         try:
-            to(self)
+            self._add(act(self) or (), now, facts)
         except Exception as error:
             self._recover(error, self.stamper.at(now), facts)
 
@@ -352,7 +352,7 @@ class Sensor:
         """Learn the sensor anew; a contact that is open is cancelled."""
         self.vitals.restart()
         self._fresh = True
-        self._run(lambda _: self.reset(), now, facts)
+        self.run(Sensor.reset, now, facts)
 
     def change(self, scene: Scene, classifier: Classifier, now: float, facts: list[Fact]) -> None:
         """Go on in another scene; what was learned stays where it still holds."""
@@ -361,7 +361,7 @@ class Sensor:
         another_clock = scene.clock_of(self.name) != before.clock_of(self.name)
         alike = (old.sent, old.mounting, old.timing) == (new.sent, new.mounting, new.timing)
         if another_clock or not alike or scene.waits_for_double_tap != before.waits_for_double_tap:
-            self._run(lambda _: self.reset(), now, facts)
+            self.run(Sensor.reset, now, facts)
             self.front_end, self.habits = new, Habits(*new.sent)
             self._square = new.rows == new.columns
         if another_clock:
@@ -402,18 +402,10 @@ class Sensor:
             facts += self._fingers.end()
         self._fingers.asked = asked
 
-    def ask_later(self, now: float, facts: list[Fact]) -> None:
-        """Do what `ask` does at `now` (s); a bug in it is added to `facts`."""
-        self._run(lambda _: self.ask(), now, facts)
-
     @property
     def looks(self) -> bool:
         """Whether there is something for `look`."""
         return self._foresight.wanted is not None
-
-    def look_later(self, now: float, facts: list[Fact]) -> None:
-        """Do what `look` does at `now` (s), and add its events to `facts`."""
-        self._run(lambda _: self.look(), now, facts)
 
     def review(self, now: float, facts: list[Fact]) -> None:
         """Look at what need not be looked at with each frame; called with each tick."""
@@ -469,11 +461,7 @@ class Sensor:
         return view_of(self.front_end, raw=raw)
 
     def _run(self, act: Callable[[float], list[Told]], now: float, facts: list[Fact]) -> None:
-        t = self.stamper.at(now)
-        try:
-            self._add(act(t), now, facts)
-        except Exception as error:
-            self._recover(error, t, facts)
+        self.run(lambda _: act(self.stamper.at(now)), now, facts)
 
     def _recover(self, error: Exception, t: float, facts: list[Fact]) -> None:
         """After a bug: start clean, and end what consumers believe to be open."""
