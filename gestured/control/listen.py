@@ -4,6 +4,7 @@ import argparse
 import sys
 import time
 from datetime import datetime
+from functools import partial
 from typing import Any
 
 from gestured.client.lines import Unsubscribed
@@ -56,10 +57,7 @@ def _listen(args: argparse.Namespace) -> int:
     left = args.count
     early: dict[str, dict[str, Any]] = {}  # for `readable`
 
-    def passed_over(words: str) -> None:
-        say(f"gesturectl: {words}", to=sys.stderr)
-
-    with Subscriber(path, **wanted, reconnect=args.reconnect, say=passed_over) as subscriber:
+    with Subscriber(path, **wanted, reconnect=args.reconnect, say=partial(say, to=sys.stderr)) as subscriber:
         for line, event in subscriber.lines():
             kind = event.get("type")
             if args.json:

@@ -5,7 +5,8 @@ import base64
 import queue
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,6 @@ class Keeper:
         self.scene = scene
         self._tape, self._epoch_ns = tape, scene["epoch_ns"]
         self._t_ns = time.time_ns()
-        self._flushed = 0.0
         self.packets = self.events = self.lost = 0
 
     def keep(self, line: Mapping[str, Any]) -> None:
@@ -94,29 +94,14 @@ class Keeper:
 
     def follow(self, control: Control) -> str:
         """Keep what comes, until the daemon hangs up or the file is full; says why it ended."""
-        for line in _waiting(control):
-            if line is not None:
+        lines, flushed = read_ahead(control.lines(), WAITING_LINES), 0.0
+        while not self._tape.full:
+            with suppress(queue.Empty):
+                line = lines.get(timeout=FLUSH_S / 4)
+                if line is None:
+                    return "as asked" if control.finished else GONE
                 self.keep(line)
-            if line is None or time.monotonic() > self._flushed + FLUSH_S:
-                self._flush()
-            if self._tape.full:
-                return "the file is as large as it may be"
-        return "as asked" if control.finished else GONE
-
-    def _flush(self) -> None:
-        self._tape.flush()
-        self._flushed = time.monotonic()
-
-
-def _waiting(control: Control) -> Iterator[dict[str, Any] | None]:
-    """The daemon's lines; None now and then where none come."""
-    lines = read_ahead(control.lines(), WAITING_LINES)
-    while True:
-        try:
-            line = lines.get(timeout=FLUSH_S / 4)
-        except queue.Empty:
-            yield None
-            continue
-        if line is None:
-            return
-        yield line
+            if time.monotonic() > flushed + FLUSH_S:
+                self._tape.flush()
+                flushed = time.monotonic()
+        return "the file is as large as it may be"
