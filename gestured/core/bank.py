@@ -162,7 +162,10 @@ class Bank:
         idle.glance, idle.quieter, idle.reviewed, idle.level = glance, int(quieter), reviewed, level
         activity.usual, activity.scale = usual, scale
         idle.counts, idle.sigma, conditioner.weight, idle.compared, sent = self._taxels[row].copy()
-        when, above = (np.roll(ring[row], -int(count), axis=0) for ring in (self._when, self._above))  # oldest first
+        when, above = (  # oldest first
+            ring[row, np.arange(int(count), int(count) + ring.shape[1]) % ring.shape[1]]
+            for ring in (self._when, self._above)
+        )
         stamper.intervals.extend(step for _, _, step in when.tolist() if step > 0)
         for higher, (t, since, _) in zip(above, when[-len(above) :].tolist(), strict=True):
             if t > -math.inf:

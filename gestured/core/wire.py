@@ -85,9 +85,9 @@ class Arrival(NamedTuple):
 
 
 class Block(NamedTuple):
-    """The frames of n packets that are laid out alike."""
+    """The frames of n packets, all of one grid, with counters and time tags or all without."""
 
-    packets: list[int]  # their places among all that were found waiting
+    packets: list[int]  # their places among all that were found waiting, which rise
     sensors: list[str]
     values: NDArray[np.float32] | NDArray[np.float64]  # (n, R, C) counts, as in `Arrival`
     counters: NDArray[np.int64] | None
@@ -170,7 +170,7 @@ class Decoder:
         return (self._join(found, source) if touched else arrivals), errors
 
     def together(self, packets: Sequence[bytes]) -> list[Block]:
-        """The frames of packets that are laid out alike and as some before them.
+        """The frames of packets that are laid out as some before them; of one block for each kind of frames.
 
         They are what `decode` gives of each packet, at a fraction of the price. A packet that is in no block is for
         `decode`: it is laid out in another way than its neighbours, or its frame is not finite.
@@ -183,7 +183,13 @@ class Decoder:
                     meaning = layout.meaning = self._meaning(layout)
                 if meaning:
                     alike.setdefault(meaning.form, []).append((i, meaning))
-        return [_block(packets, members) for members in alike.values() if len(members) >= FEW]
+        found: dict[tuple[object, ...], list[Block]] = {}
+        for members in alike.values():
+            if len(members) >= FEW:
+                one = _block(packets, members)
+                key = one.values.shape[1:], one.values.dtype, one.counters is None, one.tags is None
+                found.setdefault(key, []).append(one)
+        return [_joined(blocks) for blocks in found.values()]
 
     def _meaning(self, layout: Layout) -> _Meaning | Literal[False]:
         """What packets of a layout hold; False where each of them has to be read by itself."""
@@ -310,6 +316,18 @@ def _block(packets: Sequence[bytes], members: list[tuple[int, _Meaning]]) -> Blo
         values.reshape(-1, *route.grid), counters, tags,
     )  # fmt: skip
     return found if good.all() else found.only(good.nonzero()[0])
+
+
+def _joined(blocks: list[Block]) -> Block:
+    """The frames of several blocks as one, in the order of their packets: names of other lengths make other forms."""
+    if len(blocks) == 1:
+        return blocks[0]
+    packets, sensors, values, counters, tags = zip(*blocks, strict=True)
+    every = Block(
+        sum(packets, []), sum(sensors, []), np.concatenate(values),
+        None if counters[0] is None else np.concatenate(counters), None if tags[0] is None else np.concatenate(tags),
+    )  # fmt: skip
+    return every.only(np.argsort(every.packets))
 
 
 def _touches(args: tuple[Argument, ...]) -> tuple[Touch, ...]:
