@@ -136,8 +136,8 @@ def put(box: Container, package: Path) -> str:
 
 
 def apt(box: Container, *arguments: str, check: bool = True) -> "subprocess.CompletedProcess[str]":
-    """What an operator types; no question is asked, since the package has none."""
-    return box.run("apt-get", "--yes", "--quiet", *arguments, check=check)
+    """What an operator types; he keeps his own file where the package has another one, which is the default answer."""
+    return box.run("apt-get", "--yes", "--quiet", "--option=Dpkg::Options::=--force-confold", *arguments, check=check)
 
 
 def listening(box: Container) -> set[str]:
