@@ -13,7 +13,7 @@ from gestured.core.address import Address
 from gestured.core.errors import GesturedError
 
 STOP_S = 5.0  # that the daemon may take to end
-# Who is killed can end nothing any more, so the kernel is asked to (where it can: Linux). PR_SET_PDEATHSIG, SIGTERM.
+# A program that is killed cannot end its children, so the kernel is told to (on Linux). PR_SET_PDEATHSIG, SIGTERM.
 DIE = "import ctypes; ctypes.CDLL(None).prctl(1, 15); " if sys.platform == "linux" else ""
 
 

@@ -232,5 +232,5 @@ class _Source:
     lines: Lines | None = None
     hello: dict[str, Any] = field(default_factory=dict)  # the hello of this connection; empty until it came
     begun: bytearray = field(default_factory=bytearray)  # the part of a line whose end has not come yet
-    due: float = 0.0  # monotonic s: when to call it, or by when it must have said hello
+    due: float = 0.0  # monotonic s: when to connect, or by when the hello must have come
     wait_s: float = FIRST_S  # how long to wait after the next failure

@@ -24,12 +24,12 @@ SURPRISE = 2.0  # times the typical activity: the most that one idle frame count
 
 
 def rarely(taxels: int) -> float:
-    """Noise units that the strongest of so many idle taxels exceeds rarely: extreme values of normal deviates."""
+    """The activity that the strongest of so many idle taxels rarely exceeds, in noise units."""
     return 1.0 + math.sqrt(2 * math.log(taxels))
 
 
 def hardly_ever(taxels: int) -> float:
-    """Noise units that the strongest of so many idle taxels almost never exceeds; two more than `rarely`."""
+    """The activity that the strongest of so many idle taxels almost never exceeds, in noise units."""
     return 3.0 + math.sqrt(2 * math.log(taxels))
 
 

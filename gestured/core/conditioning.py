@@ -20,11 +20,11 @@ Array = NDArray[np.float64]
 
 LEAST_SIGMA = 0.2  # of the sensor's noise: a taxel that hardly moves counts for at most five times a usual one
 BELOW_SHARE = 0.3  # of the highest taxel: taxels less deep than that share may come with a firm finger
-DRIFTED = 0.1  # of the activity of what rested: so far the bare sensor may have drifted meanwhile
+DRIFTED = 0.1  # share of the activity of what rested: the bare sensor may have drifted by so much while it was covered
 WIDE_PEAK = 0.5  # of the highest taxel: the taxels above it tell how wide a contact is
 WIDE, WIDE_TAXELS = 0.1, 6  # share of all taxels, and taxels at least, from which on that is no finger, nor two of them
 WIDE_S = 0.5  # s after a wide frame in which a contact counts as wide: an elbow presses about WIDE_TAXELS
-SHIFTED, SHIFTED_OF = 3, 20  # taxels: where so many of so many lie far below the baseline, no touch does that
+SHIFTED, SHIFTED_OF = 3, 20  # where 3 taxels of 20 lie far below the baseline, no touch did that
 
 
 _new = tuple.__new__  # Look(...) takes twice the time
@@ -89,7 +89,7 @@ class Conditioner:
         return self._look(look.t, look.raw, after)
 
     def resting(self) -> tuple[float, float]:
-        """On which share of the taxels something rests that has become part of the baseline, and how hard, in noise."""
+        """The share of the taxels on which something rests that the baseline has learned, and its activity."""
         bare = self.idle.bare
         if bare is None:
             return 0.0, 0.0
@@ -159,7 +159,7 @@ class Conditioner:
         return self.taxels.inspect(frames, self.idle.level)
 
     def judge(self, seen: Inspection) -> None:
-        """The contact that was inspected is over: what it says of the taxels counts."""
+        """The contact that was inspected is over: what was found counts as evidence that taxels are stuck."""
         if self.taxels.stuck.judge(seen):
             self.review()
 
@@ -194,6 +194,6 @@ def weigh(sigma: Array, level: float | Array, scale: float | Array) -> Array:
 
 
 def _shifted(scaled: Array, level: float) -> bool:
-    """Whether many of (N,) taxels lie more than `level` noise units below the baseline, and than what is pressed."""
+    """Whether many of (N,) taxels lie below the baseline by `level` noise units and by BELOW_SHARE of the highest."""
     below = scaled < -max(level, BELOW_SHARE * float(scaled.max()))
     return int(np.count_nonzero(below)) * SHIFTED_OF >= SHIFTED * scaled.size

@@ -9,11 +9,11 @@ Place = tuple[float, float]  # (row, column) in taxel pitches
 
 RESTS = 0.5  # taxel pitches: a shorter way has no direction, and a finger that goes no further rests
 ON_SHARE = 0.20  # of a contact's peak: a frame of it is strong from there on, and a new contact must exceed it
-RECOVERY_S = 1.0  # time constant with which the after-effect fades, and for how long a contact is followed by it
+RECOVERY_S = 1.0  # s, with which the after-effect fades; for so long after a contact the baseline follows faster
 AFTER_S = 8.0  # after so long nothing is left of a contact: a firm finger has faded below the noise
-SPIKE = 4.0  # times the second highest frame: the most that a peak in one frame alone counts
+SPIKE = 4.0  # times the second highest frame: a peak in a single frame counts as at most this
 SPAN_S = 0.15  # the length of a span; of three spans it is remembered how strongly the contact was pressed
-FIRM = 8.0  # times `on`: the least that the second highest frame counts, since a tap may have a single frame
+FIRM = 8.0  # times `on`: a contact's second highest frame counts as at least this, since a tap may have a single frame
 
 
 class Stretch:
@@ -46,7 +46,7 @@ class Lately:
         self._tops = (0.0, 0.0, 0.0)  # noise units, the highest activity of three spans, the latest last
 
     def before(self, t: float, activity: float) -> float:
-        """Take a frame at `t` s; the highest activity of the two spans before it, 0 where there are not two yet."""
+        """Take a frame at `t` s; return the highest activity of the two spans before the present one, else 0."""
         older, old, latest = self._tops
         if t - self._since >= SPAN_S:
             older, old, latest, self._since = old, latest, 0.0, t
@@ -112,7 +112,7 @@ class AfterEffect:
 
 @dataclass(slots=True)
 class Memory:
-    """What the segmenter goes by, and what it remembers."""
+    """The levels that the segmenter compares with, and what it remembers of the last contacts."""
 
     timing: Timing
     on: float  # noise units: activity from which there is a contact, if the last one has left nothing behind

@@ -53,7 +53,7 @@ class Sight(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Made:
-    """A segment as it was made, perhaps before it was cut."""
+    """A segment made of the kept frames, and held so that the classifier is given the same object when it is cut."""
 
     segment: Segment
     peak: float  # counts
@@ -129,7 +129,7 @@ class Cutter:
     def hole(self, onset: float, offset: float, until: float) -> float:
         """The longest time in s in which a finger may have done anything unseen, from before the onset to `until` s.
 
-        It is infinite where the finger's arrival was not seen. A sensor that sends nothing more has no last hole.
+        It is infinite where the finger's arrival was not seen. What comes after `until` does not count.
         """
         last, longest = self._settled, 0.0
         for new in (*(kept.new for kept in self.kept), until):
@@ -191,7 +191,7 @@ def clear(before: Sequence[Sight], after: Sequence[Sight], travel: float) -> boo
         came = max(math.dist(one.place, before[-1].place) for one in before)
         return came >= 2 * travel and all(math.hypot(*way) < RESTS for way in ways)
     bends = [_turn(way, across) for way in ways if math.hypot(*way) >= RESTS]
-    one_way = len(bends) == 2 and bends[0] * bends[1] < 0  # the way before turns to it, the way after turned from it
+    one_way = len(bends) == 2 and bends[0] * bends[1] < 0  # it bends to one side on both sides of the hole
     if not bends or max(map(abs, bends)) > (BENT if one_way else STRAIGHT):
         return False
     usual = sum(math.hypot(*way) for way in ways) / sum(side[-1].t - side[0].t for side in sides)

@@ -14,7 +14,7 @@ from gestured.core.timing import outside
 class Decision:
     """The thresholds, strictness, gestures in use and refractory pauses of a scene, for one sensor.
 
-    What falls to gestures that are not in use is not given to those that are left. A segment of which
+    The scores of gestures that are not in use are dropped, and not shared out among the others. A segment of which
     the model is not sure enough, or with a hole in which the finger may have moved unseen, is unknown. A gesture of the
     user's own may take what the model does not know, and what is much nearer to it than to the model's gestures.
     """
@@ -37,7 +37,7 @@ class Decision:
     ) -> tuple[dict[str, float], str, float]:
         """The scores of those of the classifier's `gestures` that are in use, the best of them, and how sure it is.
 
-        A gesture that may not begin in `zone` cannot be the best; where none may, nothing is sure at all.
+        A gesture that may not begin in `zone` cannot be the best; where none may begin there, the confidence is 0.
         """
         scores = {
             gesture: float(value)
@@ -67,7 +67,7 @@ class Decision:
         return None if answer.points is None else answer.points.points[self._strictness]
 
     def is_own(self, match: Match | None, zone: str | None = None, *, known: bool) -> bool:
-        """Whether a gesture of the user's own may have a segment; `known`: the model would have it, too."""
+        """Whether a segment is the user's own gesture `match`; `known`: the model alone would have named it."""
         if match is None or (known and not match.nearer) or not self.may(match.name, zone):
             return False
         return match.confidence >= self._thresholds.get(match.name, NEAR)

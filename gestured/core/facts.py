@@ -10,7 +10,7 @@ from gestured.core.owner import Source
 
 
 class Decided(NamedTuple):
-    """A segment that was classified, and whether the model's answer was enough for a gesture; it follows its event."""
+    """A segment that was classified, and whether the model was sure enough; it comes right after its event."""
 
     sensor: str
     segment: Segment

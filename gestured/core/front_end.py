@@ -38,7 +38,7 @@ class Shown(NamedTuple):
 class Cut(NamedTuple):
     """A segment that is complete and waits for its name."""
 
-    segment: Segment  # the same object as was shown last, unless more has become known since
+    segment: Segment  # the object that `Shown` held last, unless a taxel has turned out to be bad since
     decided: float  # s, when it was complete
     hole_s: float  # the longest time until then in which the finger may have done anything unseen
 
@@ -263,7 +263,7 @@ class FrontEnd:
         return found
 
     def _shift(self, look: Look) -> list[Found]:
-        """Frames far below the baseline. Interference passes, and they are lost; a sensor that restarted stays so."""
+        """Drop a frame far below the baseline. Where such frames last, the sensor has restarted: learn it anew."""
         found: list[Found] = []
         if self._below_since is None:
             self._below_since, self._lowest = look.t, look.raw
@@ -275,7 +275,7 @@ class FrontEnd:
         return found
 
     def _left(self) -> list[Found]:
-        """What rested on the sensor and had become part of its baseline has left; a contact until then was its own."""
+        """What rested on the sensor and was learned has left; a contact that was open was its own, and is held."""
         found = self._cancel("held") if self.touched else []
         self.segmenter.phase = IDLE
         self.cutter.clear()
@@ -283,7 +283,7 @@ class FrontEnd:
         return found
 
     def _restart(self, *, keep: bool, shown: NDArray[np.float64] | None = None) -> list[Found]:
-        """Start clean. `keep`: the frames that may show the idle sensor as it is now count already; so does `shown`."""
+        """Start clean. `keep`: frames offered as idle still count; `shown` counts stand for the baseline until then."""
         found = self._void("restart")
         self.conditioner.idle.forget(keep=keep, shown=shown)
         self._below_since, self.calm = None, False

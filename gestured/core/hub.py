@@ -41,7 +41,7 @@ class Hub:
         self._banks = bank.Banks()
         self._missed = 0  # times that this machine had no room for a packet
         self._seen = 0  # what `_missed` was when packets were read last
-        self._told: dict[str, int] = {}  # by sensor: what `_missed` was when that sensor was last told of it
+        self._told: dict[str, int] = {}  # by sensor: what `_missed` was at its last frame
         self._owners: frozenset[Source] = frozenset()
         self._asked: frozenset[str] | None = frozenset()  # sensors with provisional events; None is all
         self._waits: dict[str, Sensor] = {}  # sensors in which a contact may be over before the next frame

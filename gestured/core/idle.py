@@ -21,10 +21,10 @@ REVIEW_S = 0.5  # the pause between two looks at the noise; they would cost too 
 UNSEEN_S = 4.0  # the most that one look counts of the time under a contact or in silence
 OUTLIER = 4.0  # times a taxel's noise: the furthest that it counts as off its baseline, since one outlier must not rule
 QUIETER = 10.0  # where frames move so many times less than the noise that was learned, that was no idle sensor's
-SHARED = 0.1  # of the taxels: so many may lie lower than what all share
+SHARED = 0.1  # the quantile of the taxels' change that is taken for drift of them all
 LOADED = 10.0  # times a taxel's noise: where no taxel is further above the bare sensor, nothing rests on it any more
 GLANCE_S = 0.19  # the pause between two glances at how much frames move
-GLANCE, GLANCE_REPEATED, GLANCES = 3, 1, 9  # weights of a quieter frame and of a repeated one; the sum that tells
+GLANCE, GLANCE_REPEATED, GLANCES = 3, 1, 9  # of a quieter frame, of a repeated one; the sum that puts it in doubt
 
 
 class Bare(NamedTuple):
@@ -188,7 +188,7 @@ def glances(changes: Array, learned: Array, lively: Array, quieter: Array) -> Ar
 
 
 def seen(above: Array, sigma: Array) -> Array:
-    """(..., N) counts, the noise that a frame shows of taxels so far off their baselines; `sigma`: the noise so far."""
+    """(..., N) counts, the noise of each taxel as one frame shows it; `sigma`: the noise so far."""
     return np.minimum(np.abs(above), OUTLIER * sigma) * SIGMA_PER_DEVIATION
 
 

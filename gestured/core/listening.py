@@ -84,7 +84,7 @@ class Listening:
         return over
 
     def gate(self, closed: Mapping[str, float], past: float) -> bool:
-        """These gates are closed from now on; what began until `past` has begun before. Returns whether to tell it."""
+        """Close these gates; a contact that began by `past` counts as begun before. Returns whether to tell it."""
         if closed == self.closed:
             return False
         if closed:
@@ -105,7 +105,7 @@ class Listening:
         return told
 
     def told(self, sensor: str, since: float, armed_until: float) -> Gate:
-        """All of it as an event of that sensor; times are on the hub's clock, that until which it is armed, too."""
+        """What the sensor listens to, as a `Gate` event; all times, `armed_until` too, are on the hub's clock."""
         armed = None if self.arming is None else self.armed
         until = min((*self.closed.values(), *([armed_until] if self.armed else [])), default=math.inf)
         return Gate(sensor, armed, tuple(sorted(self.closed)), until if until < math.inf else None, since)

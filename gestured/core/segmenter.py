@@ -61,11 +61,11 @@ class Action(IntEnum):
     LEFT = auto()  # a given-up contact was let go
 
 
-# --- which activity says something: from the first number on a frame is strong, below the second it is quiet
+# --- levels of activity in each phase: a frame is strong from the first on, and quiet below the second
 
 
 def _untouched(memory: Memory, t: float) -> tuple[float, float]:
-    """A contact has to exceed what the last one has left behind."""
+    """Levels while nobody touches: a new contact has to exceed what the last one has left behind."""
     return memory.on + memory.after.level(t), memory.off
 
 
@@ -81,7 +81,7 @@ def _touched(memory: Memory, t: float) -> tuple[float, float]:
 
 
 def _given_up(memory: Memory, t: float) -> tuple[float, float]:
-    """What lies there counts as touched down to `off`: it is never weak."""
+    """Levels of a contact that was given up: whatever reaches `off` counts as touched, so that nothing is weak."""
     return memory.off, memory.off
 
 
@@ -112,7 +112,7 @@ def _again(memory: Memory, t: float, activity: float, place: Place | None) -> Si
 
 
 def _press(memory: Memory, t: float, activity: float, place: Place | None) -> Signal | None:
-    """A frame that is pressed strongly: it also tells where."""
+    """Remember a strong frame: its activity, and its centroid."""
     rose = _touch(memory, t, activity)
     if place is not None:
         memory.contact.follow(place)

@@ -60,7 +60,7 @@ class Sensor:
         self._zones, self._listening = scene.setup(name).zones, Listening(scene.arming_of(name))
         self.stamper = Stamper(scene.clock_of(name))
         self._asked: tuple[Classifier, Segment, Scores | None] | None = None  # last; no scores where it failed
-        self._placed: tuple[Segment, Where] | None = None  # where the last one that was shown was
+        self._placed: tuple[Segment, Where] | None = None  # the segment that was located last, and where it was
         self.shown: Shown | None = None  # what `ask` is to ask about
         self._foresight = Foresight(name, taps=scene.provisional_taps)
         self._fingers = Fingers(name, scene.setup(name).zones)

@@ -47,7 +47,7 @@ class Stamper:
         self.last: float | None = None  # s, the last stamp
         self.arrived = 0.0  # s, the arrival of the frame that was stamped last
         self.tag: float | None = None  # s, the time tag of that frame
-        self.ahead = 0.0  # s, how far that frame was put beyond its tag, which earlier frames had, too
+        self.ahead = 0.0  # s by which that frame's time is beyond its tag, which an earlier frame had, too
         self.counter: int | None = None  # of the newest frame
         self.late: tuple[int, int] = (0, 0)  # counter of the last late frame, and how many came in a row
 
@@ -56,7 +56,7 @@ class Stamper:
         return arrived if self.last is None else self.last + max(0.0, arrived - self.arrived)
 
     def past(self, arrived: float) -> float:
-        """The stream's time up to which what was felt has come before `arrived` (s).
+        """The stream's time by which everything that was felt had arrived at `arrived` (s).
 
         A sensor's own clock is known by its frames alone, and may have stood still since the last one.
         """

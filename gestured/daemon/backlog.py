@@ -48,8 +48,8 @@ class Backlog:
         self._until = 0.0  # s, when the flood is over unless packets are dropped before
         self._cost: dict[Sender, float] = {}  # by sender: s of work that a byte costs
         self._credit: dict[Sender, tuple[float, float]] = {}  # by sender: s of work saved up, and `_equal` at that time
-        self._equal = 0.0  # s of work that each owner could have had so far, all turns together
-        self._turns = 0.0  # s of turns that have passed since a packet was served that costs more than one
+        self._equal = 0.0  # s of work that was offered to each owner in all turns of this flood
+        self._turns = 0.0  # s of turns since a packet that costs more than a whole turn was last served
 
     def __bool__(self) -> bool:
         return bool(self._waiting)

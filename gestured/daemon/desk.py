@@ -94,7 +94,7 @@ class Desk:
         self._throttle.error("a bug, caught", what, exc_info=error or True, **fields)
 
     def _beside(self, what: str, look: Callable[[Any], None], facts: Sequence[Fact]) -> None:
-        """Show facts to one that looks on. A bug in it is caught, so that it stops nobody else."""
+        """Give facts to an observer; a bug in it is caught, so that it stops nobody else."""
         for fact in facts:
             try:
                 look(fact)

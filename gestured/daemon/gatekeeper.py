@@ -39,7 +39,7 @@ class Gatekeeper:
         return {"inhibit": Verb(self.keep_closed, changes=False), "allow": Verb(self.open_again, changes=False)}
 
     def overdue(self, now: float) -> dict[str, float]:
-        """By gate that a bridge has closed, and that is closed still: for how many s it has owed a sign of life."""
+        """By gate that a bridge has closed and that is still closed: for how many s its bridge is overdue."""
         owed: dict[str, float] = {}
         for (gate, sensor), due in tuple(self._owed.items()):
             if now > due and gate in self._hub.gates.of(sensor):

@@ -43,7 +43,7 @@ class OwnGestures:
         return keeper, ladder.compared(keeper.found.gestures)
 
     def follow(self, ladder: Ladder, keeper: Keeper, own: Own) -> None:
-        """Use what was read for these models: at the start, and after a reload."""
+        """Compare contacts with the examples that were read, by these models: at the start, and after a reload."""
         if self._finishing is None:
             self._give_up("the daemon was told to reload; enrol again")
         if keeper is not self._keeper:

@@ -47,7 +47,7 @@ def run(settings: Settings, load: Loader) -> None:
 async def _run(settings: Settings, load: Loader) -> None:
     """Bind sockets, open models, serve. What cannot be had ends the daemon before it says that it is ready."""
     loop = asyncio.get_running_loop()
-    _abort(signal.SIG_BLOCK)  # in the threads that are made from here on, so that it finds this one
+    _abort(signal.SIG_BLOCK)  # in threads that are made from here on: it reaches this one
     loop.set_default_executor(ThreadPoolExecutor(initializer=_abort, initargs=(signal.SIG_BLOCK,)))
     stop, reload = asyncio.Event(), asyncio.Event()
     throttle = Throttle()

@@ -34,7 +34,7 @@ PAUSE_S = 0.001  # between reads of packets that come thick, since waking for ea
 FULL_S = 0.25  # for which a stall explains that the kernel drops packets; if it lasts longer, it is a flood
 EARLY_S = 0.001  # by which we wake before a wait is over, since the loop's timers know whole milliseconds only
 REST = 2  # seconds that the loop has for everything else, for each second that is spent on provisional events
-SPARSE_S = 0.02  # between packets; where they are further apart, there is time to wait for that moment exactly
+SPARSE_S = 0.02  # between packets: where they are further apart, an answer's moment is waited for exactly
 STEP_S = 0.05  # by which the wall clock may move against ours; after a larger step the kernel's times say nothing
 
 TIMESTAMP = struct.Struct("@qq")  # s and ns since the epoch, by the wall clock

@@ -40,7 +40,7 @@ CALM = np.array([*past(UNDISTURBED), 4.0, -0.05, 0.0, 0.05, 0.1], np.float32)
 
 
 def calm(batch: int, names: Sequence[str]) -> NDArray[np.float32]:
-    """(B, K) `CALM` for so many windows, of the values of these names."""
+    """(B, K) the context of a clear gesture on an undisturbed sensor, for `count` windows."""
     return np.tile(CALM[chosen(names)], (batch, 1))
 
 

@@ -50,7 +50,7 @@ class Own:
         """`known` are the models' gestures: one of the user's own that is called the same is off."""
         self.gestures = {name: examples for name, examples in gestures.items() if name not in known}
         self.hidden = tuple(name for name in gestures if name in known)
-        self.missing: Callable[[Model], None] = self.make  # called in the midst of an answer of a model without a bank
+        self.missing: Callable[[Model], None] = self.make  # called while a model answers that has no prototypes yet
         self._banks: WeakKeyDictionary[Model, Bank | None] = WeakKeyDictionary()
 
     def match(self, model: Model, segment: Segment) -> Match | None:

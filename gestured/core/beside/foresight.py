@@ -56,7 +56,7 @@ class Foresight:
         return offset + DRAFT_S if self.asked and front_end.segmenter.phase.let_go and self._left != offset else None
 
     def see(self, front_end: FrontEnd, t: float) -> None:
-        """A frame came at `t` s: whether a model is to look at the contact that goes on.
+        """Take note of a frame at `t` s, and set `wanted` where a model is to look at the contact that goes on.
 
         While the finger is down, that is at most 15 times a second, and with every frame at 15 Hz. Once it has left,
         the front end shows the segment itself.
@@ -84,7 +84,7 @@ class Foresight:
             self.wanted = due if self._said is None else None
 
     def _pass_over(self) -> None:
-        """What a model was to look at is no more; frames in a row are looked at, each of them."""
+        """A frame that waited for a look is dropped, and with it the count of sure looks in a row."""
         if self.wanted is not None:
             self.wanted, self._row = None, 0
 
@@ -122,7 +122,7 @@ class Foresight:
         return self._said
 
     def judged(self, answer: Answer) -> Answer:
-        """The answer of a contact, with what became of what was said of it. There is nothing to be said any more."""
+        """The answer of a contact, which confirms or revokes its provisional event; none is said of it later."""
         said, self.wanted = self._said, None
         if said is None or said.id != answer.id:
             return answer
