@@ -53,7 +53,7 @@ class Banks:
         times = {stamper.last, front.pace.last, front.conditioner.idle.followed}
         arrived = {stamper.arrived, sensor.vitals.last, owner.heard, owner.own}
         if owner.steady and len(times) == len(arrived) == 1 and not stamper.ahead:
-            frames = min(LEAD_S / front.pace.interval_s, LEAD_FRAMES)
+            frames = min(max(LEAD_S / front.pace.interval_s, 1.0), LEAD_FRAMES)  # slow sensors keep one, too
             kind = (*front.kind, stamper.by_tag, 2 << math.ceil(math.log2(frames)))
             bank = self._banks.get(kind) or self._banks.setdefault(kind, Bank(front, *kind[-2:]))
             bank.enter(sensor)

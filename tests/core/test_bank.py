@@ -135,6 +135,23 @@ def test_a_taxel_that_slowly_grows_noisy_is_found_alike() -> None:
     assert sum("bad_taxels=1" in str(one) for one in known) > 10
 
 
+@pytest.mark.parametrize("rate_hz", [0.4, 2.0, 3.3, 1000.0])
+def test_sensors_of_any_rate_are_served(rate_hz: float) -> None:
+    scene, rng, faults = Scene(GESTURES, (9, 9), stale_s=5.0), np.random.default_rng(0), list[Fact]()
+    hub, names, seconds = Hub(scene, Sure()), [f"s{n}" for n in range(EACH)], 2 + 50 / rate_hz
+    for k in range(int(seconds * rate_hz)):
+        values = rng.normal(100.0, 2.0, (EACH, 81))
+        packets = [
+            encoding.message(f"/{name}/pressure", "f" * 81, one.tolist())
+            for name, one in zip(names, values, strict=True)
+        ]
+        found = hub.receive([(packet, SOURCE) for packet in packets], k / rate_hz)
+        faults += [fact for fact in found if isinstance(fact, Fault)]
+    hub.tick(k / rate_hz)
+    assert faults == []
+    assert hub.states(k / rate_hz) == dict.fromkeys(names, "ok")
+
+
 def test_a_bug_in_a_pass_costs_no_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     arrived = reads(0)
     said, known = play(arrived, together=True)
