@@ -203,7 +203,8 @@ class Decoder:
         dtype = place.dtype if place.dtype is not None else _BLOBS.get(place.length / (rows * columns))
         if dtype is None or any(other.blob for other in layout.places if other is not place):
             return False
-        form = layout.length, place.run, place.length, place.blob, dtype.kind, route.grid, route.counted
+        bundled = place.start > 0  # a short name in a bundle's packet is as long as a long one by itself
+        form = layout.length, bundled, place.run, place.length, place.blob, dtype.kind, route.grid, route.counted
         if len(self._forms) >= _MAX_ROUTES:
             self._forms.clear()
         return _Meaning(route, place, dtype, self._forms.setdefault(form, next(self._numbers)))

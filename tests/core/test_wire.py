@@ -328,6 +328,18 @@ def test_touches_nobody_wants_are_passed_over() -> None:
     assert arrival.touches == () and errors == []
 
 
+def test_time_tags_are_not_mixed_up_where_packets_have_one_length() -> None:
+    """A bundle's head takes 20 bytes, as much as a name may be longer in a packet that is in no bundle."""
+    decode, values = decoder(keep_touches=False), np.ones(GRID[0] * GRID[1])
+    packets = [pressure(values, n, "a" * 20) for n in range(4)]
+    packets += [encoding.bundle([pressure(values, n, "s")], 1.7e9 + n) for n in range(4)]
+    assert len(set(map(len, packets))) == 1
+    for each in (packets, packets[::-1]):
+        expected = [arrival.timetag for packet in each for arrival in decode.decode(packet)[0]]
+        read = {n: block.arrival(k) for block in decode.together(each) for k, n in enumerate(block.packets)}
+        assert [read[n].timetag for n in range(8)] == expected
+
+
 def test_a_frame_carries_the_time_tag_of_its_bundle() -> None:
     (arrival,), _ = decoder().decode(encoding.bundle([FRAME], 1_700_000_000.5))
     assert arrival.timetag == 1_700_000_000.5
